@@ -1,0 +1,1 @@
+"""The Jinja templates of a bundle, as text; `codegen.render` is their only reader."""
