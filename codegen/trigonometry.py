@@ -1,0 +1,81 @@
+"""Constants of the controller's own sine and cosine.
+
+The C libraries of the world disagree on the last bit of `sinf`; a Taylor series with stated terms does
+not. The argument is reduced by quarter turns, with pi/2 in three parts of which the first two have so few
+bits that their product with the number of quarter turns is exact (Cody and Waite 1980).
+"""
+
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from math import factorial
+from typing import Final
+
+import numpy as np
+
+from codegen.literals import SCALARS
+
+YAW_LIMIT_RAD: Final = 1024.0
+"""Largest heading, either way, for which the reduction is exact: 652 quarter turns fit in ten bits."""
+
+SINE_ERRORS: Final = {"float32": 1.2e-7, "float64": 2.3e-16}
+"""Largest absolute error of sine and cosine within YAW_LIMIT_RAD: about one ulp of 1."""
+
+_QUARTER_TURN: Final = Fraction(Decimal("3.14159265358979323846264338327950288419716939937510582")) / 2
+_TURN_BITS: Final = 10
+
+
+@dataclass(frozen=True)
+class Trigonometry:
+    """What `nmpc_sine_cosine` computes with, each value exact in the scalar type.
+
+    With r the angle less its quarter turns, |r| <= pi/4:
+    sin r = r + r * r^2 * (sine[0] + r^2 * (sine[1] + ...)), cos r = 1 + r^2 * (cosine[0] + ...).
+    """
+
+    quarter_turns_per_rad: float
+    quarter_turn_rad: tuple[float, float, float]
+    sine: tuple[float, ...]
+    cosine: tuple[float, ...]
+
+
+def trigonometry(scalar: str) -> Trigonometry:
+    """Derive the constants for `scalar`: as many terms as its precision can show."""
+    return Trigonometry(
+        quarter_turns_per_rad=_rounded(1 / _QUARTER_TURN, scalar),
+        quarter_turn_rad=_split(scalar),
+        sine=_taylor(3, scalar),
+        cosine=_taylor(2, scalar),
+    )
+
+
+def _rounded(value: Fraction, scalar: str) -> float:
+    return float(SCALARS[scalar](float(value)))
+
+
+def _split(scalar: str) -> tuple[float, float, float]:
+    """Cut pi/2 into two short parts and the rest."""
+    bits = np.finfo(SCALARS[scalar]).nmant + 1 - _TURN_BITS
+    high = _chopped(_QUARTER_TURN, bits)
+    middle = _chopped(_QUARTER_TURN - high, bits)
+    return float(high), float(middle), _rounded(_QUARTER_TURN - high - middle, scalar)
+
+
+def _chopped(value: Fraction, bits: int) -> Fraction:
+    """Keep the leading `bits` bits of a positive value below 2."""
+    unit = Fraction(1, 2**bits)
+    while value / unit < 2 ** (bits - 1):
+        unit /= 2
+    return (value // unit) * unit
+
+
+def _taylor(first_power: int, scalar: str) -> tuple[float, ...]:
+    """Collect coefficients from `first_power` on, until a term at pi/4 is below a sixteenth of an ulp of 1."""
+    smallest = Fraction(float(np.finfo(SCALARS[scalar]).eps)) / 16
+    largest_angle = _QUARTER_TURN / 2
+    coefficients: list[float] = []
+    power, sign = first_power, -1
+    while largest_angle**power / factorial(power) > smallest:
+        coefficients.append(_rounded(Fraction(sign, factorial(power)), scalar))
+        power, sign = power + 2, -sign
+    return tuple(coefficients)
