@@ -1,0 +1,188 @@
+"""Controller: checked inputs in, one command out, and what is remembered between two steps."""
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from codegen.horizon import horizon_tables
+from codegen.literals import SCALARS
+from codegen.reference import cost, optimizer
+from codegen.reference.math import Real
+from codegen.reference.predictor import Predictor
+from codegen.settings import Settings
+from codegen.trigonometry import YAW_LIMIT_RAD
+
+ATTITUDE_LIMIT_RAD: Final = 3.25
+"""Largest measured roll or pitch: a little more than half a turn, so that degrees are refused."""
+
+WEIGHT_LIMIT: Final = 1e6
+"""Largest run-time weight, the bound of `cost.tracking_weight` and `cost.effort_weight`."""
+
+
+class Status(IntEnum):
+    """What `nmpc_step` and its siblings return."""
+
+    OK = 0
+    NULL_POINTER = 1
+    BAD_STATE = 2
+    BAD_TARGET = 3
+    BAD_THRUST = 4
+    BAD_WEIGHT = 5
+    BAD_COMMAND = 6
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What n controllers remember between steps.
+
+    command_rad is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost (n,), gradient (n, control, 2),
+    iterations (n,), converged (n,).
+    """
+
+    command_rad: Real
+    plan_rad: Real
+    weights: Real
+    cost: Real
+    gradient: Real
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Step:
+    """The outcome of one step of n controllers; all but the status repeats the last good step after bad input.
+
+    status:      (n,) a `Status` each.
+    command_rad: (n, 2) roll and pitch to apply now, in rad.
+    cost:        (n,) cost of the plan that the last iteration evaluated.
+    gradient:    (n, control, 2) gradient of that plan, per rad.
+    plan_rad:    (n, control, 2) moves found, the first of which is the command.
+    iterations:  (n,) updates made.
+    converged:   (n,) whether the cost came to rest.
+    """
+
+    status: NDArray[np.int64]
+    command_rad: Real
+    cost: Real
+    gradient: Real
+    plan_rad: Real
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+
+
+class ReferenceController:
+    """n controllers in NumPy, bit for bit what the generated C computes."""
+
+    def __init__(self, settings: Settings, n: int = 1) -> None:
+        self.settings = settings
+        self.scalar = SCALARS[settings.code.scalar]
+        self._predictor = Predictor(settings, horizon_tables(settings), self.scalar)
+        control = settings.horizon.control
+        self.memory = Memory(
+            command_rad=np.zeros((n, 2), self.scalar),
+            plan_rad=np.zeros((n, control, 2), self.scalar),
+            weights=np.tile(
+                np.array([settings.cost.tracking_weight, settings.cost.effort_weight], self.scalar), (n, 1)
+            ),
+            cost=np.zeros(n, self.scalar),
+            gradient=np.zeros((n, control, 2), self.scalar),
+            iterations=np.zeros(n, np.int64),
+            converged=np.zeros(n, np.bool_),
+        )
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Start all controllers over from `command_rad` (n, 2), clamped to the tilt limit.
+
+        Returns a status (n,); a command that is not finite, or beyond ATTITUDE_LIMIT_RAD, changes nothing.
+        """
+        given = np.asarray(command_rad, self.scalar)
+        good = _within(given, ATTITUDE_LIMIT_RAD)
+        limit = self.scalar(self.settings.limits.tilt_rad)
+        command = np.where(good[:, None], np.minimum(np.maximum(given, -limit), limit), self.memory.command_rad)
+        plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
+        self.memory = replace(
+            self.memory,
+            command_rad=command,
+            plan_rad=np.where(good[:, None, None], plan, self.memory.plan_rad),
+        )
+        return np.where(good, Status.OK, Status.BAD_COMMAND)
+
+    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
+        """Replace tracking and effort weight by `weights` (n, 2), each in 0..WEIGHT_LIMIT; returns a status (n,)."""
+        given = np.asarray(weights, self.scalar)
+        good = np.all((given >= 0) & (given <= self.scalar(WEIGHT_LIMIT)), axis=1)
+        self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
+        return np.where(good, Status.OK, Status.BAD_WEIGHT)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands.
+
+        state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
+        target (n, 4): x, y (m), vx, vy (m/s). thrust_acceleration_m_s2 (n,): thrust over mass, up.
+        """
+        states = np.asarray(state, self.scalar)
+        targets = np.asarray(target, self.scalar)
+        thrusts = np.asarray(thrust_acceleration_m_s2, self.scalar)
+        status = self._check(states, targets, thrusts)
+        good = status == Status.OK
+        searched = self._search(
+            np.where(good[:, None], states, self.scalar(0)),
+            np.where(good[:, None], targets, self.scalar(0)),
+            np.where(good, thrusts, self.scalar(self.settings.ranges.thrust_acceleration_min_m_s2)),
+        )
+        old = self.memory
+        self.memory = replace(
+            old,
+            command_rad=np.where(good[:, None], searched.moves_rad[:, 0], old.command_rad),
+            plan_rad=np.where(good[:, None, None], searched.moves_rad, old.plan_rad),
+            cost=np.where(good, searched.cost, old.cost),
+            gradient=np.where(good[:, None, None], searched.gradient, old.gradient),
+            iterations=np.where(good, searched.iterations, old.iterations),
+            converged=np.where(good, searched.converged, old.converged),
+        )
+        new = self.memory
+        return Step(
+            status, new.command_rad, new.cost, new.gradient, new.plan_rad, new.iterations, new.converged
+        )
+
+    def _search(self, state: Real, target: Real, thrust: Real) -> optimizer.Search:
+        memory = self.memory
+        prediction = self._predictor.prepare(state, target, thrust)
+
+        def evaluate(moves_rad: Real) -> tuple[Real, Real]:
+            return cost.evaluate(
+                self._predictor, prediction, memory.weights, moves_rad, memory.command_rad
+            )
+
+        start = memory.plan_rad
+        if self.settings.optimizer.warm_start == "last_command":
+            start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
+        return optimizer.minimize(self.settings, evaluate, start)
+
+    def _check(self, state: Real, target: Real, thrust: Real) -> NDArray[np.int64]:
+        ranges = self.settings.ranges
+        good_state = (
+            _within(state[:, 0:2], self.scalar(ranges.position_m))
+            & _within(state[:, 2:4], self.scalar(ranges.velocity_m_s))
+            & _within(state[:, 4:6], ATTITUDE_LIMIT_RAD)
+            & _within(state[:, 6:7], YAW_LIMIT_RAD)
+        )
+        good_target = _within(target[:, 0:2], self.scalar(ranges.position_m)) & _within(
+            target[:, 2:4], self.scalar(ranges.velocity_m_s)
+        )
+        good_thrust = (thrust >= self.scalar(ranges.thrust_acceleration_min_m_s2)) & (
+            thrust <= self.scalar(ranges.thrust_acceleration_max_m_s2)
+        )
+        return np.select(
+            [~good_state, ~good_target, ~good_thrust],
+            [Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST],
+            Status.OK,
+        )
+
+
+def _within(values: Real, limit: float) -> NDArray[np.bool_]:
+    """Tell for each row of (n, k) whether all values lie in -limit..limit; NaN does not."""
+    return np.all((values >= -limit) & (values <= limit), axis=1)

@@ -1,0 +1,27 @@
+"""Cost function: the Manhattan distance to the target and the variation of the moves (eq 12)."""
+
+from codegen.reference.math import Real, ordered_sum, sign
+from codegen.reference.predictor import Prediction, Predictor
+
+import numpy as np
+
+
+def evaluate(
+    predictor: Predictor, prediction: Prediction, weights: Real, moves_rad: Real, last_command_rad: Real
+) -> tuple[Real, Real]:
+    """Return the cost (n,) and its subgradient (n, control, 2) at `moves_rad` (n, control, 2).
+
+    weights is (n, 2): lambda1 in 1/m, lambda2 in 1/rad; last_command_rad (n, 2) precedes the first move.
+    """
+    error = predictor.error(prediction, moves_rad)
+    distance = ordered_sum(np.abs(error[:, 0]) + np.abs(error[:, 1]), axis=1)
+    tracking = predictor.gradient(prediction, sign(error))
+
+    change = moves_rad - np.concatenate([last_command_rad[:, None], moves_rad[:, :-1]], axis=1)
+    variation = ordered_sum(np.abs(change).reshape(len(change), -1), axis=1)
+    leaving = np.concatenate([change[:, 1:], np.zeros_like(change[:, :1])], axis=1)
+    effort = sign(change) - sign(leaving)
+
+    cost = (weights[:, 0] * distance) + (weights[:, 1] * variation)
+    gradient = (weights[:, 0, None, None] * tracking) + (weights[:, 1, None, None] * effort)
+    return cost, gradient
