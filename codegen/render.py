@@ -1,0 +1,130 @@
+"""Render the templates: settings in, {path: text} of a bundle out; a pure function, no clock and no path."""
+
+import re
+from functools import partial
+from pathlib import PurePosixPath
+from typing import Final
+
+import jinja2
+
+import codegen
+from codegen import literals
+from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from codegen.horizon import horizon_tables
+from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
+from codegen.self_test import self_test
+from codegen.settings import Settings
+from codegen.settings_toml import to_toml
+from codegen.trigonometry import SINE_ERRORS, YAW_LIMIT_RAD, trigonometry
+
+PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
+SUB_BLOCKS: Final = ("nmpc_math", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
+SOURCES: Final = (*(f"{block}.c" for block in SUB_BLOCKS), "nmpc.c", "nmpc_self_test.c")
+PROJECT: Final = {"README.md": "README.md", "Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "main.c": "example/main.c"}
+
+_OWN_NAME = re.compile(r"(?<![\w-])(nmpc|NMPC)(?=[_.])")
+_OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
+_REAL_BYTES: Final = {"float32": 4, "float64": 8}
+
+
+def render(settings: Settings, *, amalgamate: bool = False) -> dict[str, str]:
+    """Render the bundle of `settings`: {relative POSIX path: text}.
+
+    With `amalgamate` the library is one header and one source in the bundle's folder.
+    """
+    environment = _environment(settings.code.scalar)
+    headers = {name: environment.get_template(f"include/{name}.j2") for name in PUBLIC_HEADERS}
+    privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in SUB_BLOCKS}
+    sources = {name: environment.get_template(f"src/{name}.j2") for name in SOURCES}
+    project = {path: environment.get_template(f"project/{name}.j2") for name, path in PROJECT.items()}
+
+    context = _context(settings) | {"amalgamated": amalgamate}
+    text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
+    if amalgamate:
+        layout = {"header_folder": "", "source_folder": "", "sources": ["nmpc.c"]}
+        library = _amalgamated(text)
+    else:
+        layout = {"header_folder": "include", "source_folder": "src/", "sources": [f"src/{name}" for name in SOURCES]}
+        library = {_home(name): content for name, content in text.items()}
+    files = library | {path: template.render(context | layout) for path, template in project.items()}
+    files["controller.toml"] = to_toml(settings)
+    return {with_prefix(path, settings.code.prefix): with_prefix(files[path], settings.code.prefix) for path in files}
+
+
+def with_prefix(text: str, prefix: str) -> str:
+    """Give every name of the controller its prefix: nmpc_step becomes prefix_step, NMPC_OK PREFIX_OK."""
+    return _OWN_NAME.sub(lambda name: prefix if name[1] == "nmpc" else prefix.upper(), text)
+
+
+def _environment(scalar: str) -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("templates", ""),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # noqa: S701 - C is not HTML, and no text of the user's reaches a template
+    )
+    environment.filters |= {
+        spell.__name__: partial(spell, scalar=scalar) for spell in (literals.real, literals.row, literals.rows)
+    }
+    return environment
+
+
+def _context(settings: Settings) -> dict[str, object]:
+    """Decide everything that the templates only arrange."""
+    tables = horizon_tables(settings)
+    scalar = settings.code.scalar
+    backtracking = settings.optimizer.variant == "rprop+"
+    return {
+        "settings": settings,
+        "parameters": [
+            (f"{section}.{key}", value)
+            for section, values in settings.model_dump().items()
+            for key, value in values.items()
+        ],
+        "version": codegen.__version__,
+        "digest": settings.digest[:16],
+        "c_type": literals.C_TYPES[scalar],
+        "scalar_bytes": _REAL_BYTES[scalar],
+        "instance_bytes": _instance_bytes(settings, backtracking=backtracking),
+        "backtracking": backtracking,
+        "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
+        "tables": tables,
+        "response_rows": tables.response_s2.reshape(settings.horizon.prediction, -1),
+        "trigonometry": trigonometry(scalar),
+        "sine_error": SINE_ERRORS[scalar],
+        "weight_limit": WEIGHT_LIMIT,
+        "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
+        "yaw_limit_rad": YAW_LIMIT_RAD,
+        "vectors": self_test(settings),
+        "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
+        "compile_flags": " ".join(COMPILE_FLAGS),
+        "warning_flags": " ".join(WARNING_FLAGS),
+    }
+
+
+def _instance_bytes(settings: Settings, *, backtracking: bool) -> int:
+    """Count the members of nmpc_t: scalars, then single bytes, padded to a whole scalar."""
+    moves = 2 * settings.horizon.control
+    weights, gains, command, cost = 2, 4, 2, 1
+    arrays_of_moves = 4 if backtracking else 3
+    scalars = weights + gains + (2 * settings.horizon.prediction) + command + cost + (arrays_of_moves * moves)
+    flags = moves + 2
+    scalar_bytes = _REAL_BYTES[settings.code.scalar]
+    return (scalars + -(-flags // scalar_bytes)) * scalar_bytes
+
+
+def _home(name: str) -> str:
+    return f"include/{name}" if name in PUBLIC_HEADERS else f"src/{name}"
+
+
+def _amalgamated(text: dict[str, str]) -> dict[str, str]:
+    """Join the library into one header and one source: each file once, in order, without our own includes."""
+    header = [text[name] for name in PUBLIC_HEADERS]
+    source = [text[f"{block}{ending}"] for ending in (".h", ".c") for block in SUB_BLOCKS]
+    source += [text["nmpc.c"], text["nmpc_self_test.c"]]
+    return {
+        "nmpc.h": _OWN_INCLUDE.sub("", "\n".join(header)),
+        "nmpc.c": '#include "nmpc.h"\n\n' + _OWN_INCLUDE.sub("", "\n".join(source)),
+    }

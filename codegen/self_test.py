@@ -1,0 +1,78 @@
+"""Self-test vectors of a bundle: consecutive steps, and what the reference controller makes of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from codegen.reference import ReferenceController, Status
+from codegen.settings import Settings
+
+STEPS: Final = 24
+_GOLDEN_RATIO: Final = 0.6180339887498949
+
+
+@dataclass(frozen=True)
+class SelfTestStep:
+    """One step: state (7,), target (4,) and thrust in; status, command (2,) and cost out."""
+
+    state: tuple[float, ...]
+    target: tuple[float, ...]
+    thrust_acceleration_m_s2: float
+    status: Status
+    command_rad: tuple[float, float]
+    cost: float
+
+
+def self_test(settings: Settings) -> list[SelfTestStep]:
+    """Run the reference controller through STEPS inputs spread over those of a flight.
+
+    Every seventh input is out of range, in turn its state, its target and its thrust. The spread is a Weyl
+    sequence rather than a random number generator, whose stream may change with a library's version.
+    """
+    controller = ReferenceController(settings)
+    spread = _spread()
+    steps = []
+    for index in range(STEPS):
+        target = [_next(spread, scale) for scale in (2.0, 2.0, 1.0, 1.0)]
+        error = [_next(spread, scale) for scale in (0.3, 0.3, 0.5, 0.5)]
+        tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
+        state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
+        thrust = 9.81 + _next(spread, 2.0)
+        if index % 7 == 6:
+            match index // 7 % 3:
+                case 0:
+                    state[0] = 2 * settings.ranges.position_m
+                case 1:
+                    target[3] = -2 * settings.ranges.velocity_m_s
+                case _:
+                    thrust = 0.0
+        steps.append(_step(controller, state, target, thrust))
+    return steps
+
+
+def _step(
+    controller: ReferenceController, state: list[float], target: list[float], thrust: float
+) -> SelfTestStep:
+    step = controller.step([state], [target], [thrust])
+    roll_rad, pitch_rad = (float(angle) for angle in step.command_rad[0])
+    return SelfTestStep(
+        state=tuple(state),
+        target=tuple(target),
+        thrust_acceleration_m_s2=thrust,
+        status=Status(int(step.status[0])),
+        command_rad=(roll_rad, pitch_rad),
+        cost=float(step.cost[0]),
+    )
+
+
+def _spread() -> Iterator[float]:
+    """Yield a low-discrepancy sequence in 0..1."""
+    fraction = 0.5
+    while True:
+        fraction = (fraction + _GOLDEN_RATIO) % 1.0
+        yield fraction
+
+
+def _next(spread: Iterator[float], scale: float) -> float:
+    """Draw the next value in -scale..scale, rounded to three digits so that the vectors can be read."""
+    return round(scale * (2 * next(spread) - 1), 3)
