@@ -1,0 +1,97 @@
+"""The compiled controller: the generated C behind the interface of the reference."""
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from codegen.literals import SCALARS
+from codegen.reference import Step
+from codegen.render import render
+from codegen.settings import Settings
+from sil.extension import load_extension
+from sil.toolchain import Toolchain, host_toolchain
+
+
+def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
+    """Generate and build the C of `settings`, with the default prefix: names do not change what is computed."""
+    return load_extension(render(settings.replaced("code", prefix="nmpc")), settings.code.scalar, toolchain)
+
+
+class CompiledController:
+    """n controllers in generated C, behind the interface of `codegen.reference.ReferenceController`."""
+
+    def __init__(self, settings: Settings, n: int = 1, extension: ModuleType | None = None) -> None:
+        self.settings = settings
+        self.scalar = SCALARS[settings.code.scalar]
+        self._n = n
+        self._moves = (settings.horizon.control, 2)
+        self._real = np.dtype(self.scalar)
+        extension = extension or compiled(settings, host_toolchain())
+        self._ffi, self._lib = extension.ffi, extension.lib
+        self._controllers = self._ffi.new("nmpc_t[]", n)
+        self._lib.nmpc_batch_init(self._controllers, n)
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Start all controllers over from `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
+        return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad)
+
+    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
+        """Replace tracking and effort weight by `weights` (n, 2); returns a status (n,)."""
+        return self._set_each(self._lib.nmpc_set_weights, "nmpc_weights_t", weights)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
+        n = self._n
+        status, iterations, converged = (np.empty(n, np.intc) for _ in range(3))
+        command, cost = np.empty((n, 2), self.scalar), np.empty(n, self.scalar)
+        gradient, plan = (np.empty((n, *self._moves), self.scalar) for _ in range(2))
+        inputs = [
+            self._input(values, shape)
+            for values, shape in ((state, (n, 7)), (target, (n, 4)), (thrust_acceleration_m_s2, (n,)))
+        ]
+        outcome = self._ffi.new("nmpc_outcome_t *")
+        for name, kind, values in (
+            ("status", "int", status),
+            ("command", "nmpc_command_t", command),
+            ("cost", "nmpc_real_t", cost),
+            ("gradient", "nmpc_real_t", gradient),
+            ("plan_rad", "nmpc_real_t", plan),
+            ("iterations", "int", iterations),
+            ("converged", "int", converged),
+        ):
+            setattr(outcome, name, self._pointer(kind, values))
+        self._lib.nmpc_batch_step(
+            self._controllers,
+            n,
+            self._pointer("nmpc_state_t", inputs[0]),
+            self._pointer("nmpc_target_t", inputs[1]),
+            self._pointer("nmpc_real_t", inputs[2]),
+            outcome,
+        )
+        return Step(
+            status=status.astype(np.int64),
+            command_rad=command,
+            cost=cost,
+            gradient=gradient,
+            plan_rad=plan,
+            iterations=iterations.astype(np.int64),
+            converged=converged.astype(np.bool_),
+        )
+
+    def _input(self, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[Any]:
+        array = np.ascontiguousarray(values, self._real)
+        if array.shape != shape:
+            raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
+        return array
+
+    def _pointer(self, kind: str, array: NDArray[Any]) -> Any:
+        return self._ffi.cast(f"{kind} *", self._ffi.from_buffer(array))
+
+    def _set_each(self, function: Any, kind: str, values: ArrayLike) -> NDArray[np.int64]:
+        array = self._input(values, (self._n, 2))
+        pointer = self._pointer(kind, array)
+        return np.array(
+            [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)], np.int64
+        )

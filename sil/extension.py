@@ -1,0 +1,111 @@
+"""Build a rendered bundle as a Python extension, once, and load it.
+
+cffi's API mode lets the C compiler check every declaration below against the bundle's own headers. The
+extension is linked here rather than by setuptools, whose flags are Python's and not the bundle's.
+"""
+
+import hashlib
+import importlib.machinery
+import importlib.util
+import sys
+import sysconfig
+from importlib import resources
+from pathlib import Path
+from types import ModuleType
+from typing import Final
+
+import cffi
+
+from codegen.flags import COMPILE_FLAGS
+from codegen.literals import C_TYPES
+from sil.cache import cached
+from sil.errors import BuildError
+from sil.toolchain import Toolchain
+
+_DECLARATIONS: Final = """
+typedef REAL nmpc_real_t;
+typedef int... nmpc_status_t;
+typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
+typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
+typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
+typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
+typedef struct { nmpc_real_t gain_x_m_s2[2], gain_y_m_s2[2], free_x_m[...], free_y_m[...]; } nmpc_prediction_t;
+typedef struct { ...; } nmpc_t;
+typedef struct {
+    int *status;
+    nmpc_command_t *command;
+    nmpc_real_t *cost, *gradient, *plan_rad;
+    int *iterations, *converged;
+} nmpc_outcome_t;
+
+void nmpc_init(nmpc_t *);
+nmpc_status_t nmpc_reset(nmpc_t *, const nmpc_command_t *);
+nmpc_status_t nmpc_set_weights(nmpc_t *, const nmpc_weights_t *);
+nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_command_t *);
+const char *nmpc_version(void);
+int nmpc_self_test(nmpc_t *);
+
+void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
+void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
+void nmpc_predictor_error(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_real_t *, nmpc_real_t *);
+void nmpc_predictor_add_gradient(const nmpc_prediction_t *, int, nmpc_real_t, nmpc_real_t, nmpc_real_t *);
+nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *, const nmpc_weights_t *, const nmpc_real_t *,
+                               const nmpc_real_t *, nmpc_real_t *);
+
+void nmpc_batch_init(nmpc_t *, int);
+void nmpc_batch_step(nmpc_t *, int, const nmpc_state_t *, const nmpc_target_t *, const nmpc_real_t *,
+                     const nmpc_outcome_t *);
+"""
+_INCLUDES: Final = '#include "nmpc_cost.h"\n#include "nmpc_math.h"\n#include "nmpc_predictor.h"\n#include "nmpc_self_test.h"\n'
+
+
+def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> ModuleType:
+    """Return the extension of a bundle {path: text} with prefix nmpc: a module with cffi's `ffi` and `lib`.
+
+    It is built with `toolchain` unless the cache has it. Raises BuildError and CacheError.
+    """
+    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    made_of = (files, glue, _DECLARATIONS, COMPILE_FLAGS, toolchain, toolchain.identity(), suffix, cffi.__version__)
+    name = f"_nmpc_{hashlib.sha256(repr(made_of).encode()).hexdigest()[:32]}"
+    if name not in sys.modules:
+
+        def build(folder: Path) -> Path:
+            return _build(name, files, glue, scalar, toolchain, folder)
+
+        sys.modules[name] = _loaded(name, cached(f"{name}{suffix}", build))
+    return sys.modules[name]
+
+
+def _build(
+    name: str, files: dict[str, str], glue: str, scalar: str, toolchain: Toolchain, folder: Path
+) -> Path:
+    """Compile bundle and extension in `folder`; returns the shared object."""
+    python_headers = Path(sysconfig.get_paths()["include"])
+    if not (python_headers / "Python.h").is_file():
+        raise BuildError(f"no Python.h in {python_headers}; install Python's headers, such as Debian's python3-dev")
+    for path, text in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, "utf-8")
+    ffi = cffi.FFI()
+    ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]))
+    ffi.set_source(name, _INCLUDES + glue, compiler_verbose=0)
+    ffi.emit_c_code(str(folder / "extension.c"))
+
+    sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
+    objects = [Path(source).with_suffix(".o").name for source in sources]
+    flags = [*COMPILE_FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
+    toolchain.run([*flags, "-fPIC", "-Iinclude", "-c", *sources], folder)
+    glue_flags = ["-O2", "-ffp-contract=off", "-fPIC", "-Iinclude", "-Isrc", f"-I{python_headers}"]
+    link = ["-shared", *(["-undefined", "dynamic_lookup"] if sys.platform == "darwin" else [])]
+    toolchain.run([*glue_flags, *link, "extension.c", *objects, "-o", "extension.so"], folder)
+    return folder / "extension.so"
+
+
+def _loaded(name: str, path: Path) -> ModuleType:
+    loader = importlib.machinery.ExtensionFileLoader(name, str(path))
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    assert spec is not None  # a loader was given
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    return module

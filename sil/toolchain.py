@@ -1,0 +1,59 @@
+"""The host's C compiler: found, never assumed, and run with a readable message when it fails."""
+
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from sil.errors import BuildError
+
+
+@dataclass(frozen=True)
+class Toolchain:
+    """A compiler as a command line, and the optimisation that replaces the bundle's own, if any."""
+
+    command: tuple[str, ...]
+    optimisation: str | None = None
+
+    def run(self, arguments: Sequence[str], folder: Path) -> None:
+        """Compile or link in `folder`; raises BuildError with the compiler's first words."""
+        line = [*self.command, *arguments]
+        try:
+            done = subprocess.run(line, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+        except OSError as error:
+            raise BuildError(f"cannot run the C compiler {shlex.join(self.command)}: {error.strerror}") from error
+        if done.returncode != 0:
+            raise BuildError(f"{shlex.join(line)} failed:\n{_first_lines(done.stderr)}")
+
+    def identity(self) -> str:
+        """Name compiler and version: builds of different compilers are different builds."""
+        return _version(self.command)
+
+
+def host_toolchain(optimisation: str | None = None) -> Toolchain:
+    """Take the compiler that CC names, else cc, gcc or clang; raises BuildError when there is none."""
+    named = shlex.split(os.environ.get("CC", ""))
+    if named:
+        return Toolchain(tuple(named), optimisation)
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name):
+            return Toolchain((name,), optimisation)
+    raise BuildError("no C compiler found (cc, gcc, clang); install one, such as Debian's gcc, or name it in CC")
+
+
+@lru_cache
+def _version(command: tuple[str, ...]) -> str:
+    try:
+        done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        raise BuildError(f"cannot run the C compiler {shlex.join(command)}: {error.strerror}") from error
+    return done.stdout
+
+
+def _first_lines(text: str, count: int = 20) -> str:
+    lines = text.splitlines()
+    return "\n".join(lines[:count] + ([f"... {len(lines) - count} more lines"] if len(lines) > count else []))
