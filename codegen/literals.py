@@ -1,12 +1,12 @@
 """Spell Python values as C tokens: the one place that knows C's lexical rules."""
 
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
-Scalar = type[np.float32] | type[np.float64]
-"""The scalar type of a controller: `numpy.float32` or `numpy.float64`."""
+Scalar = type[np.floating[Any]]
+"""The scalar type of a controller, `numpy.float32` or `numpy.float64`."""
 
 SCALARS: Final[dict[str, Scalar]] = {"float32": np.float32, "float64": np.float64}
 C_TYPES: Final[dict[str, str]] = {"float32": "float", "float64": "double"}

@@ -2,7 +2,6 @@
 
 import re
 from functools import partial
-from pathlib import PurePosixPath
 from typing import Final
 
 import jinja2
@@ -20,7 +19,12 @@ from codegen.trigonometry import SINE_ERRORS, YAW_LIMIT_RAD, trigonometry
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
 SUB_BLOCKS: Final = ("nmpc_math", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
 SOURCES: Final = (*(f"{block}.c" for block in SUB_BLOCKS), "nmpc.c", "nmpc_self_test.c")
-PROJECT: Final = {"README.md": "README.md", "Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "main.c": "example/main.c"}
+PROJECT: Final = {
+    "README.md": "README.md",
+    "Makefile": "Makefile",
+    "CMakeLists.txt": "CMakeLists.txt",
+    "main.c": "example/main.c",
+}
 
 _OWN_NAME = re.compile(r"(?<![\w-])(nmpc|NMPC)(?=[_.])")
 _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
@@ -44,11 +48,18 @@ def render(settings: Settings, *, amalgamate: bool = False) -> dict[str, str]:
         layout = {"header_folder": "", "source_folder": "", "sources": ["nmpc.c"]}
         library = _amalgamated(text)
     else:
-        layout = {"header_folder": "include", "source_folder": "src/", "sources": [f"src/{name}" for name in SOURCES]}
+        layout = {
+            "header_folder": "include",
+            "source_folder": "src/",
+            "sources": [f"src/{name}" for name in SOURCES],
+        }
         library = {_home(name): content for name, content in text.items()}
     files = library | {path: template.render(context | layout) for path, template in project.items()}
     files["controller.toml"] = to_toml(settings)
-    return {with_prefix(path, settings.code.prefix): with_prefix(files[path], settings.code.prefix) for path in files}
+    return {
+        with_prefix(path, settings.code.prefix): with_prefix(files[path], settings.code.prefix)
+        for path in files
+    }
 
 
 def with_prefix(text: str, prefix: str) -> str:
@@ -63,10 +74,11 @@ def _environment(scalar: str) -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701 - C is not HTML, and no text of the user's reaches a template
+        autoescape=False,
     )
     environment.filters |= {
-        spell.__name__: partial(spell, scalar=scalar) for spell in (literals.real, literals.row, literals.rows)
+        spell.__name__: partial(spell, scalar=scalar)
+        for spell in (literals.real, literals.row, literals.rows)
     }
     return environment
 

@@ -70,7 +70,7 @@ def _chopped(value: Fraction, bits: int) -> Fraction:
 
 
 def _taylor(first_power: int, scalar: str) -> tuple[float, ...]:
-    """Collect coefficients from `first_power` on, until a term at pi/4 is below a sixteenth of an ulp of 1."""
+    """Collect coefficients until a term at pi/4 is below a sixteenth of the precision."""
     smallest = Fraction(float(np.finfo(SCALARS[scalar]).eps)) / 16
     largest_angle = _QUARTER_TURN / 2
     coefficients: list[float] = []

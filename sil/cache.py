@@ -21,9 +21,13 @@ def cache_folder() -> Path:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()
     except OSError as error:
-        raise CacheError(f"cannot use the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME") from error
+        raise CacheError(
+            f"cannot use the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME"
+        ) from error
     if status.st_uid != os.getuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise CacheError(f"others may write to the cache folder {folder}; make it yours alone: chmod 700 {folder}")
+        raise CacheError(
+            f"others may write to the cache folder {folder}; make it yours alone: chmod 700 {folder}"
+        )
     return folder
 
 

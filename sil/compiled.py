@@ -15,8 +15,9 @@ from sil.toolchain import Toolchain, host_toolchain
 
 
 def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
-    """Generate and build the C of `settings`, with the default prefix: names do not change what is computed."""
-    return load_extension(render(settings.replaced("code", prefix="nmpc")), settings.code.scalar, toolchain)
+    """Generate and build the C of `settings`, with the default prefix: a name changes no bit."""
+    plain = settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "nmpc"})})
+    return load_extension(render(plain), settings.code.scalar, toolchain)
 
 
 class CompiledController:
@@ -34,7 +35,7 @@ class CompiledController:
         self._lib.nmpc_batch_init(self._controllers, n)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Start all controllers over from `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
+        """Start all controllers over from `command_rad` (n, 2), clamped; returns a status (n,)."""
         return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
@@ -93,5 +94,6 @@ class CompiledController:
         array = self._input(values, (self._n, 2))
         pointer = self._pointer(kind, array)
         return np.array(
-            [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)], np.int64
+            [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)],
+            np.int64,
         )

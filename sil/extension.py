@@ -7,6 +7,7 @@ extension is linked here rather than by setuptools, whose flags are Python's and
 import hashlib
 import importlib.machinery
 import importlib.util
+import re
 import sys
 import sysconfig
 from importlib import resources
@@ -29,7 +30,9 @@ typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
-typedef struct { nmpc_real_t gain_x_m_s2[2], gain_y_m_s2[2], free_x_m[...], free_y_m[...]; } nmpc_prediction_t;
+typedef struct {
+    nmpc_real_t gain_x_m_s2[2], gain_y_m_s2[2], free_x_m[...], free_y_m[...];
+} nmpc_prediction_t;
 typedef struct { ...; } nmpc_t;
 typedef struct {
     int *status;
@@ -56,47 +59,64 @@ void nmpc_batch_init(nmpc_t *, int);
 void nmpc_batch_step(nmpc_t *, int, const nmpc_state_t *, const nmpc_target_t *, const nmpc_real_t *,
                      const nmpc_outcome_t *);
 """
-_INCLUDES: Final = '#include "nmpc_cost.h"\n#include "nmpc_math.h"\n#include "nmpc_predictor.h"\n#include "nmpc_self_test.h"\n'
+_INCLUDES: Final = "".join(
+    f'#include "nmpc_{name}.h"\n' for name in ("cost", "math", "predictor", "self_test")
+)
 
 
 def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> ModuleType:
-    """Return the extension of a bundle {path: text} with prefix nmpc: a module with cffi's `ffi` and `lib`.
+    """Return the extension of a bundle with prefix nmpc: a module that has cffi's `ffi` and `lib`.
 
     It is built with `toolchain` unless the cache has it. Raises BuildError and CacheError.
     """
-    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    glue = _INCLUDES + resources.files("sil").joinpath("batch.c").read_text("utf-8")
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
-    made_of = (files, glue, _DECLARATIONS, COMPILE_FLAGS, toolchain, toolchain.identity(), suffix, cffi.__version__)
+    made_of = (
+        files,
+        glue,
+        _DECLARATIONS,
+        COMPILE_FLAGS,
+        toolchain,
+        toolchain.identity(),
+        suffix,
+        cffi.__version__,
+    )
     name = f"_nmpc_{hashlib.sha256(repr(made_of).encode()).hexdigest()[:32]}"
     if name not in sys.modules:
 
         def build(folder: Path) -> Path:
-            return _build(name, files, glue, scalar, toolchain, folder)
+            _place(files, folder)
+            _emit_glue(name, glue, scalar, folder)
+            return _compile(
+                sorted(path for path in files if re.fullmatch(r"src/.*\.c", path)), toolchain, folder
+            )
 
         sys.modules[name] = _loaded(name, cached(f"{name}{suffix}", build))
     return sys.modules[name]
 
 
-def _build(
-    name: str, files: dict[str, str], glue: str, scalar: str, toolchain: Toolchain, folder: Path
-) -> Path:
-    """Compile bundle and extension in `folder`; returns the shared object."""
-    python_headers = Path(sysconfig.get_paths()["include"])
-    if not (python_headers / "Python.h").is_file():
-        raise BuildError(f"no Python.h in {python_headers}; install Python's headers, such as Debian's python3-dev")
+def _place(files: dict[str, str], folder: Path) -> None:
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
+
+
+def _emit_glue(name: str, glue: str, scalar: str, folder: Path) -> None:
     ffi = cffi.FFI()
     ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]))
-    ffi.set_source(name, _INCLUDES + glue, compiler_verbose=0)
+    ffi.set_source(name, glue, compiler_verbose=0)
     ffi.emit_c_code(str(folder / "extension.c"))
 
-    sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
+
+def _compile(sources: list[str], toolchain: Toolchain, folder: Path) -> Path:
+    """Compile the bundle's sources with its own flags, and the glue with Python's headers."""
+    headers = Path(sysconfig.get_paths()["include"])
+    if not (headers / "Python.h").is_file():
+        raise BuildError(f"no Python.h in {headers}; install Python's headers, such as Debian's python3-dev")
     objects = [Path(source).with_suffix(".o").name for source in sources]
     flags = [*COMPILE_FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
     toolchain.run([*flags, "-fPIC", "-Iinclude", "-c", *sources], folder)
-    glue_flags = ["-O2", "-ffp-contract=off", "-fPIC", "-Iinclude", "-Isrc", f"-I{python_headers}"]
+    glue_flags = ["-O2", "-ffp-contract=off", "-fPIC", "-Iinclude", "-Isrc", f"-I{headers}"]
     link = ["-shared", *(["-undefined", "dynamic_lookup"] if sys.platform == "darwin" else [])]
     toolchain.run([*glue_flags, *link, "extension.c", *objects, "-o", "extension.so"], folder)
     return folder / "extension.so"

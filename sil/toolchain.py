@@ -23,9 +23,13 @@ class Toolchain:
         """Compile or link in `folder`; raises BuildError with the compiler's first words."""
         line = [*self.command, *arguments]
         try:
-            done = subprocess.run(line, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+            done = subprocess.run(
+                line, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+            )
         except OSError as error:
-            raise BuildError(f"cannot run the C compiler {shlex.join(self.command)}: {error.strerror}") from error
+            raise BuildError(
+                f"cannot run the C compiler {shlex.join(self.command)}: {error.strerror}"
+            ) from error
         if done.returncode != 0:
             raise BuildError(f"{shlex.join(line)} failed:\n{_first_lines(done.stderr)}")
 
@@ -42,13 +46,17 @@ def host_toolchain(optimisation: str | None = None) -> Toolchain:
     for name in ("cc", "gcc", "clang"):
         if shutil.which(name):
             return Toolchain((name,), optimisation)
-    raise BuildError("no C compiler found (cc, gcc, clang); install one, such as Debian's gcc, or name it in CC")
+    raise BuildError(
+        "no C compiler found (cc, gcc, clang); install one, such as Debian's gcc, or name it in CC"
+    )
 
 
 @lru_cache
 def _version(command: tuple[str, ...]) -> str:
     try:
-        done = subprocess.run([*command, "--version"], capture_output=True, text=True, errors="replace", check=False)
+        done = subprocess.run(
+            [*command, "--version"], capture_output=True, text=True, errors="replace", check=False
+        )
     except OSError as error:
         raise BuildError(f"cannot run the C compiler {shlex.join(command)}: {error.strerror}") from error
     return done.stdout

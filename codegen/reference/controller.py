@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,7 +53,7 @@ class Memory:
 
 @dataclass(frozen=True)
 class Step:
-    """The outcome of one step of n controllers; all but the status repeats the last good step after bad input.
+    """The outcome of one step of n controllers; after bad input all but the status is the last good step's.
 
     status:      (n,) a `Status` each.
     command_rad: (n, 2) roll and pitch to apply now, in rad.
@@ -101,7 +101,9 @@ class ReferenceController:
         given = np.asarray(command_rad, self.scalar)
         good = _within(given, ATTITUDE_LIMIT_RAD)
         limit = self.scalar(self.settings.limits.tilt_rad)
-        command = np.where(good[:, None], np.minimum(np.maximum(given, -limit), limit), self.memory.command_rad)
+        command = np.where(
+            good[:, None], np.minimum(np.maximum(given, -limit), limit), self.memory.command_rad
+        )
         plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
         self.memory = replace(
             self.memory,
@@ -111,7 +113,10 @@ class ReferenceController:
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Replace tracking and effort weight by `weights` (n, 2), each in 0..WEIGHT_LIMIT; returns a status (n,)."""
+        """Replace tracking and effort weight by `weights` (n, 2), each in 0..WEIGHT_LIMIT.
+
+        Returns a status (n,); bad weights change nothing.
+        """
         given = np.asarray(weights, self.scalar)
         good = np.all((given >= 0) & (given <= self.scalar(WEIGHT_LIMIT)), axis=1)
         self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
@@ -153,9 +158,7 @@ class ReferenceController:
         prediction = self._predictor.prepare(state, target, thrust)
 
         def evaluate(moves_rad: Real) -> tuple[Real, Real]:
-            return cost.evaluate(
-                self._predictor, prediction, memory.weights, moves_rad, memory.command_rad
-            )
+            return cost.evaluate(self._predictor, prediction, memory.weights, moves_rad, memory.command_rad)
 
         start = memory.plan_rad
         if self.settings.optimizer.warm_start == "last_command":
@@ -183,6 +186,7 @@ class ReferenceController:
         )
 
 
-def _within(values: Real, limit: float) -> NDArray[np.bool_]:
+def _within(values: Real, limit: float | np.floating[Any]) -> NDArray[np.bool_]:
     """Tell for each row of (n, k) whether all values lie in -limit..limit; NaN does not."""
-    return np.all((values >= -limit) & (values <= limit), axis=1)
+    inside: NDArray[np.bool_] = np.all((values >= -limit) & (values <= limit), axis=1)
+    return inside

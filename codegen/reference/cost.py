@@ -1,9 +1,9 @@
 """Cost function: the Manhattan distance to the target and the variation of the moves (eq 12)."""
 
+import numpy as np
+
 from codegen.reference.math import Real, ordered_sum, sign
 from codegen.reference.predictor import Prediction, Predictor
-
-import numpy as np
 
 
 def evaluate(

@@ -44,4 +44,5 @@ def sign(value: Real) -> Real:
 
 def ordered_sum(terms: Real, axis: int) -> Real:
     """Add along `axis`, first to last, starting from zero, as a C loop does."""
-    return terms.dtype.type(0) + np.take(np.add.accumulate(terms, axis=axis), -1, axis=axis)
+    total: Real = terms.dtype.type(0) + np.take(np.add.accumulate(terms, axis=axis), -1, axis=axis)
+    return total

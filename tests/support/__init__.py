@@ -1,0 +1,1 @@
+"""What several tests share: inputs, settings, builds. Tests import these, never each other."""

@@ -1,0 +1,76 @@
+"""Compare the outcomes of two controllers bit for bit."""
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from codegen.reference import Step
+from codegen.settings import Settings
+from tests.support.cases import Inputs, random_inputs
+
+FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
+
+
+class Controller(Protocol):
+    """What reference and compiled controller share."""
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Start over."""
+
+    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
+        """Replace the weights."""
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands."""
+
+
+def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[Inputs]:
+    """Draw the inputs of consecutive steps of n controllers."""
+    rng = np.random.default_rng(seed)
+    return [random_inputs(settings, n, rng) for _ in range(steps)]
+
+
+class Run(NamedTuple):
+    """What a controller answered: the statuses of its setters, and the outcome of every step."""
+
+    setters: list[NDArray[np.int64]]
+    steps: list[Step]
+
+
+def run(controller: Controller, inputs: list[Inputs], seed: int) -> Run:
+    """Step a fresh controller through `inputs`, reset and reweighted halfway, bad values among the good."""
+    rng = np.random.default_rng(seed)
+    setters: list[NDArray[np.int64]] = []
+    steps: list[Step] = []
+    for index, case in enumerate(inputs):
+        if index == len(inputs) // 2:
+            n = len(case.thrust)
+            command = rng.uniform(-1.5, 1.5, (n, 2))
+            command[::5, 0] = rng.choice([np.nan, np.inf, 4.0, -4.0], len(command[::5]))
+            weights = 10.0 ** rng.uniform(-2, 6, (n, 2))
+            weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1e6], len(weights[::7]))
+            setters += [controller.reset(command), controller.set_weights(weights)]
+        steps.append(controller.step(case.state, case.target, case.thrust))
+    return Run(setters, steps)
+
+
+def differences(a: Run, b: Run) -> dict[str, int]:
+    """Count by field the values that differ in any bit; empty when there are none."""
+    counts = {
+        name: _total([getattr(s, name) for s in a.steps], [getattr(s, name) for s in b.steps])
+        for name in FIELDS
+    }
+    counts["setters"] = _total(a.setters, b.setters)
+    return {name: count for name, count in counts.items() if count}
+
+
+def _total(ours: list[NDArray[Any]], theirs: list[NDArray[Any]]) -> int:
+    return sum(_differing(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+def _differing(a: NDArray[Any], b: NDArray[Any]) -> int:
+    assert a.dtype == b.dtype
+    assert a.shape == b.shape
+    raw = [np.ascontiguousarray(values).view(np.uint8).reshape(-1, a.dtype.itemsize) for values in (a, b)]
+    return int(np.any(raw[0] != raw[1], axis=1).sum())

@@ -1,0 +1,159 @@
+"""The generated C as firmware people build it: dialects, warnings, symbols, two controllers in one image."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from codegen import presets
+from codegen.flags import WARNING_FLAGS
+from codegen.render import render
+from codegen.settings import Settings
+from tests.support.cases import settings_case
+from tests.support.tools import require
+
+STRICT = [*WARNING_FLAGS, "-Werror"]
+GCC_STRICT = [*STRICT, "-Wunsuffixed-float-constants"]
+CXX_STRICT = [
+    "-pedantic",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wsign-conversion",
+    "-Wshadow",
+    "-Wundef",
+    "-Werror",
+]
+DIALECTS = {
+    "gnu89 of the Mambo's compiler": ("gcc", ["-std=gnu89", "-Wall", "-Werror", "-fPIC"]),
+    "c99": ("gcc", ["-std=c99", *GCC_STRICT]),
+    "c11": ("gcc", ["-std=c11", *GCC_STRICT]),
+    "c99 clang": ("clang", ["-std=c99", *STRICT]),
+    "c++11": ("g++", ["-xc++", "-std=c++11", *CXX_STRICT]),
+    "c++20 clang": ("clang++", ["-xc++", "-std=c++20", *CXX_STRICT]),
+}
+PACKAGES = {"gcc": "gcc", "g++": "g++", "clang": "clang", "clang++": "clang"}
+SETTINGS = {name: presets.load(name) for name in presets.names()} | {
+    f"case {index}": settings_case(index, "float32") for index in (0, 3, 9)
+}
+COMPILER_HELPERS = {"memcpy", "memset"}
+
+
+def placed(settings: Settings, folder: Path, *, amalgamate: bool = False) -> Path:
+    """Write the bundle of `settings` below `folder`, without ceremony."""
+    for path, text in render(settings, amalgamate=amalgamate).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text)
+    return folder
+
+
+def renamed(settings: Settings, prefix: str) -> Settings:
+    """Return `settings` with another prefix."""
+    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": prefix})})
+
+
+def shell(*command: str | Path, folder: Path) -> str:
+    """Run a command that must succeed without a word on stderr; returns what it printed."""
+    done = subprocess.run(
+        [str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return done.stdout
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("name", SETTINGS)
+def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
+    """All warnings on and fatal, library, self-test and example."""
+    compiler, flags = DIALECTS[dialect]
+    require(compiler, PACKAGES[compiler])
+    placed(SETTINGS[name], tmp_path)
+    sources = sorted(str(path) for path in [*tmp_path.glob("src/*.c"), tmp_path / "example/main.c"])
+    shell(compiler, *flags, "-O2", "-ffp-contract=off", "-Iinclude", "-c", *sources, folder=tmp_path)
+
+
+@pytest.mark.parametrize("amalgamate", [False, True])
+def test_float64_builds_without_a_word(tmp_path: Path, *, amalgamate: bool) -> None:
+    """The same for double, less the one warning of gcc that asks for a suffix C has not got."""
+    require("gcc", "gcc")
+    wide = Settings.model_validate(presets.load("mambo").model_dump() | {"code": {"scalar": "float64"}})
+    placed(wide, tmp_path, amalgamate=amalgamate)
+    sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
+    shell("gcc", "-std=c99", *STRICT, "-O2", "-Iinclude", "-I.", "-c", *sources, folder=tmp_path)
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_the_objects_need_nothing_from_outside(name: str, tmp_path: Path) -> None:
+    """Every undefined symbol is defined by another object of the bundle, or is a helper of the compiler."""
+    require("nm", "binutils")
+    placed(SETTINGS[name], tmp_path)
+    shell("gcc", "-std=c99", "-O2", "-Iinclude", "-c", *sorted(tmp_path.glob("src/*.c")), folder=tmp_path)
+    objects = sorted(tmp_path.glob("*.o"))
+    undefined = set(re.findall(r" U (\w+)", shell("nm", *objects, folder=tmp_path)))
+    defined = set(re.findall(r" [TRD] (\w+)", shell("nm", *objects, folder=tmp_path)))
+    assert undefined - defined <= COMPILER_HELPERS
+    assert all(symbol.startswith("nmpc_") for symbol in defined)
+    assert not re.findall(r" [bBdDC] \w+", shell("nm", *objects, folder=tmp_path)), "writable static memory"
+
+
+def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
+    """Two controllers of different settings link into one program, and both pass their self-test."""
+    require("gcc", "gcc")
+    for prefix, preset in (("left", "mambo"), ("right_wing", "table1")):
+        placed(renamed(presets.load(preset), prefix), tmp_path / prefix)
+    (tmp_path / "main.c").write_text(
+        '#include "left_self_test.h"\n#include "right_wing_self_test.h"\n'
+        "static left_t one;\nstatic right_wing_t two;\n"
+        "int main(void)\n{\n    return left_self_test(&one) + right_wing_self_test(&two);\n}\n"
+    )
+    includes = ["-Ileft/include", "-Iright_wing/include"]
+    sources = sorted(tmp_path.glob("*/src/*.c"))
+    shell(
+        "gcc",
+        "-std=c99",
+        *GCC_STRICT,
+        "-O2",
+        "-ffp-contract=off",
+        *includes,
+        *sources,
+        "main.c",
+        "-o",
+        "image",
+        folder=tmp_path,
+    )
+    shell("./image", folder=tmp_path)
+
+
+@pytest.mark.parametrize("amalgamate", [False, True])
+def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: bool) -> None:
+    """`make run`: the self-test passes and the point mass closes in on its target."""
+    require("make", "make")
+    placed(renamed(presets.load("mambo"), "drone"), tmp_path, amalgamate=amalgamate)
+    printed = shell("make", "-s", "run", folder=tmp_path)
+    assert "self-test: all steps equal the reference" in printed
+    last = [float(word) for word in printed.splitlines()[-1].split()]
+    assert abs(last[1] - last[3]) < 0.05
+    assert abs(last[2] + 0.5) < 0.05
+    shell("make", "-s", "clean", folder=tmp_path)
+    assert not (tmp_path / "build").exists()
+
+
+def test_the_bundle_builds_by_cmake(tmp_path: Path) -> None:
+    """CMakeLists.txt configures, builds and runs the same example."""
+    require("cmake", "cmake")
+    placed(presets.load("mambo"), tmp_path)
+    shell("cmake", "-S", ".", "-B", "out", folder=tmp_path)
+    shell("cmake", "--build", "out", folder=tmp_path)
+    assert "all steps equal" in shell("out/nmpc_example", folder=tmp_path)
+
+
+def test_fast_math_is_refused(tmp_path: Path) -> None:
+    """-ffast-math, which would remove the NaN checks, stops the build with the reason."""
+    require("gcc", "gcc")
+    placed(presets.load("mambo"), tmp_path)
+    command = ["gcc", "-ffast-math", "-Iinclude", "-c", "src/nmpc.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "build without -ffast-math" in done.stderr

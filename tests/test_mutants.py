@@ -1,0 +1,153 @@
+"""A wrong line of C turns parity red: deliberate one-line faults, each of which must be caught."""
+
+from functools import cache
+from typing import NamedTuple
+
+import pytest
+
+from codegen.reference import ReferenceController
+from codegen.render import render
+from codegen.settings import Settings
+from sil.compiled import CompiledController
+from sil.extension import load_extension
+from tests.support.cases import Inputs
+from tests.support.parity import Run, differences, inputs_of_steps, run
+from tests.support.tools import toolchain
+
+BACKTRACKING = Settings.model_validate(
+    {
+        "horizon": {"control": 3, "prediction_step_s": 0.05},
+        "model": {"roll_lag_s": 0.27, "pitch_lag_s": 0.15},
+        "cost": {"effort_weight": 40.0},
+        "optimizer": {
+            "iterations": 12,
+            "tolerance": 2.0,
+            "warm_start": "plan",
+            "step_min_rad": 0.004,
+            "step_max_rad": 0.03,
+        },
+        "limits": {"tilt_rad": 0.25},
+    }
+)
+STAYING = BACKTRACKING.model_copy(
+    update={
+        "optimizer": BACKTRACKING.optimizer.model_copy(
+            update={"variant": "irprop-", "warm_start": "last_command"}
+        )
+    }
+)
+CASES = 400
+
+
+class Mutant(NamedTuple):
+    """A fault: in `path`, the one place that reads `right` reads `wrong`."""
+
+    name: str
+    path: str
+    right: str
+    wrong: str
+    settings: Settings = BACKTRACKING
+
+
+MATH, PREDICTOR, COST = "src/nmpc_math.c", "src/nmpc_predictor.c", "src/nmpc_cost.c"
+OPTIMIZER, STEP, HELPERS, CONFIG = (
+    "src/nmpc_optimizer.c",
+    "src/nmpc.c",
+    "src/nmpc_math.h",
+    "include/nmpc_config.h",
+)
+
+MUTANTS = [
+    # signs
+    Mutant("roll pushes x the other way", PREDICTOR, "gain_x_m_s2[ROLL] = -across", "gain_x_m_s2[ROLL] = across"),
+    Mutant("pitch pushes x the other way", PREDICTOR, "gain_x_m_s2[PITCH] = -along", "gain_x_m_s2[PITCH] = along"),
+    Mutant("pitch pushes y the other way", PREDICTOR, "gain_y_m_s2[PITCH] = -across", "gain_y_m_s2[PITCH] = across"),
+    Mutant("error counts from the target", PREDICTOR, "state->position_m[0] - target->position_m[0]", "target->position_m[0] - state->position_m[0]"),
+    Mutant("sine of a half turn keeps its sign", MATH, "*sine = -sine_rest;", "*sine = sine_rest;"),
+    Mutant("quadrants of negative angles round up", MATH, "? -half : half", "? half : half"),
+    Mutant("the move climbs", OPTIMIZER, "move_rad - ((nmpc_real_t)slope", "move_rad + ((nmpc_real_t)slope"),
+    Mutant("the sign of zero is one", HELPERS, "(value > (nmpc_real_t)0) ? 1", "(value >= (nmpc_real_t)0) ? 1"),
+    Mutant("a negative value stays negative", HELPERS, "? -value : value", "? value : value"),
+    Mutant("leaving a move costs like entering it", COST, "slope = slope - nmpc_sign", "slope = slope + nmpc_sign"),
+    # bounds
+    Mutant("one predicted step too few", COST, "for (i = 0; i < NMPC_PREDICTION_HORIZON; i++)", "for (i = 0; i < NMPC_PREDICTION_HORIZON - 1; i++)"),
+    Mutant("the first predicted step left out", COST, "for (i = 0; i < NMPC_PREDICTION_HORIZON; i++)", "for (i = 1; i < NMPC_PREDICTION_HORIZON; i++)"),
+    Mutant("one iteration too few", OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration < NMPC_ITERATIONS - 1"),
+    Mutant("one iteration too many", OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
+    Mutant("the last move never updated", OPTIMIZER, "            for (k = 0; k < NMPC_MOVES; k++)", "            for (k = 0; k < NMPC_MOVES - 1; k++)"),
+    Mutant("the last move is left for another", COST, "if (k < (NMPC_MOVES - NMPC_AXES))", "if (k < (NMPC_MOVES - NMPC_AXES - 1))"),
+    Mutant("a sine term too few", MATH, "for (k = NMPC_SINE_TERMS - 2", "for (k = NMPC_SINE_TERMS - 3"),
+    Mutant("convergence tested at once", OPTIMIZER, "(iteration > 0) && ", ""),
+    Mutant("convergence at the tolerance itself", OPTIMIZER, "nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE", "self->cost - previous_cost < NMPC_TOLERANCE"),
+    # indices
+    Mutant("y looks where x is", PREDICTOR, "state->position_m[1] - target", "state->position_m[0] - target"),
+    Mutant("pitch takes roll's response", PREDICTOR, "pitch + (response_s2[i][k + PITCH]", "pitch + (response_s2[i][k + ROLL]"),
+    Mutant("the gradient of pitch takes roll's response", PREDICTOR, "(pitch * response_s2[i][k + PITCH])", "(pitch * response_s2[i][k + ROLL])"),
+    Mutant("pitch decays like roll", PREDICTOR, "free_s2[i][PITCH] * state->pitch_rad", "free_s2[i][ROLL] * state->pitch_rad"),
+    Mutant("a move follows the other axis", COST, "moves_rad[k - NMPC_AXES]", "moves_rad[k - 1]"),
+    Mutant("the command takes the second move", STEP, "self->command_rad[1] = self->plan_rad[1]", "self->command_rad[1] = self->plan_rad[3]"),
+    Mutant("roll and pitch change places", STEP, "command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),
+    Mutant("a reset starts pitch at roll", STEP, "self->command_rad[k % NMPC_AXES]", "self->command_rad[0]"),
+    # weights and constants
+    Mutant("effort free of charge in the gradient", COST, "(weights->effort * (nmpc_real_t)slope)", "((nmpc_real_t)slope)"),
+    Mutant("effort weighs like tracking in the cost", COST, "(weights->effort * variation_rad)", "(weights->tracking * variation_rad)"),
+    Mutant("tracking unweighted in the gradient", COST, "(weights->tracking * gradient[k])", "(gradient[k])"),
+    Mutant("time runs twice as fast for y", PREDICTOR, "(time_s[i] * error_y_m_s)", "((time_s[i] + time_s[i]) * error_y_m_s)"),
+    Mutant("thrust left out", PREDICTOR, "along = thrust_acceleration_m_s2 * along", "along = along"),
+    Mutant("steps grow while they should shrink", OPTIMIZER, "self->step_rad[k] * NMPC_DECREASE", "self->step_rad[k] * NMPC_INCREASE"),
+    Mutant("a table entry off by a tenth", PREDICTOR, "0.05f, 0.1f,", "0.05f, 0.11f,"),
+    # order of operations
+    Mutant("free error added before the sum", PREDICTOR, "prediction->free_x_m[i]\n                 + ((prediction->gain_x_m_s2[ROLL] * roll) + (prediction->gain_x_m_s2[PITCH] * pitch))", "(prediction->free_x_m[i]\n                 + (prediction->gain_x_m_s2[ROLL] * roll)) + (prediction->gain_x_m_s2[PITCH] * pitch)"),
+    Mutant("distance added one axis at a time", COST, "distance_m + (nmpc_absolute(error_x_m) + nmpc_absolute(error_y_m))", "distance_m + nmpc_absolute(error_x_m) + nmpc_absolute(error_y_m)"),
+    Mutant("sine multiplied out", MATH, "rest + (rest * (square * sine_rest))", "rest * ((nmpc_real_t)1 + (square * sine_rest))"),
+    Mutant("angle reduced in one go", MATH, "((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))", "(angle_rad - (count * (quarter_turn_rad[0] + quarter_turn_rad[1])))"),
+    # missing lines
+    Mutant("no clamp", OPTIMIZER, "nmpc_clamp(move_rad - ((nmpc_real_t)slope * self->step_rad[k]), NMPC_TILT_LIMIT_RAD)", "move_rad - ((nmpc_real_t)slope * self->step_rad[k])"),
+    Mutant("no lower clamp", HELPERS, "nmpc_smaller(nmpc_larger(value, -limit), limit)", "nmpc_smaller(value, limit)"),
+    Mutant("no largest step", OPTIMIZER, "nmpc_smaller(self->step_rad[k] * NMPC_INCREASE, NMPC_STEP_MAX_RAD)", "self->step_rad[k] * NMPC_INCREASE"),
+    Mutant("no smallest step", OPTIMIZER, "nmpc_larger(self->step_rad[k] * NMPC_DECREASE, NMPC_STEP_MIN_RAD)", "self->step_rad[k] * NMPC_DECREASE"),
+    Mutant("no backtracking", OPTIMIZER, "        self->plan_rad[k] = self->before_rad[k];\n", ""),
+    Mutant("backtracking from the start", OPTIMIZER, "        self->before_rad[k] = move_rad;\n", ""),
+    Mutant("backtracking where there is none", OPTIMIZER, "        self->direction[k] = 0;\n    } else", "        self->direction[k] = 0;\n        self->plan_rad[k] -= self->step_rad[k];\n    } else", STAYING),
+    Mutant("the stored slope outlives a crossing", OPTIMIZER, "        self->direction[k] = 0;\n    } else", "    } else"),
+    Mutant("step sizes live on", OPTIMIZER, "        self->step_rad[k] = NMPC_INITIAL_STEP_RAD;\n", ""),
+    Mutant("the plan starts over", STEP, "        nmpc_optimizer_minimize(self);", "        set_plan(self);\n        nmpc_optimizer_minimize(self);"),
+    Mutant("the plan lives on", STEP, "        set_plan(self);\n        nmpc_optimizer_minimize(self);", "        nmpc_optimizer_minimize(self);", STAYING),
+    Mutant("the frozen plan moves on", OPTIMIZER, "if (self->converged == 0U)", "if (self->converged <= 1U)"),
+    Mutant("yaw unchecked", STEP, "nmpc_within(state->yaw_rad, NMPC_YAW_RANGE_RAD)", "(state->yaw_rad == state->yaw_rad)"),
+    Mutant("NaN passes", HELPERS, "(value >= -limit) && (value <= limit)", "!((value < -limit) || (value > limit))"),
+    Mutant("velocity of the target unchecked", STEP, "           && nmpc_within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);", "           ;"),
+    Mutant("no least thrust", STEP, "(thrust_acceleration_m_s2 >= NMPC_THRUST_ACCELERATION_MIN_M_S2)", "(thrust_acceleration_m_s2 >= 0)"),
+    Mutant("negative weights pass", STEP, "(weights->effort >= (nmpc_real_t)0) && ", ""),
+    Mutant("a reset beyond the limit", STEP, "nmpc_clamp(command->roll_rad, NMPC_TILT_LIMIT_RAD)", "command->roll_rad"),
+    Mutant("bad input gets a level command", STEP, "    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
+    Mutant("the tilt limit an ulp wider", CONFIG, "NMPC_TILT_LIMIT_RAD 0.25f", "NMPC_TILT_LIMIT_RAD 0.25000003f"),
+]  # fmt: skip
+
+
+@cache
+def expected(settings: Settings) -> tuple[list[Inputs], Run]:
+    """Run the reference once for all mutants of `settings`."""
+    inputs = inputs_of_steps(settings, CASES, steps=4, seed=0)
+    return inputs, run(ReferenceController(settings, CASES), inputs, seed=0)
+
+
+def found(settings: Settings, files: dict[str, str]) -> Run:
+    """Build the C in `files` and run it through the same inputs."""
+    extension = load_extension(files, settings.code.scalar, toolchain("gcc"))
+    return run(CompiledController(settings, CASES, extension), expected(settings)[0], seed=0)
+
+
+@pytest.mark.parametrize("settings", [BACKTRACKING, STAYING], ids=["rprop+", "irprop-"])
+def test_the_unharmed_code_passes(settings: Settings) -> None:
+    """Without a fault the check that catches the mutants finds nothing."""
+    assert differences(expected(settings)[1], found(settings, render(settings))) == {}
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=[mutant.name for mutant in MUTANTS])
+def test_mutant_is_caught(mutant: Mutant) -> None:
+    """The fault applies, compiles, and shows as differing bits."""
+    files = render(mutant.settings)
+    assert mutant.right in files[mutant.path], "the template moved on: the mutant must follow"
+    harmed = files | {mutant.path: files[mutant.path].replace(mutant.right, mutant.wrong, 1)}
+    assert differences(expected(mutant.settings)[1], found(mutant.settings, harmed)) != {}

@@ -1,0 +1,163 @@
+"""The generated C computes the bits of the reference: per sub-block, then whole steps."""
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from codegen.horizon import horizon_tables
+from codegen.literals import SCALARS
+from codegen.reference import ReferenceController, cost
+from codegen.reference.math import sine_cosine
+from codegen.reference.predictor import Predictor
+from codegen.settings import Settings
+from codegen.trigonometry import SINE_ERRORS, YAW_LIMIT_RAD, trigonometry
+from sil.compiled import CompiledController, compiled
+from tests.support.cases import CORNER_HORIZONS, settings_case
+from tests.support.parity import differences, inputs_of_steps, run
+from tests.support.tools import toolchain
+
+BUILDS = [("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2")]
+FEW_SETTINGS = range(len(CORNER_HORIZONS) + 5)
+MANY_SETTINGS = range(50)
+
+
+def bits(values: Any) -> bytes:
+    """Return the bits of an array or of a cffi array copied into one."""
+    return np.ascontiguousarray(values).tobytes()
+
+
+class SubBlocks:
+    """The C of one set of settings, sub-block by sub-block."""
+
+    def __init__(self, settings: Settings) -> None:
+        extension: ModuleType = compiled(settings, toolchain("gcc"))
+        self.scalar = SCALARS[settings.code.scalar]
+        self.ffi, self.lib = extension.ffi, extension.lib
+
+    def reals(self, count: int) -> tuple[NDArray[Any], Any]:
+        """Make an array of `count` scalars and the pointer to it."""
+        array = np.zeros(count, self.scalar)
+        return array, self.pointer("nmpc_real_t", array)
+
+    def pointer(self, kind: str, array: NDArray[Any]) -> Any:
+        """Point at `array`."""
+        return self.ffi.cast(f"{kind} *", self.ffi.from_buffer(array))
+
+    def unpack(self, array: Any) -> NDArray[Any]:
+        """Copy an array out of C."""
+        return np.array(list(array), self.scalar)
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -> None:
+    """Over the whole range of yaw: same bits in C and Python, and the stated absolute error."""
+    blocks = SubBlocks(settings_case(0, scalar))
+    corners = np.arange(-651, 652) * (np.pi / 4)
+    angles = np.concatenate(
+        [
+            corners,
+            np.random.default_rng(0).uniform(-1, 1, 20_000) * YAW_LIMIT_RAD,
+            [0.0, -0.0, 1024.0, -1024.0],
+        ]
+    ).astype(blocks.scalar)
+    sine, cosine = sine_cosine(angles, trigonometry(scalar))
+    (c_sine, sine_pointer), (c_cosine, cosine_pointer) = blocks.reals(1), blocks.reals(1)
+    for angle, expected_sine, expected_cosine in zip(angles, sine, cosine, strict=True):
+        blocks.lib.nmpc_sine_cosine(angle, sine_pointer, cosine_pointer)
+        assert bits(c_sine) == bits(expected_sine)
+        assert bits(c_cosine) == bits(expected_cosine)
+
+    exact = angles.astype(np.longdouble)
+    assert float(np.max(np.abs(sine - np.sin(exact)))) < SINE_ERRORS[scalar]
+    assert float(np.max(np.abs(cosine - np.cos(exact)))) < SINE_ERRORS[scalar]
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None:
+    """Gains, free errors, predicted errors, carried gradient, cost and its gradient have the same bits."""
+    settings = settings_case(index, scalar)
+    blocks = SubBlocks(settings)
+    ffi, lib = blocks.ffi, blocks.lib
+    prediction_horizon, moves_count = settings.horizon.prediction, 2 * settings.horizon.control
+    predictor = Predictor(settings, horizon_tables(settings), blocks.scalar)
+    rng = np.random.default_rng(index)
+    prediction = ffi.new("nmpc_prediction_t *")
+    (error_x, x_pointer), (error_y, y_pointer) = blocks.reals(1), blocks.reals(1)
+
+    for _ in range(50):
+        state = (rng.normal(0, 1, (1, 7)) * [1, 1, 1, 1, 0.3, 0.3, 10]).astype(blocks.scalar)
+        target = rng.normal(0, 1, (1, 4)).astype(blocks.scalar)
+        thrust = rng.uniform(5, 15, 1).astype(blocks.scalar)
+        last = rng.uniform(-0.3, 0.3, (1, 2)).astype(blocks.scalar)
+        moves = rng.uniform(-0.3, 0.3, (1, moves_count // 2, 2)).astype(blocks.scalar)
+        moves[0, 0, int(rng.integers(2))] = last[0, 0]
+        weights = rng.uniform(0, 1000, (1, 2)).astype(blocks.scalar)
+        slopes = rng.choice([-1, 0, 1], (1, 2, prediction_horizon)).astype(blocks.scalar)
+
+        expected = predictor.prepare(state, target, thrust)
+        lib.nmpc_predictor_prepare(
+            blocks.pointer("nmpc_state_t", state),
+            blocks.pointer("nmpc_target_t", target),
+            thrust[0],
+            prediction,
+        )
+        gains = [blocks.unpack(prediction.gain_x_m_s2), blocks.unpack(prediction.gain_y_m_s2)]
+        frees = [blocks.unpack(prediction.free_x_m), blocks.unpack(prediction.free_y_m)]
+        assert bits(gains) == bits(expected.gain_m_s2[0])
+        assert bits(frees) == bits(expected.free_error_m[0])
+
+        errors = predictor.error(expected, moves)[0]
+        carried, carried_pointer = blocks.reals(moves_count)
+        for i in range(prediction_horizon):
+            lib.nmpc_predictor_error(
+                prediction, blocks.pointer("nmpc_real_t", moves), i, x_pointer, y_pointer
+            )
+            assert bits([error_x[0], error_y[0]]) == bits(errors[:, i])
+            lib.nmpc_predictor_add_gradient(prediction, i, slopes[0, 0, i], slopes[0, 1, i], carried_pointer)
+        assert bits(carried) == bits(predictor.gradient(expected, slopes))
+
+        gradient, gradient_pointer = blocks.reals(moves_count)
+        c_cost = lib.nmpc_cost_evaluate(
+            prediction,
+            blocks.pointer("nmpc_weights_t", weights),
+            blocks.pointer("nmpc_real_t", last),
+            blocks.pointer("nmpc_real_t", moves),
+            gradient_pointer,
+        )
+        expected_cost, expected_gradient = cost.evaluate(predictor, expected, weights, moves, last)
+        assert bits(blocks.scalar(c_cost)) == bits(expected_cost)
+        assert bits(gradient) == bits(expected_gradient)
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_steps_equal_the_reference(index: int, scalar: str) -> None:
+    """Over random and corner cases, resets and reweightings: not one differing bit, gcc and clang."""
+    settings = settings_case(index, scalar)
+    n = 250
+    inputs = inputs_of_steps(settings, n, steps=4, seed=index)
+    expected = run(ReferenceController(settings, n), inputs, index)
+    for compiler in ("gcc", "clang"):
+        extension = compiled(settings, toolchain(compiler))
+        found = run(CompiledController(settings, n, extension), inputs, index)
+        assert differences(expected, found) == {}, f"{compiler} for {settings!r}"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("index", MANY_SETTINGS)
+def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int, scalar: str) -> None:
+    """100,000 cases of each of 50 settings: not one differing bit, at every optimisation, gcc and clang."""
+    settings = settings_case(index, scalar)
+    chunk = 1000
+    extensions = [compiled(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
+    for seed in range(25):
+        inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
+        expected = run(ReferenceController(settings, chunk), inputs, seed)
+        for (compiler, level), extension in zip(BUILDS, extensions, strict=True):
+            found = run(CompiledController(settings, chunk, extension), inputs, seed)
+            assert differences(expected, found) == {}, f"{compiler} {level} for {settings!r}"
