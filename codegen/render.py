@@ -55,11 +55,9 @@ def render(settings: Settings, *, amalgamate: bool = False) -> dict[str, str]:
         }
         library = {_home(name): content for name, content in text.items()}
     files = library | {path: template.render(context | layout) for path, template in project.items()}
-    files["controller.toml"] = to_toml(settings)
-    return {
-        with_prefix(path, settings.code.prefix): with_prefix(files[path], settings.code.prefix)
-        for path in files
-    }
+    prefix = settings.code.prefix
+    named = {with_prefix(path, prefix): with_prefix(text, prefix) for path, text in files.items()}
+    return named | {"controller.toml": to_toml(settings)}
 
 
 def with_prefix(text: str, prefix: str) -> str:
@@ -94,6 +92,7 @@ def _context(settings: Settings) -> dict[str, object]:
             (f"{section}.{key}", value)
             for section, values in settings.model_dump().items()
             for key, value in values.items()
+            if key != "prefix"  # the one text of the user's; the names show it
         ],
         "version": codegen.__version__,
         "digest": settings.digest[:16],

@@ -1,0 +1,57 @@
+"""The named presets: small TOML files that hold only what departs from the defaults, and say why."""
+
+import difflib
+from importlib import resources
+from pathlib import Path
+
+from codegen import settings_toml
+from codegen.errors import SourceNotFoundError, echo
+from codegen.settings import Settings
+
+_FOLDER = resources.files("codegen") / "data" / "presets"
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the presets, sorted."""
+    return tuple(sorted(file.name.removesuffix(".toml") for file in _FOLDER.iterdir()))
+
+
+def preset(name: str) -> Settings:
+    """Return the settings of the preset `name`; raises SourceNotFoundError."""
+    return settings_toml.parse(_text(name), f"preset {name}")
+
+
+def description(name: str) -> str:
+    """Return what the preset `name` is for, in one line; raises SourceNotFoundError."""
+    return _text(name).splitlines()[0].removeprefix("# ")
+
+
+def load(name_or_path: str) -> Settings:
+    """Return the settings of a preset, or else of the file at a path (./mambo is a file, mambo a preset).
+
+    Raises SourceNotFoundError if there is neither, and the errors of `settings_toml.read`.
+    """
+    if name_or_path in names():
+        return preset(name_or_path)
+    try:
+        found = Path(name_or_path).exists()
+    except OSError:
+        found = False
+    if not found:
+        raise _not_found(name_or_path, "neither a preset nor a file")
+    return settings_toml.read(Path(name_or_path))
+
+
+def _text(name: str) -> str:
+    if name not in names():
+        raise _not_found(name, "not a preset")
+    return (_FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _not_found(name: str, what: str) -> SourceNotFoundError:
+    near = difflib.get_close_matches(name, names(), n=1)
+    guess = f" (did you mean {near[0]}?)" if near else ""
+    return SourceNotFoundError(
+        f"{echo(name)} is {what}{guess}; presets are {', '.join(names())}, "
+        "and `mambo-nmpc init` writes a controller.toml to start from"
+    )

@@ -1,0 +1,102 @@
+"""Turn what pydantic finds wrong with settings into sentences: key, value, rule and fix, one per fault."""
+
+import difflib
+import json
+import math
+import re
+from collections.abc import Mapping
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from codegen.errors import echo
+from codegen.settings_keys import KEYS, SECTIONS, Key
+
+_LONGEST_NUMBER_BITS = 190
+"""Whole numbers up to here (58 digits) are repeated in a message, longer ones described."""
+
+
+def faults(error: ValidationError, document: Mapping[str, object]) -> tuple[str, ...]:
+    """Return one sentence for each fault that `error` found in `document`, without the name of its source."""
+    return tuple(
+        _fault(details, document) for details in error.errors(include_url=False, include_context=False)
+    )
+
+
+def _fault(details: ErrorDetails, document: Mapping[str, object]) -> str:
+    """Say which key is wrong, with its value, and what to write instead."""
+    names = [str(part) for part in details["loc"]]
+    dotted = ".".join(_spelled_name(name) for name in names)
+    if details["type"] == "extra_forbidden":
+        return _unknown(names, dotted)
+    value = details["input"]
+    if len(names) == 1:
+        return f"{dotted} = {_spelled_value(value)} must be a section; write [{dotted}] and its keys below"
+    key = KEYS[dotted]
+    section = document.get(names[0])
+    default = "" if isinstance(section, Mapping) and names[1] in section else " (the default)"
+    return f"{dotted} = {_spelled_value(value)}{default} {_rule(details, key)}"
+
+
+def _rule(details: ErrorDetails, key: Key) -> str:
+    """Return what the value must be, from "must" on."""
+    value = details["input"]
+    match details["type"]:
+        case "int_type" | "float_type" if not (isinstance(value, int) and not isinstance(value, bool)):
+            return f"must be a {key.kind} and {key.rule}"
+        case "int_type" | "float_type" | "less_than_equal" | "greater_than_equal":
+            return f"must {key.rule}{_unit_hint(value, key)}"
+        case "finite_number":
+            return f"must be a finite number; it must {key.rule}"
+        case "literal_error" | "string_type" | "string_pattern_mismatch" | "string_too_long":
+            return f"must {key.rule}"
+        case _:
+            return details["msg"]
+
+
+def _unit_hint(value: float, key: Key) -> str:
+    """Return a hint for a number in the unit that people use instead of ours, or nothing."""
+    if key.low is None or key.high is None or not key.high < value < 1e6:
+        return ""
+    if key.path.endswith(("_period_s", "_step_s")) and key.low <= 1 / value <= key.high:
+        return f"; it is a period in seconds: for {value:g} Hz write {1 / value:.3g}"
+    if key.path.endswith("_rad") and key.low <= math.radians(value) <= key.high:
+        return f"; it is in radians: for {value:g} degrees write {math.radians(value):.3g}"
+    return ""
+
+
+def _unknown(names: list[str], dotted: str) -> str:
+    """Say that a section or key does not exist, with the nearest one that does."""
+    if len(names) == 1:
+        return f"{dotted} is not a section{_suggestion(names[0], list(SECTIONS))}"
+    siblings = [path.removeprefix(f"{names[0]}.") for path in KEYS if path.startswith(f"{names[0]}.")]
+    return f"{dotted} is not a setting{_suggestion(names[1], siblings)}"
+
+
+def _suggestion(name: str, siblings: list[str]) -> str:
+    """Return what the writer of `name` may have meant: a sibling, a key of another section, or the choice."""
+    elsewhere = [path for path in KEYS if path.endswith(f".{name}")]
+    near = difflib.get_close_matches(name, siblings, n=1) or elsewhere[:1]
+    return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(siblings)}"
+
+
+def _spelled_name(name: str) -> str:
+    """Return a key as TOML spells it, bare if it can be."""
+    return echo(name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False))
+
+
+def _spelled_value(value: object) -> str:
+    """Return a value as TOML spells it, shortened; a whole table or list only by its kind."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case int() if value.bit_length() > _LONGEST_NUMBER_BITS:
+            return f"{'-' if value < 0 else ''}1e{int(value.bit_length() * math.log10(2))} or so"
+        case str():
+            return echo(json.dumps(value[:1000], ensure_ascii=False))
+        case dict():
+            return "a table"
+        case list():
+            return "a list"
+        case _:
+            return echo(str(value))

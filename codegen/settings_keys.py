@@ -1,0 +1,59 @@
+"""The keys of controller.toml as records made from the settings model: what messages and comments quote."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from codegen.settings import Settings
+
+
+@dataclass(frozen=True)
+class Key:
+    """One setting: its dotted path, what it means, what it admits.
+
+    `kind` is "whole number", "number", "one of" or "text"; `domain` is the admitted values in words; `rule`
+    follows "must" in a message; `low` and `high` bound a number and are None for text.
+    """
+
+    path: str
+    description: str
+    kind: str
+    domain: str
+    rule: str
+    low: float | None = None
+    high: float | None = None
+
+
+def spelled(value: object) -> str:
+    """Return a setting's value as TOML spells it: the shortest decimal, text in quotes."""
+    if isinstance(value, float):
+        return repr(value).replace("e-0", "e-")
+    return f'"{value}"' if isinstance(value, str) else str(value)
+
+
+def _key(path: str, schema: dict[str, Any]) -> Key:
+    """Return the key at `path` from its JSON schema."""
+    description = schema["description"]
+    if "enum" in schema:
+        choices = " or ".join(spelled(choice) for choice in schema["enum"])
+        return Key(path, description, "one of", choices, f"be {choices}")
+    if "pattern" in schema:
+        words = f"lower-case letters, digits and single inner underscores, at most {schema['maxLength']}"
+        return Key(path, description, "text", words, f"be {words}, a letter first")
+    low, high = schema["minimum"], schema["maximum"]
+    kind = "whole number" if schema["type"] == "integer" else "number"
+    if "not" in schema:
+        domain = f"0 or {schema['not']['exclusiveMaximum']:.10g}..{high:.10g}"
+        return Key(path, description, kind, domain, f"be {domain}", low, high)
+    domain = f"{spelled(low)}..{high:.10g}"
+    return Key(path, description, kind, domain, f"lie in {domain}", low, high)
+
+
+SECTIONS: dict[str, str] = {name: field.description or "" for name, field in Settings.model_fields.items()}
+"""What each section is about, in the order of the file."""
+
+KEYS: dict[str, Key] = {
+    f"{section}.{name}": _key(f"{section}.{name}", schema)
+    for section, field in Settings.model_fields.items()
+    for name, schema in field.default.model_json_schema()["properties"].items()
+}
+"""Every setting by its dotted path, in the order of the file."""

@@ -1,0 +1,225 @@
+"""The commands that generate: what they print where, what they write, and how they fail."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from codegen import cli, presets, settings_toml
+from codegen.settings import Settings
+
+COMMAND = "from codegen import cli; app = cli.root(); cli.register(app); app()"
+INTERRUPTED = """
+from codegen import cli
+app = cli.root()
+cli.register(app)
+@app.command()
+def stop(): raise KeyboardInterrupt
+app()
+"""
+
+
+@pytest.fixture(scope="module")
+def app() -> typer.Typer:
+    """Build the command with the sub-commands of codegen."""
+    app = cli.root()
+    cli.register(app)
+    return app
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(app: typer.Typer, *arguments: str, code: int = 0) -> tuple[str, str]:
+    """Run the command, demand its exit code, and return stdout and stderr."""
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == code, result.output
+    return result.stdout, result.stderr
+
+
+def test_init_writes_the_commented_settings_of_a_preset(app: typer.Typer) -> None:
+    """The file that init writes reads back as the preset, mambo if none is named."""
+    run(app, "init")
+    run(app, "init", "table1", "-o", "paper.toml")
+    assert presets.load("controller.toml") == presets.preset("mambo")
+    assert presets.load("paper.toml") == presets.preset("table1")
+
+
+def test_init_overwrites_only_by_force(app: typer.Typer) -> None:
+    """A controller.toml somebody worked on stays until --force."""
+    Path("controller.toml").write_text("mine", encoding="utf-8")
+    _, talk = run(app, "init", code=2)
+    assert talk == "controller.toml: already exists; name another with -o, or overwrite it with --force\n"
+    assert Path("controller.toml").read_text(encoding="utf-8") == "mine"
+    run(app, "init", "--force")
+    assert presets.load("controller.toml") == presets.preset("mambo")
+
+
+def test_init_to_stdout_prints_the_file_alone(app: typer.Typer) -> None:
+    """With -o - the settings are the whole of stdout."""
+    text, talk = run(app, "init", "-o", "-")
+    assert settings_toml.parse(text, "stdout") == presets.preset("mambo")
+    assert talk == ""
+    assert not Path("controller.toml").exists()
+
+
+def test_init_where_nothing_can_be_written_says_so(app: typer.Typer) -> None:
+    """A folder that is not there gets a message."""
+    _, talk = run(app, "init", "-o", "none/controller.toml", code=2)
+    assert talk == "none/controller.toml: cannot be written: No such file or directory\n"
+
+
+def test_presets_lists_every_preset_with_its_use(app: typer.Typer) -> None:
+    """People get a line per preset, machines a JSON object."""
+    lines = run(app, "presets")[0].splitlines()
+    described = {name: presets.description(name) for name in presets.names()}
+    assert {line.split()[0]: line.split(maxsplit=1)[1] for line in lines} == described
+    assert json.loads(run(app, "presets", "--json")[0]) == described
+
+
+def test_schema_prints_the_json_schema(app: typer.Typer) -> None:
+    """What schema prints is a JSON schema that every preset fits."""
+    schema = json.loads(run(app, "schema")[0])
+    for name in presets.names():
+        jsonschema.validate(presets.preset(name).model_dump(), schema)
+
+
+def test_generate_reports_what_it_did(app: typer.Typer) -> None:
+    """The first run creates; a second, from the bundle's own controller.toml, finds nothing to do."""
+    created, talk = run(app, "generate", "-o", "out")
+    assert "created src/nmpc.c\n" in created
+    assert talk == f"out: written, settings {presets.preset('mambo').digest[:16]}\n"
+    assert {line.split()[1] for line in created.splitlines()} == {
+        path.relative_to("out").as_posix() for path in Path("out").rglob("*") if path.is_file()
+    }
+    assert run(app, "generate", "out/controller.toml", "-o", "out")[0] == ""
+
+
+def test_generate_as_json_tells_digest_and_files(app: typer.Typer) -> None:
+    """Machines get the outcome of a run, dry or not, as one JSON object."""
+    dry = json.loads(run(app, "generate", "-o", "out", "--dry-run", "--json")[0])
+    assert not Path("out").exists()
+    real = json.loads(run(app, "generate", "-o", "out", "--json")[0])
+    assert (dry.pop("dry_run"), real.pop("dry_run")) == (True, False)
+    assert dry == real
+    assert real["digest"] == presets.preset("mambo").digest
+    assert "manifest.json" in real["created"]
+
+
+def test_check_passes_on_an_up_to_date_folder(app: typer.Typer) -> None:
+    """No output and exit code 0 where nothing drifted."""
+    run(app, "generate", "table1", "-o", "out")
+    assert run(app, "generate", "table1", "-o", "out", "--check") == ("", "out: up to date\n")
+
+
+def test_check_shows_drift_and_exits_1(app: typer.Typer) -> None:
+    """A changed file is shown as a diff, to machines as JSON, and stays as it is."""
+    run(app, "generate", "-o", "out")
+    source = Path("out/src/nmpc.c")
+    source.write_text(source.read_text(encoding="utf-8") + "/* by hand */\n", encoding="utf-8")
+    diff, talk = run(app, "generate", "-o", "out", "--check", code=1)
+    assert "--- src/nmpc.c (on disk)\n+++ src/nmpc.c (generated)\n" in diff
+    assert "\n-/* by hand */\n" in diff
+    assert talk.startswith("out: not up to date")
+    (drift,) = json.loads(run(app, "generate", "-o", "out", "--check", "--json", code=1)[0])["drifts"]
+    assert (drift["path"], drift["kind"]) == ("src/nmpc.c", "changed")
+    assert "by hand" in source.read_text(encoding="utf-8")
+
+
+def test_generate_keeps_edited_files_until_forced(app: typer.Typer) -> None:
+    """An edited file is named and kept; --force takes it back."""
+    run(app, "generate", "-o", "out")
+    Path("out/Makefile").write_text("mine", encoding="utf-8")
+    assert "Makefile (edited by hand)" in run(app, "generate", "-o", "out", code=2)[1]
+    assert run(app, "generate", "-o", "out", "--force")[0] == "changed Makefile\n"
+
+
+def test_check_refuses_options_that_write(app: typer.Typer) -> None:
+    """--check with --force would promise what it does not do."""
+    assert "--check" in run(app, "generate", "-o", "out", "--check", "--force", code=2)[1]
+
+
+@pytest.mark.parametrize("prefix", ["roll", "nmpc_left", "left_nmpc"])
+def test_options_override_the_settings_and_the_bundle_remembers(app: typer.Typer, prefix: str) -> None:
+    """--prefix and --scalar end up in the bundle's controller.toml, which generates the same bundle."""
+    run(app, "generate", "-o", "out", "--prefix", prefix, "--scalar", "float64")
+    written = presets.load("out/controller.toml")
+    assert (written.code.prefix, written.code.scalar) == (prefix, "float64")
+    assert written.cost == Settings().cost
+    assert Path(f"out/include/{prefix}.h").is_file()
+    run(app, "generate", "out/controller.toml", "-o", "out", "--check")
+
+
+def test_amalgamated_bundle_is_one_header_and_one_source(app: typer.Typer) -> None:
+    """--amalgamate puts the library into two files, and replaces a bundle of many."""
+    run(app, "generate", "-o", "out")
+    run(app, "generate", "-o", "out", "--amalgamate")
+    assert sorted(path.name for path in Path("out").glob("*.[ch]")) == ["nmpc.c", "nmpc.h"]
+    assert not Path("out/src").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--prefix", "int"], '--prefix: code.prefix = "int" must not be a keyword'),
+        (["--scalar", "float16"], '--scalar: code.scalar = "float16" must be "float32" or "float64"'),
+        (["nope"], "nope is neither a preset nor a file"),
+        (["slow.toml"], "slow.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)"),
+    ],
+)
+def test_bad_input_gets_a_message_and_exit_code_2(
+    app: typer.Typer, arguments: list[str], message: str
+) -> None:
+    """What the user got wrong is said on stderr without a traceback, and nothing is written."""
+    Path("slow.toml").write_text("horizon.control = 11", encoding="utf-8")
+    results, talk = run(app, "generate", "-o", "out", *arguments, code=2)
+    assert results == ""
+    assert talk.startswith(message)
+    assert "Traceback" not in talk
+    assert not Path("out").exists()
+
+
+def test_debug_shows_the_traceback() -> None:
+    """With --debug an error arrives whole."""
+    command = [sys.executable, "-c", COMMAND, "--debug", "generate", "nope", "-o", "out"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "Traceback" in result.stderr
+    assert "SourceNotFoundError: nope is neither" in result.stderr
+
+
+def test_output_that_nobody_reads_ends_quietly() -> None:
+    """A closed pipe (| head) ends the command as the signal would, without a traceback."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-c", COMMAND, "schema"]
+    with os.fdopen(writer, "wb") as closed:
+        result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False)
+    assert (result.returncode, result.stderr) == (cli.NO_READER, b"")
+
+
+def test_ctrl_c_exits_130() -> None:
+    """An interrupted command says so by its exit code, without a traceback."""
+    command = [sys.executable, "-c", INTERRUPTED, "stop"]
+    result = subprocess.run(command, capture_output=True, check=False)
+    assert (result.returncode, result.stderr) == (cli.INTERRUPTED, b"")
+
+
+@pytest.mark.parametrize("command", ["init", "presets", "schema", "generate"])
+def test_help_teaches_by_example(app: typer.Typer, command: str) -> None:
+    """Every command explains itself, and those with options show examples."""
+    text = run(app, command, "--help")[0]
+    assert command == "presets" or f"mambo-nmpc {command}" in text
+    assert "\x1b" not in text
+
+
+def test_version_is_printed(app: typer.Typer) -> None:
+    """--version prints name and version."""
+    assert run(app, "--version")[0].startswith("mambo-nmpc ")
