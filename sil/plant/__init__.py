@@ -1,0 +1,1 @@
+"""The simulated vehicle: rigid body, rotors, stock control loops and the integrator that moves them."""

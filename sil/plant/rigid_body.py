@@ -1,0 +1,102 @@
+"""The rigid body of the paper: equations 2 to 7 with r_C = 0, and Euler's rotational dynamics.
+
+World frame NED, body frame forward-right-down, Euler angles 3-2-1. Arrays are component-major: the rows
+of a state (12, n) are
+
+    0:3   position in the world frame, m                      r_A
+    3:6   velocity in the body frame, m/s                     v_A
+    6:9   roll, pitch, yaw, rad                               phi, theta, psi
+    9:12  body rates, rad/s                                   w_A
+
+and those of a wrench (4, n) are the total rotor thrust along -z of the body (N, u1 of equation 6) and the
+torques about the body axes x, y, z (N m).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sil.plant.airframe import GRAVITY_M_S2, FloatArray, PerFlight
+
+POSITION = slice(0, 3)
+VELOCITY = slice(3, 6)
+EULER = slice(6, 9)
+RATES = slice(9, 12)
+STATE_ROWS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A rigid body with linear rotor drag in a field of gravity and wind.
+
+    Blade flapping acts in the plane of the rotors and is proportional to the speed along it (Pounds,
+    Mahony and Corke 2010). Wind is a disturbance acceleration in the world frame.
+    """
+
+    mass_kg: PerFlight
+    inertia_kg_m2: tuple[PerFlight, PerFlight, PerFlight]
+    drag_1_s: PerFlight
+    wind_m_s2: tuple[PerFlight, PerFlight]
+
+    def derivative(self, state: FloatArray, wrench: FloatArray) -> FloatArray:
+        """Return the time derivative (12, n) of a state (12, n) under a wrench (4, n)."""
+        sin_roll, sin_pitch, sin_yaw = sines = np.sin(state[EULER])
+        cos_roll, cos_pitch, cos_yaw = cosines = np.cos(state[EULER])
+        u, v, w = state[VELOCITY]
+        p, q, r = state[RATES]
+        thrust, roll_torque, pitch_torque, yaw_torque = wrench
+        inertia_x, inertia_y, inertia_z = self.inertia_kg_m2
+        wind_x, wind_y = self.wind_m_s2
+
+        rate = np.empty_like(state)
+
+        # Equation 2.
+        rate[POSITION] = _to_world(sines, cosines, state[VELOCITY])
+
+        # Equation 7 with the wind beside gravity: R transposed takes both to the body frame.
+        along = cos_yaw * wind_x + sin_yaw * wind_y
+        across = cos_yaw * wind_y - sin_yaw * wind_x
+        below = cos_pitch * GRAVITY_M_S2 + sin_pitch * along
+        field_x = cos_pitch * along - sin_pitch * GRAVITY_M_S2
+        field_y = cos_roll * across + sin_roll * below
+        field_z = cos_roll * below - sin_roll * across
+
+        # Equation 6, solved for the derivative of v_A.
+        rate[3] = field_x - self.drag_1_s * u - (q * w - r * v)
+        rate[4] = field_y - self.drag_1_s * v - (r * u - p * w)
+        rate[5] = field_z - thrust / self.mass_kg - (p * v - q * u)
+
+        # Equations 4 and 5.
+        turn = sin_roll * q + cos_roll * r
+        yaw_rate = turn / cos_pitch
+        rate[6] = p + sin_pitch * yaw_rate
+        rate[7] = cos_roll * q - sin_roll * r
+        rate[8] = yaw_rate
+
+        # Euler: J w' = torque - w x J w.
+        rate[9] = (roll_torque - (inertia_z - inertia_y) * (q * r)) / inertia_x
+        rate[10] = (pitch_torque - (inertia_x - inertia_z) * (r * p)) / inertia_y
+        rate[11] = (yaw_torque - (inertia_y - inertia_x) * (p * q)) / inertia_z
+        return rate
+
+
+def world_velocity(state: FloatArray) -> FloatArray:
+    """Return the velocity (3, n) in the world frame (equation 2) of a state (12, n)."""
+    return _to_world(np.sin(state[EULER]), np.cos(state[EULER]), state[VELOCITY])
+
+
+def _to_world(sines: FloatArray, cosines: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return R times a body vector (3, n): the three rotations of equation 3, one after the other."""
+    sin_roll, sin_pitch, sin_yaw = sines
+    cos_roll, cos_pitch, cos_yaw = cosines
+    x, y, z = vector
+    lateral = cos_roll * y - sin_roll * z
+    vertical = sin_roll * y + cos_roll * z
+    forward = cos_pitch * x + sin_pitch * vertical
+    world = np.empty_like(vector)
+    world[0] = cos_yaw * forward - sin_yaw * lateral
+    world[1] = sin_yaw * forward + cos_yaw * lateral
+    world[2] = cos_pitch * vertical - sin_pitch * x
+    return world

@@ -1,0 +1,65 @@
+"""Four rotors: mixer, motor command limits, motor lag, and the wrench they exert.
+
+Rotors in body axes, seen from above: 1 front left, 2 front right, 3 rear right, 4 rear left. Rotors 1 and 3
+spin clockwise (positive about body z), 2 and 4 counter-clockwise. Thrust is positive upwards, along -z of
+the body (the stock code counts it negative upwards).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from sil.plant.airframe import Airframe, FloatArray, PerFlight
+
+WRENCH_SIGNS = np.array(
+    [
+        [1.0, 1.0, 1.0, 1.0],  # thrust
+        [1.0, -1.0, -1.0, 1.0],  # roll: the left rotors push the left side up
+        [1.0, 1.0, -1.0, -1.0],  # pitch: the front rotors push the nose up
+        [-1.0, 1.0, -1.0, 1.0],  # yaw: the reaction to the spin
+    ]
+)
+"""Sign with which each rotor (column) enters thrust, roll, pitch and yaw torque (row).
+
+The rows are orthogonal, so a quarter of the transpose is the inverse: the mixer.
+"""
+
+
+def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
+    """Return the motor commands (4, n) that ask for a wrench (4, n), clipped to the command limits."""
+    offset = nominal.rotor_offset_m
+    lever = np.array([[1.0], [offset], [offset], [nominal.torque_per_thrust_m]])
+    shares = wrench / (4.0 * lever * nominal.thrust_per_command_n)
+    commands = np.add.reduce(WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :], axis=0)
+    return np.asarray(np.clip(commands, nominal.command_min, nominal.command_max))
+
+
+@dataclass(frozen=True, eq=False)
+class Rotors:
+    """The rotors of a real airframe: their speed follows the command with a first-order lag (0: at once)."""
+
+    airframe: Airframe
+    lag_s: PerFlight
+
+    def commanded_speed_rad_s(self, command: FloatArray) -> FloatArray:
+        """Return the steady rotor speeds (4, n) of motor commands (4, n)."""
+        return np.sqrt(self.airframe.speed_squared_per_command_rad2_s2 * command)
+
+    def decay(self, time_s: FloatArray) -> FloatArray:
+        """Return the share (k, 1, n or 1) of a speed error that is left after each of k times."""
+        lag_s = np.atleast_1d(self.lag_s)
+        lagging = lag_s > 0.0
+        exponent = time_s[:, np.newaxis] / np.where(lagging, lag_s, 1.0)
+        return np.asarray(np.where(lagging, np.exp(-exponent), 0.0)[:, np.newaxis, :])
+
+    def wrench(self, speed_rad_s: FloatArray) -> FloatArray:
+        """Return the wrenches (4, k, n) of rotor speeds (k, 4, n)."""
+        thrusts_n = self.airframe.thrust_factor_n_s2 * (speed_rad_s * speed_rad_s)
+        wrench: FloatArray = np.add.reduce(WRENCH_SIGNS[:, np.newaxis, :, np.newaxis] * thrusts_n, axis=2)
+        wrench[1:3] *= self.airframe.rotor_offset_m
+        wrench[3] *= self.airframe.torque_per_thrust_m
+        return wrench

@@ -1,0 +1,331 @@
+"""The vehicle: airframe, mixer and rotors, rigid body, integrator, stock loops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # scipy ships no types
+
+from sil.plant import loops
+from sil.plant.airframe import GRAVITY_M_S2, MAMBO
+from sil.plant.integrator import NODES, bogacki_shampine
+from sil.plant.rigid_body import RigidBody, world_velocity
+from sil.plant.rotors import Rotors, mix
+from sil.plant.vehicle import STEP_S, Vehicle, VehicleState, thrust_demand
+
+FloatArray = NDArray[np.float64]
+
+STOCK_MIXER = np.array(
+    [
+        [0.25, 103.5736, -5.66592, -5.66592],
+        [0.25, -103.5736, -5.66592, 5.66592],
+        [0.25, 103.5736, 5.66592, 5.66592],
+        [0.25, -103.5736, 5.66592, -5.66592],
+    ]
+)
+"""Stock table: thrust of each motor (negative up) from thrust (negative up), yaw, pitch, roll torque."""
+
+OFFSET_M = 0.0441235
+ROTOR_POSITIONS_M = np.array(
+    [
+        [OFFSET_M, -OFFSET_M, 0.0],
+        [OFFSET_M, OFFSET_M, 0.0],
+        [-OFFSET_M, OFFSET_M, 0.0],
+        [-OFFSET_M, -OFFSET_M, 0.0],
+    ]
+)
+ROTOR_SPINS = np.array([1.0, -1.0, 1.0, -1.0])
+
+
+def rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
+    """Return R of equation 3 as the product of its three matrices."""
+    about_x = [[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]]
+    about_y = [[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]]
+    about_z = [[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]
+    return np.array(about_z) @ np.array(about_y) @ np.array(about_x)
+
+
+def paper_derivative(state: FloatArray, wrench: FloatArray, body: RigidBody) -> FloatArray:
+    """Return the derivative (12,) from equations 2 to 7 in matrix form, and Euler's equation."""
+    velocity, rates = state[3:6], state[9:12]
+    roll, pitch, yaw = state[6:9]
+    matrix = rotation(roll, pitch, yaw)
+    gamma = np.array(
+        [
+            [1, np.sin(roll) * np.tan(pitch), np.cos(roll) * np.tan(pitch)],
+            [0, np.cos(roll), -np.sin(roll)],
+            [0, np.sin(roll) / np.cos(pitch), np.cos(roll) / np.cos(pitch)],
+        ]
+    )
+    inertia = np.diag(np.array(body.inertia_kg_m2))
+    wind = matrix.T @ np.array([*body.wind_m_s2, 0.0])
+    gravity = GRAVITY_M_S2 * np.array(
+        [-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)]
+    )
+    force = -np.array([0.0, 0.0, wrench[0]]) / body.mass_kg - body.drag_1_s * velocity * [1.0, 1.0, 0.0]
+    return np.concatenate(
+        [
+            matrix @ velocity,
+            gravity + wind + force - np.cross(rates, velocity),
+            gamma @ rates,
+            np.linalg.solve(inertia, wrench[1:] - np.cross(rates, inertia @ rates)),
+        ]
+    )
+
+
+def body_of(vehicle: Vehicle) -> RigidBody:
+    """Return a Mambo with wind, for free motion."""
+    return replace(vehicle.rigid_body, wind_m_s2=(0.3, -0.2))
+
+
+TUMBLING = np.array([0.1, -0.2, -1.1, 0.5, -0.4, 0.3, 0.2, -0.1, 0.4, 3.0, 0.5, -0.4])
+"""State of a vehicle that rolls over and over, clear of the singularity at pitch 90 deg."""
+HELD_WRENCH = np.array([0.6, 2e-6, 0.0, 0.0])
+
+
+def coast(body: RigidBody, duration_s: float, step_s: float) -> FloatArray:
+    """Return the state (12,) after free motion from `TUMBLING` under `HELD_WRENCH`."""
+    state, wrench = TUMBLING[:, np.newaxis], HELD_WRENCH[:, np.newaxis]
+    for _ in range(round(duration_s / step_s)):
+        state = bogacki_shampine(body.derivative, state, (wrench, wrench, wrench), step_s)
+    return state[:, 0]
+
+
+def coast_exactly(body: RigidBody, duration_s: float) -> FloatArray:
+    """Return the same from the matrix form and an integrator of order eight."""
+    solution = solve_ivp(
+        lambda _, state: paper_derivative(state, HELD_WRENCH, body),
+        (0.0, duration_s),
+        TUMBLING,
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-12,
+    )
+    return np.asarray(solution.y[:, -1])
+
+
+def fly_attitude(vehicle: Vehicle, command_rad: FloatArray, ticks: int) -> list[VehicleState]:
+    """Return the states after each tick of held roll and pitch commands, from hover."""
+    state = vehicle.at_rest(np.array([[0.0], [0.0], [-1.1]]), 0.0, MAMBO.hover_command)
+    states = []
+    for _ in range(ticks):
+        state = vehicle.step(state, command_rad[:, np.newaxis], thrust_demand(state, -1.1), 0.0)
+        states.append(state)
+    return states
+
+
+def test_derived_airframe_constants_match_the_stock_tables() -> None:
+    """Hover speed, motor command, thrust per command and thrust to weight are those of the stock model."""
+    assert pytest.approx(6.532844e-4, rel=1e-6) == MAMBO.thrust_per_command_n
+    assert pytest.approx(0.0441235, rel=1e-5) == MAMBO.rotor_offset_m
+    assert pytest.approx(2.41374e-3, rel=1e-5) == MAMBO.torque_per_thrust_m
+    assert pytest.approx(236.5, rel=1e-3) == MAMBO.hover_command
+    hover_speed_rad_s = np.sqrt(MAMBO.speed_squared_per_command_rad2_s2 * MAMBO.hover_command)
+    assert hover_speed_rad_s == pytest.approx(1809.0, rel=1e-3)
+    assert MAMBO.command_max / MAMBO.hover_command == pytest.approx(2.11, rel=2e-3)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_mixer_matches_the_stock_table(part: int) -> None:
+    """Thrust, yaw, pitch and roll each reach the four motors with the stock factors."""
+    demand = np.zeros(4)
+    demand[0] = -0.618
+    demand[part] += (-0.01, 1e-4, 1e-3, 1e-3)[part]
+    thrust, yaw, pitch, roll = demand
+    expected = -1530.72683 * (STOCK_MIXER @ demand)
+    commands = mix(MAMBO, np.array([[-thrust], [roll], [pitch], [yaw]]))
+    np.testing.assert_allclose(commands[:, 0], expected, rtol=1e-5)
+
+
+def test_mixer_stays_within_the_command_limits() -> None:
+    """No demand, however large, asks a motor for less than 10 or more than 500."""
+    demands = np.array([[1e3, -1e3, 0.6], [0.0, 0.0, 10.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    commands = mix(MAMBO, demands)
+    np.testing.assert_array_equal(commands[:, :2], [[500.0, 10.0]] * 4)
+    np.testing.assert_array_equal(commands[:, 2], [500.0, 10.0, 10.0, 500.0])
+
+
+def test_rotors_exert_the_wrench_that_the_mixer_was_asked_for() -> None:
+    """Mixer and rotors are inverse to each other within the limits."""
+    rng = np.random.default_rng(1)
+    demand = np.array([[0.618], [1e-3], [1e-3], [1e-4]]) * (1.0 + rng.uniform(-0.3, 0.3, (4, 50)))
+    rotors = Rotors(MAMBO, 0.0)
+    speeds = rotors.commanded_speed_rad_s(mix(MAMBO, demand))
+    np.testing.assert_allclose(rotors.wrench(speeds[np.newaxis])[:, 0], demand, rtol=1e-12)
+
+
+def test_wrench_is_the_sum_of_the_forces_at_the_rotors() -> None:
+    """Torques are lever arm times force, and the reaction to the spin, with b and k of each flight."""
+    speeds = np.random.default_rng(2).uniform(500.0, 2500.0, (4, 2))
+    factors = np.array([4.0e-8, 4.9e-8])
+    rotors = Rotors(replace(MAMBO, thrust_factor_n_s2=factors), 0.0)
+    wrench = rotors.wrench(speeds[np.newaxis])[:, 0]
+    for flight, factor in enumerate(factors):
+        forces = np.zeros((4, 3))
+        forces[:, 2] = -factor * speeds[:, flight] ** 2
+        torque = np.cross(ROTOR_POSITIONS_M, forces).sum(axis=0)
+        torque[2] -= (ROTOR_SPINS * 1.139284e-10 * speeds[:, flight] ** 2).sum()
+        np.testing.assert_allclose(wrench[0, flight], -forces[:, 2].sum(), rtol=1e-12)
+        np.testing.assert_allclose(wrench[1:, flight], torque, rtol=1e-5)
+
+
+def test_derivative_matches_the_matrix_form_of_the_paper() -> None:
+    """Equations 2 to 7 and Euler's equation hold for every flight of a batch, each with its own airframe."""
+    rng = np.random.default_rng(3)
+    flights = 40
+    states, wrenches = rng.uniform(-1.4, 1.4, (12, flights)), rng.uniform(-1.0, 1.0, (4, flights))
+    masses, drags = rng.uniform(0.05, 0.08, flights), rng.uniform(0.0, 0.2, flights)
+    inertias, winds = rng.uniform(5e-5, 1.5e-4, (3, flights)), rng.uniform(-1.0, 1.0, (2, flights))
+    body = RigidBody(masses, (inertias[0], inertias[1], inertias[2]), drags, (winds[0], winds[1]))
+    rates = body.derivative(states, wrenches)
+    for flight in range(flights):
+        x, y, z = (float(value) for value in inertias[:, flight])
+        wind_x, wind_y = (float(value) for value in winds[:, flight])
+        alone = RigidBody(float(masses[flight]), (x, y, z), float(drags[flight]), (wind_x, wind_y))
+        expected = paper_derivative(states[:, flight], wrenches[:, flight], alone)
+        np.testing.assert_allclose(rates[:, flight], expected, rtol=1e-11, atol=1e-12)
+
+
+def test_world_velocity_is_the_rotated_body_velocity() -> None:
+    """Equation 2 with the full rotation of equation 3."""
+    state = TUMBLING[:, np.newaxis]
+    expected = rotation(*TUMBLING[6:9]) @ TUMBLING[3:6]
+    np.testing.assert_allclose(world_velocity(state)[:, 0], expected, rtol=1e-14)
+
+
+def test_integrator_is_exact_for_a_quadratic_input() -> None:
+    """A third-order rule integrates t^2 without error, so nodes and weights belong together."""
+
+    def derivative(_: FloatArray, time: float) -> FloatArray:
+        return np.array([3.0 * time**2])
+
+    nodes = (float(NODES[0]), float(NODES[1]), float(NODES[2]))
+    np.testing.assert_allclose(bogacki_shampine(derivative, np.zeros(1), nodes, 1.0), [1.0], rtol=1e-15)
+
+
+def test_integrator_takes_the_tabulated_step() -> None:
+    """On y' = -y one step is 1 - h + h^2/2 - h^3/6, the expansion of the exponential to third order."""
+    step = bogacki_shampine(lambda state, _: -state, np.ones(1), (None, None, None), 0.3)
+    np.testing.assert_allclose(step, [1.0 - 0.3 + 0.3**2 / 2.0 - 0.3**3 / 6.0], rtol=1e-15)
+
+
+def test_free_motion_agrees_with_an_independent_integrator() -> None:
+    """Five seconds and 2.5 turns stay within 0.2 mm and 0.2 mrad of DOP853 on the matrix form."""
+    body = body_of(Vehicle())
+    np.testing.assert_allclose(coast(body, 5.0, STEP_S), coast_exactly(body, 5.0), rtol=0.0, atol=2e-4)
+
+
+def test_free_motion_converges_at_third_order() -> None:
+    """Halving the step divides the error by about eight."""
+    body = body_of(Vehicle())
+    exact = coast_exactly(body, 2.0)
+    errors = [np.linalg.norm(coast(body, 2.0, step_s) - exact) for step_s in (0.02, 0.01, 0.005)]
+    assert errors[0] / errors[1] == pytest.approx(8.0, abs=0.1)
+    assert errors[1] / errors[2] == pytest.approx(8.0, abs=0.1)
+
+
+def test_rotor_speed_follows_the_command_with_its_lag() -> None:
+    """After one time constant 1/e of the way is left; without a lag nothing is."""
+    command = np.full((4, 2), 300.0)
+    vehicle = Vehicle(motor_lag_s=np.array([0.05, 0.0]))
+    state = vehicle.at_rest(np.zeros((3, 2)), 0.0, 100.0)
+    start, goal = np.sqrt(13840.8 * 100.0), np.sqrt(13840.8 * 300.0)
+    body, speed = vehicle.coast(state, command)
+    np.testing.assert_allclose(speed[:, 1], goal, rtol=1e-15)
+    for _ in range(9):
+        body, speed = vehicle.coast(VehicleState(body, speed, state.attitude_integral_rad_s), command)
+    np.testing.assert_allclose(speed[:, 0], goal + (start - goal) / np.e, rtol=1e-12)
+
+
+def test_lagging_thrust_is_integrated_within_the_step() -> None:
+    """The climb of lagging rotors agrees with the integral of their exponential thrust."""
+    lag_s, ticks = 0.03, 20
+    vehicle = Vehicle(motor_lag_s=lag_s)
+    start, goal = np.sqrt(13840.8 * 100.0), np.sqrt(13840.8 * 300.0)
+    state = vehicle.at_rest(np.zeros((3, 1)), 0.0, 100.0)
+    body, speed = state.body, state.rotor_speed_rad_s
+    for _ in range(ticks):
+        body, speed = vehicle.coast(
+            VehicleState(body, speed, state.attitude_integral_rad_s), np.full((4, 1), 300.0)
+        )
+    time_s = ticks * STEP_S
+    gap, left = start - goal, np.exp(-time_s / lag_s)
+    square = (
+        goal**2 * time_s + 2.0 * goal * gap * lag_s * (1.0 - left) + gap**2 * lag_s / 2.0 * (1.0 - left**2)
+    )
+    expected = GRAVITY_M_S2 * time_s - 4.0 * 4.71999e-8 * square / 0.063
+    np.testing.assert_allclose(body[5], expected, rtol=0.0, atol=2e-6)
+
+
+def test_hover_holds_still() -> None:
+    """Twenty seconds of hover move the vehicle by less than a nanometre."""
+    start = np.array([0.0, 0.0, -1.1])
+    last = fly_attitude(Vehicle(), np.zeros(2), 4000)[-1]
+    np.testing.assert_allclose(last.body[:3, 0], start, atol=1e-9)
+    np.testing.assert_allclose(last.body[3:, 0], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("axis", "lag_s"), [(0, 0.245), (1, 0.155)])
+def test_attitude_reaches_its_command_with_the_stock_lag(axis: int, lag_s: float) -> None:
+    """Roll is the slow axis, pitch the quick one: time to 63 % of a step of 0.05 rad."""
+    command_rad = np.zeros(2)
+    command_rad[axis] = 0.05
+    angles = np.array([state.body[6 + axis, 0] for state in fly_attitude(Vehicle(), command_rad, 400)])
+    reached_s = STEP_S * (1 + np.flatnonzero(angles >= 0.05 * (1.0 - np.exp(-1.0)))[0])
+    assert reached_s == pytest.approx(lag_s, abs=0.0051)
+
+
+def test_stock_loops_have_the_stock_gains() -> None:
+    """Unit errors, rates and integrals give the gains of the stock controllers, roll before pitch."""
+    none, one = np.zeros((2, 1)), np.ones((2, 1))
+    np.testing.assert_array_equal(loops.attitude_torque(one, none, none, none), [[0.010], [0.013]])
+    np.testing.assert_array_equal(loops.attitude_torque(none, one, none, none), [[-0.010], [-0.013]])
+    np.testing.assert_array_equal(loops.attitude_torque(none, none, one, none), [[-0.0028], [-0.0020]])
+    np.testing.assert_array_equal(loops.attitude_torque(none, none, none, one), [[0.010], [0.010]])
+    np.testing.assert_array_equal(loops.yaw_torque(1.0, none[0], none[0]), 0.004)
+    np.testing.assert_array_equal(loops.yaw_torque(0.0, none[0], one[0]), -0.0012)
+    weight_n = 0.063 * 9.81
+    np.testing.assert_allclose(loops.altitude_thrust(-0.1, none[0], none[0]), weight_n + 0.08, rtol=1e-14)
+    np.testing.assert_allclose(loops.altitude_thrust(0.0, none[0], 0.1 * one[0]), weight_n + 0.03, rtol=1e-14)
+
+
+def test_attitude_integral_leaks_and_is_limited() -> None:
+    """It grows by the error times the period, loses a thousandth a second, and stops at 2 rad s."""
+    error, none = np.array([[0.2], [-0.4]]), np.zeros((2, 1))
+    np.testing.assert_allclose(loops.attitude_integral(error, none, none), 0.005 * error, rtol=1e-15)
+    held = np.array([[1.0], [-1.0]])
+    np.testing.assert_allclose(loops.attitude_integral(none, none, held), held * (1.0 - 5e-6), rtol=1e-15)
+    limited = loops.attitude_integral(1e3 * error, none, none)
+    np.testing.assert_array_equal(limited, [[1.0], [-2.0]])
+
+
+def test_altitude_loop_returns_to_its_reference() -> None:
+    """Half a metre below the reference is made good within five seconds."""
+    vehicle = Vehicle()
+    state = vehicle.at_rest(np.array([[0.0], [0.0], [-0.6]]), 0.0, MAMBO.hover_command)
+    for _ in range(1000):
+        state = vehicle.step(state, np.zeros((2, 1)), thrust_demand(state, -1.1), 0.0)
+    assert state.body[2, 0] == pytest.approx(-1.1, abs=1e-3)
+
+
+def test_altitude_thrust_is_limited() -> None:
+    """The demand never leaves +/- 1.20204 N."""
+    thrust_n = loops.altitude_thrust(-1.1, np.array([100.0, -100.0]), np.zeros(2))
+    np.testing.assert_array_equal(thrust_n, [1.20204, -1.20204])
+
+
+def test_yaw_loop_holds_its_reference() -> None:
+    """A heading error of 0.3 rad is gone after five seconds."""
+    vehicle = Vehicle()
+    state = vehicle.at_rest(np.array([[0.0], [0.0], [-1.1]]), 0.5, MAMBO.hover_command)
+    for _ in range(1000):
+        state = vehicle.step(state, np.zeros((2, 1)), thrust_demand(state, -1.1), 0.8)
+    assert state.body[8, 0] == pytest.approx(0.8, abs=1e-3)
+
+
+def test_drag_and_wind_balance_at_the_terminal_speed() -> None:
+    """Level flight in a steady wind settles at wind over drag, in both axes."""
+    vehicle = Vehicle(drag_1_s=2.0, wind_m_s2=(0.5, -0.3))
+    state = fly_attitude(vehicle, np.zeros(2), 1000)[-1]
+    np.testing.assert_allclose(world_velocity(state.body)[:2, 0], [0.25, -0.15], rtol=1e-3)
