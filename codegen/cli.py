@@ -53,21 +53,21 @@ def root() -> typer.Typer:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
-        epilog=_examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller"),
+        epilog=examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller"),
     )
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this module to `app`."""
     app.command(
-        epilog=_examples(
+        epilog=examples(
             "mambo-nmpc init", "mambo-nmpc init table1 -o paper.toml", "mambo-nmpc init -o - | less"
         )
     )(init)
     app.command(name="presets")(list_presets)
-    app.command(epilog=_examples("mambo-nmpc schema > controller.schema.json"))(schema)
+    app.command(epilog=examples("mambo-nmpc schema > controller.schema.json"))(schema)
     app.command(
-        epilog=_examples(
+        epilog=examples(
             "mambo-nmpc generate -o controller",
             "mambo-nmpc generate controller.toml -o controller --prefix roll_pitch",
             "mambo-nmpc generate controller.toml -o controller --check",
@@ -204,6 +204,6 @@ def _report_drifts(drifts: tuple[bundle.Drift, ...], output: Path, *, as_json: b
     typer.echo(f"{name}: up to date", err=True)
 
 
-def _examples(*lines: str) -> str:
+def examples(*lines: str) -> str:
     """Return an epilog of example commands, one paragraph each, so that help keeps them on their lines."""
     return "\n\n".join(("Examples:", *lines))

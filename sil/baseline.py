@@ -4,15 +4,12 @@ Source: block "XY to angles" of the MathWorks asbQuadcopter example; Kp = 0.24, 
 (section III), after Pounds et al.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
+from sil.arrays import FloatArray
 
 POSITION_P_RAD_M = 0.24
 POSITION_D_RAD_S_M = 0.1

@@ -7,5 +7,17 @@ class BuildError(MamboNmpcError):
     """The C cannot be compiled here: no compiler, no Python headers, or the compiler refused."""
 
 
+class TrajectoryError(MamboNmpcError):
+    """A trajectory that cannot be flown; the message names file, row and rule."""
+
+
+class FlightError(MamboNmpcError):
+    """A flight that cannot be simulated as described."""
+
+
+class TraceError(MamboNmpcError):
+    """A file that holds no trace; the message names it."""
+
+
 class CacheError(MamboNmpcError):
     """The compile cache cannot be used, or others may write to it."""

@@ -8,27 +8,23 @@ The simulation is pure: the same flight with the same controller gives the same 
 among many is the same, bit for bit, as the flight alone.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sil.arrays import FloatArray, IntArray, PerFlight
+from sil.errors import FlightError
 from sil.plant import loops
-from sil.plant.airframe import MAMBO, FloatArray, PerFlight
+from sil.plant.airframe import MAMBO
 from sil.plant.rigid_body import EULER, POSITION, world_velocity
 from sil.plant.vehicle import STEP_S, Vehicle, VehicleState, thrust_demand
 from sil.traces import Trace
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from sil.trajectories import Trajectory
+from sil.trajectories import Trajectory
 
 HEIGHT_REFERENCE_M = -1.1
 """z of every flight, up being negative."""
@@ -40,20 +36,16 @@ LOST_M = 1e4
 """Distance from the origin, along any axis, at which a flight counts as lost."""
 
 
-class FlightError(ValueError):
-    """A flight that cannot be simulated as described."""
-
-
 class Outcome(Protocol):
     """What a position controller returns for n flights."""
 
     @property
-    def command_rad(self) -> FloatArray:
+    def command_rad(self) -> NDArray[np.floating[Any]]:
         """Roll and pitch (n, 2)."""
         ...
 
     @property
-    def status(self) -> NDArray[np.int64]:
+    def status(self) -> IntArray:
         """0 where all went well (n,)."""
         ...
 

@@ -5,18 +5,12 @@ trajectory's clock; the take-off is never counted. Integrals of e follow the tra
 instants of the trace, those of u are exact because commands are held.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from sil.traces import Trace
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from sil.arrays import FloatArray
+from sil.traces import Trace
 
 TRANSIENT_S = 10.0
 """What is left out of a flight to judge it without its start."""
@@ -43,6 +37,12 @@ class Metrics:
     """Mean 1-norm of the change of u from one step of the controller to the next."""
 
 
+def horizontal_error_m(trace: Trace) -> FloatArray:
+    """Return e (k, n), the horizontal distance to the target."""
+    offset_m = trace.target[..., :2] - trace.position_m[..., :2]
+    return np.hypot(offset_m[..., 0], offset_m[..., 1])
+
+
 def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
     """Return the metrics from `start_s` to the end: 0 for the whole flight, or `TRANSIENT_S`.
 
@@ -52,9 +52,8 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
     time_s = trace.time_s[counted]
     if len(time_s) < 2:
         raise ValueError(f"start_s = {start_s:g} must lie before the end {trace.time_s[-1]:g} of the flight")
-    offset_m = trace.target[counted, :, :2] - trace.position_m[counted, :, :2]
     command_rad = trace.command_rad[counted]
-    error_m = np.hypot(offset_m[..., 0], offset_m[..., 1])
+    error_m = horizontal_error_m(trace)[counted]
     weight_s = time_s[:, np.newaxis]
     span_s = time_s[-1] - time_s[0]
     ise_m2_s = _integral(error_m**2, time_s)

@@ -1,29 +1,21 @@
 """What a closed-loop run leaves behind, and how it is written down."""
 
-from __future__ import annotations
-
 import csv
 import zipfile
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, TypeAlias
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from sil.arrays import FloatArray, IntArray
+from sil.errors import TraceError
 
 CSV_COLUMNS = (
     *("time_s", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"),
     *("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s"),
     *("roll_command_rad", "pitch_command_rad", "thrust_acceleration_m_s2", "status"),
 )
-
-
-class TraceError(ValueError):
-    """A file that holds no trace; the message names it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +39,7 @@ class Trace:
     """Roll and pitch commanded from this instant to the next (k, n, 2)."""
     thrust_acceleration_m_s2: FloatArray
     """Thrust that the altitude loop asks for, over the nominal mass (k, n)."""
-    status: NDArray[np.int64]
+    status: IntArray
     """Status of the position controller (k, n)."""
 
     @property

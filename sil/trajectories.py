@@ -4,27 +4,20 @@ Every curve has its centre at the origin, and starts on its first point: before 
 there at rest. Half-width and radius are in metres, angular rate in rad/s.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from pathlib import Path
+from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-FloatArray = NDArray[np.float64]
+from sil.arrays import FloatArray
+from sil.errors import TrajectoryError
 
 STEP_TIME_S = 1.0
 COLUMNS = ("time_s", "x_m", "y_m")
-
-
-class TrajectoryError(ValueError):
-    """A trajectory that cannot be flown; the message names file, row and rule."""
 
 
 class Trajectory(Protocol):
@@ -171,7 +164,7 @@ class Waypoints:
                 )
 
     @classmethod
-    def read(cls, path: Path) -> Waypoints:
+    def read(cls, path: Path) -> Self:
         """Read a CSV file with the columns time_s, x_m, y_m; row 1 is the first below the header.
 
         Raises `TrajectoryError`, naming file, row and rule.
@@ -196,7 +189,7 @@ class Waypoints:
         return _held_before_start(times, np.concatenate([position, velocity[leg]], axis=-1))
 
 
-def _points(rows: csv.DictReader[str]) -> tuple[tuple[float, float, float], ...]:
+def _points(rows: "csv.DictReader[str]") -> tuple[tuple[float, float, float], ...]:
     """Turn the rows of a CSV file into points; errors name row and column."""
     missing = [column for column in COLUMNS if column not in (rows.fieldnames or ())]
     if missing:

@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from sil.baseline import PdController, PdOutcome
-from sil.loop import Flight, FlightError, Start, fly
+from sil.errors import FlightError
+from sil.loop import Flight, Start, fly
 from sil.metrics import measure
 from sil.plant.airframe import MAMBO
 from sil.plant.vehicle import Vehicle

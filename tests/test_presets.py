@@ -28,7 +28,7 @@ def departures(settings: Settings) -> dict[str, Any]:
         (
             "mambo",
             {
-                "horizon.prediction_step_s": 0.05,
+                "horizon.prediction_step_s": 0.055,
                 "model.roll_lag_s": 0.27,
                 "model.pitch_lag_s": 0.15,
                 "optimizer.warm_start": "plan",

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from sil.baseline import PdController
+from sil.errors import TraceError
 from sil.loop import Flight, fly
-from sil.traces import CSV_COLUMNS, Trace, TraceError, read_npz, write_csv, write_npz
+from sil.traces import CSV_COLUMNS, Trace, read_npz, write_csv, write_npz
 from sil.trajectories import Bernoulli, Circle, Trajectories
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sil.errors import TrajectoryError
 from sil.trajectories import (
     Bernoulli,
     Circle,
@@ -14,7 +15,6 @@ from sil.trajectories import (
     Step,
     Trajectories,
     Trajectory,
-    TrajectoryError,
     Waypoints,
 )
 

@@ -1,17 +1,9 @@
 """Constants of the airframe, each with its source."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray: TypeAlias = NDArray[np.float64]
-PerFlight: TypeAlias = float | FloatArray
-"""One value for every flight, or an array (n,) with one value per flight."""
+from sil.arrays import PerFlight
 
 GRAVITY_M_S2 = 9.81
 

@@ -1,15 +1,11 @@
 """Fixed-step Bogacki-Shampine: third order, three stages (Bogacki and Shampine 1989)."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from sil.plant.airframe import FloatArray
+from sil.arrays import FloatArray
 
 NODES = np.array([0.0, 0.5, 0.75])
 """Times of the three stages, as fractions of the step."""

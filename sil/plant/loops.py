@@ -4,11 +4,10 @@ Source: `controllerVars` and the flight control system of the MathWorks asbQuadc
 R2020a. Gains of two axes stand in the order roll, pitch, as in every command of this project.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
-from sil.plant.airframe import GRAVITY_M_S2, MAMBO, FloatArray, PerFlight
+from sil.arrays import FloatArray, PerFlight
+from sil.plant.airframe import GRAVITY_M_S2, MAMBO
 
 PERIOD_S = 0.005
 

@@ -12,13 +12,12 @@ and those of a wrench (4, n) are the total rotor thrust along -z of the body (N,
 torques about the body axes x, y, z (N m).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
-from sil.plant.airframe import GRAVITY_M_S2, FloatArray, PerFlight
+from sil.arrays import FloatArray, PerFlight
+from sil.plant.airframe import GRAVITY_M_S2
 
 POSITION = slice(0, 3)
 VELOCITY = slice(3, 6)

@@ -5,15 +5,12 @@ spin clockwise (positive about body z), 2 and 4 counter-clockwise. Thrust is pos
 the body (the stock code counts it negative upwards).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from sil.plant.airframe import Airframe, FloatArray, PerFlight
+from sil.arrays import FloatArray, PerFlight
+from sil.plant.airframe import Airframe
 
 WRENCH_SIGNS = np.array(
     [

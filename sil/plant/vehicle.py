@@ -1,14 +1,13 @@
 """The whole vehicle: stock loops, mixer, rotors and rigid body, one tick of 5 ms at a time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from sil.arrays import FloatArray, PerFlight
 from sil.plant import loops
-from sil.plant.airframe import MAMBO, Airframe, FloatArray, PerFlight
+from sil.plant.airframe import MAMBO, Airframe
 from sil.plant.integrator import NODES, bogacki_shampine
 from sil.plant.rigid_body import EULER, POSITION, RATES, STATE_ROWS, RigidBody, world_velocity
 from sil.plant.rotors import Rotors, mix

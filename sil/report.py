@@ -1,0 +1,67 @@
+"""What flights found, as plain text for a terminal, a pipe or a diff."""
+
+from dataclasses import fields
+from typing import Any
+
+from sil.metrics import Metrics
+from sil.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD, Four, Row, Table2
+
+_UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
+_UNITS |= {"_rad": "rad", "_m": "m"}
+
+
+def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
+    """Return the metrics of one flight by name."""
+    return {field.name: float(getattr(metrics, field.name)[flight]) for field in fields(metrics)}
+
+
+def flight_text(summary: dict[str, Any]) -> str:
+    """Spell the summary of a flight: a metric a line, with and without the start transient."""
+    whole, settled = summary["metrics"], summary.get("metrics_without_transient")
+    lines = [f"{'':22}{'whole flight':>14}" + (f"{'after 10 s':>14}" if settled else "")]
+    for key, value in whole.items():
+        name, unit = _named(key)
+        line = f"{name:22}{value:14.5g}" + (f"{settled[key]:14.5g}" if settled else "")
+        lines.append(f"{line}  {unit}")
+    refused = {name: count for name, count in summary["statuses"].items() if name != "OK"}
+    if refused:
+        lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
+    if summary["lost"]:
+        lines.append("LOST: the vehicle left the world before the end of the flight")
+    return "\n".join(lines)
+
+
+def _named(key: str) -> tuple[str, str]:
+    suffix = next(suffix for suffix in _UNITS if key.endswith(suffix))
+    name = key.removesuffix(suffix).replace("_", " ")
+    return (name.upper() if name in ("iae", "ise", "itse", "itae") else name), _UNITS[suffix]
+
+
+def table2_text(result: Table2) -> str:
+    """Spell Table II: a block for each case, printed above measured, then the verdicts."""
+    lines = []
+    for case in CASES:
+        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES) + "  PD over this"]
+        if case == next(iter(CASES)):
+            lines += [_line("printed PD", PRINTED_PD, None)]
+            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
+        lines += [_row(row) for row in result.rows if row.case == case]
+        lines += [""]
+    lines += [
+        f"{'holds' if claim.holds else 'FAILS':6} {claim.text}: {claim.evidence}" for claim in result.claims
+    ]
+    return "\n".join(lines)
+
+
+def _row(row: Row) -> str:
+    return _line(f"flown {row.controller}", row.measured, row.improvement)
+
+
+def _line(name: str, values: Four, improvement: Four | None) -> str:
+    ratios = "" if improvement is None else "".join(f"{_digits(ratio):>9}" for ratio in improvement)
+    return f"  {name:26}" + "".join(f"{_digits(value):>10}" for value in values) + ratios
+
+
+def _digits(value: float) -> str:
+    """Spell a value with four digits, and a large one in full."""
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"

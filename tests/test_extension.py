@@ -1,0 +1,107 @@
+"""Building and caching the C: private, once, and with messages that say what is missing."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from codegen import presets
+from sil.cache import cache_folder, cached
+from sil.compiled import CompiledController, compiled
+from sil.errors import BuildError, CacheError
+from sil.toolchain import Toolchain, host_toolchain
+from tests.support.tools import require
+
+MAMBO = presets.load("mambo")
+
+
+@pytest.fixture
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Give the test a cache folder of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "mambo-nmpc"
+
+
+def test_the_cache_is_private(empty_cache: Path) -> None:
+    """Made for its owner alone; one that others may write to is refused, for code is loaded from there."""
+    assert cache_folder() == empty_cache
+    assert empty_cache.stat().st_mode & 0o777 == 0o700
+    empty_cache.chmod(0o770)
+    with pytest.raises(CacheError, match="others may write"):
+        cache_folder()
+
+
+def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None:
+    """The second request finds the first one's file; the work folder is gone."""
+    built = []
+
+    def build(folder: Path) -> Path:
+        built.append(folder)
+        (folder / "made").write_text("made")
+        return folder / "made"
+
+    assert cached("name", build) == cached("name", build) == empty_cache / "name"
+    assert len(built) == 1
+    assert [path.name for path in empty_cache.iterdir()] == ["name"]
+
+
+def test_a_failed_build_leaves_nothing(empty_cache: Path) -> None:
+    """An error in the middle: no file, no work folder, and the next request builds again."""
+
+    def fail(folder: Path) -> Path:
+        (folder / "half").write_text("half")
+        raise BuildError("no")
+
+    with pytest.raises(BuildError):
+        cached("name", fail)
+    assert list(empty_cache.iterdir()) == []
+
+
+def test_two_processes_may_build_the_same_code_at_once(empty_cache: Path) -> None:
+    """Both fly, and one file remains."""
+    require("cc", "gcc")
+    script = (
+        "from codegen import presets; from sil.compiled import CompiledController as C;"
+        "print(C(presets.load('table1')).step([[0]*7], [[1,0,0,0]], [9.81]).command_rad.tolist())"
+    )
+    command = [sys.executable, "-c", script]
+    both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    printed = [process.communicate()[0] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert printed[0] == printed[1] != ""
+    assert len(list(empty_cache.iterdir())) == 1
+
+
+def test_without_a_compiler_the_message_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """No cc, gcc or clang on the path, and no CC."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BuildError, match=r"no C compiler found.*install one"):
+        host_toolchain()
+
+
+def test_the_named_compiler_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """CC may hold arguments too; one that does not exist is named in the message."""
+    monkeypatch.setenv("CC", "gcc -O1")
+    assert host_toolchain().command == ("gcc", "-O1")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(BuildError, match="cannot run the C compiler no-such-compiler"):
+        CompiledController(MAMBO)
+
+
+@pytest.mark.usefixtures("empty_cache")
+def test_a_refusing_compiler_is_quoted() -> None:
+    """A flag that the compiler does not know: its own words, and nothing cached."""
+    require("gcc", "gcc")
+    with pytest.raises(BuildError, match=r"(?s)failed:.*--no-such-flag"):
+        compiled(MAMBO, Toolchain(("gcc", "--no-such-flag")))
+
+
+def test_wrong_shapes_are_refused() -> None:
+    """A batch of another size would read beyond the arrays: it is an error instead."""
+    controller = CompiledController(MAMBO, 2)
+    with pytest.raises(ValueError, match=r"expected an array of shape \(2, 7\), got \(1, 7\)"):
+        controller.step([[0.0] * 7], [[0.0] * 4] * 2, [9.81] * 2)
