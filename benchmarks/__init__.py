@@ -1,0 +1,1 @@
+"""Measurements: what is faster than what, in one run on one machine."""

@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Predictor: how far robot and target will be apart, given the moves (eqs 8-11).
+ *
+ * Position is affine in the moves, so the roll-out of eq 9 over the horizon stands in constant tables.
+ * Prediction step: 0.055 s. Attitude lag: roll 0.27 s, pitch 0.15 s.
+ */
+#include "nmpc_predictor.h"
+
+#include "nmpc_math.h"
+
+#define ROLL 0
+#define PITCH 1
+
+/* Time from now to each predicted step, in s. */
+static const nmpc_real_t time_s[NMPC_PREDICTION_HORIZON] = {
+    0.055f, 0.11f, 0.165f, 0.22f, 0.275f, 0.33f, 0.385f, 0.44f, 0.495f, 0.55f
+};
+
+/* Double time integral of a unit of measured roll, pitch as it decays, at each predicted step, in s^2. */
+static const nmpc_real_t free_s2[NMPC_PREDICTION_HORIZON][NMPC_AXES] = {
+    { 0.0014148235f, 0.001343414f },
+    { 0.005305696f, 0.004806869f },
+    { 0.011216291f, 0.009739599f },
+    { 0.018774383f, 0.015690597f },
+    { 0.027676344f, 0.022347294f },
+    { 0.037674505f, 0.029493071f },
+    { 0.04856684f, 0.036977798f },
+    { 0.060188558f, 0.044697434f },
+    { 0.072405234f, 0.052579872f },
+    { 0.08510722f, 0.060575135f }
+};
+
+/* Double time integral of the angle that a unit of each move makes, at each predicted step, in s^2.
+ * The last move is held to the end of the horizon. */
+static const nmpc_real_t response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
+    { 9.7676544e-05f, 0.00016908605f, 0.0f, 0.0f },
+    { 0.00064662757f, 0.0010740447f, 9.7676544e-05f, 0.00016908605f },
+    { 0.0016519045f, 0.00262977f, 0.00074430415f, 0.0012431308f },
+    { 0.0030294082f, 0.004636503f, 0.0023962087f, 0.0038729005f },
+    { 0.004710539f, 0.0069558024f, 0.0054256166f, 0.008509403f },
+    { 0.0066393395f, 0.009491723f, 0.010136155f, 0.015465206f },
+    { 0.008770165f, 0.012177772f, 0.016775494f, 0.024956929f },
+    { 0.011065783f, 0.014967864f, 0.02554566f, 0.0371347f },
+    { 0.013495823f, 0.017830065f, 0.03661144f, 0.052102566f },
+    { 0.016035512f, 0.020742238f, 0.050107267f, 0.06993263f }
+};
+
+void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
+                            nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
+{
+    const nmpc_real_t error_x_m = state->position_m[0] - target->position_m[0];
+    const nmpc_real_t error_y_m = state->position_m[1] - target->position_m[1];
+    const nmpc_real_t error_x_m_s = state->velocity_m_s[0] - target->velocity_m_s[0];
+    const nmpc_real_t error_y_m_s = state->velocity_m_s[1] - target->velocity_m_s[1];
+    nmpc_real_t across;
+    nmpc_real_t along;
+    int i;
+
+    /* Eq 8 with the signs of eq 3. */
+    nmpc_sine_cosine(state->yaw_rad, &across, &along);
+    across = thrust_acceleration_m_s2 * across;
+    along = thrust_acceleration_m_s2 * along;
+    prediction->gain_x_m_s2[ROLL] = -across;
+    prediction->gain_x_m_s2[PITCH] = -along;
+    prediction->gain_y_m_s2[ROLL] = along;
+    prediction->gain_y_m_s2[PITCH] = -across;
+
+    /* Eqs 9-11 without moves: both robot and target keep their velocity. */
+    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
+        prediction->free_x_m[i] = error_x_m + (time_s[i] * error_x_m_s);
+        prediction->free_y_m[i] = error_y_m + (time_s[i] * error_y_m_s);
+    }
+
+    /* The present tilt keeps pushing while it decays. */
+    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
+        const nmpc_real_t roll = free_s2[i][ROLL] * state->roll_rad;
+        const nmpc_real_t pitch = free_s2[i][PITCH] * state->pitch_rad;
+
+        prediction->free_x_m[i] =
+            prediction->free_x_m[i]
+            + ((prediction->gain_x_m_s2[ROLL] * roll) + (prediction->gain_x_m_s2[PITCH] * pitch));
+        prediction->free_y_m[i] =
+            prediction->free_y_m[i]
+            + ((prediction->gain_y_m_s2[ROLL] * roll) + (prediction->gain_y_m_s2[PITCH] * pitch));
+    }
+}
+
+void nmpc_predictor_error(const nmpc_prediction_t *prediction, const nmpc_real_t moves_rad[NMPC_MOVES], int i,
+                          nmpc_real_t *error_x_m, nmpc_real_t *error_y_m)
+{
+    nmpc_real_t roll = (nmpc_real_t)0;
+    nmpc_real_t pitch = (nmpc_real_t)0;
+    int k;
+
+    for (k = 0; k < NMPC_MOVES; k += NMPC_AXES) {
+        roll = roll + (response_s2[i][k + ROLL] * moves_rad[k + ROLL]);
+        pitch = pitch + (response_s2[i][k + PITCH] * moves_rad[k + PITCH]);
+    }
+    *error_x_m = prediction->free_x_m[i]
+                 + ((prediction->gain_x_m_s2[ROLL] * roll) + (prediction->gain_x_m_s2[PITCH] * pitch));
+    *error_y_m = prediction->free_y_m[i]
+                 + ((prediction->gain_y_m_s2[ROLL] * roll) + (prediction->gain_y_m_s2[PITCH] * pitch));
+}
+
+void nmpc_predictor_add_gradient(const nmpc_prediction_t *prediction, int i, nmpc_real_t slope_x,
+                                 nmpc_real_t slope_y, nmpc_real_t gradient[NMPC_MOVES])
+{
+    const nmpc_real_t roll =
+        (slope_x * prediction->gain_x_m_s2[ROLL]) + (slope_y * prediction->gain_y_m_s2[ROLL]);
+    const nmpc_real_t pitch =
+        (slope_x * prediction->gain_x_m_s2[PITCH]) + (slope_y * prediction->gain_y_m_s2[PITCH]);
+    int k;
+
+    for (k = 0; k < NMPC_MOVES; k += NMPC_AXES) {
+        gradient[k + ROLL] = gradient[k + ROLL] + (roll * response_s2[i][k + ROLL]);
+        gradient[k + PITCH] = gradient[k + PITCH] + (pitch * response_s2[i][k + PITCH]);
+    }
+}

@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Self-test: does this build, on this board, compute the bits that the reference computed?
+ */
+#ifndef NMPC_SELF_TEST_H
+#define NMPC_SELF_TEST_H
+
+#include "nmpc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Step `scratch`, which it initialises, through 24 built-in steps, good and bad input among them, and compare
+ * status, command and cost exactly. Returns 0 if all agree, else the number, from 1, of the first step that
+ * does not. Call it at start-up; it needs no other instance. `scratch` must not be null. */
+int nmpc_self_test(nmpc_t *scratch);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * The few functions that the controller needs beyond + - *, the same bits everywhere.
+ */
+#ifndef NMPC_MATH_H
+#define NMPC_MATH_H
+
+#include "nmpc_config.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+static inline nmpc_real_t nmpc_absolute(nmpc_real_t value)
+{
+    return (value < (nmpc_real_t)0) ? -value : value;
+}
+
+/* The sign of zero, of either sign, is 0. */
+static inline int nmpc_sign(nmpc_real_t value)
+{
+    return (value > (nmpc_real_t)0) ? 1 : ((value < (nmpc_real_t)0) ? -1 : 0);
+}
+
+static inline nmpc_real_t nmpc_smaller(nmpc_real_t a, nmpc_real_t b)
+{
+    return (a < b) ? a : b;
+}
+
+static inline nmpc_real_t nmpc_larger(nmpc_real_t a, nmpc_real_t b)
+{
+    return (a > b) ? a : b;
+}
+
+/* Bring `value` within +/- `limit`. */
+static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
+{
+    return nmpc_smaller(nmpc_larger(value, -limit), limit);
+}
+
+/* Tell whether `value` is a number within +/- `limit`. */
+static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
+{
+    return (value >= -limit) && (value <= limit);
+}
+
+/* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, each within 1.2e-07 of the true value. */
+void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
