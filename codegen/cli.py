@@ -15,10 +15,10 @@ import typer
 from typer.core import TyperGroup
 
 import codegen
-from codegen import bundle, presets, settings_toml
+from codegen import bundle, presets
 from codegen.errors import DriftError, FileExistsRefusedError, MamboNmpcError, UnwritableError, echo
 from codegen.render import render
-from codegen.settings import Settings
+from codegen.settings import Settings, controller_toml
 
 INTERRUPTED, NO_READER = 130, 141
 
@@ -85,7 +85,7 @@ def init(
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> None:
     """Write a controller.toml to start from, every setting in it and explained."""
-    text = settings_toml.to_toml(presets.preset(preset), presets.description(preset))
+    text = controller_toml.to_toml(presets.preset(preset), presets.description(preset))
     if str(output) == "-":
         typer.echo(text, nl=False)
         return
@@ -147,9 +147,9 @@ def generate(
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")
     settings = presets.load(source)
     if prefix is not None:
-        settings = settings_toml.with_option(settings, "code.prefix", prefix, "--prefix")
+        settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")
     if scalar is not None:
-        settings = settings_toml.with_option(settings, "code.scalar", scalar, "--scalar")
+        settings = controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
     files = render(settings, amalgamate=amalgamate)
     if check:
         _report_drifts(bundle.check(files, output), output, as_json=as_json)

@@ -4,9 +4,8 @@ import difflib
 from importlib import resources
 from pathlib import Path
 
-from codegen import settings_toml
 from codegen.errors import SourceNotFoundError, echo
-from codegen.settings import Settings
+from codegen.settings import Settings, controller_toml
 
 _FOLDER = resources.files("codegen") / "data" / "presets"
 
@@ -18,7 +17,7 @@ def names() -> tuple[str, ...]:
 
 def preset(name: str) -> Settings:
     """Return the settings of the preset `name`; raises SourceNotFoundError."""
-    return settings_toml.parse(_text(name), f"preset {name}")
+    return controller_toml.parse(_text(name), f"preset {name}")
 
 
 def description(name: str) -> str:
@@ -29,7 +28,7 @@ def description(name: str) -> str:
 def load(name_or_path: str) -> Settings:
     """Return the settings of a preset, or else of the file at a path (./mambo is a file, mambo a preset).
 
-    Raises SourceNotFoundError if there is neither, and the errors of `settings_toml.read`.
+    Raises SourceNotFoundError if there is neither, and the errors of `controller_toml.read`.
     """
     if name_or_path in names():
         return preset(name_or_path)
@@ -39,7 +38,7 @@ def load(name_or_path: str) -> Settings:
         found = False
     if not found:
         raise _not_found(name_or_path, "neither a preset nor a file")
-    return settings_toml.read(Path(name_or_path))
+    return controller_toml.read(Path(name_or_path))
 
 
 def _text(name: str) -> str:

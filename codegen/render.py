@@ -13,7 +13,7 @@ from codegen.horizon import horizon_tables
 from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
 from codegen.self_test import self_test
 from codegen.settings import Settings
-from codegen.settings_toml import to_toml
+from codegen.settings.controller_toml import to_toml
 from codegen.trigonometry import SINE_ERRORS, YAW_LIMIT_RAD, trigonometry
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")

@@ -11,8 +11,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from codegen import cli, presets, settings_toml
-from codegen.settings import Settings
+from codegen import cli, presets
+from codegen.settings import Settings, controller_toml
 
 COMMAND = "from codegen import cli; app = cli.root(); cli.register(app); app()"
 INTERRUPTED = """
@@ -66,7 +66,7 @@ def test_init_overwrites_only_by_force(app: typer.Typer) -> None:
 def test_init_to_stdout_prints_the_file_alone(app: typer.Typer) -> None:
     """With -o - the settings are the whole of stdout."""
     text, talk = run(app, "init", "-o", "-")
-    assert settings_toml.parse(text, "stdout") == presets.preset("mambo")
+    assert controller_toml.parse(text, "stdout") == presets.preset("mambo")
     assert talk == ""
     assert not Path("controller.toml").exists()
 

@@ -6,7 +6,7 @@ import pytest
 
 from codegen import bundle, presets
 from codegen.render import render
-from codegen.settings_toml import read
+from codegen.settings.controller_toml import read
 
 GENERATED = Path(__file__).parent.parent / "generated"
 BUNDLES = {

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codegen import settings_toml
 from codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
-from codegen.settings import KEYWORDS, Settings
-from codegen.settings_keys import KEYS, Key, spelled
+from codegen.settings import controller_toml
+from codegen.settings.keys import KEYS, Key, spelled
+from codegen.settings.model import KEYWORDS, Settings
 
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 COMPANIONS: dict[str, dict[str, float]] = {
@@ -91,14 +91,14 @@ def toml(values: dict[str, Any]) -> str:
 def faults_of(text: str) -> list[str]:
     """Return the lines that `text` gets, as the file slow.toml."""
     with pytest.raises(InvalidSettingsError) as caught:
-        settings_toml.parse(text, "slow.toml")
+        controller_toml.parse(text, "slow.toml")
     assert str(caught.value) == "\n".join(caught.value.faults)
     return list(caught.value.faults)
 
 
 def test_empty_file_is_table_1() -> None:
     """A file without a key gives the values that Table I prints."""
-    settings = settings_toml.parse("", "empty")
+    settings = controller_toml.parse("", "empty")
     assert (settings.cost.tracking_weight, settings.cost.effort_weight) == (2250, 1)
     assert (settings.horizon.prediction, settings.horizon.control) == (10, 2)
     optimizer = settings.optimizer
@@ -111,7 +111,7 @@ def test_empty_file_is_table_1() -> None:
 @given(any_settings())
 def test_written_settings_read_back_equal(settings: Settings) -> None:
     """A controller.toml holds every bit of its settings, whatever they are."""
-    read_back = settings_toml.parse(settings_toml.to_toml(settings), "written")
+    read_back = controller_toml.parse(controller_toml.to_toml(settings), "written")
     assert read_back == settings
     assert read_back.digest == settings.digest
 
@@ -124,7 +124,7 @@ def test_written_settings_fit_their_schema(settings: Settings) -> None:
 
 def test_written_file_explains_every_key_within_100_columns() -> None:
     """Every key stands below its description and the values it admits, in lines that fit a screen."""
-    text = settings_toml.to_toml(Settings(), "A title.")
+    text = controller_toml.to_toml(Settings(), "A title.")
     unwrapped = text.replace("\n# ", " ")
     assert text.startswith("# A title.\n")
     assert max(map(len, text.splitlines())) <= 100
@@ -147,7 +147,7 @@ def test_bounds_are_closed(key: Key) -> None:
         assert f"{key.path} = {beyond} must {key.rule}" in fault
         companions = COMPANIONS.get(f"{key.path} = {spelled(bound)}", {})
         if (key.path, bound) != ("ranges.thrust_acceleration_max_m_s2", 0.1):
-            settings_toml.parse(toml({key.path: bound, **companions}), "at the bound")
+            controller_toml.parse(toml({key.path: bound, **companions}), "at the bound")
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_odd_value_gets_short_printable_line(value: str) -> None:
     """No value, however long or strange, gets more than one printable line of bearable length."""
     for path in KEYS:
         try:
-            settings_toml.parse(f"{path} = {value}", "odd")
+            controller_toml.parse(f"{path} = {value}", "odd")
         except InvalidSettingsError as error:
             assert any(line.startswith(f"odd: {path} = ") for line in error.faults)  # noqa: PT017 - some are valid
             assert all(line.isprintable() and len(line) < 300 for line in error.faults)  # noqa: PT017
@@ -285,14 +285,14 @@ def test_odd_value_gets_short_printable_line(value: str) -> None:
 def test_prefix_that_is_no_c_name_is_refused(prefix: str) -> None:
     """A prefix is a lower-case C name without double or trailing underscores, and no keyword."""
     with pytest.raises(InvalidSettingsError, match=r"--prefix: code\.prefix = .* must "):
-        settings_toml.with_option(Settings(), "code.prefix", prefix, "--prefix")
+        controller_toml.with_option(Settings(), "code.prefix", prefix, "--prefix")
 
 
 def test_option_replaces_one_value() -> None:
     """An option on the command line changes the value it names and nothing else."""
-    changed = settings_toml.with_option(Settings(), "code.prefix", "a" * 24, "--prefix")
+    changed = controller_toml.with_option(Settings(), "code.prefix", "a" * 24, "--prefix")
     assert changed.code.prefix == "a" * 24
-    assert settings_toml.with_option(changed, "code.prefix", "nmpc", "--prefix") == Settings()
+    assert controller_toml.with_option(changed, "code.prefix", "nmpc", "--prefix") == Settings()
 
 
 @pytest.mark.parametrize("key", KEYS.values(), ids=lambda key: key.path)
@@ -309,14 +309,14 @@ def test_digest_depends_on_every_value(key: Key) -> None:
             value = "3"
         case _:
             value = spelled(default * 0.9 or 0.1)
-    changed = settings_toml.parse(f"{key.path} = {value}", "changed")
+    changed = controller_toml.parse(f"{key.path} = {value}", "changed")
     assert changed.digest != Settings().digest
 
 
 def test_digest_ignores_spelling() -> None:
     """Equal values have one digest, whether written 1, 1.0 or left out, 0.0 or -0.0."""
     spelled_otherwise = "cost.effort_weight = 1\nmodel.roll_lag_s = -0.0\noptimizer.step_min_rad = 0.000001"
-    settings = settings_toml.parse(spelled_otherwise, "other")
+    settings = controller_toml.parse(spelled_otherwise, "other")
     assert settings.digest == Settings().digest
     assert len(settings.digest) == 64
 
@@ -360,30 +360,30 @@ def test_file_that_is_not_toml_is_refused(tmp_path: Path, content: bytes, messag
     path = tmp_path / "slow.toml"
     path.write_bytes(content)
     with pytest.raises(UnreadableFileError) as caught:
-        settings_toml.read(path)
+        controller_toml.read(path)
     assert f": {message}" in str(caught.value)
 
 
 def test_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     """A missing file and a folder are told apart."""
     with pytest.raises(UnreadableFileError, match="there is no such file"):
-        settings_toml.read(tmp_path / "none.toml")
+        controller_toml.read(tmp_path / "none.toml")
     with pytest.raises(UnreadableFileError, match="is a folder"):
-        settings_toml.read(tmp_path)
+        controller_toml.read(tmp_path)
 
 
 def test_byte_order_mark_is_read_over(tmp_path: Path) -> None:
     """A file saved by an editor that begins UTF-8 with a mark reads like any other."""
     path = tmp_path / "controller.toml"
     path.write_bytes(b"\xef\xbb\xbfhorizon.control = 3\r\n")
-    assert settings_toml.read(path).horizon.control == 3
+    assert controller_toml.read(path).horizon.control == 3
 
 
 @given(st.text())
 def test_any_text_is_settings_or_our_error(text: str) -> None:
     """No text whatever ends in an exception that is not ours."""
     try:
-        settings_toml.parse(text, "any")
+        controller_toml.parse(text, "any")
     except MamboNmpcError as error:
         assert error.exit_code == 2  # noqa: PT017 - most texts are wrong, some are not
 

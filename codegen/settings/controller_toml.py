@@ -9,9 +9,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from codegen.errors import InvalidSettingsError, UnreadableFileError, echo
-from codegen.settings import Settings
-from codegen.settings_faults import faults
-from codegen.settings_keys import KEYS, SECTIONS, spelled
+from codegen.settings.faults import faults
+from codegen.settings.keys import KEYS, SECTIONS, spelled
+from codegen.settings.model import Settings
 
 LARGEST_FILE_BYTES = 64_000
 COLUMNS = 88

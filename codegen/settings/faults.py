@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from codegen.errors import echo
-from codegen.settings_keys import KEYS, SECTIONS, Key
+from codegen.settings.keys import KEYS, SECTIONS, Key
 
 _LONGEST_NUMBER_BITS = 190
 """Whole numbers up to here (58 digits) are repeated in a message, longer ones described."""
