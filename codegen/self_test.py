@@ -4,6 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
+from codegen.literals import SCALARS
 from codegen.reference import ReferenceController, Status
 from codegen.settings import Settings
 
@@ -26,28 +29,37 @@ class SelfTestStep:
 def self_test(settings: Settings) -> list[SelfTestStep]:
     """Run the reference controller through STEPS inputs spread over those of a flight.
 
-    Every seventh input is out of range, in turn its state, its target and its thrust. The spread is a Weyl
+    The first is an error too small for a normal number: it shows a board that flushes those to zero. Of the
+    others every seventh is out of range, in turn its state, its target and its thrust. The spread is a Weyl
     sequence rather than a random number generator, whose stream may change with a library's version.
     """
     controller = ReferenceController(settings)
+    ranges = settings.ranges
+    position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
     spread = _spread()
-    steps = []
-    for index in range(STEPS):
-        target = [_next(spread, scale) for scale in (2.0, 2.0, 1.0, 1.0)]
-        error = [_next(spread, scale) for scale in (0.3, 0.3, 0.5, 0.5)]
+    tiny = float(np.finfo(SCALARS[settings.code.scalar]).smallest_normal) / 100
+    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, _within_range(settings, 9.81))]
+    for index in range(1, STEPS):
+        target = [_next(spread, scale) for scale in (position_m, position_m, speed_m_s, speed_m_s)]
+        error = [_next(spread, scale) for scale in (*[0.15 * position_m] * 2, *[0.5 * speed_m_s] * 2)]
         tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
         state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
-        thrust = 9.81 + _next(spread, 2.0)
+        thrust = _within_range(settings, 9.81 + _next(spread, 2.0))
         if index % 7 == 6:
-            match index // 7 % 3:
+            match index // 7:
                 case 0:
-                    state[0] = 2 * settings.ranges.position_m
+                    state[0] = 2 * ranges.position_m
                 case 1:
-                    target[3] = -2 * settings.ranges.velocity_m_s
+                    target[3] = -2 * ranges.velocity_m_s
                 case _:
                     thrust = 0.0
         steps.append(_step(controller, state, target, thrust))
     return steps
+
+
+def _within_range(settings: Settings, thrust: float) -> float:
+    ranges = settings.ranges
+    return min(max(thrust, ranges.thrust_acceleration_min_m_s2), ranges.thrust_acceleration_max_m_s2)
 
 
 def _step(

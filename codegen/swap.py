@@ -1,7 +1,8 @@
 """Replace a folder as a whole: the new one is built beside it and takes its place by a rename.
 
-Whoever looks sees the old folder or the new one, never a mixture. A run killed at any point leaves at most
-two hidden siblings, `.NAME.mambo-nmpc-new` and `.NAME.mambo-nmpc-old`; the next run puts them right.
+Whoever looks sees the old folder, the new one, or for a moment none; never a mixture. A run killed at any
+point leaves at most two hidden siblings, `.NAME.mambo-nmpc-new` and `.NAME.mambo-nmpc-old`; the next run
+puts them right.
 """
 
 import contextlib

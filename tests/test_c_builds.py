@@ -149,11 +149,29 @@ def test_the_bundle_builds_by_cmake(tmp_path: Path) -> None:
     assert "all steps equal" in shell("out/nmpc_example", folder=tmp_path)
 
 
-def test_fast_math_is_refused(tmp_path: Path) -> None:
-    """-ffast-math, which would remove the NaN checks, stops the build with the reason."""
+@pytest.mark.parametrize(
+    "flag", ["-ffast-math", "-Ofast", "-ffinite-math-only", "-funsafe-math-optimizations"]
+)
+def test_flags_that_change_the_arithmetic_are_refused(flag: str, tmp_path: Path) -> None:
+    """They would remove the NaN checks or reorder sums: the build stops and says which flag."""
     require("gcc", "gcc")
     placed(presets.load("mambo"), tmp_path)
-    command = ["gcc", "-ffast-math", "-Iinclude", "-c", "src/nmpc.c"]
+    command = ["gcc", flag, "-Iinclude", "-c", "src/nmpc.c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode != 0
-    assert "build without -ffast-math" in done.stderr
+    assert "build without -f" in done.stderr
+
+
+@pytest.mark.parametrize("name", presets.names())
+def test_the_self_test_notices_a_build_that_contracts(name: str, tmp_path: Path) -> None:
+    """Fused multiply-adds, where the processor has them, change bits that the vectors see."""
+    require("gcc", "gcc")
+    if " fma " not in Path("/proc/cpuinfo").read_text():
+        pytest.skip("this processor has no fused multiply-add")
+    placed(presets.load(name), tmp_path)
+    sources = sorted(tmp_path.glob("src/*.c"))
+    for contract, message in (("off", "equal the reference"), ("fast", "differs from the reference")):
+        flags = ["-O2", "-mfma", f"-ffp-contract={contract}", "-Iinclude"]
+        shell("gcc", *flags, *sources, "example/main.c", "-o", "example/run", folder=tmp_path)
+        done = subprocess.run(["example/run"], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert message in done.stdout

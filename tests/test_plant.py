@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp  # type: ignore[import-untyped]  # scipy ships no types
+from scipy.integrate import solve_ivp
 
 from sil.plant import loops
 from sil.plant.airframe import GRAVITY_M_S2, MAMBO

@@ -157,7 +157,7 @@ class Cost(_Section):
         ge=0,
         le=1e6,
         description="lambda_2, per radian: weight of the 1-norm of the change from one move to the next (eq "
-        "12, Table I). Near 1000 it halves the chatter under noise and costs some tracking.",
+        "12, Table I). A larger one calms the commands and costs tracking.",
     )
 
 

@@ -23,7 +23,7 @@ class Inputs:
 
 
 def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> Inputs:
-    """Draw inputs from centimetres to the whole range, a tenth of them with a corner in one place."""
+    """Draw inputs with errors from 0.1 mm to 10 m, a tenth of them with a corner in one place."""
     ranges = settings.ranges
     scale = 10.0 ** rng.uniform(-4, 1, (n, 1))
     target = rng.normal(0, 1, (n, 4)) * [2, 2, 1, 1]

@@ -36,6 +36,12 @@
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0))
 #error "build without -ffast-math: the input check relies on NaN, the proof on the order of operations"
 #endif
+#if defined(__ASSOCIATIVE_MATH__)
+#error "build without -fassociative-math: it changes the order of operations"
+#endif
+#if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ != 0) && (__FLT_EVAL_METHOD__ != 16)
+#error "arithmetic must keep the precision of its type: on x86 build with -mfpmath=sse"
+#endif
 
 typedef float nmpc_real_t;
 
