@@ -54,6 +54,10 @@ class ForeignFilesError(MamboNmpcError):
         self.paths = paths
 
 
+class BuildError(MamboNmpcError):
+    """The C cannot be compiled here: no compiler, no headers, or the compiler refused."""
+
+
 class DriftError(MamboNmpcError):
     """A bundle on disk is not what its settings generate."""
 

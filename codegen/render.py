@@ -11,7 +11,7 @@ from codegen import literals
 from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from codegen.horizon import horizon_tables
 from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
-from codegen.self_test import self_test
+from codegen.self_test import hover_thrust, self_test
 from codegen.settings import Settings
 from codegen.settings.controller_toml import to_toml
 from codegen.trigonometry import SINE_ERRORS, YAW_LIMIT_RAD, trigonometry
@@ -49,7 +49,7 @@ def render(settings: Settings, *, amalgamate: bool = False) -> dict[str, str]:
         library = _amalgamated(text)
     else:
         layout = {
-            "header_folder": "include",
+            "header_folder": "include/",
             "source_folder": "src/",
             "sources": [f"src/{name}" for name in SOURCES],
         }
@@ -109,6 +109,9 @@ def _context(settings: Settings) -> dict[str, object]:
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
         "vectors": self_test(settings),
+        "hover_thrust_m_s2": hover_thrust(settings),
+        "example_position_m": min(1.0, settings.ranges.position_m / 2),
+        "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
         "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
         "compile_flags": " ".join(COMPILE_FLAGS),
         "warning_flags": " ".join(WARNING_FLAGS),

@@ -16,7 +16,7 @@ _GOLDEN_RATIO: Final = 0.6180339887498949
 
 @dataclass(frozen=True)
 class SelfTestStep:
-    """One step: state (7,), target (4,) and thrust in; status, command (2,) and cost out."""
+    """One step: state (7,), target (4,), thrust in; status, command (2,), cost, gradient (2,) out."""
 
     state: tuple[float, ...]
     target: tuple[float, ...]
@@ -24,6 +24,7 @@ class SelfTestStep:
     status: Status
     command_rad: tuple[float, float]
     cost: float
+    gradient: tuple[float, float]
 
 
 def self_test(settings: Settings) -> list[SelfTestStep]:
@@ -38,13 +39,13 @@ def self_test(settings: Settings) -> list[SelfTestStep]:
     position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
     spread = _spread()
     tiny = float(np.finfo(SCALARS[settings.code.scalar]).smallest_normal) / 100
-    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, _within_range(settings, 9.81))]
+    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, hover_thrust(settings))]
     for index in range(1, STEPS):
         target = [_next(spread, scale) for scale in (position_m, position_m, speed_m_s, speed_m_s)]
         error = [_next(spread, scale) for scale in (*[0.15 * position_m] * 2, *[0.5 * speed_m_s] * 2)]
         tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
         state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
-        thrust = _within_range(settings, 9.81 + _next(spread, 2.0))
+        thrust = hover_thrust(settings, _next(spread, 2.0))
         if index % 7 == 6:
             match index // 7:
                 case 0:
@@ -57,8 +58,10 @@ def self_test(settings: Settings) -> list[SelfTestStep]:
     return steps
 
 
-def _within_range(settings: Settings, thrust: float) -> float:
+def hover_thrust(settings: Settings, offset_m_s2: float = 0.0) -> float:
+    """Return the thrust acceleration of hover, in m/s^2, or the nearest that the settings admit."""
     ranges = settings.ranges
+    thrust = 9.81 + offset_m_s2
     return min(max(thrust, ranges.thrust_acceleration_min_m_s2), ranges.thrust_acceleration_max_m_s2)
 
 
@@ -66,7 +69,8 @@ def _step(
     controller: ReferenceController, state: list[float], target: list[float], thrust: float
 ) -> SelfTestStep:
     step = controller.step([state], [target], [thrust])
-    roll_rad, pitch_rad = (float(angle) for angle in step.command_rad[0])
+    roll_rad, pitch_rad = step.command_rad[0].tolist()
+    by_roll, by_pitch = step.gradient[0, 0].tolist()
     return SelfTestStep(
         state=tuple(state),
         target=tuple(target),
@@ -74,6 +78,7 @@ def _step(
         status=Status(int(step.status[0])),
         command_rad=(roll_rad, pitch_rad),
         cost=float(step.cost[0]),
+        gradient=(by_roll, by_pitch),
     )
 
 

@@ -15,7 +15,7 @@ typedef struct {
     int *converged;
 } nmpc_outcome_t;
 
-static void nmpc_batch_init(nmpc_t *controllers, int n)
+void nmpc_batch_init(nmpc_t *controllers, int n)
 {
     int i;
 
@@ -24,7 +24,7 @@ static void nmpc_batch_init(nmpc_t *controllers, int n)
     }
 }
 
-static void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, const nmpc_target_t *target,
+void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, const nmpc_target_t *target,
                             const nmpc_real_t *thrust_acceleration_m_s2, const nmpc_outcome_t *outcome)
 {
     int i;
@@ -43,4 +43,9 @@ static void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *stat
             outcome->plan_rad[(i * NMPC_MOVES) + k] = self->plan_rad[k];
         }
     }
+}
+
+int nmpc_batch_instance_bytes(void)
+{
+    return (int)sizeof(nmpc_t);
 }

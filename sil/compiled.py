@@ -6,18 +6,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.literals import SCALARS
+from codegen.literals import SCALARS, Scalar
 from codegen.reference import Step
 from codegen.render import render
 from codegen.settings import Settings
+from codegen.toolchain import Toolchain, host_toolchain
 from sil.extension import load_extension
-from sil.toolchain import Toolchain, host_toolchain
 
 
 def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
     """Generate and build the C of `settings`, with the default prefix: a name changes no bit."""
     plain = settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "nmpc"})})
     return load_extension(render(plain), settings.code.scalar, toolchain)
+
+
+def as_array(values: ArrayLike, scalar: Scalar, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Return `values` as a contiguous array of `scalar`; raises ValueError if the shape is another."""
+    array = np.ascontiguousarray(values, scalar)
+    if array.shape != shape:
+        raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
+    return array
+
+
+DIRT = b"\xa5"
+"""What fills the memory of a controller before nmpc_init, as memory of a board is not zero either."""
 
 
 class CompiledController:
@@ -28,10 +40,10 @@ class CompiledController:
         self.scalar = SCALARS[settings.code.scalar]
         self._n = n
         self._moves = (settings.horizon.control, 2)
-        self._real = np.dtype(self.scalar)
         extension = extension or compiled(settings, host_toolchain())
         self._ffi, self._lib = extension.ffi, extension.lib
         self._controllers = self._ffi.new("nmpc_t[]", n)
+        self._ffi.buffer(self._controllers)[:] = DIRT * self._ffi.sizeof(self._controllers)
         self._lib.nmpc_batch_init(self._controllers, n)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
@@ -49,7 +61,7 @@ class CompiledController:
         command, cost = np.empty((n, 2), self.scalar), np.empty(n, self.scalar)
         gradient, plan = (np.empty((n, *self._moves), self.scalar) for _ in range(2))
         inputs = [
-            self._input(values, shape)
+            as_array(values, self.scalar, shape)
             for values, shape in ((state, (n, 7)), (target, (n, 4)), (thrust_acceleration_m_s2, (n,)))
         ]
         outcome = self._ffi.new("nmpc_outcome_t *")
@@ -81,17 +93,11 @@ class CompiledController:
             converged=converged.astype(np.bool_),
         )
 
-    def _input(self, values: ArrayLike, shape: tuple[int, ...]) -> NDArray[Any]:
-        array = np.ascontiguousarray(values, self._real)
-        if array.shape != shape:
-            raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
-        return array
-
     def _pointer(self, kind: str, array: NDArray[Any]) -> Any:
         return self._ffi.cast(f"{kind} *", self._ffi.from_buffer(array))
 
     def _set_each(self, function: Any, kind: str, values: ArrayLike) -> NDArray[np.int64]:
-        array = self._input(values, (self._n, 2))
+        array = as_array(values, self.scalar, (self._n, 2))
         pointer = self._pointer(kind, array)
         return np.array(
             [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)],

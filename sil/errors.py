@@ -3,10 +3,6 @@
 from codegen.errors import MamboNmpcError
 
 
-class BuildError(MamboNmpcError):
-    """The C cannot be compiled here: no compiler, no Python headers, or the compiler refused."""
-
-
 class TrajectoryError(MamboNmpcError):
     """A trajectory that cannot be flown; the message names file, row and rule."""
 
@@ -21,3 +17,7 @@ class TraceError(MamboNmpcError):
 
 class CacheError(MamboNmpcError):
     """The compile cache cannot be used, or others may write to it."""
+
+
+class EmulationError(MamboNmpcError):
+    """The program on the emulated core died, or did not return in time."""

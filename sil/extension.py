@@ -17,11 +17,11 @@ from typing import Final
 
 import cffi
 
+from codegen.errors import BuildError
 from codegen.flags import COMPILE_FLAGS
 from codegen.literals import C_TYPES
+from codegen.toolchain import Toolchain
 from sil.cache import cached
-from sil.errors import BuildError
-from sil.toolchain import Toolchain
 
 _DECLARATIONS: Final = """
 typedef REAL nmpc_real_t;

@@ -1,10 +1,10 @@
 """What a caller of the generated C may rely on, whatever it passes in."""
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -122,6 +122,8 @@ def test_weights_change_the_cost_and_bad_ones_nothing(kind: str) -> None:
 
     initial = cost(None, Status.OK)
     assert cost([4500.0, 2.0], Status.OK) == 2 * initial
+    assert cost([0.0, 0.0], Status.OK) == 0
+    assert cost([1e6, 1e6], Status.OK) > initial
     for bad in ([-1.0, 1.0], [2250.0, np.nan], [2e6, 1.0]):
         assert cost(bad, Status.BAD_WEIGHT) == initial
 
@@ -151,19 +153,34 @@ def test_null_pointers_get_a_status_and_a_safe_command() -> None:
     assert lib.nmpc_set_weights(ffi.NULL, ffi.new("nmpc_weights_t *")) == Status.NULL_POINTER
 
 
+WIDTHS: dict[str, Literal[32, 64]] = {"float32": 32, "float64": 64}
+
+
+def any_number(limit: float, width: Literal[32, 64]) -> st.SearchStrategy[float]:
+    """Draw a number: within +/- limit mostly, at its very end, too small for a normal number, or any bits."""
+    within = st.floats(-limit, limit, width=width)
+    return st.one_of(
+        within, within, st.sampled_from([limit, -limit, 0.0, -0.0, 1e-40]), st.floats(width=width)
+    )
+
+
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @settings(max_examples=300, deadline=None)
 @given(data=st.data())
-def test_any_bits_at_all_keep_the_command_within_the_limit(scalar: str, data: st.DataObject) -> None:
-    """Whatever the bits of the input, a documented status and |command| <= tilt limit."""
+def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: st.DataObject) -> None:
+    """Whatever the input, among good ones: a documented status and |command| <= tilt limit."""
     chosen = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
     used = CompiledController(chosen, 1, compiled(chosen, toolchain("gcc")))
-    size = np.dtype(SCALARS[scalar]).itemsize
-    for _ in range(data.draw(st.integers(1, 4))):
-        raw = data.draw(st.binary(min_size=12 * size, max_size=12 * size))
-        values = np.frombuffer(raw, SCALARS[scalar])
-        step = used.step(values[None, :7], values[None, 7:11], values[11:])
-        assert Status(int(step.status[0])) in Status
+    width = WIDTHS[scalar]
+    position, speed = any_number(1000, width), any_number(100, width)
+    angle, yaw = any_number(3.25, width), any_number(1024, width)
+    states = st.tuples(position, position, speed, speed, angle, angle, yaw)
+    targets = st.tuples(position, position, speed, speed)
+    thrusts = st.one_of(st.floats(1, 50, width=width), st.floats(1, 50, width=width), st.floats(width=width))
+    assert used.step([HOVER_STATE], [HOVER_TARGET], [HOVER_THRUST]).status[0] == Status.OK
+    for _ in range(data.draw(st.integers(1, 5))):
+        step = used.step([data.draw(states)], [data.draw(targets)], [data.draw(thrusts)])
+        event(Status(int(step.status[0])).name)
         assert np.all(np.abs(step.command_rad) <= SCALARS[scalar](chosen.limits.tilt_rad))
 
 

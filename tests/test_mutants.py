@@ -36,6 +36,9 @@ STAYING = BACKTRACKING.model_copy(
         )
     }
 )
+NEVER_CONVERGING = BACKTRACKING.model_copy(
+    update={"optimizer": BACKTRACKING.optimizer.model_copy(update={"tolerance": 0.0})}
+)
 CASES = 400
 
 
@@ -59,7 +62,7 @@ OPTIMIZER, STEP, HELPERS, CONFIG = (
 
 MUTANTS = [
     # signs
-    Mutant("roll pushes x the other way", PREDICTOR, "gain_x_m_s2[ROLL] = -across", "gain_x_m_s2[ROLL] = across"),
+    Mutant("roll pushes x the other way", PREDICTOR, "gain_x_m_s2[ROLL] = -across_m_s2", "gain_x_m_s2[ROLL] = across_m_s2"),
     Mutant("pitch pushes x the other way", PREDICTOR, "gain_x_m_s2[PITCH] = -along", "gain_x_m_s2[PITCH] = along"),
     Mutant("pitch pushes y the other way", PREDICTOR, "gain_y_m_s2[PITCH] = -across", "gain_y_m_s2[PITCH] = across"),
     Mutant("error counts from the target", PREDICTOR, "state->position_m[0] - target->position_m[0]", "target->position_m[0] - state->position_m[0]"),
@@ -78,11 +81,11 @@ MUTANTS = [
     Mutant("the last move is left for another", COST, "if (k < (NMPC_MOVES - NMPC_AXES))", "if (k < (NMPC_MOVES - NMPC_AXES - 1))"),
     Mutant("a sine term too few", MATH, "for (k = NMPC_SINE_TERMS - 2", "for (k = NMPC_SINE_TERMS - 3"),
     Mutant("convergence tested at once", OPTIMIZER, "(iteration > 0) && ", ""),
-    Mutant("convergence at the tolerance itself", OPTIMIZER, "nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE", "self->cost - previous_cost < NMPC_TOLERANCE"),
+    Mutant("any cheaper plan counts as converged", OPTIMIZER, "nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE", "self->cost - previous_cost < NMPC_TOLERANCE"),
     # indices
     Mutant("y looks where x is", PREDICTOR, "state->position_m[1] - target", "state->position_m[0] - target"),
-    Mutant("pitch takes roll's response", PREDICTOR, "pitch + (response_s2[i][k + PITCH]", "pitch + (response_s2[i][k + ROLL]"),
-    Mutant("the gradient of pitch takes roll's response", PREDICTOR, "(pitch * response_s2[i][k + PITCH])", "(pitch * response_s2[i][k + ROLL])"),
+    Mutant("pitch takes roll's response", PREDICTOR, "pitch_rad_s2 + (response_s2[i][k + PITCH]", "pitch_rad_s2 + (response_s2[i][k + ROLL]"),
+    Mutant("the gradient of pitch takes roll's response", PREDICTOR, "(by_pitch * response_s2[i][k + PITCH])", "(by_pitch * response_s2[i][k + ROLL])"),
     Mutant("pitch decays like roll", PREDICTOR, "free_s2[i][PITCH] * state->pitch_rad", "free_s2[i][ROLL] * state->pitch_rad"),
     Mutant("a move follows the other axis", COST, "moves_rad[k - NMPC_AXES]", "moves_rad[k - 1]"),
     Mutant("the command takes the second move", STEP, "self->command_rad[1] = self->plan_rad[1]", "self->command_rad[1] = self->plan_rad[3]"),
@@ -93,11 +96,11 @@ MUTANTS = [
     Mutant("effort weighs like tracking in the cost", COST, "(weights->effort * variation_rad)", "(weights->tracking * variation_rad)"),
     Mutant("tracking unweighted in the gradient", COST, "(weights->tracking * gradient[k])", "(gradient[k])"),
     Mutant("time runs twice as fast for y", PREDICTOR, "(time_s[i] * error_y_m_s)", "((time_s[i] + time_s[i]) * error_y_m_s)"),
-    Mutant("thrust left out", PREDICTOR, "along = thrust_acceleration_m_s2 * along", "along = along"),
+    Mutant("thrust left out", PREDICTOR, "along_m_s2 = thrust_acceleration_m_s2 * cosine", "along_m_s2 = cosine"),
     Mutant("steps grow while they should shrink", OPTIMIZER, "self->step_rad[k] * NMPC_DECREASE", "self->step_rad[k] * NMPC_INCREASE"),
     Mutant("a table entry off by a tenth", PREDICTOR, "0.05f, 0.1f,", "0.05f, 0.11f,"),
     # order of operations
-    Mutant("free error added before the sum", PREDICTOR, "prediction->free_x_m[i]\n                 + ((prediction->gain_x_m_s2[ROLL] * roll) + (prediction->gain_x_m_s2[PITCH] * pitch))", "(prediction->free_x_m[i]\n                 + (prediction->gain_x_m_s2[ROLL] * roll)) + (prediction->gain_x_m_s2[PITCH] * pitch)"),
+    Mutant("free error added before the sum", PREDICTOR, "*error_x_m = prediction->free_x_m[i] + displacement_m(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2)", "*error_x_m = (prediction->free_x_m[i] + (prediction->gain_x_m_s2[ROLL] * roll_rad_s2)) + (prediction->gain_x_m_s2[PITCH] * pitch_rad_s2)"),
     Mutant("distance added one axis at a time", COST, "distance_m + (nmpc_absolute(error_x_m) + nmpc_absolute(error_y_m))", "distance_m + nmpc_absolute(error_x_m) + nmpc_absolute(error_y_m)"),
     Mutant("sine multiplied out", MATH, "rest + (rest * (square * sine_rest))", "rest * ((nmpc_real_t)1 + (square * sine_rest))"),
     Mutant("angle reduced in one go", MATH, "((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))", "(angle_rad - (count * (quarter_turn_rad[0] + quarter_turn_rad[1])))"),
@@ -114,6 +117,15 @@ MUTANTS = [
     Mutant("the plan starts over", STEP, "        nmpc_optimizer_minimize(self);", "        set_plan(self);\n        nmpc_optimizer_minimize(self);"),
     Mutant("the plan lives on", STEP, "        set_plan(self);\n        nmpc_optimizer_minimize(self);", "        nmpc_optimizer_minimize(self);", STAYING),
     Mutant("the frozen plan moves on", OPTIMIZER, "if (self->converged == 0U)", "if (self->converged <= 1U)"),
+    Mutant("convergence at the tolerance itself", OPTIMIZER, "nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE", "nmpc_absolute(self->cost - previous_cost) <= NMPC_TOLERANCE", NEVER_CONVERGING),
+    Mutant("no first command", STEP, "        self->command_rad[k] = (nmpc_real_t)0;\n", ""),
+    Mutant("no first plan", STEP, "        self->plan_rad[k] = (nmpc_real_t)0;\n", ""),
+    Mutant("no first cost", STEP, "    self->cost = (nmpc_real_t)0;\n", ""),
+    Mutant("no first gradient", STEP, "        self->gradient[k] = (nmpc_real_t)0;\n", ""),
+    Mutant("no first count of iterations", STEP, "    self->iterations = 0U;\n", ""),
+    Mutant("no first verdict on convergence", STEP, "    self->converged = 0U;\n", ""),
+    Mutant("the largest weight refused", STEP, "(weights->tracking <= NMPC_WEIGHT_LIMIT)", "(weights->tracking < NMPC_WEIGHT_LIMIT)"),
+    Mutant("a weight of zero refused", STEP, "(weights->effort >= (nmpc_real_t)0)", "(weights->effort > (nmpc_real_t)0)"),
     Mutant("yaw unchecked", STEP, "nmpc_within(state->yaw_rad, NMPC_YAW_RANGE_RAD)", "(state->yaw_rad == state->yaw_rad)"),
     Mutant("NaN passes", HELPERS, "(value >= -limit) && (value <= limit)", "!((value < -limit) || (value > limit))"),
     Mutant("velocity of the target unchecked", STEP, "           && nmpc_within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);", "           ;"),
@@ -148,6 +160,6 @@ def test_the_unharmed_code_passes(settings: Settings) -> None:
 def test_mutant_is_caught(mutant: Mutant) -> None:
     """The fault applies, compiles, and shows as differing bits."""
     files = render(mutant.settings)
-    assert mutant.right in files[mutant.path], "the template moved on: the mutant must follow"
+    assert files[mutant.path].count(mutant.right) == 1, "the template moved on: the mutant must follow"
     harmed = files | {mutant.path: files[mutant.path].replace(mutant.right, mutant.wrong, 1)}
     assert differences(expected(mutant.settings)[1], found(mutant.settings, harmed)) != {}

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
-from codegen.settings import controller_toml
+from codegen.settings import Settings, controller_toml
 from codegen.settings.keys import KEYS, Key, spelled
-from codegen.settings.model import KEYWORDS, Settings
+from codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
 
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 COMPANIONS: dict[str, dict[str, float]] = {
@@ -66,7 +66,7 @@ def any_settings(draw: st.DrawFn) -> Settings:
         "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(
             st.from_regex(r"[a-z][a-z0-9]{0,7}(_[a-z0-9]{1,7}){0,2}", fullmatch=True).filter(
-                lambda word: word not in KEYWORDS
+                lambda word: word not in KEYWORDS | STANDARD_NAMES
             )
         ),
     }
@@ -279,7 +279,7 @@ def test_odd_value_gets_short_printable_line(value: str) -> None:
         "nmpc\n",
         "naïve",
         "a" * 25,
-        *sorted(KEYWORDS),
+        *sorted(KEYWORDS | STANDARD_NAMES),
     ],
 )
 def test_prefix_that_is_no_c_name_is_refused(prefix: str) -> None:

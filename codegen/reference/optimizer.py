@@ -34,7 +34,7 @@ class Search:
 def minimize(settings: Settings, evaluate: Evaluate, moves_rad: Real) -> Search:
     """Search from `moves_rad` for exactly `optimizer.iterations` evaluations.
 
-    Once the cost changes by less than the tolerance the plan is frozen; the work stays the same.
+    Once the cost changes by less than the tolerance the plan is frozen; the evaluations go on.
     """
     scalar = moves_rad.dtype.type
     optimizer = settings.optimizer

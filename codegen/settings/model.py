@@ -13,6 +13,8 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from codegen.settings import reserved
+
 SHORTEST_LAG_S = 0.001
 """An attitude lag is 0 (none) or at least this: below it the exact discretisation is a unit step."""
 
@@ -26,10 +28,6 @@ _WORDS = """
     struct switch template this thread_local throw true try typedef typeid typename typeof
     typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq
 """
-KEYWORDS = frozenset(_WORDS.split())
-"""The words of C23 and C++23 that cannot begin a name of ours, the contextual ones included."""
-
-
 def _without_minus_zero(value: float) -> float:
     """Return `value` with -0.0 as 0.0, so that equal settings have equal digests and equal C."""
     return value + 0.0
@@ -173,7 +171,7 @@ class Optimizer(_Section):
         5,
         ge=1,
         le=100,
-        description="I_max, iterations in every control step: always as many, so that the time is constant "
+        description="I_max, iterations in every control step: always as many evaluations of the cost "
         "(Table I).",
     )
     tolerance: Number = Field(
@@ -303,9 +301,14 @@ class Code(_Section):
     @field_validator("prefix")
     @classmethod
     def _no_keyword(cls, prefix: str) -> str:
-        if prefix in KEYWORDS:
+        if prefix in reserved.KEYWORDS:
             raise PydanticCustomError(
                 "keyword", f"must not be a keyword of C or C++; write for example {prefix}_nmpc"
+            )
+        if prefix in reserved.STANDARD_NAMES:
+            raise PydanticCustomError(
+                "keyword",
+                f"must not be a header or a type of the C library; write for example {prefix}_nmpc",
             )
         return prefix
 

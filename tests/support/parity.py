@@ -49,6 +49,7 @@ def run(controller: Controller, inputs: list[Inputs], seed: int) -> Run:
             command = rng.uniform(-1.5, 1.5, (n, 2))
             command[::5, 0] = rng.choice([np.nan, np.inf, 4.0, -4.0], len(command[::5]))
             weights = 10.0 ** rng.uniform(-2, 6, (n, 2))
+            weights[3::7] = rng.choice([0.0, 1e6], weights[3::7].shape)
             weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1e6], len(weights[::7]))
             setters += [controller.reset(command), controller.set_weights(weights)]
         steps.append(controller.step(case.state, case.target, case.thrust))

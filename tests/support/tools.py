@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from sil.toolchain import Toolchain
+from codegen.toolchain import Toolchain
 
 
 def require(tool: str, package: str) -> str:

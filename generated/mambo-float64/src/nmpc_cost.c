@@ -20,7 +20,7 @@ nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_w
         gradient[k] = (nmpc_real_t)0;
     }
 
-    /* Eq 12a: the 1-norm sees of each error its size, and its gradient only the sign. */
+    /* Eq 12a: an error costs its size; its slope is its sign. */
     for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
         nmpc_real_t error_x_m;
         nmpc_real_t error_y_m;

@@ -11,9 +11,10 @@
 extern "C" {
 #endif
 
-/* Step `scratch`, which it initialises, through 24 built-in steps, good and bad input among them, and compare
- * status, command and cost exactly. Returns 0 if all agree, else the number, from 1, of the first step that
- * does not. Call it at start-up; it needs no other instance. `scratch` must not be null. */
+/* Step `scratch` through 24 built-in steps, good and bad input among them, and compare status, command,
+ * cost and the gradient of the first move exactly. Returns 0 if all agree, else the number, from 1, of the
+ * first step that does not. Call it at start-up, with the controller that will fly if there is no room for
+ * another: it is initialised before and after. `scratch` must not be null. */
 int nmpc_self_test(nmpc_t *scratch);
 
 #ifdef __cplusplus

@@ -7,6 +7,17 @@
 
 #include "nmpc_config.h"
 
+/* Flags that would change the arithmetic of this library. */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0))
+#error "build without -ffast-math: the input check relies on NaN, the bits on the order of operations"
+#endif
+#if defined(__ASSOCIATIVE_MATH__)
+#error "build without -fassociative-math: it changes the order of operations"
+#endif
+#if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ != 0) && (__FLT_EVAL_METHOD__ != 16)
+#error "arithmetic must keep the precision of its type: on x86 build with -mfpmath=sse"
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif

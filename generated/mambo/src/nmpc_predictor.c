@@ -46,6 +46,13 @@ static const nmpc_real_t response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
     { 0.016035512f, 0.020742238f, 0.050107267f, 0.06993263f }
 };
 
+/* Turn double time integrals of roll and pitch into a displacement along the axis of `gain_m_s2`. */
+static nmpc_real_t displacement_m(const nmpc_real_t gain_m_s2[NMPC_AXES], nmpc_real_t roll_rad_s2,
+                                  nmpc_real_t pitch_rad_s2)
+{
+    return (gain_m_s2[ROLL] * roll_rad_s2) + (gain_m_s2[PITCH] * pitch_rad_s2);
+}
+
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
@@ -53,18 +60,20 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     const nmpc_real_t error_y_m = state->position_m[1] - target->position_m[1];
     const nmpc_real_t error_x_m_s = state->velocity_m_s[0] - target->velocity_m_s[0];
     const nmpc_real_t error_y_m_s = state->velocity_m_s[1] - target->velocity_m_s[1];
-    nmpc_real_t across;
-    nmpc_real_t along;
+    nmpc_real_t sine;
+    nmpc_real_t cosine;
+    nmpc_real_t across_m_s2;
+    nmpc_real_t along_m_s2;
     int i;
 
     /* Eq 8 with the signs of eq 3. */
-    nmpc_sine_cosine(state->yaw_rad, &across, &along);
-    across = thrust_acceleration_m_s2 * across;
-    along = thrust_acceleration_m_s2 * along;
-    prediction->gain_x_m_s2[ROLL] = -across;
-    prediction->gain_x_m_s2[PITCH] = -along;
-    prediction->gain_y_m_s2[ROLL] = along;
-    prediction->gain_y_m_s2[PITCH] = -across;
+    nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
+    across_m_s2 = thrust_acceleration_m_s2 * sine;
+    along_m_s2 = thrust_acceleration_m_s2 * cosine;
+    prediction->gain_x_m_s2[ROLL] = -across_m_s2;
+    prediction->gain_x_m_s2[PITCH] = -along_m_s2;
+    prediction->gain_y_m_s2[ROLL] = along_m_s2;
+    prediction->gain_y_m_s2[PITCH] = -across_m_s2;
 
     /* Eqs 9-11 without moves: both robot and target keep their velocity. */
     for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
@@ -74,46 +83,42 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
 
     /* The present tilt keeps pushing while it decays. */
     for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        const nmpc_real_t roll = free_s2[i][ROLL] * state->roll_rad;
-        const nmpc_real_t pitch = free_s2[i][PITCH] * state->pitch_rad;
+        const nmpc_real_t roll_rad_s2 = free_s2[i][ROLL] * state->roll_rad;
+        const nmpc_real_t pitch_rad_s2 = free_s2[i][PITCH] * state->pitch_rad;
 
         prediction->free_x_m[i] =
-            prediction->free_x_m[i]
-            + ((prediction->gain_x_m_s2[ROLL] * roll) + (prediction->gain_x_m_s2[PITCH] * pitch));
+            prediction->free_x_m[i] + displacement_m(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
         prediction->free_y_m[i] =
-            prediction->free_y_m[i]
-            + ((prediction->gain_y_m_s2[ROLL] * roll) + (prediction->gain_y_m_s2[PITCH] * pitch));
+            prediction->free_y_m[i] + displacement_m(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
     }
 }
 
 void nmpc_predictor_error(const nmpc_prediction_t *prediction, const nmpc_real_t moves_rad[NMPC_MOVES], int i,
                           nmpc_real_t *error_x_m, nmpc_real_t *error_y_m)
 {
-    nmpc_real_t roll = (nmpc_real_t)0;
-    nmpc_real_t pitch = (nmpc_real_t)0;
+    nmpc_real_t roll_rad_s2 = (nmpc_real_t)0;
+    nmpc_real_t pitch_rad_s2 = (nmpc_real_t)0;
     int k;
 
     for (k = 0; k < NMPC_MOVES; k += NMPC_AXES) {
-        roll = roll + (response_s2[i][k + ROLL] * moves_rad[k + ROLL]);
-        pitch = pitch + (response_s2[i][k + PITCH] * moves_rad[k + PITCH]);
+        roll_rad_s2 = roll_rad_s2 + (response_s2[i][k + ROLL] * moves_rad[k + ROLL]);
+        pitch_rad_s2 = pitch_rad_s2 + (response_s2[i][k + PITCH] * moves_rad[k + PITCH]);
     }
-    *error_x_m = prediction->free_x_m[i]
-                 + ((prediction->gain_x_m_s2[ROLL] * roll) + (prediction->gain_x_m_s2[PITCH] * pitch));
-    *error_y_m = prediction->free_y_m[i]
-                 + ((prediction->gain_y_m_s2[ROLL] * roll) + (prediction->gain_y_m_s2[PITCH] * pitch));
+    *error_x_m = prediction->free_x_m[i] + displacement_m(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
+    *error_y_m = prediction->free_y_m[i] + displacement_m(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
 }
 
 void nmpc_predictor_add_gradient(const nmpc_prediction_t *prediction, int i, nmpc_real_t slope_x,
                                  nmpc_real_t slope_y, nmpc_real_t gradient[NMPC_MOVES])
 {
-    const nmpc_real_t roll =
+    const nmpc_real_t by_roll =
         (slope_x * prediction->gain_x_m_s2[ROLL]) + (slope_y * prediction->gain_y_m_s2[ROLL]);
-    const nmpc_real_t pitch =
+    const nmpc_real_t by_pitch =
         (slope_x * prediction->gain_x_m_s2[PITCH]) + (slope_y * prediction->gain_y_m_s2[PITCH]);
     int k;
 
     for (k = 0; k < NMPC_MOVES; k += NMPC_AXES) {
-        gradient[k + ROLL] = gradient[k + ROLL] + (roll * response_s2[i][k + ROLL]);
-        gradient[k + PITCH] = gradient[k + PITCH] + (pitch * response_s2[i][k + PITCH]);
+        gradient[k + ROLL] = gradient[k + ROLL] + (by_roll * response_s2[i][k + ROLL]);
+        gradient[k + PITCH] = gradient[k + PITCH] + (by_pitch * response_s2[i][k + PITCH]);
     }
 }

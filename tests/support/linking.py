@@ -1,0 +1,111 @@
+"""Small programs linked for a board, without its start-up code and without a C library."""
+
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+from codegen import presets
+from codegen.flags import COMPILE_FLAGS
+from codegen.render import render
+from tests.support.tools import require
+
+GUEST = """
+#include "nmpc_self_test.h"
+nmpc_t nmpc_instance;
+nmpc_state_t state;
+nmpc_target_t target;
+nmpc_real_t thrust;
+nmpc_command_t command;
+int run(void) { return nmpc_self_test(&nmpc_instance); }
+int fly(void) { return nmpc_step(&nmpc_instance, &state, &target, thrust, &command); }
+"""
+"""A program that runs the self-test, or one step from variables."""
+
+_MEMORY = """
+void *memset(void *to, int value, __SIZE_TYPE__ count)
+{
+    unsigned char *byte = to;
+    while (count--) { *byte++ = (unsigned char)value; }
+    return to;
+}
+void *memcpy(void *to, const void *from, __SIZE_TYPE__ count)
+{
+    unsigned char *byte = to;
+    const unsigned char *source = from;
+    while (count--) { *byte++ = *source++; }
+    return to;
+}
+"""
+"""What a compiler may call even without a library."""
+
+_LINK = (
+    "-ffunction-sections -fdata-sections -fno-tree-loop-distribute-patterns -static -fno-pie -nostartfiles "
+    "-nodefaultlibs -Wl,--gc-sections -Wl,--build-id=none -Wl,-Ttext=0x10000 -Wl,-e,run -Wl,-u,fly"
+).split()
+
+
+@dataclass(frozen=True)
+class Board:
+    """A processor, and the compiler that builds for it."""
+
+    name: str
+    compiler: str
+    package: str
+    flags: tuple[str, ...]
+
+
+def _board(name: str, compiler: str, package: str, flags: str) -> Board:
+    return Board(name, compiler, package, tuple(flags.split()))
+
+
+_ARM = ("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+_HARD = "-mthumb -mfloat-abi=hard -mfpu"
+BOARDS = {
+    board.name: board
+    for board in (
+        _board(
+            "arm926",
+            "arm-linux-gnueabi-gcc",
+            "gcc-arm-linux-gnueabi",
+            "-mcpu=arm926ej-s -marm -mfloat-abi=soft",
+        ),
+        _board("m4f", *_ARM, f"-mcpu=cortex-m4 {_HARD}=fpv4-sp-d16"),
+        _board("m7", *_ARM, f"-mcpu=cortex-m7 {_HARD}=fpv5-d16"),
+        _board("m0plus", *_ARM, "-mcpu=cortex-m0plus -mthumb"),
+        _board(
+            "rv32imac",
+            "riscv64-unknown-elf-gcc",
+            "gcc-riscv64-unknown-elf",
+            "-march=rv32imac -mabi=ilp32 -ffreestanding",
+        ),
+    )
+}
+
+
+def linked(board: Board, text: str, folder: Path, *flags: str, name: str = "guest") -> Path:
+    """Compile and link `text`, C whose entry is run(), for `board`; more flags may bring more sources."""
+    compiler = require(board.compiler, board.package)
+    (folder / f"{name}.c").write_text(text + _MEMORY)
+    command = [
+        compiler,
+        *COMPILE_FLAGS,
+        *board.flags,
+        *_LINK,
+        f"{name}.c",
+        *flags,
+        "-lgcc",
+        "-o",
+        f"{name}.elf",
+    ]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder / f"{name}.elf"
+
+
+def linked_controller(board: Board, folder: Path, *flags: str, preset: str = "mambo") -> Path:
+    """Link the guest with the controller of a preset, and leave gcc's figures of the stack beside it."""
+    for path, text in render(presets.load(preset)).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text)
+    sources = sorted(str(path.relative_to(folder)) for path in folder.glob("src/*.c"))
+    return linked(board, GUEST, folder, "-fstack-usage", *flags, "-Iinclude", *sources)
