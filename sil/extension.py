@@ -51,7 +51,6 @@ int nmpc_self_test(nmpc_t *);
 void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
 void nmpc_predictor_error(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_real_t *, nmpc_real_t *);
-void nmpc_predictor_add_gradient(const nmpc_prediction_t *, int, nmpc_real_t, nmpc_real_t, nmpc_real_t *);
 nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *, const nmpc_weights_t *, const nmpc_real_t *,
                                const nmpc_real_t *, nmpc_real_t *);
 

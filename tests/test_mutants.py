@@ -53,6 +53,7 @@ class Mutant(NamedTuple):
 
 
 MATH, PREDICTOR, COST = "src/nmpc_math.c", "src/nmpc_predictor.c", "src/nmpc_cost.c"
+PREDICTOR_H = "src/nmpc_predictor.h"
 OPTIMIZER, STEP, HELPERS, CONFIG = (
     "src/nmpc_optimizer.c",
     "src/nmpc.c",
@@ -62,50 +63,54 @@ OPTIMIZER, STEP, HELPERS, CONFIG = (
 
 MUTANTS = [
     # signs
-    Mutant("roll pushes x the other way", PREDICTOR, "gain_x_m_s2[ROLL] = -across_m_s2", "gain_x_m_s2[ROLL] = across_m_s2"),
-    Mutant("pitch pushes x the other way", PREDICTOR, "gain_x_m_s2[PITCH] = -along", "gain_x_m_s2[PITCH] = along"),
-    Mutant("pitch pushes y the other way", PREDICTOR, "gain_y_m_s2[PITCH] = -across", "gain_y_m_s2[PITCH] = across"),
+    Mutant("roll pushes x the other way", PREDICTOR, "gain_x_m_s2[NMPC_ROLL] = -across_m_s2", "gain_x_m_s2[NMPC_ROLL] = across_m_s2"),
+    Mutant("pitch pushes x the other way", PREDICTOR, "gain_x_m_s2[NMPC_PITCH] = -along", "gain_x_m_s2[NMPC_PITCH] = along"),
+    Mutant("pitch pushes y the other way", PREDICTOR, "gain_y_m_s2[NMPC_PITCH] = -across", "gain_y_m_s2[NMPC_PITCH] = across"),
     Mutant("error counts from the target", PREDICTOR, "state->position_m[0] - target->position_m[0]", "target->position_m[0] - state->position_m[0]"),
     Mutant("sine of a half turn keeps its sign", MATH, "*sine = -sine_rest;", "*sine = sine_rest;"),
     Mutant("quadrants of negative angles round up", MATH, "? -half : half", "? half : half"),
-    Mutant("the move climbs", OPTIMIZER, "move_rad - ((nmpc_real_t)slope", "move_rad + ((nmpc_real_t)slope"),
+    Mutant("the move climbs", OPTIMIZER, "nmpc_larger(move_rad - self", "nmpc_larger(move_rad + self"),
     Mutant("the sign of zero is one", HELPERS, "(value > (nmpc_real_t)0) ? 1", "(value >= (nmpc_real_t)0) ? 1"),
     Mutant("a negative value stays negative", HELPERS, "? -value : value", "? value : value"),
-    Mutant("leaving a move costs like entering it", COST, "slope = slope - nmpc_sign", "slope = slope + nmpc_sign"),
+    Mutant("leaving a move costs like entering it", COST, "gradient[k - NMPC_AXES] - effort", "gradient[k - NMPC_AXES] + effort"),
+    Mutant("an error below zero has a negative size", COST, "        size_m = -error_m;\n", ""),
+    Mutant("an error below zero slopes up", COST, "sums_s2[k] - response_s2[k]", "sums_s2[k] + response_s2[k]"),
     # bounds
     Mutant("one predicted step too few", COST, "for (i = 0; i < NMPC_PREDICTION_HORIZON; i++)", "for (i = 0; i < NMPC_PREDICTION_HORIZON - 1; i++)"),
     Mutant("the first predicted step left out", COST, "for (i = 0; i < NMPC_PREDICTION_HORIZON; i++)", "for (i = 1; i < NMPC_PREDICTION_HORIZON; i++)"),
     Mutant("one iteration too few", OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration < NMPC_ITERATIONS - 1"),
     Mutant("one iteration too many", OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
     Mutant("the last move never updated", OPTIMIZER, "            for (k = 0; k < NMPC_MOVES; k++)", "            for (k = 0; k < NMPC_MOVES - 1; k++)"),
-    Mutant("the last move is left for another", COST, "if (k < (NMPC_MOVES - NMPC_AXES))", "if (k < (NMPC_MOVES - NMPC_AXES - 1))"),
+    Mutant("roll of the second move is entered from nowhere", COST, "if (k >= NMPC_AXES)", "if (k > NMPC_AXES)"),
     Mutant("a sine term too few", MATH, "for (k = NMPC_SINE_TERMS - 2", "for (k = NMPC_SINE_TERMS - 3"),
     Mutant("convergence tested at once", OPTIMIZER, "(iteration > 0) && ", ""),
     Mutant("any cheaper plan counts as converged", OPTIMIZER, "nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE", "self->cost - previous_cost < NMPC_TOLERANCE"),
     # indices
     Mutant("y looks where x is", PREDICTOR, "state->position_m[1] - target", "state->position_m[0] - target"),
-    Mutant("pitch takes roll's response", PREDICTOR, "pitch_rad_s2 + (response_s2[i][k + PITCH]", "pitch_rad_s2 + (response_s2[i][k + ROLL]"),
-    Mutant("the gradient of pitch takes roll's response", PREDICTOR, "(by_pitch * response_s2[i][k + PITCH])", "(by_pitch * response_s2[i][k + ROLL])"),
-    Mutant("pitch decays like roll", PREDICTOR, "free_s2[i][PITCH] * state->pitch_rad", "free_s2[i][ROLL] * state->pitch_rad"),
+    Mutant("pitch takes roll's response", PREDICTOR_H, "(response_s2[k + NMPC_PITCH]", "(response_s2[k + NMPC_ROLL]"),
+    Mutant("pitch of the first move takes roll's response", PREDICTOR_H, "response_s2[NMPC_PITCH] * moves", "response_s2[NMPC_ROLL] * moves"),
+    Mutant("the gradient of pitch takes the gain of roll", COST, "gain_x_m_s2[axis]", "gain_x_m_s2[0]"),
+    Mutant("pitch decays like roll", PREDICTOR, "free_s2[i][NMPC_PITCH] * state->pitch_rad", "free_s2[i][NMPC_ROLL] * state->pitch_rad"),
     Mutant("a move follows the other axis", COST, "moves_rad[k - NMPC_AXES]", "moves_rad[k - 1]"),
     Mutant("the command takes the second move", STEP, "self->command_rad[1] = self->plan_rad[1]", "self->command_rad[1] = self->plan_rad[3]"),
     Mutant("roll and pitch change places", STEP, "command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),
     Mutant("a reset starts pitch at roll", STEP, "self->command_rad[k % NMPC_AXES]", "self->command_rad[0]"),
     # weights and constants
-    Mutant("effort free of charge in the gradient", COST, "(weights->effort * (nmpc_real_t)slope)", "((nmpc_real_t)slope)"),
+    Mutant("effort free of charge in the gradient", COST, "weights->effort * (nmpc_real_t)nmpc_sign", "(nmpc_real_t)nmpc_sign"),
     Mutant("effort weighs like tracking in the cost", COST, "(weights->effort * variation_rad)", "(weights->tracking * variation_rad)"),
-    Mutant("tracking unweighted in the gradient", COST, "(weights->tracking * gradient[k])", "(gradient[k])"),
+    Mutant("tracking unweighted in the gradient", COST, "(weights->tracking * distance_by_move_m)", "(distance_by_move_m)"),
     Mutant("time runs twice as fast for y", PREDICTOR, "(time_s[i] * error_y_m_s)", "((time_s[i] + time_s[i]) * error_y_m_s)"),
     Mutant("thrust left out", PREDICTOR, "along_m_s2 = thrust_acceleration_m_s2 * cosine", "along_m_s2 = cosine"),
     Mutant("steps grow while they should shrink", OPTIMIZER, "self->step_rad[k] * NMPC_DECREASE", "self->step_rad[k] * NMPC_INCREASE"),
     Mutant("a table entry off by a tenth", PREDICTOR, "0.05f, 0.1f,", "0.05f, 0.11f,"),
     # order of operations
-    Mutant("free error added before the sum", PREDICTOR, "*error_x_m = prediction->free_x_m[i] + displacement_m(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2)", "*error_x_m = (prediction->free_x_m[i] + (prediction->gain_x_m_s2[ROLL] * roll_rad_s2)) + (prediction->gain_x_m_s2[PITCH] * pitch_rad_s2)"),
-    Mutant("distance added one axis at a time", COST, "distance_m + (nmpc_absolute(error_x_m) + nmpc_absolute(error_y_m))", "distance_m + nmpc_absolute(error_x_m) + nmpc_absolute(error_y_m)"),
+    Mutant("free error added before the sum", PREDICTOR_H, "prediction->free_x_m[i]\n                 + nmpc_predictor_displacement(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2)", "(prediction->free_x_m[i] + (prediction->gain_x_m_s2[0] * roll_rad_s2)) + (prediction->gain_x_m_s2[1] * pitch_rad_s2)"),
+    Mutant("distance added the other way round", COST, "distance_m\n                     + (weigh(error_x_m, nmpc_predictor_response_s2[i], sums_x_s2)\n                        + weigh(error_y_m, nmpc_predictor_response_s2[i], sums_y_s2))", "(distance_m + weigh(error_x_m, nmpc_predictor_response_s2[i], sums_x_s2))\n                     + weigh(error_y_m, nmpc_predictor_response_s2[i], sums_y_s2)"),
     Mutant("sine multiplied out", MATH, "rest + (rest * (square * sine_rest))", "rest * ((nmpc_real_t)1 + (square * sine_rest))"),
     Mutant("angle reduced in one go", MATH, "((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))", "(angle_rad - (count * (quarter_turn_rad[0] + quarter_turn_rad[1])))"),
     # missing lines
-    Mutant("no clamp", OPTIMIZER, "nmpc_clamp(move_rad - ((nmpc_real_t)slope * self->step_rad[k]), NMPC_TILT_LIMIT_RAD)", "move_rad - ((nmpc_real_t)slope * self->step_rad[k])"),
+    Mutant("no upper clamp of a move", OPTIMIZER, "nmpc_smaller(move_rad + self->step_rad[k], NMPC_TILT_LIMIT_RAD)", "move_rad + self->step_rad[k]"),
+    Mutant("no lower clamp of a move", OPTIMIZER, "nmpc_larger(move_rad - self->step_rad[k], -NMPC_TILT_LIMIT_RAD)", "move_rad - self->step_rad[k]"),
     Mutant("no lower clamp", HELPERS, "nmpc_smaller(nmpc_larger(value, -limit), limit)", "nmpc_smaller(value, limit)"),
     Mutant("no largest step", OPTIMIZER, "nmpc_smaller(self->step_rad[k] * NMPC_INCREASE, NMPC_STEP_MAX_RAD)", "self->step_rad[k] * NMPC_INCREASE"),
     Mutant("no smallest step", OPTIMIZER, "nmpc_larger(self->step_rad[k] * NMPC_DECREASE, NMPC_STEP_MIN_RAD)", "self->step_rad[k] * NMPC_DECREASE"),

@@ -19,9 +19,9 @@ def evaluate(
 
     change = moves_rad - np.concatenate([last_command_rad[:, None], moves_rad[:, :-1]], axis=1)
     variation = ordered_sum(np.abs(change).reshape(len(change), -1), axis=1)
-    leaving = np.concatenate([change[:, 1:], np.zeros_like(change[:, :1])], axis=1)
-    effort = sign(change) - sign(leaving)
+    effort = weights[:, 1, None, None] * sign(change)
 
     cost = (weights[:, 0] * distance) + (weights[:, 1] * variation)
-    gradient = (weights[:, 0, None, None] * tracking) + (weights[:, 1, None, None] * effort)
+    gradient = (weights[:, 0, None, None] * tracking) + effort
+    gradient[:, :-1] = gradient[:, :-1] - effort[:, 1:]
     return cost, gradient

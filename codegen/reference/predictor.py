@@ -53,14 +53,15 @@ class Predictor:
 
     def error(self, prediction: Prediction, moves_rad: Real) -> Real:
         """Predict position less target for `moves_rad` (n, control, 2): (n, 2, prediction), in m."""
-        tilt = ordered_sum(self._response_s2 * np.swapaxes(moves_rad, 1, 2)[:, :, None, :], axis=3)
+        reach = self._response_s2 * np.swapaxes(moves_rad, 1, 2)[:, :, None, :]
+        tilt = np.take(np.add.accumulate(reach, axis=3), -1, axis=3)
         return prediction.free_error_m + _world(prediction.gain_m_s2, tilt)
 
     def gradient(self, prediction: Prediction, slope: Real) -> Real:
-        """Carry `slope`, a derivative by the errors (n, 2, prediction), to the moves: (n, control, 2)."""
+        """Carry `slope`, the signs of the errors (n, 2, prediction), to the moves: (n, control, 2), in m."""
+        sums = ordered_sum(slope[:, :, None, :, None] * self._response_s2, axis=3)
         gain = prediction.gain_m_s2[..., None]
-        weight = (slope[:, 0, None] * gain[:, 0]) + (slope[:, 1, None] * gain[:, 1])
-        return np.swapaxes(ordered_sum(weight[..., None] * self._response_s2, axis=2), 1, 2)
+        return np.swapaxes((gain[:, 0] * sums[:, 0]) + (gain[:, 1] * sums[:, 1]), 1, 2)
 
 
 def _world(gain: Real, tilt: Real) -> Real:

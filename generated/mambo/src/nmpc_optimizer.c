@@ -8,7 +8,8 @@
 #include "nmpc_cost.h"
 #include "nmpc_math.h"
 
-/* Update move `k`: RPROP reads nothing of the gradient but its sign, now and before. */
+/* Update move `k`, downhill and within the tilt limit: RPROP reads nothing of the gradient but its sign, now
+ * and before. */
 static void update_move(nmpc_t *self, int k)
 {
     const int slope = nmpc_sign(self->gradient[k]);
@@ -25,8 +26,13 @@ static void update_move(nmpc_t *self, int k)
             self->step_rad[k] = nmpc_smaller(self->step_rad[k] * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
         }
         self->before_rad[k] = move_rad;
-        self->plan_rad[k] =
-            nmpc_clamp(move_rad - ((nmpc_real_t)slope * self->step_rad[k]), NMPC_TILT_LIMIT_RAD);
+        if (slope > 0) {
+            self->plan_rad[k] = nmpc_larger(move_rad - self->step_rad[k], -NMPC_TILT_LIMIT_RAD);
+        } else if (slope < 0) {
+            self->plan_rad[k] = nmpc_smaller(move_rad + self->step_rad[k], NMPC_TILT_LIMIT_RAD);
+        } else {
+            /* Level ground: stay. */
+        }
         self->direction[k] = (signed char)slope;
     }
 }
