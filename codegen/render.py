@@ -26,7 +26,7 @@ PROJECT: Final = {
     "main.c": "example/main.c",
 }
 
-_OWN_NAME = re.compile(r"(?<![\w-])(nmpc|NMPC)(?=[_.])")
+_OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
 _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
 _REAL_BYTES: Final = {"float32": 4, "float64": 8}
 

@@ -191,7 +191,7 @@ def test_flags_that_change_the_arithmetic_are_refused(flag: str, tmp_path: Path)
     assert "build without -f" in done.stderr
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", presets.names())
 def test_the_self_test_notices_a_build_that_contracts(name: str, tmp_path: Path) -> None:
     """Fused multiply-adds, where the processor has them, change bits that the vectors see."""
     require("gcc", "gcc")

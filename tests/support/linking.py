@@ -3,6 +3,7 @@
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from codegen import presets
 from codegen.flags import COMPILE_FLAGS
@@ -39,9 +40,19 @@ void *memcpy(void *to, const void *from, __SIZE_TYPE__ count)
 """What a compiler may call even without a library."""
 
 _LINK = (
-    "-ffunction-sections -fdata-sections -fno-tree-loop-distribute-patterns -static -fno-pie -nostartfiles "
-    "-nodefaultlibs -Wl,--gc-sections -Wl,--build-id=none -Wl,-Ttext=0x10000 -Wl,-e,run -Wl,-u,fly"
-).split()
+    "-ffunction-sections",
+    "-fdata-sections",
+    "-fno-tree-loop-distribute-patterns",
+    "-static",
+    "-fno-pie",
+    "-nostartfiles",
+    "-nodefaultlibs",
+    "-Wl,--gc-sections",
+    "-Wl,--build-id=none",
+    "-Wl,-Ttext=0x10000",
+    "-Wl,-e,run",
+    "-Wl,-u,fly",
+)
 
 
 @dataclass(frozen=True)
@@ -102,9 +113,13 @@ def linked(board: Board, text: str, folder: Path, *flags: str, name: str = "gues
     return folder / f"{name}.elf"
 
 
-def linked_controller(board: Board, folder: Path, *flags: str, preset: str = "mambo") -> Path:
-    """Link the guest with the controller of a preset, and leave gcc's figures of the stack beside it."""
-    for path, text in render(presets.load(preset)).items():
+def linked_controller(
+    board: Board, folder: Path, *flags: str, scalar: Literal["float32", "float64"] = "float32"
+) -> Path:
+    """Link the guest with the controller of preset mambo, and leave gcc's figures of the stack beside it."""
+    settings = presets.load("mambo")
+    code = settings.code.model_copy(update={"scalar": scalar})
+    for path, text in render(settings.model_copy(update={"code": code})).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)
     sources = sorted(str(path.relative_to(folder)) for path in folder.glob("src/*.c"))

@@ -48,7 +48,7 @@ typedef double nmpc_real_t;
 /* Call nmpc_step() once in this time; the prediction step is in the tables of the predictor. */
 #define NMPC_UPDATE_PERIOD_S 0.01
 
-/* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest that may replace them. */
+/* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest to replace them. */
 #define NMPC_TRACKING_WEIGHT 2250.0
 #define NMPC_EFFORT_WEIGHT 1.0
 #define NMPC_WEIGHT_LIMIT 1000000.0
@@ -64,7 +64,7 @@ typedef double nmpc_real_t;
 /* No command ever exceeds this, either way. */
 #define NMPC_TILT_LIMIT_RAD 0.35
 
-/* Input beyond these is refused with a status: beyond +/- a range, or thrust beyond its two ends. */
+/* Input beyond these is refused with a status: +/- a range, and the two ends of thrust. */
 #define NMPC_POSITION_RANGE_M 1000.0
 #define NMPC_VELOCITY_RANGE_M_S 100.0
 #define NMPC_ATTITUDE_RANGE_RAD 3.25

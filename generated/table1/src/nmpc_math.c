@@ -14,7 +14,8 @@ static const nmpc_real_t quarter_turn_rad[3] = {
     1.5707397f, 5.657971e-05f, 9.920936e-10f
 };
 
-/* sin r = r + r^3 * (-1/3! + r^2/5! - ...), cos r = 1 + r^2 * (-1/2! + r^2/4! - ...), |r| <= pi/4 but for rounding. */
+/* sin r = r + r^3 * (-1/3! + r^2/5! - ...), cos r = 1 + r^2 * (-1/2! + r^2/4! - ...); |r| <= pi/4, but for
+ * rounding. */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
     -0.16666667f, 0.008333334f, -0.0001984127f, 2.7557319e-06f
 };

@@ -34,8 +34,8 @@ static inline nmpc_real_t nmpc_predictor_displacement(const nmpc_real_t gain_m_s
 
 /* Predict position less target at step `i`, 0 .. NMPC_PREDICTION_HORIZON - 1, in m. */
 static inline void nmpc_predictor_error(const nmpc_prediction_t *prediction,
-                                        const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_real_t *error_x_m,
-                                        nmpc_real_t *error_y_m)
+                                        const nmpc_real_t moves_rad[NMPC_MOVES], int i,
+                                        nmpc_real_t *error_x_m, nmpc_real_t *error_y_m)
 {
     const nmpc_real_t *response_s2 = nmpc_predictor_response_s2[i];
     nmpc_real_t roll_rad_s2 = response_s2[NMPC_ROLL] * moves_rad[NMPC_ROLL];

@@ -1,0 +1,210 @@
+"""The named boards: TOML files with what a board has, how C is built for it, what a controller may take.
+
+Every section of such a file says where its values come from and how sure they are. A file of one's own in the
+same shape is as good as a named board.
+"""
+
+import difflib
+import json
+import tomllib
+from collections.abc import Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Final, Generic, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError, echo
+from codegen.settings.controller_toml import LARGEST_FILE_BYTES
+
+_FOLDER = resources.files("codegen") / "data" / "boards"
+_PYDANTIC_SUBJECTS: Final = ("Input should", "String should", "Tuple should")
+
+Value = TypeVar("Value")
+Words = Annotated[str, Field(min_length=1)]
+Bytes = Annotated[int, Field(ge=1, le=2**40)]
+Share = Annotated[float, Field(gt=0, le=1)]
+ManyWords = Annotated[tuple[Words, ...], Field(strict=False)]
+
+
+class _Section(BaseModel):
+    """What all sections share: frozen, no unknown keys, no silent conversion, and a source."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    source: Words = Field(description="where the values of this section come from")
+    confidence: Literal["high", "medium", "low"] = Field(description='how sure: "high", "medium" or "low"')
+
+
+class Fact(_Section, Generic[Value]):
+    """One value of a board."""
+
+    value: Value = Field(description="the value itself, in the unit that the section's name ends in")
+
+
+class Compiler(_Section):
+    """How C is built for a board."""
+
+    candidates: ManyWords = Field(min_length=1, description="commands, the first that is there is taken")
+    packages: ManyWords = Field(min_length=1, description="Debian packages that bring one of the candidates")
+    flags: ManyWords = Field(description="what compiling and linking add: core, FPU, dialect")
+    link_flags: ManyWords = Field((), description="what linking for the firmware adds to that")
+
+
+class Cycles(_Section):
+    """A clock cycle estimate from an instruction count, for caches and prefetch buffers that are warm."""
+
+    per_instruction: float = Field(gt=0, le=100, description="clock cycles an instruction, on average")
+    error_share: Share = Field(description="half-width of the estimate's band, as a share of it")
+
+
+class Budget(_Section):
+    """What a controller may take of a board."""
+
+    flash_bytes: Bytes = Field(description="code and constants, the compiler's helpers included, in bytes")
+    ram_bytes: Bytes = Field(description="static memory, the controller's instance included, in bytes")
+    stack_bytes: Bytes = Field(description="stack of one step, in bytes, on top of ram_bytes")
+    period_share: Share = Field(description="time of one step, as a share of the update period")
+
+
+class Board(BaseModel):
+    """A board; `name` is the stem of its file."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    name: str = Field(description="the stem of the file")
+    title: Words = Field(description="the name of the board in full")
+    core: Fact[Words] = Field(description="the core and its architecture")
+    fpu: Fact[Literal["none", "single", "double"]] = Field(
+        description="the widest floating-point format that the core computes itself"
+    )
+    emulated_core: Fact[Literal["arm926", "cortex-m0", "cortex-m4", "cortex-m7", "rv32", "avr"]] = Field(
+        description="the emulated core that runs the same instructions"
+    )
+    clock_hz: Fact[Annotated[int, Field(ge=1, le=10**11)]] = Field(description="clock of the core, in hertz")
+    flash_bytes: Fact[Bytes] = Field(description="memory for code and constants, in bytes")
+    ram_bytes: Fact[Bytes] = Field(description="memory for data and stack, in bytes")
+    compiler: Compiler = Field(description="how C is built for the board")
+    cycles: Cycles = Field(description="clock cycles estimated from instructions")
+    budget: Budget = Field(description="what a controller may take of the board")
+
+    @field_validator("budget")
+    @classmethod
+    def _within_the_board(cls, budget: Budget, info: ValidationInfo) -> Budget:
+        flash, ram = info.data.get("flash_bytes"), info.data.get("ram_bytes")
+        if flash is not None and budget.flash_bytes > flash.value:
+            raise PydanticCustomError(
+                "budget",
+                f"flash_bytes = {budget.flash_bytes} must lie in 1..{flash.value} (flash_bytes.value)",
+            )
+        if ram is not None and budget.ram_bytes + budget.stack_bytes > ram.value:
+            raise PydanticCustomError(
+                "budget",
+                f"ram_bytes + stack_bytes = {budget.ram_bytes + budget.stack_bytes} must lie in "
+                f"2..{ram.value} (ram_bytes.value)",
+            )
+        return budget
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the boards, sorted."""
+    return tuple(sorted(file.name.removesuffix(".toml") for file in _FOLDER.iterdir()))
+
+
+def load(name_or_path: str) -> Board:
+    """Return a named board, or else the one in the file at a path (./mambo is a file, mambo a board).
+
+    Raises SourceNotFoundError if there is neither, UnreadableFileError for what is not TOML and
+    InvalidSettingsError with every broken rule.
+    """
+    if name_or_path in names():
+        content = (_FOLDER / f"{name_or_path}.toml").read_bytes()
+        return _parse(content, f"board {name_or_path}", name_or_path)
+    path = Path(name_or_path)
+    try:
+        found = path.exists()
+    except OSError:
+        found = False
+    if not found:
+        raise _not_found(name_or_path)
+    source = echo(name_or_path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE_BYTES + 1)
+    except OSError as error:
+        raise UnreadableFileError(f"{source}: cannot be read: {error.strerror}") from error
+    return _parse(content, source, path.stem)
+
+
+def _parse(content: bytes, source: str, name: str) -> Board:
+    """Return the board in `content`; `source` begins every message."""
+    if len(content) > LARGEST_FILE_BYTES:
+        raise UnreadableFileError(
+            f"{source}: is larger than {LARGEST_FILE_BYTES // 1000} kB; a board takes a few"
+        )
+    try:
+        document = tomllib.loads(content.decode("utf-8-sig"))
+    except RecursionError:
+        raise UnreadableFileError(f"{source}: is nested too deeply; a board is [section] and key") from None
+    except ValueError as error:
+        raise UnreadableFileError(f"{source}: is not TOML: {echo(str(error))}") from None
+    if "name" in document:
+        raise InvalidSettingsError(
+            (f"{source}: name is not a key of a board, the file's name is; leave it out",)
+        )
+    try:
+        return Board.model_validate({"name": name, **document})
+    except ValidationError as error:
+        details = error.errors(include_url=False, include_context=False)
+        raise InvalidSettingsError(tuple(f"{source}: {_fault(one)}" for one in details)) from None
+
+
+def _fault(details: ErrorDetails) -> str:
+    """Say which key is wrong, with its value, and what to write instead."""
+    *section, key = details["loc"]
+    dotted = echo(".".join(str(part) for part in details["loc"]))
+    match details["type"]:
+        case "missing":
+            return f"{dotted} is missing; add it: {_fields(section)[str(key)].description}"
+        case "extra_forbidden":
+            keys = _fields(section)
+            near = difflib.get_close_matches(str(key), keys, n=1)
+            return f"{dotted} is not a key of a board; " + (
+                f"did you mean {near[0]}?" if near else f"there are {', '.join(keys)}"
+            )
+        case "model_type":
+            value = _spelled(details["input"])
+            return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
+        case "budget":
+            return f"{dotted}.{details['msg']}"
+        case _:
+            rule = details["msg"]
+            for subject in _PYDANTIC_SUBJECTS:
+                rule = rule.replace(subject, "must")
+            return f"{dotted} = {_spelled(details['input'])} {rule}"
+
+
+def _fields(section: Sequence[int | str]) -> dict[str, Any]:
+    """Return the fields that a section has, or a board for no section."""
+    model: Any = Board
+    for part in section:
+        model = model.model_fields[part].annotation
+    return {key: field for key, field in model.model_fields.items() if key != "name"}
+
+
+def _spelled(value: object) -> str:
+    """Return a value nearly as TOML spells it, shortened."""
+    try:
+        return echo(json.dumps(value, ensure_ascii=False, default=str))
+    except ValueError:
+        return "a number too long to repeat"
+
+
+def _not_found(name: str) -> SourceNotFoundError:
+    near = difflib.get_close_matches(name, names(), n=1)
+    guess = f" (did you mean {near[0]}?)" if near else ""
+    return SourceNotFoundError(
+        f"{echo(name)} is neither a board nor a file{guess}; boards are {', '.join(names())}, "
+        "and a TOML file of the same shape describes another"
+    )

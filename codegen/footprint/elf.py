@@ -1,0 +1,226 @@
+"""Read a linked program: its sections, and functions and objects that share no byte."""
+
+import bisect
+import itertools
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final, Literal
+
+from elftools.common.exceptions import ELFError
+from elftools.elf.constants import SH_FLAGS
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from codegen.errors import MamboNmpcError
+
+_ARM: Final = "EM_ARM"
+_KINDS: Final[dict[str, Literal["function", "object"]]] = {"STT_FUNC": "function", "STT_OBJECT": "object"}
+
+
+class FootprintError(MamboNmpcError):
+    """A program cannot be measured, or its worst case cannot be proven."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section that takes memory while the program runs; `contents` is empty where it starts as zeros."""
+
+    name: str
+    address: int
+    size_bytes: int
+    alignment: int
+    in_flash: bool
+    in_ram: bool
+    executable: bool
+    contents: bytes = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """A function or an object, and the bytes from its address that no later one begins.
+
+    `name` is unique in its program; `aliases` are the other labels at the same address. `file` is the source
+    file of a symbol that is local to it.
+    """
+
+    name: str
+    aliases: tuple[str, ...]
+    address: int
+    size_bytes: int
+    section: str
+    kind: Literal["function", "object"]
+    file: str | None
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """All its names."""
+        return (self.name, *self.aliases)
+
+
+@dataclass(frozen=True)
+class Image:
+    """A linked program, for the processor `machine` of an ELF header with addresses of `address_bits`.
+
+    `modes` are the places where ARM code becomes A32 (a), Thumb (t) or data (d).
+    """
+
+    path: Path
+    machine: str
+    address_bits: int
+    sections: tuple[Section, ...]
+    symbols: tuple[Symbol, ...]
+    modes: tuple[tuple[int, str], ...]
+
+    def error(self, problem: str) -> FootprintError:
+        """Return the error that names this program."""
+        return FootprintError(f"{self.path.name}: {problem}")
+
+    def symbol(self, label: str) -> Symbol:
+        """Return the symbol that has `label` as a name; raises FootprintError if there is none."""
+        for symbol in self.symbols:
+            if label in symbol.labels:
+                return symbol
+        raise self.error(f"no function or object {label}; was it linked, or collected as unused?")
+
+    def name_of(self, address: int) -> str:
+        """Name an address of code: a function, or a place in one."""
+        index = bisect.bisect(self.symbols, address, key=lambda symbol: symbol.address) - 1
+        if index < 0:
+            return f"{address:#x}"
+        symbol = self.symbols[index]
+        return symbol.name if symbol.address == address else f"{symbol.name}+{address - symbol.address:#x}"
+
+    def constant(self, address: int) -> int | None:
+        """Read a little-endian word of memory that nothing writes; None for any other memory."""
+        for section in self.sections:
+            start = address - section.address
+            if not section.in_ram and 0 <= start <= len(section.contents) - 4:
+                return int.from_bytes(section.contents[start : start + 4], "little")
+        return None
+
+
+def load(path: Path) -> Image:
+    """Read a program that is linked statically to fixed addresses and keeps its symbols.
+
+    Raises FootprintError for anything else.
+    """
+    try:
+        with path.open("rb") as stream:
+            return _image(path, ELFFile(stream))
+    except OSError as error:
+        raise FootprintError(f"{path}: cannot be read: {error.strerror}") from error
+    except ELFError as error:
+        raise FootprintError(f"{path.name}: not a program in ELF format: {error}") from error
+
+
+def _image(path: Path, elf: ELFFile) -> Image:
+    if elf.header["e_type"] != "ET_EXEC" or elf.get_section_by_name(".dynamic"):
+        raise FootprintError(f"{path.name}: not linked to fixed addresses; link with -static -no-pie")
+    if not elf.little_endian:
+        raise FootprintError(f"{path.name}: big-endian programs cannot be measured")
+    table = elf.get_section_by_name(".symtab")
+    if not isinstance(table, SymbolTableSection):
+        raise FootprintError(f"{path.name}: has no symbols; measure it before it is stripped")
+    machine = str(elf.header["e_machine"])
+    allocated = {i: s for i, s in enumerate(elf.iter_sections()) if s["sh_flags"] & SH_FLAGS.SHF_ALLOC}
+    sections = {
+        index: Section(
+            name=section.name,
+            address=section["sh_addr"],
+            size_bytes=section["sh_size"],
+            alignment=section["sh_addralign"],
+            in_flash=section["sh_type"] != "SHT_NOBITS",
+            in_ram=bool(section["sh_flags"] & SH_FLAGS.SHF_WRITE),
+            executable=bool(section["sh_flags"] & SH_FLAGS.SHF_EXECINSTR),
+            contents=b"" if section["sh_type"] == "SHT_NOBITS" else section.data(),
+        )
+        for index, section in allocated.items()
+        if section["sh_size"]
+    }
+    labels = list(_labels(table, sections, machine))
+    symbols = [
+        symbol
+        for index, section in sections.items()
+        for symbol in _disjoint([label for label in labels if label.section == index], section)
+    ]
+    modes = {
+        (symbol["st_value"], symbol.name[1])
+        for symbol in table.iter_symbols()
+        if machine == _ARM and symbol.name[:2] in {"$a", "$t", "$d"} and symbol["st_shndx"] in sections
+    }
+    return Image(
+        path=path,
+        machine=machine,
+        address_bits=elf.elfclass,
+        sections=tuple(sections.values()),
+        symbols=_uniquely_named(symbols),
+        modes=tuple(sorted(modes)),
+    )
+
+
+@dataclass(frozen=True)
+class _Label:
+    name: str
+    address: int
+    size_bytes: int
+    section: int
+    kind: Literal["function", "object"]
+    file: str | None
+
+
+def _labels(table: SymbolTableSection, sections: dict[int, Section], machine: str) -> Iterator[_Label]:
+    """Yield functions, objects, and the untyped labels that hand-written assembly leaves in code."""
+    file = None
+    for symbol in table.iter_symbols():
+        kind = symbol["st_info"]["type"]
+        if kind == "STT_FILE":
+            file = symbol.name
+        section = sections.get(symbol["st_shndx"])
+        if section is None or symbol.name.startswith("$"):
+            continue
+        if kind == "STT_NOTYPE" and section.executable:
+            kind = "STT_FUNC"
+        if kind in _KINDS:
+            thumb = machine == _ARM and kind == "STT_FUNC"
+            yield _Label(
+                name=symbol.name,
+                address=symbol["st_value"] & ~1 if thumb else symbol["st_value"],
+                size_bytes=symbol["st_size"],
+                section=symbol["st_shndx"],
+                kind=_KINDS[kind],
+                file=file if symbol["st_info"]["bind"] == "STB_LOCAL" else None,
+            )
+
+
+def _disjoint(labels: list[_Label], section: Section) -> Iterator[Symbol]:
+    """Give each byte to the last label before it, as far as its size reaches, or else to the next label."""
+    places: dict[int, list[_Label]] = defaultdict(list)
+    for label in labels:
+        places[label.address].append(label)
+    covered = 0
+    section_end = section.address + section.size_bytes
+    starts = sorted(start for start in places if start < section_end)
+    for start, end in itertools.pairwise([*starts, section_end]):
+        here = sorted(places[start], key=lambda label: (label.file is not None, len(label.name), label.name))
+        sizes = [label.size_bytes for label in here if label.size_bytes]
+        covered = max(covered, start + max(sizes) if sizes else end)
+        yield Symbol(
+            name=here[0].name,
+            aliases=tuple(label.name for label in here[1:]),
+            address=start,
+            size_bytes=min(covered, end) - start,
+            section=section.name,
+            kind=here[0].kind,
+            file=here[0].file,
+        )
+
+
+def _uniquely_named(symbols: list[Symbol]) -> tuple[Symbol, ...]:
+    """Return the symbols by address; names used twice get their file in front, or else their address."""
+    by_address = sorted(symbols, key=lambda symbol: symbol.address)
+    used = Counter(symbol.name for symbol in by_address)
+    in_files = [replace(s, name=f"{s.file}:{s.name}") if used[s.name] > 1 else s for s in by_address]
+    used = Counter(symbol.name for symbol in in_files)
+    return tuple(replace(s, name=f"{s.name}@{s.address:#x}") if used[s.name] > 1 else s for s in in_files)

@@ -1,0 +1,255 @@
+"""Boards: what their files say, whether compilers agree, and what is said about a bad file."""
+
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from codegen import boards
+from codegen.boards import Board
+from codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
+from tests.support.tools import require
+
+FOLDER = Path(boards.__file__).parent / "data" / "boards"
+NAMES = ("crazyflie", "mambo", "mega", "rp2040", "rv32", "teensy41")
+SECTIONS = (
+    "core",
+    "fpu",
+    "emulated_core",
+    "clock_hz",
+    "flash_bytes",
+    "ram_bytes",
+    "compiler",
+    "cycles",
+    "budget",
+)
+MACROS: dict[str, dict[str, str | None]] = {
+    "crazyflie": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
+    "mambo": {"__ARM_ARCH_5TEJ__": "1", "__SOFTFP__": "1", "__pic__": "2", "__pie__": None},
+    "mega": {"__AVR_ATmega2560__": "1", "__SIZEOF_INT__": "2", "__SIZEOF_DOUBLE__": "4"},
+    "rp2040": {"__ARM_ARCH_6M__": "1", "__SOFTFP__": "1"},
+    "rv32": {"__riscv_xlen": "32", "__riscv_mul": "1", "__riscv_compressed": "1", "__riscv_atomic": "1"},
+    "teensy41": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
+}
+"""What each board's compiler must define (None: must not), given its flags, for the file to be right."""
+
+
+def file_of(name: str) -> str:
+    """Return the text of a board's file."""
+    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def changed(old: str, new: str) -> str:
+    """Return the Crazyflie's file with one place changed."""
+    text = file_of("crazyflie")
+    assert text.count(old) == 1, old
+    return text.replace(old, new)
+
+
+def own(folder: Path, text: str) -> str:
+    """Write a board of one's own; returns its path."""
+    path = folder / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def compiled(board: Board, folder: Path, *arguments: str) -> str:
+    """Run the board's compiler with its flags on an empty file, warnings fatal; returns what it printed."""
+    here = [command for command in board.compiler.candidates if shutil.which(command)]
+    command = here[0] if here else require(board.compiler.candidates[-1], board.compiler.packages[0])
+    (folder / "empty.c").write_text("", encoding="utf-8")
+    done = subprocess.run(
+        [command, *board.compiler.flags, "-Wall", "-Werror", *arguments, "empty.c"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def macros_of(board: Board, folder: Path) -> dict[str, str]:
+    """Return the macros that the board's compiler defines by itself."""
+    defined = (line.split(maxsplit=2) for line in compiled(board, folder, "-dM", "-E").splitlines())
+    return {words[1]: words[2] if len(words) > 2 else "" for words in defined}
+
+
+def fpu_of(macros: dict[str, str]) -> str:
+    """Return the widest format that the compiler leaves to the core: __ARM_FP of ACLE, __riscv_flen."""
+    if "__riscv_flen" in macros:
+        return {"32": "single", "64": "double"}[macros["__riscv_flen"]]
+    formats = int(macros.get("__ARM_FP", "0"), 0)
+    return "double" if formats & 0x8 else "single" if formats & 0x4 else "none"
+
+
+def test_the_boards_are_those_with_a_file() -> None:
+    """Nobody loses a board by accident, and each is called what its file is called."""
+    assert boards.names() == NAMES
+    assert [boards.load(name).name for name in NAMES] == list(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("key", ["source", "confidence"])
+@pytest.mark.parametrize("section", SECTIONS)
+def test_no_value_stands_without_source_and_confidence(
+    section: str, key: str, name: str, tmp_path: Path
+) -> None:
+    """A file that forgets where a number comes from is refused, by the key that is missing."""
+    before, header, after = file_of(name).partition(f"[{section}]\n")
+    lines = after.splitlines(keepends=True)
+    lines.remove(next(line for line in lines if line.startswith(f"{key} =")))
+    with pytest.raises(InvalidSettingsError) as caught:
+        boards.load(own(tmp_path, before + header + "".join(lines)))
+    assert len(caught.value.faults) == 1
+    assert f"own.toml: {section}.{key} is missing; add it: " in caught.value.faults[0]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_sections_are_all_that_a_file_holds(name: str) -> None:
+    """Beside title and sections, whose sources are tested above, a file has no value."""
+    assert set(tomllib.loads(file_of(name))) == {"title", *SECTIONS}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_compiler_accepts_the_flags(name: str, tmp_path: Path) -> None:
+    """An empty file compiles without a word."""
+    compiled(boards.load(name), tmp_path, "-c", "-o", "empty.o")
+    assert (tmp_path / "empty.o").stat().st_size > 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_compiler_confirms_the_core(name: str, tmp_path: Path) -> None:
+    """Architecture and widths are those of the board, not those that the compiler likes best."""
+    macros = macros_of(boards.load(name), tmp_path)
+    assert {macro: macros.get(macro) for macro in MACROS[name]} == MACROS[name]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_compiler_confirms_the_fpu(name: str, tmp_path: Path) -> None:
+    """What the file says about floating point is what the flags let the compiler use."""
+    board = boards.load(name)
+    assert fpu_of(macros_of(board, tmp_path)) == board.fpu.value
+
+
+def test_a_board_cannot_be_changed() -> None:
+    """Nobody moves a limit on the way."""
+    board = boards.load("mambo")
+    with pytest.raises(ValidationError, match="frozen"):
+        board.budget.ram_bytes = 1  # type: ignore[misc] # that it is refused is the point
+    assert boards.load("mambo") == board
+
+
+def test_name_finds_board_and_path_finds_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bare name is the named board even where a file has that name; ./name is the file."""
+    monkeypatch.chdir(tmp_path)
+    Path("mambo").write_text(changed("168_000_000", "1_000_000"), encoding="utf-8")
+    Path("small.drone.toml").write_text(changed("168_000_000", "2_000_000"), encoding="utf-8")
+    assert boards.load("mambo").title == "Parrot Mambo"
+    assert boards.load("./mambo").clock_hz.value == 1_000_000
+    assert boards.load("./mambo").name == "mambo"
+    assert boards.load("small.drone.toml").name == "small.drone"
+
+
+@pytest.mark.parametrize("name", ["teensy", "none/board.toml", "a\0b", "x" * 5000, "\x1b[31m"])
+def test_unknown_board_lists_those_there_are(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever asks for a board that is nowhere is told what there is and how to add one."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SourceNotFoundError) as caught:
+        boards.load(name)
+    message = str(caught.value)
+    assert f"boards are {', '.join(NAMES)}, and a TOML file of the same shape describes another" in message
+    assert ("did you mean teensy41?" in message) == (name == "teensy")
+    assert message.isprintable()
+    assert len(message) < 300
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("value = 168_000_000", "value = -1", "clock_hz.value = -1 must be greater than or equal to 1"),
+        ("value = 168_000_000", 'value = "fast"', 'clock_hz.value = "fast" must be a valid integer'),
+        ("value = 168_000_000", "value = true", "clock_hz.value = true must be a valid integer"),
+        (
+            "value = 168_000_000",
+            f"value = 0x{'f' * 6000}",
+            "clock_hz.value = a number too long to repeat must be less than or equal to 100000000000",
+        ),
+        ('value = "single"', 'value = "half"', "fpu.value = \"half\" must be 'none', 'single' or 'double'"),
+        (
+            "period_share = 0.1",
+            "period_share = 1.5",
+            "budget.period_share = 1.5 must be less than or equal to 1",
+        ),
+        ("period_share = 0.1", "period_share = nan", "budget.period_share = NaN must be a finite number"),
+        (
+            "flash_bytes = 16_384",
+            "flash_bytes = 1_048_577",
+            "budget.flash_bytes = 1048577 must lie in 1..1048576 (flash_bytes.value)",
+        ),
+        (
+            "stack_bytes = 1_024",
+            "stack_bytes = 195_585",
+            "budget.ram_bytes + stack_bytes = 196609 must lie in 2..196608 (ram_bytes.value)",
+        ),
+        ("stack_bytes = 1_024\n", "", "budget.stack_bytes is missing; add it: stack of one step, in bytes"),
+        ("[clock_hz]", "[clok_hz]", "clok_hz is not a key of a board; did you mean clock_hz?"),
+        ("[cycles]", "[cycles]\nodd = 1", "cycles.odd is not a key of a board; there are source, confidence"),
+        (
+            'candidates = ["arm-none-eabi-gcc"]',
+            "candidates = []",
+            "compiler.candidates = [] must have at least 1 item",
+        ),
+        ('"-mthumb"', "7", "compiler.flags.1 = 7 must be a valid string"),
+        ("title =", "fpu_bits = 32\ntitle =", "fpu_bits is not a key of a board; there are title, core, fpu"),
+        ("title =", "core = 5\ntitle =", "is not TOML: "),
+        (
+            "title =",
+            'name = "own"\ntitle =',
+            "name is not a key of a board, the file's name is; leave it out",
+        ),
+        ("title =", "title", "is not TOML: "),
+    ],
+)
+def test_bad_file_is_told_key_value_and_rule(old: str, new: str, fault: str, tmp_path: Path) -> None:
+    """Every message names the file and what to write instead."""
+    path = own(tmp_path, changed(old, new))
+    with pytest.raises((InvalidSettingsError, UnreadableFileError)) as caught:
+        boards.load(path)
+    lines = str(caught.value).splitlines()
+    assert all("own.toml: " in line for line in lines)
+    assert any(fault in line for line in lines), lines
+
+
+def test_section_without_keys_is_told_to_be_a_section(tmp_path: Path) -> None:
+    """A bare number where a section belongs shows how the section begins."""
+    document = "clock_hz = 5\n" + file_of("crazyflie").replace("[clock_hz]", "[core.clock]")
+    with pytest.raises(InvalidSettingsError, match=r"clock_hz = 5 must be a section; write \[clock_hz\]"):
+        boards.load(own(tmp_path, document))
+
+
+def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
+    """Nobody mends a file in ten rounds."""
+    with pytest.raises(InvalidSettingsError) as caught:
+        boards.load(own(tmp_path, 'title = ""\n'))
+    assert len(caught.value.faults) == 1 + len(SECTIONS)
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * 64_001, b"a = " + b"[" * 60_000])
+def test_file_that_is_no_toml_is_unreadable(content: bytes, tmp_path: Path) -> None:
+    """Wrong encodings, huge files and deep nests are named without a traceback."""
+    path = tmp_path / "own.toml"
+    path.write_bytes(content)
+    with pytest.raises(UnreadableFileError, match=r"own\.toml: is "):
+        boards.load(str(path))
+
+
+def test_folder_is_unreadable(tmp_path: Path) -> None:
+    """A folder is not a board."""
+    with pytest.raises(UnreadableFileError, match="cannot be read: Is a directory"):
+        boards.load(str(tmp_path))
