@@ -47,8 +47,8 @@ class Predictor:
         velocity_error = state[:, 2:4] - target[:, 2:4]
         free = position_error[:, :, None] + (self._time_s * velocity_error[:, :, None])
         if self._has_lag:
-            tilt = self._free_s2 * state[:, 4:6, None]
-            free = free + _world(gain, tilt)
+            push = gain * state[:, None, 4:6]
+            free = free + _world(push, np.broadcast_to(self._free_s2, (len(push), *self._free_s2.shape)))
         return Prediction(gain_m_s2=gain, free_error_m=free)
 
     def error(self, prediction: Prediction, moves_rad: Real) -> Real:

@@ -4,7 +4,6 @@
  */
 #include "nmpc_cost.h"
 
-#include "nmpc_math.h"
 #include "nmpc_predictor.h"
 
 /* Return what an error costs, its size, and add its slope to `sums_s2`: the responses with its sign. */
@@ -60,15 +59,25 @@ nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_w
 
     /* Eq 12b: a move counts by its change from the one before, the first by that from the last command; its
      * slope falls to both moves. */
+    NMPC_UNROLL
     for (k = 0; k < NMPC_MOVES; k++) {
         const int axis = k % NMPC_AXES;
         const nmpc_real_t before_rad = (k < NMPC_AXES) ? last_rad[k] : moves_rad[k - NMPC_AXES];
         const nmpc_real_t change_rad = moves_rad[k] - before_rad;
-        const nmpc_real_t effort = weights->effort * (nmpc_real_t)nmpc_sign(change_rad);
         const nmpc_real_t distance_by_move_m = (prediction->gain_x_m_s2[axis] * sums_x_s2[k])
                                                + (prediction->gain_y_m_s2[axis] * sums_y_s2[k]);
+        nmpc_real_t size_rad = change_rad;
+        nmpc_real_t effort = (nmpc_real_t)0;
 
-        variation_rad = variation_rad + nmpc_absolute(change_rad);
+        if (change_rad > (nmpc_real_t)0) {
+            effort = weights->effort;
+        } else if (change_rad < (nmpc_real_t)0) {
+            size_rad = -change_rad;
+            effort = -weights->effort;
+        } else {
+            /* No change, no slope. */
+        }
+        variation_rad = variation_rad + size_rad;
         gradient[k] = (weights->tracking * distance_by_move_m) + effort;
         if (k >= NMPC_AXES) {
             gradient[k - NMPC_AXES] = gradient[k - NMPC_AXES] - effort;

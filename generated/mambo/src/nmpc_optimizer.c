@@ -9,10 +9,10 @@
 #include "nmpc_math.h"
 
 /* Update move `k`, downhill and within the tilt limit: RPROP reads nothing of the gradient but its sign, now
- * and before. */
+ * and before. Once the cost has come to rest all slopes are level: the plan stays, and the work goes on. */
 static void update_move(nmpc_t *self, int k)
 {
-    const int slope = nmpc_sign(self->gradient[k]);
+    const int slope = (self->converged == 0U) ? nmpc_sign(self->gradient[k]) : 0;
     const int agreement = slope * (int)self->direction[k];
     const nmpc_real_t move_rad = self->plan_rad[k];
 
@@ -49,7 +49,6 @@ void nmpc_optimizer_minimize(nmpc_t *self)
     self->iterations = 0U;
     self->converged = 0U;
 
-    /* Once the cost has come to rest the plan is frozen; the evaluations go on, always as many. */
     for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
         const nmpc_real_t previous_cost = self->cost;
 
@@ -58,10 +57,10 @@ void nmpc_optimizer_minimize(nmpc_t *self)
         if ((iteration > 0) && (nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
             self->converged = 1U;
         }
+        for (k = 0; k < NMPC_MOVES; k++) {
+            update_move(self, k);
+        }
         if (self->converged == 0U) {
-            for (k = 0; k < NMPC_MOVES; k++) {
-                update_move(self, k);
-            }
             self->iterations++;
         }
     }

@@ -50,6 +50,8 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     nmpc_real_t cosine;
     nmpc_real_t across_m_s2;
     nmpc_real_t along_m_s2;
+    nmpc_real_t push_x_m_s2[NMPC_AXES];
+    nmpc_real_t push_y_m_s2[NMPC_AXES];
     int i;
 
     /* Eq 8 with the signs of eq 3. */
@@ -60,18 +62,19 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     prediction->gain_x_m_s2[NMPC_PITCH] = -along_m_s2;
     prediction->gain_y_m_s2[NMPC_ROLL] = along_m_s2;
     prediction->gain_y_m_s2[NMPC_PITCH] = -across_m_s2;
+    push_x_m_s2[NMPC_ROLL] = prediction->gain_x_m_s2[NMPC_ROLL] * state->roll_rad;
+    push_x_m_s2[NMPC_PITCH] = prediction->gain_x_m_s2[NMPC_PITCH] * state->pitch_rad;
+    push_y_m_s2[NMPC_ROLL] = prediction->gain_y_m_s2[NMPC_ROLL] * state->roll_rad;
+    push_y_m_s2[NMPC_PITCH] = prediction->gain_y_m_s2[NMPC_PITCH] * state->pitch_rad;
 
     /* Eqs 9-11 without moves: both robot and target keep their velocity, and the present tilt keeps pushing
      * while it decays. */
     for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        const nmpc_real_t roll_rad_s2 = free_s2[i][NMPC_ROLL] * state->roll_rad;
-        const nmpc_real_t pitch_rad_s2 = free_s2[i][NMPC_PITCH] * state->pitch_rad;
-
         prediction->free_x_m[i] =
             (error_x_m + (time_s[i] * error_x_m_s))
-            + nmpc_predictor_displacement(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
+            + nmpc_predictor_displacement(push_x_m_s2, free_s2[i][NMPC_ROLL], free_s2[i][NMPC_PITCH]);
         prediction->free_y_m[i] =
             (error_y_m + (time_s[i] * error_y_m_s))
-            + nmpc_predictor_displacement(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
+            + nmpc_predictor_displacement(push_y_m_s2, free_s2[i][NMPC_ROLL], free_s2[i][NMPC_PITCH]);
     }
 }

@@ -25,11 +25,11 @@ extern const nmpc_real_t nmpc_predictor_response_s2[NMPC_PREDICTION_HORIZON][NMP
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction);
 
-/* Turn double time integrals of roll and pitch into a displacement along the axis of `gain_m_s2`, in m. */
+/* Add up what roll and pitch displace along one axis: acceleration times double time integral, in m. */
 static inline nmpc_real_t nmpc_predictor_displacement(const nmpc_real_t gain_m_s2[NMPC_AXES],
-                                                      nmpc_real_t roll_rad_s2, nmpc_real_t pitch_rad_s2)
+                                                      nmpc_real_t roll_s2, nmpc_real_t pitch_s2)
 {
-    return (gain_m_s2[NMPC_ROLL] * roll_rad_s2) + (gain_m_s2[NMPC_PITCH] * pitch_rad_s2);
+    return (gain_m_s2[NMPC_ROLL] * roll_s2) + (gain_m_s2[NMPC_PITCH] * pitch_s2);
 }
 
 /* Predict position less target at step `i`, 0 .. NMPC_PREDICTION_HORIZON - 1, in m. */
