@@ -1,47 +1,89 @@
 """The commands that generate C: init, presets, schema, generate; and the root that all commands share.
 
-Results go to stdout, talk to stderr. Exit codes: 0 good, 1 a check failed, 2 bad input, 130 interrupted,
-141 nobody reads the output any more.
+Results go to stdout, talk to stderr.
 """
 
+import errno
 import json
 import os
 import sys
+import traceback
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 import codegen
-from codegen import bundle, presets
+from codegen import bundle, exchange, presets
 from codegen.errors import DriftError, FileExistsRefusedError, MamboNmpcError, UnwritableError, echo
 from codegen.render import render
 from codegen.settings import Settings, controller_toml
 
-INTERRUPTED, NO_READER = 130, 141
+BAD_INPUT, INTERRUPTED, NO_READER = 2, 130, 141
+EXIT_CODES = (
+    "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "
+    "130 interrupted; 141 nobody reads the output."
+)
 
 
 class RootGroup(TyperGroup):
-    """The root of the command: our errors become a message and an exit code, without a traceback."""
+    """The root of the command: errors become a message and an exit code, without a traceback."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run a command line, help and version included, up to the last byte on stdout."""
+        try:
+            if sys.stdout is None:
+                raise OSError(errno.EBADF, "is closed", "stdout")
+            try:
+                return super().main(*arguments, **options)
+            finally:
+                sys.stdout.flush()
+        except OSError as error:
+            sys.exit(_exit_code(error))
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
-        """Run a command; with `--debug` let errors through."""
+        """Run a command; with `--debug` an error shows its traceback first."""
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()
-        except MamboNmpcError as error:
-            if ctx.params["_debug"]:
-                raise
-            typer.echo(str(error), err=True)
-            raise typer.Exit(error.exit_code) from error
-        except KeyboardInterrupt as error:
-            raise typer.Exit(INTERRUPTED) from error
-        except BrokenPipeError as error:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(NO_READER) from error
+        except (MamboNmpcError, OSError, MemoryError, KeyboardInterrupt) as error:
+            if ctx.params["_debug"] and not isinstance(error, KeyboardInterrupt | BrokenPipeError):
+                traceback.print_exception(error)
+            raise typer.Exit(_exit_code(error)) from error
         return result
+
+
+def _exit_code(error: BaseException) -> int:
+    """Return the exit code of a command that ended in `error`, and say why on stderr."""
+    match error:
+        case KeyboardInterrupt():
+            return INTERRUPTED
+        case MemoryError():
+            typer.echo("there is not enough memory", err=True)
+        case OSError():
+            stdout_failed = _silence_broken_stdout()
+            if isinstance(error, BrokenPipeError):
+                return NO_READER
+            file = "stdout" if stdout_failed else error.filename or "cannot read or write"
+            typer.echo(f"{echo(str(file))}: {error.strerror or error}", err=True)
+        case MamboNmpcError():
+            typer.echo(str(error), err=True)
+            return error.exit_code
+    return BAD_INPUT
+
+
+def _silence_broken_stdout() -> bool:
+    """Send what stdout cannot take to nowhere, lest it fail again at exit; return whether that was so."""
+    if sys.stdout is None:
+        return False
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 def root() -> typer.Typer:
@@ -53,7 +95,8 @@ def root() -> typer.Typer:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
-        epilog=examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller"),
+        epilog=examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller")
+        + f"\n\n{EXIT_CODES}",
     )
 
 
@@ -90,13 +133,15 @@ def init(
         typer.echo(text, nl=False)
         return
     name = echo(str(output))
-    try:
-        with output.open("w" if force else "x", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-    except FileExistsError:
+    place = Path(os.path.realpath(output))
+    if place.exists() and not place.is_file():
+        raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
+    if os.path.lexists(output) and not force:
         raise FileExistsRefusedError(
             f"{name}: already exists; name another with -o, or overwrite it with --force"
-        ) from None
+        )
+    try:
+        exchange.put(place, text.encode())
     except OSError as error:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
     typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)

@@ -62,3 +62,7 @@ class DriftError(MamboNmpcError):
     """A bundle on disk is not what its settings generate."""
 
     exit_code = 1
+
+
+class LayoutError(MamboNmpcError):
+    """A bundle in folders would become an amalgamated one, or the other way round, and nobody said so."""

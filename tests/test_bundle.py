@@ -1,9 +1,7 @@
-"""Bundles on disk: all or nothing, idempotent, and never at the cost of somebody else's file."""
+"""Bundles on disk: whole, idempotent, and never at the cost of somebody else's file."""
 
 import json
 import os
-import subprocess
-import sys
 from hashlib import sha256
 from pathlib import Path
 
@@ -11,60 +9,8 @@ import pytest
 
 from codegen import bundle
 from codegen.bundle import Changes, Drift
-from codegen.errors import ForeignFilesError, UnwritableError
-
-FILES = {
-    "README.md": "What.\n",
-    "include/nmpc.h": "#pragma once\n",
-    "src/nmpc.c": "int x;\n",
-    "src/a.c": "µ\n",
-}
-NEXT = {"README.md": "What.\n", "include/nmpc.h": "/* next */\n", "src/nmpc.c": "int x;\n", "src/b.c": "\n"}
-
-STOPPED_RUNS = """
-import os, shutil, signal, sys
-from pathlib import Path
-from codegen import bundle
-
-start, root, how = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
-seen = 0
-
-def stop_at(operation):
-    def hook(event, arguments):
-        global seen
-        if event.startswith(("os.", "open", "shutil.", "fcntl.")):
-            seen += 1
-            if seen == operation:
-                if how == "interrupt":
-                    raise KeyboardInterrupt
-                os.kill(os.getpid(), signal.SIGKILL)
-    return hook
-
-for operation in range(1, 500):
-    folder = root / str(operation) / "controller"
-    shutil.copytree(start, folder)
-    child = os.fork()
-    if child == 0:
-        sys.addaudithook(stop_at(operation))
-        try:
-            bundle.write({"src/nmpc.c": "new"}, folder)
-            os._exit(0)
-        except KeyboardInterrupt:
-            os._exit(1)
-    if os.waitpid(child, 0)[1] == 0:
-        break
-"""
-"""Runs that stop at their n-th operation on the disk, for every n: dead at once, or by Ctrl-C."""
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    """Return {relative path: bytes} of every file in `folder`, hidden ones included."""
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
-
-
-def expected(files: dict[str, str]) -> dict[str, bytes]:
-    """Return what a folder holds that holds the bundle `files` alone."""
-    return {path: text.encode() for path, text in {**files, "manifest.json": bundle.manifest(files)}.items()}
+from codegen.errors import ForeignFilesError, LayoutError, UnwritableError
+from tests.support.bundles import FILES, NEXT, content, expected
 
 
 @pytest.fixture
@@ -280,15 +226,44 @@ def test_target_that_can_be_no_folder_is_refused(tmp_path: Path) -> None:
     assert sorted(place.name for place in tmp_path.iterdir()) == ["file", "loop"]
 
 
-def test_current_folder_is_not_pulled_from_under_the_caller(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where a shell stands the folder is not replaced; being up to date needs no replacing."""
-    monkeypatch.chdir(folder / "src")
-    assert not bundle.write(FILES, Path("..")).any
-    with pytest.raises(UnwritableError, match="holds the current folder"):
-        bundle.write(NEXT, Path(".."))
-    assert content(folder) == expected(FILES)
+def test_folder_stays_the_same_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever stands in the folder, or holds it open, stays in it; `-o .` is a folder like any other."""
+    monkeypatch.chdir(folder)
+    before = Path().stat().st_ino, Path("src").stat().st_ino
+    bundle.write(NEXT, Path())
+    assert content(folder) == expected(NEXT)
+    assert (Path().stat().st_ino, Path("src").stat().st_ino) == before
+
+
+def test_replaced_file_keeps_its_permissions(folder: Path) -> None:
+    """Who may read, write and run a file is not the generator's business."""
+    for path, mode in (("include/nmpc.h", 0o640), ("manifest.json", 0o755)):
+        (folder / path).chmod(mode)
+    bundle.write(NEXT, folder)
+    assert [(folder / path).stat().st_mode & 0o777 for path in ("include/nmpc.h", "manifest.json")] == [
+        0o640,
+        0o755,
+    ]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_replaced_file_keeps_its_owner(folder: Path) -> None:
+    """A run as root takes no file away from its owner."""
+    os.chown(folder / "include" / "nmpc.h", 1234, 5678)
+    bundle.write(NEXT, folder)
+    found = (folder / "include" / "nmpc.h").stat()
+    assert (found.st_uid, found.st_gid) == (1234, 5678)
+
+
+def test_other_layout_is_refused_without_force(folder: Path) -> None:
+    """A bundle of folders becomes an amalgamated one, or the other way round, only on purpose."""
+    one = {"README.md": "one", "nmpc.h": "one", "nmpc.c": "one"}
+    with pytest.raises(LayoutError, match="is a bundle of folders; leave out --amalgamate"):
+        bundle.write(one, folder)
+    bundle.write(one, folder, force=True)
+    assert content(folder) == expected(one)
+    with pytest.raises(LayoutError, match="is amalgamated; add --amalgamate"):
+        bundle.write(FILES, folder, dry_run=True)
 
 
 def test_dry_run_tells_and_touches_nothing(folder: Path) -> None:
@@ -310,35 +285,6 @@ def test_failure_half_way_leaves_the_old_folder(folder: Path) -> None:
         bundle.write(impossible, folder.parent / "new" / "folder")
     assert content(folder) == expected(FILES)
     assert only(folder)
-
-
-@pytest.mark.parametrize("how", ["interrupt", "kill"])
-def test_run_stopped_anywhere_loses_nothing(tmp_path: Path, how: str) -> None:
-    """Stopped at any operation, the next run makes the folder whole; an interrupt leaves it whole at once."""
-    old, new = {"README.md": "old", "src/nmpc.c": "old"}, {"src/nmpc.c": "new"}
-    mine = {"mine.txt": b"mine"}
-    bundle.write(old, tmp_path / "start")
-    (tmp_path / "start" / "mine.txt").write_bytes(b"mine")
-    command = [sys.executable, "-c", STOPPED_RUNS, str(tmp_path / "start"), str(tmp_path / "runs"), how]
-    subprocess.run(command, check=True)
-    folders = [run / "controller" for run in (tmp_path / "runs").iterdir()]
-    assert len(folders) > 20
-    for folder in folders:
-        if how == "interrupt":
-            assert content(folder) in ({**expected(old), **mine}, {**expected(new), **mine})
-        bundle.write(new, folder)
-        assert content(folder) == {**expected(new), **mine}
-        assert only(folder)
-
-
-def test_work_done_after_a_kill_is_not_lost(folder: Path) -> None:
-    """Between the two renames a folder made by hand is not mixed with the one put aside."""
-    folder.rename(folder.with_name(".controller.mambo-nmpc-old"))
-    folder.with_name(".controller.mambo-nmpc-new").mkdir()
-    folder.mkdir()
-    with pytest.raises(UnwritableError, match="run that was killed"):
-        bundle.write(NEXT, folder)
-    assert content(folder.with_name(".controller.mambo-nmpc-old")) == expected(FILES)
 
 
 def test_check_of_an_up_to_date_folder_finds_nothing(folder: Path) -> None:
@@ -382,6 +328,14 @@ def test_check_makes_invisible_differences_visible(folder: Path, found: bytes, l
     (drift,) = bundle.check(FILES, folder)
     assert line in drift.diff.splitlines()
     assert all(shown.isprintable() for shown in drift.diff.splitlines())
+
+
+def test_check_of_a_link_finds_a_change(folder: Path) -> None:
+    """A link where the bundle has a file is no file of the bundle, even if it leads to the same text."""
+    (folder / "copy.c").write_bytes((folder / "src" / "a.c").read_bytes())
+    (folder / "src" / "a.c").unlink()
+    (folder / "src" / "a.c").symlink_to(folder / "copy.c")
+    assert bundle.check(FILES, folder) == (Drift("src/a.c", "changed"),)
 
 
 def test_check_of_no_folder_finds_everything_missing(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +46,15 @@ def run(app: typer.Typer, *arguments: str, code: int = 0) -> tuple[str, str]:
     return result.stdout, result.stderr
 
 
+def run_limited(*arguments: str) -> None:
+    """Run the command where no file may have more than 1 kB, and demand a message of one line."""
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); "
+    command = [sys.executable, "-c", limit + COMMAND, *arguments]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1), result.stderr
+    assert "cannot be written: File too large" in result.stderr
+
+
 def test_init_writes_the_commented_settings_of_a_preset(app: typer.Typer) -> None:
     """The file that init writes reads back as the preset, mambo if none is named."""
     run(app, "init")
@@ -71,10 +81,34 @@ def test_init_to_stdout_prints_the_file_alone(app: typer.Typer) -> None:
     assert not Path("controller.toml").exists()
 
 
-def test_init_where_nothing_can_be_written_says_so(app: typer.Typer) -> None:
-    """A folder that is not there gets a message."""
-    _, talk = run(app, "init", "-o", "none/controller.toml", code=2)
-    assert talk == "none/controller.toml: cannot be written: No such file or directory\n"
+def test_init_makes_the_folder_of_its_file(app: typer.Typer) -> None:
+    """A folder that is not there is made, as generate makes it."""
+    run(app, "init", "-o", "made/too/controller.toml")
+    assert [path.name for path in Path("made/too").iterdir()] == ["controller.toml"]
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_init_that_fails_leaves_everything_as_it_was(app: typer.Typer, force: list[str]) -> None:
+    """No half file, no folder made for it, and the old file whole; what is no file is not replaced."""
+    Path("file").touch()
+    talk = run(app, "init", "-o", "file/controller.toml", *force, code=2)[1]
+    assert talk == "file/controller.toml: cannot be written: Not a directory\n"
+    Path("folder").mkdir()
+    assert "is not a file" in run(app, "init", "-o", "folder", *force, code=2)[1]
+    Path("controller.toml").write_text("mine", encoding="utf-8")
+    run_limited("init", "-o", "new/controller.toml", *force)
+    run_limited("init", "-o", "controller.toml", "--force")
+    assert Path("controller.toml").read_text(encoding="utf-8") == "mine"
+    assert sorted(path.name for path in Path().iterdir()) == ["controller.toml", "file", "folder"]
+
+
+def test_init_writes_where_a_link_leads(app: typer.Typer) -> None:
+    """Settings kept elsewhere and linked to stay linked to."""
+    Path("kept.toml").touch()
+    Path("controller.toml").symlink_to("kept.toml")
+    run(app, "init", "--force")
+    assert Path("controller.toml").is_symlink()
+    assert presets.load("kept.toml") == presets.preset("mambo")
 
 
 def test_presets_lists_every_preset_with_its_use(app: typer.Typer) -> None:
@@ -159,9 +193,10 @@ def test_options_override_the_settings_and_the_bundle_remembers(app: typer.Typer
 
 
 def test_amalgamated_bundle_is_one_header_and_one_source(app: typer.Typer) -> None:
-    """--amalgamate puts the library into two files, and replaces a bundle of many."""
+    """--amalgamate puts the library into two files, and replaces a bundle of many only by force."""
     run(app, "generate", "-o", "out")
-    run(app, "generate", "-o", "out", "--amalgamate")
+    assert "leave out --amalgamate" in run(app, "generate", "-o", "out", "--amalgamate", code=2)[1]
+    run(app, "generate", "-o", "out", "--amalgamate", "--force")
     assert sorted(path.name for path in Path("out").glob("*.[ch]")) == ["nmpc.c", "nmpc.h"]
     assert not Path("out/src").exists()
 
@@ -203,6 +238,43 @@ def test_output_that_nobody_reads_ends_quietly() -> None:
     with os.fdopen(writer, "wb") as closed:
         result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False)
     assert (result.returncode, result.stderr) == (cli.NO_READER, b"")
+
+
+@pytest.mark.parametrize("arguments", [["schema"], ["--help"], ["generate", "-o", "out", "--json"]])
+def test_stdout_that_takes_nothing_gets_a_message(arguments: list[str]) -> None:
+    """A full disk or a closed stdout is said in one line, without a traceback."""
+    line = shlex.join([sys.executable, "-c", COMMAND, *arguments])
+    for redirection, reason in ((">/dev/full", "No space left on device"), (">&-", "is closed")):
+        result = subprocess.run(
+            f"{line} {redirection}", shell=True, capture_output=True, text=True, check=False
+        )
+        assert result.returncode == 2, result.stderr
+        assert result.stderr.endswith(f": {reason}\n")
+        assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        ("MemoryError", "there is not enough memory\n"),
+        ("OSError(28, 'No space left on device', 'trace.csv')", "trace.csv: No space left on device\n"),
+    ],
+)
+def test_what_the_system_refuses_gets_a_message(error: str, message: str) -> None:
+    """An error that no command expects is one line, with --debug a traceback too."""
+    script = INTERRUPTED.replace("KeyboardInterrupt", error)
+    for debug in ([], ["--debug"]):
+        command = [sys.executable, "-c", script, *debug, "stop"]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert result.returncode == 2
+        assert result.stderr.endswith(message)
+        assert (result.stderr == message) is not bool(debug)
+
+
+def test_root_help_names_the_exit_codes(app: typer.Typer) -> None:
+    """Whoever writes a script finds them without the source."""
+    text = run(app, "--help")[0]
+    assert all(str(number) in text for number in (cli.BAD_INPUT, cli.INTERRUPTED, cli.NO_READER))
 
 
 def test_ctrl_c_exits_130() -> None:

@@ -17,6 +17,9 @@ LARGEST_FILE_BYTES = 64_000
 COLUMNS = 88
 
 _TITLE = "Settings of a mambo-nmpc controller."
+_SECTION = re.compile(r"\s*\[\s*([^\[\]]*?)\s*\]")
+_TWICE = re.compile("Cannot (declare|overwrite|mutate|redefine)")
+_LONG_NUMBER = re.compile(r"\d(_?\d){4300,}")
 _PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>.*)\)", re.DOTALL)
 
 
@@ -79,7 +82,7 @@ def with_option(settings: Settings, path: str, value: object, source: str) -> Se
 
 def to_toml(settings: Settings, title: str = _TITLE) -> str:
     """Return a complete controller.toml, a comment above every key; reading it gives equal settings."""
-    parts = [_comment(title), _comment("A key left out keeps the default of preset table1.")]
+    parts = [_comment(title), _comment("A missing key takes the value of preset table1.")]
     values = settings.model_dump()
     for section, about in SECTIONS.items():
         parts += ["", _comment(about), f"[{section}]"]
@@ -96,11 +99,31 @@ def _comment(text: str) -> str:
 
 def _syntax_fault(message: str, text: str) -> str:
     """Put the place that tomllib reports last in front, as compilers do."""
+    number = _LONG_NUMBER.search(text)
+    if number and "digits" in message:
+        line = text.count("\n", 0, number.start()) + 1
+        return f"line {line}: a number has {len(number[0])} digits; write a shorter one"
     found = _PLACE.fullmatch(message)
     if found is None:
         return f"is not TOML: {echo(message)}"
-    last_line = f"line {text.rstrip().count(chr(10)) + 1}"
-    return f"{found['place'].replace('end of document', last_line)}: {echo(found['reason'])}"
+    last_line = text.rstrip().count("\n") + 1
+    place = found["place"].replace("end of document", f"line {last_line}")
+    line_number = re.match(r"line (\d+)", place)
+    if line_number and _TWICE.match(found["reason"]):
+        names = re.findall(r"'([^']*)'", found["reason"])
+        return f"{place}: {_set_twice(text.splitlines()[: int(line_number[1])], names)}"
+    return f"{place}: {echo(found['reason'])}"
+
+
+def _set_twice(lines: list[str], names: list[str]) -> str:
+    """Say which section or key the last of `lines` sets again; tomllib may have told its `names`."""
+    opened = [found[1] for line in lines if (found := _SECTION.match(line))]
+    if _SECTION.match(lines[-1]):
+        section = echo(f"[{opened[-1]}]")
+        return f"{section} is there already; put all its keys below one {section}"
+    key, assigned, _ = lines[-1].partition("=")
+    dotted = ".".join(names or [*opened[-1:], key.strip()]) if names or assigned else "a key"
+    return f"{echo(dotted)} is set already; keep one of the two"
 
 
 def _invalid(source: str, error: ValidationError, document: Mapping[str, object]) -> InvalidSettingsError:

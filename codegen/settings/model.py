@@ -28,6 +28,8 @@ _WORDS = """
     struct switch template this thread_local throw true try typedef typeid typename typeof
     typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq
 """
+
+
 def _without_minus_zero(value: float) -> float:
     """Return `value` with -0.0 as 0.0, so that equal settings have equal digests and equal C."""
     return value + 0.0
