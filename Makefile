@@ -1,7 +1,8 @@
 # make fly        set up, generate the C of preset mambo, compile it, fly Table II; results in build/fly
 # make test       set up, check style and types, run the tests; with CI=true also the long ones
+# make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
-# make bench      measure against RotorPy; results on stdout
+# make bench      measure against RotorPy and against what peers generate; results on stdout
 # make clean      remove build/ and the virtual environment
 
 PYTHON ?= python3
@@ -13,7 +14,10 @@ SETUP_BENCH = $(VENV)/.installed-bench
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
 # What the tests want beside a C compiler; named as Debian names it.
-TOOLS = gcc g++ clang make cmake binutils
+TOOLS = gcc g++ clang make cmake binutils \
+    gcc-arm-linux-gnueabi libc6-dev-armel-cross gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc qemu-system-misc
+TOOL_COMMANDS = gcc g++ clang make cmake nm \
+    arm-linux-gnueabi-gcc arm-none-eabi-gcc riscv64-unknown-elf-gcc avr-gcc qemu-system-avr
 
 ifeq ($(CI),true)
 MARKED = -m "long or not long"
@@ -34,7 +38,7 @@ test: tools $(SETUP_TEST)
 
 # Where there is apt and the right to use it, install what is missing; elsewhere say what to install.
 tools:
-	@missing=""; for tool in gcc g++ clang make cmake nm; do command -v $$tool >/dev/null || missing=yes; done; \
+	@missing=""; for tool in $(TOOL_COMMANDS); do command -v $$tool >/dev/null || missing=yes; done; \
 	if [ -z "$$missing" ]; then exit 0; fi; \
 	if command -v apt-get >/dev/null && [ "$$(id -u)" = 0 ]; then \
 	    apt-get update --quiet=2 && apt-get install --quiet=2 --yes --no-install-recommends $(TOOLS) >/dev/null; \
@@ -46,22 +50,30 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o generated/mambo
 	$(BIN)/mambo-nmpc generate mambo --scalar float64 -o generated/mambo-float64
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1
+	$(BIN)/python -m tests.support.digests
 
 bench: $(SETUP_BENCH)
 	$(BIN)/python -m benchmarks.flights
+	$(BIN)/python -m benchmarks.peers
 
-$(VENV)/bin/python:
-	$(PYTHON) -m venv $(VENV)
+# A virtual environment without pip is what a stopped run left, and is made anew.
+define SET_UP
+@echo "setting up (about a minute, downloads packages)"
+@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
+endef
 
-$(SETUP): pyproject.toml constraints.txt | $(VENV)/bin/python
+$(SETUP): pyproject.toml constraints.txt
+	$(SET_UP)
 	$(PIP_INSTALL) .
 	@touch $@
 
-$(SETUP_TEST): pyproject.toml constraints.txt | $(VENV)/bin/python
+$(SETUP_TEST): pyproject.toml constraints.txt
+	$(SET_UP)
 	$(PIP_INSTALL) ".[test]"
 	@touch $@ $(SETUP)
 
-$(SETUP_BENCH): pyproject.toml constraints.txt | $(VENV)/bin/python
+$(SETUP_BENCH): pyproject.toml constraints.txt
+	$(SET_UP)
 	$(PIP_INSTALL) ".[bench]"
 	@touch $@ $(SETUP)
 

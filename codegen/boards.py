@@ -50,6 +50,15 @@ class Compiler(_Section):
     packages: ManyWords = Field(min_length=1, description="Debian packages that bring one of the candidates")
     flags: ManyWords = Field(description="what compiling and linking add: core, FPU, dialect")
     link_flags: ManyWords = Field((), description="what linking for the firmware adds to that")
+    libraries: ManyWords = Field(("-lgcc",), description="libraries that hold the compiler's own helpers")
+
+    @property
+    def common(self) -> str:
+        """The candidate that Debian's packages bring, or else the first."""
+        for candidate in self.candidates:
+            if f"gcc-{candidate.removesuffix('-gcc')}" in self.packages:
+                return candidate
+        return self.candidates[0]
 
 
 class Cycles(_Section):

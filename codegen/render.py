@@ -7,7 +7,7 @@ from typing import Final
 import jinja2
 
 import codegen
-from codegen import literals
+from codegen import boards, literals
 from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from codegen.horizon import horizon_tables
 from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
@@ -109,6 +109,14 @@ def _context(settings: Settings) -> dict[str, object]:
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
         "vectors": self_test(settings),
+        "boards": [
+            {
+                "name": board.name,
+                "compiler": board.compiler.common,
+                "flags": " ".join(board.compiler.flags),
+            }
+            for board in map(boards.load, boards.names())
+        ],
         "hover_thrust_m_s2": hover_thrust(settings),
         "example_position_m": min(1.0, settings.ranges.position_m / 2),
         "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),

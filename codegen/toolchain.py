@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from codegen.errors import BuildError
+from codegen.errors import BuildError, echo
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,21 @@ class Toolchain:
         line = [*self.command, *arguments]
         try:
             done = subprocess.run(
-                line, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+                line,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                check=False,
             )
         except OSError as error:
             raise BuildError(
                 f"cannot run the C compiler {shlex.join(self.command)}: {error.strerror}"
             ) from error
         if done.returncode != 0:
-            raise BuildError(f"{shlex.join(line)} failed:\n{_first_lines(done.stderr)}")
+            said = _first_lines(done.stderr or done.stdout) or f"exit code {done.returncode}, without a word"
+            raise BuildError(f"{shlex.join(line)} failed:\n{said}")
 
     def identity(self) -> str:
         """Name compiler and version: builds of different compilers are different builds."""
@@ -39,10 +46,19 @@ class Toolchain:
 
 
 def host_toolchain(optimisation: str | None = None) -> Toolchain:
-    """Take the compiler that CC names, else cc, gcc or clang; raises BuildError when there is none."""
-    named = shlex.split(os.environ.get("CC", ""))
+    """Take the compiler that CC names, else cc, gcc or clang; raises BuildError when there is none.
+
+    A path in CC is relative to the folder of this call, not to that of a build.
+    """
+    line = os.environ.get("CC", "")
+    try:
+        named = shlex.split(line)
+    except ValueError as error:
+        raise BuildError(f"CC = {echo(line)} must be a command: {str(error).lower()}") from None
     if named:
-        return Toolchain(tuple(named), optimisation)
+        program, *arguments = named
+        path = str(Path(program).absolute()) if os.sep in program else program
+        return Toolchain((path, *arguments), optimisation)
     for name in ("cc", "gcc", "clang"):
         if shutil.which(name):
             return Toolchain((name,), optimisation)

@@ -1,12 +1,24 @@
-"""The compile cache: one private folder, one file a build, named by the hash of all that made it."""
+"""The compile cache: one private folder, one file a build, named by the hash of all that made it.
 
+The hash of the content comes first in the name: a file that a full disk or a crash has cut short is known by
+it and built anew, for loading one would kill the process.
+"""
+
+import hashlib
 import os
+import shutil
 import stat
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final
 
 from sil.errors import CacheError
+
+_WORK: Final = "build-"
+_ABANDONED_S: Final = 3600.0
+"""Age at which the work folder of a build counts as left over by a killed process."""
 
 
 def cache_folder() -> Path:
@@ -15,8 +27,10 @@ def cache_folder() -> Path:
     It is $XDG_CACHE_HOME/mambo-nmpc, by default ~/.cache/mambo-nmpc. Raises CacheError if it cannot be
     made, or if somebody else owns it or may write to it: compiled code is loaded from there.
     """
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(home) / "mambo-nmpc"
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mambo-nmpc"
+    except RuntimeError:
+        raise CacheError("this user has no home folder for the compile cache; set XDG_CACHE_HOME") from None
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()
@@ -24,7 +38,11 @@ def cache_folder() -> Path:
         raise CacheError(
             f"cannot use the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME"
         ) from error
-    if status.st_uid != os.getuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    if status.st_uid != os.getuid():
+        raise CacheError(
+            f"the cache folder {folder} belongs to somebody else; set XDG_CACHE_HOME to a folder of yours"
+        )
+    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         raise CacheError(
             f"others may write to the cache folder {folder}; make it yours alone: chmod 700 {folder}"
         )
@@ -32,17 +50,35 @@ def cache_folder() -> Path:
 
 
 def cached(name: str, build: Callable[[Path], Path]) -> Path:
-    """Return the cached file `name`, building it first if it is not there.
+    """Return the cached file `name`, its content's hash before its name, building it first if need be.
 
     `build` works in an empty folder and returns what it made, which is then renamed into place: two
     processes may build the same file at once, and a killed one leaves no half of it.
     """
     folder = cache_folder()
-    path = folder / name
-    if not path.exists():
-        try:
-            with tempfile.TemporaryDirectory(prefix="build-", dir=folder) as work:
-                build(Path(work)).replace(path)
-        except OSError as error:
-            raise CacheError(f"cannot build in the cache folder {folder}: {error.strerror}") from error
-    return path
+    try:
+        for path in folder.glob(f"*-{name}"):
+            if path.name == _content_name(path, name):
+                return path
+        _clear_abandoned(folder)
+        with tempfile.TemporaryDirectory(prefix=_WORK, dir=folder) as work:
+            made = build(Path(work))
+            with made.open("rb") as file:
+                os.fsync(file.fileno())
+            return made.replace(folder / _content_name(made, name))
+    except OSError as error:
+        raise CacheError(
+            f"cannot build in the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME"
+        ) from error
+
+
+def _content_name(path: Path, name: str) -> str:
+    """Return the name under which the cache holds the content of `path` as `name`."""
+    return f"{hashlib.sha256(path.read_bytes()).hexdigest()[:32]}-{name}"
+
+
+def _clear_abandoned(folder: Path) -> None:
+    """Remove the work folders of builds that were killed."""
+    for work in folder.glob(f"{_WORK}*"):
+        if time.time() - work.stat().st_mtime > _ABANDONED_S:
+            shutil.rmtree(work, ignore_errors=True)

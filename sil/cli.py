@@ -1,6 +1,10 @@
 """The commands that fly, `fly` and `table2`, joined with those that generate: the whole of `mambo-nmpc`."""
 
-import json
+import hashlib
+import math
+import os
+import tempfile
+from collections.abc import Mapping
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
@@ -9,21 +13,25 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from codegen import boards, presets
 from codegen import cli as generating
-from codegen import presets
 from codegen.errors import echo
+from codegen.footprint.build import builder
+from codegen.literals import SCALARS
 from codegen.reference import ReferenceController, Status
 from codegen.settings import Settings
-from sil import report
+from sil import cli_boards, report
 from sil.baseline import PdController
 from sil.compiled import CompiledController
+from sil.emulated import EmulatedController, build_guest
 from sil.errors import FlightError, TrajectoryError
 from sil.loop import Flight, PositionController, Start
 from sil.loop import fly as simulate
+from sil.machine import CORES
 from sil.metrics import TRANSIENT_S, measure
 from sil.plant.vehicle import Vehicle
 from sil.progress import progress_bar
-from sil.results import result_folder, write_summary
+from sil.results import SUMMARY, new_results, summary_text
 from sil.table2 import CASES, PD, fly_table2
 from sil.traces import Trace, write_csv, write_npz
 from sil.trajectories import Bernoulli, Circle, Gerono, Hover, Lissajous, Step, Trajectory, Waypoints
@@ -39,27 +47,42 @@ class ControllerKind(Enum):
 
 CURVES = ("bernoulli", "gerono", "lissajous", "circle", "hover", "step")
 
+LONGEST_FLIGHT_S = 3600.0
+FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
+TABLE2_PICTURES = ("figure3.png", "figure3.svg")
+
 
 def main() -> None:
     """Run the command line."""
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; the library stops at a backend it does not know
     app = generating.root()
     generating.register(app)
+    register(app)
+    cli_boards.register(app)
+    app()
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this module to `app`."""
     app.command(
         epilog=generating.examples(
             "mambo-nmpc fly",
             "mambo-nmpc fly controller.toml --trajectory circle --yaw-rad 0.8 -o circle",
             "mambo-nmpc fly --controller pd --wind 0.5,0 -o pd-in-wind",
+            "mambo-nmpc fly --on crazyflie -o on-crazyflie",
             "mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30",
         )
     )(fly)
     app.command(epilog=generating.examples("mambo-nmpc table2 -o table2"))(table2)
-    app()
 
 
 def fly(
     source: Annotated[str, typer.Argument(help="A preset or a controller.toml.")] = "mambo",
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("flight"),
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="Folder for the results; earlier ones there are overwritten."),
+    ] = Path("flight"),
     controller: Annotated[
         ControllerKind,
         typer.Option(help="The generated C (nmpc), the stock PD, or the reference in Python."),
@@ -74,80 +97,127 @@ def fly(
     wind: Annotated[
         str, typer.Option(help="Push of the wind along x (north), y (east), in m/s^2.", metavar="X,Y")
     ] = "0,0",
-    motor_lag_s: Annotated[float, typer.Option(min=0, help="Time constant of the motors, in s.")] = 0.0,
+    motor_lag_s: Annotated[float, typer.Option(help="Time constant of the motors, in s.")] = 0.0,
     start: Annotated[Start, typer.Option(help="In the air, or 5 s earlier on the ground.")] = Start.HOVER,
     duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    on: Annotated[
+        str | None,
+        typer.Option(
+            help="Board on whose emulated core the C runs; the same flight on this machine follows."
+        ),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.", metavar="")] = False,
 ) -> None:
     """Fly once on the model of the Mambo: trace, metrics and pictures."""
     settings = presets.load(source)
-    flight = Flight(
-        _trajectory(trajectory, size_m, rate_rad_s),
-        duration_s=duration_s,
-        start=start,
-        yaw_rad=_finite(yaw_rad, "--yaw-rad"),
-        vehicle=Vehicle(motor_lag_s=_finite(motor_lag_s, "--motor-lag-s"), wind_m_s2=_wind(wind)),
-        update_period_s=settings.horizon.update_period_s,
-    )
-    flown_by = _controller(controller, settings)
-    folder = result_folder(output)
-    with progress_bar("flying") as progress:
-        trace = simulate(flight, flown_by, progress)
+    name, period_s = echo(source), settings.horizon.update_period_s
+    curve = _trajectory(trajectory, size_m, rate_rad_s)
+    wind_m_s2 = _wind(wind)
+    _within("--yaw-rad", yaw_rad, -1000.0, 1000.0)
+    _within("--motor-lag-s", motor_lag_s, 0.0, 1.0)
+    _within("--duration-s", duration_s, period_s, LONGEST_FLIGHT_S)
+    try:
+        flight = Flight(
+            curve,
+            duration_s=duration_s,
+            start=start,
+            yaw_rad=yaw_rad,
+            vehicle=Vehicle(motor_lag_s=motor_lag_s, wind_m_s2=wind_m_s2),
+            update_period_s=period_s,
+        )
+    except FlightError as error:
+        raise FlightError(
+            f"{name}: horizon.{error}; only the simulation, whose stock loops run at 200 Hz, asks for this"
+        ) from error
+    if controller is not ControllerKind.PD:
+        _check_ranges(flight, settings, trajectory)
+    with new_results(output, "fly", FLIGHT_FILES) as folder:
+        flown_by = _controller(controller, settings) if on is None else _on_board(controller, settings, on)
+        with progress_bar("flying") as progress:
+            trace = simulate(flight, flown_by, progress)
+        same_bits = (
+            None if on is None else trace.same_bits(simulate(flight, _controller(controller, settings)))
+        )
+        write_csv(trace, folder / "trace.csv")
+        write_npz(trace, folder / "trace.npz")
+        _draw({"PD" if controller is ControllerKind.PD else f"NMPC, {name}": trace}, folder / "flight")
+        summary = {
+            "controller": controller.value,
+            "board": on,
+            "same_bits_as_host": same_bits,
+            "source": source,
+            "settings": settings.digest,
+            "update_period_s": period_s,
+            "trajectory": trajectory,
+            "trajectory_sha256": _digest(trajectory) if isinstance(curve, Waypoints) else None,
+            "size_m": size_m,
+            "rate_rad_s": rate_rad_s,
+            "yaw_rad": yaw_rad,
+            "wind_m_s2": wind_m_s2,
+            "motor_lag_s": motor_lag_s,
+            "start": start.value,
+            "duration_s": duration_s,
+            **_found(trace, settings),
+        }
+        text = summary_text("fly", summary)
+        (folder / SUMMARY).write_text(text, "utf-8")
 
-    write_csv(trace, folder / "trace.csv")
-    write_npz(trace, folder / "trace.npz")
-    title = "PD" if controller is ControllerKind.PD else f"NMPC, {echo(source)}"
-    pictures = _draw({title: trace}, folder / "flight")
-    statuses = np.bincount(trace.status[:, 0], minlength=len(Status))
-    summary: dict[str, Any] = {
-        "controller": controller.value,
-        "settings": None if controller is ControllerKind.PD else settings.digest,
-        "trajectory": trajectory,
-        "duration_s": duration_s,
-        "lost": bool(trace.diverged[0]),
-        "statuses": {status.name: int(statuses[status]) for status in Status if statuses[status]},
-        "metrics": report.numbers(measure(trace)),
-    }
-    if duration_s > TRANSIENT_S:
-        summary["metrics_without_transient"] = report.numbers(measure(trace, TRANSIENT_S))
-    write_summary(folder, summary)
-
-    typer.echo(json.dumps(summary, indent=2) if as_json else report.flight_text(summary))
-    typer.echo(f"{echo(str(output))}: trace.csv, trace.npz, {pictures[0].name}, {pictures[1].name}", err=True)
-    if summary["lost"]:
+    typer.echo(text if as_json else report.flight_text(summary), nl=not as_json)
+    typer.echo(f"{echo(str(output))}: {', '.join(FLIGHT_FILES)}", err=True)
+    if summary["lost"] or summary["mostly_refused"] or same_bits is False:
         raise typer.Exit(1)
 
 
 def table2(
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("table2"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print rows and verdicts as JSON.")] = False,
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", help="Folder for the results; earlier ones there are overwritten."),
+    ] = Path("table2"),
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print rows and verdicts as JSON.", metavar="")
+    ] = False,
 ) -> None:
     """Fly Table II of the paper with PD and every preset, and judge its claims."""
-    folder = result_folder(output)
-    with progress_bar("flying Table II") as progress:
-        result = fly_table2(progress)
+    traces = {name: f"{name.lower()}.npz" for name in (PD, *presets.names())}
+    with new_results(output, "table2", (*traces.values(), *TABLE2_PICTURES)) as folder:
+        with progress_bar("flying Table II") as progress:
+            result = fly_table2(progress)
+        for name, trace in result.traces.items():
+            write_npz(trace, folder / traces[name])
+        _draw({PD: result.traces[PD], "NMPC, mambo": result.traces["mambo"]}, folder / "figure3")
+        summary = {
+            "cases": list(CASES),
+            "rows": [asdict(row) for row in result.rows],
+            "claims": [asdict(claim) for claim in result.claims],
+        }
+        text = summary_text("table2", summary)
+        (folder / SUMMARY).write_text(text, "utf-8")
 
-    for name, trace in result.traces.items():
-        write_npz(trace, folder / f"{name.lower()}.npz")
-    compared = {PD: result.traces[PD], "NMPC, mambo": result.traces["mambo"]}
-    pictures = _draw(compared, folder / "figure3")
-    summary = {
-        "cases": list(CASES),
-        "rows": [asdict(row) for row in result.rows],
-        "claims": [asdict(claim) for claim in result.claims],
+    typer.echo(text if as_json else report.table2_text(result), nl=not as_json)
+    typer.echo(f"{echo(str(output))}: {', '.join(TABLE2_PICTURES)} and the traces", err=True)
+
+
+def _found(trace: Trace, settings: Settings) -> dict[str, Any]:
+    """Return what a flight is judged by; "mostly_refused" is about the time on the trajectory."""
+    statuses = np.bincount(trace.status[:, 0], minlength=len(Status))
+    found: dict[str, Any] = {
+        "lost": bool(trace.diverged[0]),
+        "mostly_refused": bool(np.mean(trace.status[trace.time_s >= 0.0, 0] != Status.OK) > 0.5),
+        "statuses": {status.name: int(statuses[status]) for status in Status if statuses[status]},
+        "refusals": report.refusals(trace, settings),
+        "metrics": report.numbers(measure(trace)),
     }
-    write_summary(folder, summary)
+    if trace.time_s[-2] >= TRANSIENT_S:
+        found["metrics_without_transient"] = report.numbers(measure(trace, TRANSIENT_S))
+    return found
 
-    typer.echo(json.dumps(summary, indent=2) if as_json else report.table2_text(result))
-    typer.echo(f"{echo(str(output))}: {pictures[0].name}, {pictures[1].name} and the traces", err=True)
 
-
-def _draw(flights: dict[str, Trace], stem: Path) -> tuple[Path, Path]:
+def _draw(flights: Mapping[str, Trace], stem: Path) -> None:
     """Draw, and only then load the plotting library: generating C does without it."""
     from sil.plots import draw_flights  # noqa: PLC0415 - loaded when drawing
 
-    return draw_flights(flights, stem)
+    draw_flights(flights, stem)
 
 
 def _controller(kind: ControllerKind, settings: Settings) -> PositionController:
@@ -160,8 +230,21 @@ def _controller(kind: ControllerKind, settings: Settings) -> PositionController:
             return CompiledController(settings)
 
 
+def _on_board(kind: ControllerKind, settings: Settings, board: str) -> EmulatedController:
+    """Build the C for a board and put it on the board's emulated core."""
+    if kind is not ControllerKind.NMPC:
+        raise FlightError(f"--on {echo(board)} runs the C: it goes with --controller nmpc alone")
+    chosen = boards.load(board)
+    core = chosen.emulated_core.value
+    if core not in CORES:
+        raise FlightError(f"--on {echo(board)}: {core} is not emulated here; {', '.join(CORES)} are")
+    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
+        return EmulatedController(settings, build_guest(settings, builder(chosen), Path(work)), core)
+
+
 def _trajectory(name: str, size_m: float, rate_rad_s: float) -> Trajectory:
-    size_m, rate_rad_s = _finite(size_m, "--size-m"), _finite(rate_rad_s, "--rate-rad-s")
+    _within("--size-m", size_m, -1000.0, 1000.0)
+    _within("--rate-rad-s", rate_rad_s, -100.0, 100.0)
     curves: dict[str, Trajectory] = {
         "bernoulli": Bernoulli(size_m, rate_rad_s),
         "gerono": Gerono(size_m, rate_rad_s),
@@ -172,11 +255,26 @@ def _trajectory(name: str, size_m: float, rate_rad_s: float) -> Trajectory:
     }
     if name in curves:
         return curves[name]
-    if not name.endswith(".csv"):
+    if not name.lower().endswith(".csv"):
         raise TrajectoryError(
             f"--trajectory {echo(name)} must be {', '.join(curves)} or a file ending in .csv"
         )
     return Waypoints.read(Path(name))
+
+
+def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
+    """Raise FlightError if the controller would refuse a target, compared in its own scalar type."""
+    scalar, ranges = SCALARS[settings.code.scalar], settings.ranges
+    x, y, vx, vy = np.abs(flight.targets()[:, 0]).max(axis=0).astype(scalar)
+    for what, largest, unit, key, limit in (
+        ("position", max(x, y), "m", "position_m", ranges.position_m),
+        ("speed", max(vx, vy), "m/s", "velocity_m_s", ranges.velocity_m_s),
+    ):
+        if largest > scalar(limit):
+            raise FlightError(
+                f"--trajectory {echo(trajectory)}: the target's {what} along an axis, up to {largest:g} "
+                f"{unit}, exceeds ranges.{key} = {limit:g}; the controller would refuse it"
+            )
 
 
 def _wind(text: str) -> tuple[float, float]:
@@ -184,10 +282,18 @@ def _wind(text: str) -> tuple[float, float]:
         x, y = (float(word) for word in text.split(","))
     except ValueError:
         raise FlightError(f"--wind {echo(text)} must be two numbers, as in 0.5,0") from None
-    return _finite(x, "--wind"), _finite(y, "--wind")
+    _within("--wind", x, -100.0, 100.0)
+    _within("--wind", y, -100.0, 100.0)
+    return x, y
 
 
-def _finite(value: float, option: str) -> float:
-    if not np.isfinite(value):
-        raise FlightError(f"{option} = {value} must be a finite number")
-    return value
+def _within(option: str, value: float, low: float, high: float) -> None:
+    """Raise FlightError unless the value of an option is a number from `low` to `high`."""
+    if not math.isfinite(value):
+        raise FlightError(f"{option} = {value} must be a finite number; it must lie in {low:g}..{high:g}")
+    if not low <= value <= high:
+        raise FlightError(f"{option} = {value} must lie in {low:g}..{high:g}")
+
+
+def _digest(file: str) -> str:
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()

@@ -14,10 +14,14 @@ from codegen.toolchain import Toolchain, host_toolchain
 from sil.extension import load_extension
 
 
+def plainly_named(settings: Settings) -> Settings:
+    """Return `settings` with the default prefix: names do not change what is computed."""
+    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "nmpc"})})
+
+
 def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
-    """Generate and build the C of `settings`, with the default prefix: a name changes no bit."""
-    plain = settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "nmpc"})})
-    return load_extension(render(plain), settings.code.scalar, toolchain)
+    """Generate and build the C of `settings` for this machine."""
+    return load_extension(render(plainly_named(settings)), settings.code.scalar, toolchain)
 
 
 def as_array(values: ArrayLike, scalar: Scalar, shape: tuple[int, ...]) -> NDArray[Any]:

@@ -4,7 +4,7 @@ from codegen.errors import MamboNmpcError
 
 
 class TrajectoryError(MamboNmpcError):
-    """A trajectory that cannot be flown; the message names file, row and rule."""
+    """A trajectory that cannot be flown; the message names file, line and rule."""
 
 
 class FlightError(MamboNmpcError):
@@ -17,6 +17,10 @@ class TraceError(MamboNmpcError):
 
 class CacheError(MamboNmpcError):
     """The compile cache cannot be used, or others may write to it."""
+
+
+class BusyError(MamboNmpcError):
+    """Another run holds the result folder."""
 
 
 class EmulationError(MamboNmpcError):

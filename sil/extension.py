@@ -8,6 +8,7 @@ import hashlib
 import importlib.machinery
 import importlib.util
 import re
+import shlex
 import sys
 import sysconfig
 from importlib import resources
@@ -22,6 +23,7 @@ from codegen.flags import COMPILE_FLAGS
 from codegen.literals import C_TYPES
 from codegen.toolchain import Toolchain
 from sil.cache import cached
+from sil.errors import CacheError
 
 _DECLARATIONS: Final = """
 typedef REAL nmpc_real_t;
@@ -118,13 +120,23 @@ def _compile(sources: list[str], toolchain: Toolchain, folder: Path) -> Path:
     glue_flags = ["-O2", "-ffp-contract=off", "-fPIC", "-Iinclude", "-Isrc", f"-I{headers}"]
     link = ["-shared", *(["-undefined", "dynamic_lookup"] if sys.platform == "darwin" else [])]
     toolchain.run([*glue_flags, *link, "extension.c", *objects, "-o", "extension.so"], folder)
-    return folder / "extension.so"
+    made = folder / "extension.so"
+    if not made.is_file():
+        raise BuildError(f"{shlex.join(toolchain.command)} made nothing; is it a C compiler? CC names it")
+    return made
 
 
 def _loaded(name: str, path: Path) -> ModuleType:
+    """Load the extension at `path`; raises CacheError."""
     loader = importlib.machinery.ExtensionFileLoader(name, str(path))
     spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     assert spec is not None  # a loader was given
-    module = importlib.util.module_from_spec(spec)
-    loader.exec_module(module)
+    try:
+        module = importlib.util.module_from_spec(spec)
+        loader.exec_module(module)
+    except ImportError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+        raise CacheError(
+            f"cannot load {path}: {reason}; if its folder is mounted noexec, set XDG_CACHE_HOME to another"
+        ) from error
     return module

@@ -1,6 +1,8 @@
 """Pictures of flights, after the paper's Fig. 3: path, error, commands; PNG and SVG."""
 
-from collections.abc import Mapping
+import contextlib
+import warnings
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +15,7 @@ from numpy.typing import NDArray
 from sil.metrics import horizontal_error_m
 from sil.traces import Trace
 
-TARGET, FLOWN, COMMAND = "#8a8a8a", "#0072B2", "#E69F00"
+TARGET, FLOWN, COMMAND = "#c4c4c4", "#0072B2", "#E69F00"
 """Colours that stay apart for colour-blind readers and in grey (Okabe and Ito)."""
 
 _STYLE: Final[dict[Any, Any]] = {
@@ -37,7 +39,7 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
 
     The columns share their scales, so that they can be compared by eye.
     """
-    with mpl.rc_context(_STYLE):
+    with style():
         figure = Figure(figsize=(_COLUMN_INCHES * len(flights), _HEIGHT_INCHES), layout="constrained")
         rows = figure.subplots(4, len(flights), squeeze=False, sharey="row", height_ratios=(1.9, 1, 1, 1))
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
@@ -60,10 +62,22 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
     return png, svg
 
 
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Draw in our style, whatever the user's matplotlibrc says, and without a word on missing glyphs."""
+    with mpl.rc_context(), warnings.catch_warnings():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)
+        yield
+
+
 def _draw_path(axes: Axes, trace: Trace, title: str) -> None:
-    axes.plot(trace.position_m[:, 0, 0], trace.position_m[:, 0, 1], color=FLOWN, label="flown")
-    axes.plot(trace.target[:, 0, 0], trace.target[:, 0, 1], color=TARGET, linestyle="--", label="target")
-    axes.set_title(title, loc="right")
+    """Draw the target as a broad line beneath: it stays visible however often it is flown around."""
+    target, flown = trace.target[:, 0], trace.position_m[:, 0]
+    axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=4, label="target")
+    axes.plot(flown[:, 0], flown[:, 1], color=FLOWN, label="flown")
+    axes.set_title(title, loc="right", parse_math=False)
     axes.set(xlabel="x (north), m", aspect="equal")
 
 
@@ -73,8 +87,9 @@ def _draw_error(axes: Axes, trace: Trace) -> None:
 
 
 def _draw_angle(axes: Axes, trace: Trace, axis: int) -> None:
-    axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=0.5, label="command")
-    axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, label="flown")
+    """Draw the command as a broader line beneath: both show where they agree, and where one chatters."""
+    axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=2, label="command")
+    axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=0.9, label="flown")
 
 
 def _share_horizontal_scale(row: NDArray[Any]) -> None:

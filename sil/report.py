@@ -3,8 +3,13 @@
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
+from codegen.reference import Status
+from codegen.settings import Settings
 from sil.metrics import Metrics
 from sil.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD, Four, Row, Table2
+from sil.traces import Trace
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
 _UNITS |= {"_rad": "rad", "_m": "m"}
@@ -13,6 +18,34 @@ _UNITS |= {"_rad": "rad", "_m": "m"}
 def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
     """Return the metrics of one flight by name."""
     return {field.name: float(getattr(metrics, field.name)[flight]) for field in fields(metrics)}
+
+
+def refusals(trace: Trace, settings: Settings) -> list[str]:
+    """Say how often the controller of the first flight refused its input, and which range was exceeded."""
+    status, ranges = trace.status[:, 0], settings.ranges
+    sentences = []
+    refused = (status == Status.BAD_STATE) & np.isfinite(trace.position_m[:, 0]).all(axis=-1)
+    for words, unit, values, key, limit in (
+        ("position", "m", trace.position_m[:, 0, :2], "position_m", ranges.position_m),
+        ("speed", "m/s", trace.velocity_m_s[:, 0, :2], "velocity_m_s", ranges.velocity_m_s),
+    ):
+        largest = np.abs(values).max(axis=-1)
+        beyond = refused & (largest > limit)
+        if beyond.any():
+            sentences.append(
+                f"{beyond.sum()} steps: the vehicle's {words}, up to {largest[beyond].max():.4g} {unit}, "
+                f"exceeds ranges.{key} = {limit:g}"
+            )
+    refused = status == Status.BAD_THRUST
+    if refused.any():
+        thrust = trace.thrust_acceleration_m_s2[refused, 0]
+        during = " during lift-off" if (trace.time_s[refused] < 0.0).all() else ""
+        sentences.append(
+            f"{refused.sum()} steps{during}: thrust out of range, {thrust.min():.4g}..{thrust.max():.4g} "
+            f"m/s^2 where ranges.thrust_acceleration_* = {ranges.thrust_acceleration_min_m_s2:g}.."
+            f"{ranges.thrust_acceleration_max_m_s2:g}"
+        )
+    return [f"{sentence}; the last command was kept" for sentence in sentences]
 
 
 def flight_text(summary: dict[str, Any]) -> str:
@@ -26,8 +59,16 @@ def flight_text(summary: dict[str, Any]) -> str:
     refused = {name: count for name, count in summary["statuses"].items() if name != "OK"}
     if refused:
         lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
+        lines += [f"  {sentence}" for sentence in summary["refusals"]]
+    if summary["same_bits_as_host"] is not None:
+        same = "equals" if summary["same_bits_as_host"] else "DIFFERS FROM"
+        lines.append(
+            f"flown on the core of {summary['board']}: the trace {same} that of this machine, bit for bit"
+        )
     if summary["lost"]:
         lines.append("LOST: the vehicle left the world before the end of the flight")
+    elif summary["mostly_refused"]:
+        lines.append("NOT CONTROLLED: the controller refused more than half of its inputs")
     return "\n".join(lines)
 
 
@@ -38,17 +79,20 @@ def _named(key: str) -> tuple[str, str]:
 
 
 def table2_text(result: Table2) -> str:
-    """Spell Table II: a block for each case, printed above measured, then the verdicts."""
-    lines = []
+    """Spell Table II: a block for each case, printed above measured, then what the paper claims."""
+    lines = [f"{'':68}  PD over NMPC"]
     for case in CASES:
-        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES) + "  PD over this"]
+        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
+        lines[-1] += "".join(f"{index:>9}" for index in INDICES)
         if case == next(iter(CASES)):
             lines += [_line("printed PD", PRINTED_PD, None)]
             lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
         lines += [_row(row) for row in result.rows if row.case == case]
         lines += [""]
+    lines += ["the paper's claims, as flown here:"]
     lines += [
-        f"{'holds' if claim.holds else 'FAILS':6} {claim.text}: {claim.evidence}" for claim in result.claims
+        f"  {'holds' if claim.holds else 'does not hold':13}  {claim.text}: {claim.evidence}"
+        for claim in result.claims
     ]
     return "\n".join(lines)
 

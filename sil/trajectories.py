@@ -5,7 +5,7 @@ there at rest. Half-width and radius are in metres, angular rate in rad/s.
 """
 
 import csv
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, Self
@@ -13,11 +13,20 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from codegen.errors import echo
 from sil.arrays import FloatArray
 from sil.errors import TrajectoryError
 
 STEP_TIME_S = 1.0
 COLUMNS = ("time_s", "x_m", "y_m")
+LARGEST = (1e6, 1e4, 1e4)
+"""Largest magnitude of a waypoint's time in s and position in m, column by column."""
+
+SHORTEST_LEG_S = 1e-6
+"""Least time from one waypoint to the next: no velocity is infinite."""
+
+Point = tuple[float, float, float]
+"""A waypoint: time in s, x and y in m."""
 
 
 class Trajectory(Protocol):
@@ -148,34 +157,30 @@ class Step:
 class Waypoints:
     """Straight lines between points, each reached at its time; the first and the last point are held."""
 
-    points: tuple[tuple[float, float, float], ...]
+    points: tuple[Point, ...]
     """Rows of (time s, x m, y m), times increasing."""
 
     def __post_init__(self) -> None:
-        if not self.points:
-            raise TrajectoryError("no waypoint: at least one row is needed")
-        for number, point in enumerate(self.points, start=1):
-            if not all(math.isfinite(value) for value in point):
-                raise TrajectoryError(f"row {number}: {point} must be finite numbers")
-        for number, (before, after) in enumerate(zip(self.points, self.points[1:], strict=False), start=2):
-            if after[0] <= before[0]:
-                raise TrajectoryError(
-                    f"row {number}: time_s = {after[0]:g} must be later than {before[0]:g} of the row before"
-                )
+        _check([f"point {number}" for number in range(1, len(self.points) + 1)], self.points)
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a CSV file with the columns time_s, x_m, y_m; row 1 is the first below the header.
+        """Read a CSV file with the columns time_s, x_m, y_m, in any order and beside others.
 
-        Raises `TrajectoryError`, naming file, row and rule.
+        Raises `TrajectoryError`, naming file, line, column and rule.
         """
+        name = echo(str(path))
         try:
             with path.open(newline="", encoding="utf-8-sig") as file:
-                return cls(_points(csv.DictReader(file)))
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            raise TrajectoryError(f"{path}: cannot be read: {error}") from error
+                lines, points = _read(csv.DictReader(file, strict=True))
+            _check(lines, points)
+        except OSError as error:
+            raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError:
+            raise TrajectoryError(f"{name}: is not UTF-8; save the file as UTF-8") from None
         except TrajectoryError as error:
-            raise TrajectoryError(f"{path}: {error}") from error
+            raise TrajectoryError(f"{name}: {error}") from None
+        return cls(points)
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
@@ -189,24 +194,66 @@ class Waypoints:
         return _held_before_start(times, np.concatenate([position, velocity[leg]], axis=-1))
 
 
-def _points(rows: "csv.DictReader[str]") -> tuple[tuple[float, float, float], ...]:
-    """Turn the rows of a CSV file into points; errors name row and column."""
-    missing = [column for column in COLUMNS if column not in (rows.fieldnames or ())]
-    if missing:
-        raise TrajectoryError(f"header: column {', '.join(missing)} is missing; need {', '.join(COLUMNS)}")
-    return tuple(
-        (_number(row, number, "time_s"), _number(row, number, "x_m"), _number(row, number, "y_m"))
-        for number, row in enumerate(rows, start=1)
-    )
+def _check(places: Sequence[str], points: Sequence[Point]) -> None:
+    """Raise `TrajectoryError` for points that cannot be flown; `places` says where each of them stands."""
+    if not points:
+        raise TrajectoryError("holds no waypoint; at least one is needed")
+    for place, point in zip(places, points, strict=True):
+        for column, value, largest in zip(COLUMNS, point, LARGEST, strict=True):
+            if not abs(value) <= largest:
+                raise TrajectoryError(
+                    f"{place}: {column} = {value} must be a finite number of magnitude {largest:g} or less"
+                )
+    for place, before, after in zip(places[1:], points, points[1:], strict=False):
+        if after[0] - before[0] < SHORTEST_LEG_S:
+            raise TrajectoryError(
+                f"{place}: time_s = {after[0]} must be later than the {before[0]} before it, "
+                f"by {SHORTEST_LEG_S:g} or more"
+            )
 
 
-def _number(row: dict[str, str], number: int, column: str) -> float:
-    """Return one field of a CSV row as a number."""
-    text = row[column]
+def _read(rows: "csv.DictReader[str]") -> tuple[list[str], tuple[Point, ...]]:
+    """Return the points of a CSV file, and the line on which each stands."""
+    lines: list[str] = []
+    points: list[Point] = []
     try:
-        return float(text)
-    except (TypeError, ValueError):
-        raise TrajectoryError(f"row {number}: {column} = {text!r} must be a number") from None
+        header = [name.strip() for name in rows.fieldnames or ()]
+        rows.fieldnames = header
+        _check_header(header)
+        for row in rows:
+            lines.append(f"line {rows.line_num}")
+            points.append(_point(row, lines[-1], len(header)))
+    except csv.Error as error:
+        raise TrajectoryError(f"line {rows.reader.line_num}: is not CSV: {error}") from None
+    return lines, tuple(points)
+
+
+def _check_header(header: Sequence[str]) -> None:
+    """Raise `TrajectoryError` unless each column that we read stands there once."""
+    for column in COLUMNS:
+        if header.count(column) != 1:
+            fault = "stands there twice" if column in header else "is missing"
+            raise TrajectoryError(
+                f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
+            )
+
+
+def _point(row: dict[str, str], line: str, width: int) -> Point:
+    """Return the point in a row of a CSV file."""
+    if None in row:  # where DictReader puts what is beyond the header
+        raise TrajectoryError(f"{line}: has more than {width} fields, as many as the header")
+    time_s, x_m, y_m = (_number(row[column], line, column) for column in COLUMNS)
+    return time_s, x_m, y_m
+
+
+def _number(text: str | None, line: str, column: str) -> float:
+    """Return one field of a CSV row as a number; None is a field that the row does not have."""
+    if not (text or "").strip():
+        raise TrajectoryError(f"{line}: {column} is missing")
+    try:
+        return float(text or "")
+    except ValueError:
+        raise TrajectoryError(f"{line}: {column} = {echo(text or '')} must be a number") from None
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,19 @@
 """Building and caching the C: private, once, and with messages that say what is missing."""
 
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
 from codegen import presets
+from codegen.errors import BuildError
+from codegen.toolchain import Toolchain, host_toolchain
 from sil.cache import cache_folder, cached
 from sil.compiled import CompiledController, compiled
-from sil.errors import BuildError, CacheError
-from sil.toolchain import Toolchain, host_toolchain
+from sil.errors import CacheError
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -41,9 +44,46 @@ def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None
         (folder / "made").write_text("made")
         return folder / "made"
 
-    assert cached("name", build) == cached("name", build) == empty_cache / "name"
+    first = cached("name", build)
+    assert cached("name", build) == first
     assert len(built) == 1
-    assert [path.name for path in empty_cache.iterdir()] == ["name"]
+    assert list(empty_cache.iterdir()) == [first]
+    assert first.name.endswith("-name")
+
+
+def test_a_damaged_build_is_built_anew(empty_cache: Path) -> None:
+    """Cut short by a full disk or a crash, it would kill the process that loads it."""
+
+    def build(folder: Path) -> Path:
+        (folder / "made").write_text("made")
+        return folder / "made"
+
+    for damage in ("", "ma"):
+        cached("name", build).write_text(damage)
+        assert cached("name", build).read_text() == "made"
+    assert len(list(empty_cache.iterdir())) == 1
+
+
+def test_what_cannot_be_loaded_is_refused(empty_cache: Path) -> None:
+    """The message names the folder, and what to set if it may hold no programs."""
+    script = 'case "$*" in *extension.so) echo no library > extension.so;; esac'
+    with pytest.raises(CacheError, match=rf"cannot load {empty_cache}/.*noexec, set XDG_CACHE_HOME"):
+        compiled(MAMBO, Toolchain(("sh", "-c", script, "cc")))
+
+
+def test_what_killed_builds_left_is_cleared(empty_cache: Path) -> None:
+    """An old work folder goes with the next build; a young one may be at work."""
+    for name, age_s in (("build-old", 4000.0), ("build-young", 0.0)):
+        (cache_folder() / name).mkdir()
+        then = time.time() - age_s
+        os.utime(empty_cache / name, (then, then))
+
+    def build(folder: Path) -> Path:
+        (folder / "made").write_text("made")
+        return folder / "made"
+
+    made = cached("name", build)
+    assert set(empty_cache.iterdir()) == {made, empty_cache / "build-young"}
 
 
 def test_a_failed_build_leaves_nothing(empty_cache: Path) -> None:
@@ -90,6 +130,37 @@ def test_the_named_compiler_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(BuildError, match="cannot run the C compiler no-such-compiler"):
         CompiledController(MAMBO)
+
+
+@pytest.mark.usefixtures("empty_cache")
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("true", "true made nothing; is it a C compiler"),
+        ("false", r"(?s)^false .*failed:\nexit code 1, without a word"),
+        ("gcc '", "CC = gcc ' must be a command: no closing quotation"),
+    ],
+)
+def test_a_command_that_compiles_nothing_is_named(
+    line: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CC may name anything."""
+    monkeypatch.setenv("CC", line)
+    with pytest.raises(BuildError, match=message):
+        CompiledController(MAMBO)
+
+
+@pytest.mark.usefixtures("empty_cache")
+def test_a_relative_compiler_is_found_from_the_build_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A build runs in a folder of its own; CC is relative to where the user stands."""
+    gcc = require("gcc", "gcc")
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "cc").symlink_to(gcc)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("CC", "bin/cc")
+    assert CompiledController(MAMBO).settings == MAMBO
 
 
 @pytest.mark.usefixtures("empty_cache")

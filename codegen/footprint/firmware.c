@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * The least program that flies a controller, and with EMPTY the same without: what the linker makes of the two
+ * differs by the controller.
+ */
+#ifdef EMPTY
+
+void run(void);
+
+void run(void)
+{
+}
+
+#else
+
+#include "nmpc.h"
+
+nmpc_t nmpc_controller;
+
+nmpc_status_t run(const nmpc_state_t *state, const nmpc_target_t *target, nmpc_real_t thrust_acceleration_m_s2,
+                  nmpc_command_t *command);
+
+nmpc_status_t run(const nmpc_state_t *state, const nmpc_target_t *target, nmpc_real_t thrust_acceleration_m_s2,
+                  nmpc_command_t *command)
+{
+    nmpc_init(&nmpc_controller);
+    return nmpc_step(&nmpc_controller, state, target, thrust_acceleration_m_s2, command);
+}
+
+#endif

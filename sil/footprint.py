@@ -1,0 +1,146 @@
+"""What a controller takes of a board: flash, RAM, stack, instructions, time; and where it goes."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from codegen.boards import Board
+from codegen.footprint.build import ENTRY, PREFIX, Builder, builder
+from codegen.footprint.disassembly import is_readable
+from codegen.footprint.elf import load
+from codegen.footprint.gate import Forbidden, forbidden
+from codegen.footprint.sizes import Added, added
+from codegen.footprint.stack import StackReport, worst_case
+from codegen.render import render
+from codegen.settings import Settings
+from sil.baseline import PdController
+from sil.compiled import plainly_named
+from sil.emulated import build_guest
+from sil.instructions import InstructionCounts, count_instructions, in_flight, spread
+from sil.loop import Flight, fly
+from sil.machine import CORES
+from sil.trajectories import Bernoulli
+
+STEP: Final = "nmpc_step"
+COUNTED_STEPS: Final = 300
+"""Steps that are counted: a sixth in flight, a third from everywhere, half in search of the worst."""
+_FLIGHT_S: Final = 20.0
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One measured value against its budget; `unit` is of both."""
+
+    name: str
+    value: float
+    budget: float
+    unit: str
+
+    @property
+    def share(self) -> float:
+        """The value as a share of the budget."""
+        return self.value / self.budget
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """The measured controller on one board.
+
+    `added` is what it adds to a program without it, its instance in static memory included. `stack` and
+    `counts` are None where the code of the processor cannot be taken apart or emulated here.
+    """
+
+    board: Board
+    compiler: str
+    optimisation: str
+    scalar: str
+    added: Added
+    instance_bytes: int
+    stack: StackReport | None
+    counts: InstructionCounts | None
+    forbidden: tuple[Forbidden, ...]
+    update_period_s: float
+
+    @property
+    def cycles(self) -> tuple[float, float] | None:
+        """An estimate of the clock cycles of the most expensive step: least and most."""
+        if self.counts is None:
+            return None
+        cycles, error = self.board.cycles.per_instruction * self.counts.most, self.board.cycles.error_share
+        return (1 - error) * cycles, (1 + error) * cycles
+
+    @property
+    def time_s(self) -> tuple[float, float] | None:
+        """An estimate of the time of the most expensive step, in seconds: least and most."""
+        clock_hz = self.board.clock_hz.value
+        return None if self.cycles is None else (self.cycles[0] / clock_hz, self.cycles[1] / clock_hz)
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """Every measured value that has a budget."""
+        budget = self.board.budget
+        limits = [
+            Limit("flash", self.added.flash.total, budget.flash_bytes, "B"),
+            Limit("RAM", self.added.ram.total, budget.ram_bytes, "B"),
+        ]
+        if self.stack is not None:
+            limits.append(Limit("stack", self.stack.bytes, budget.stack_bytes, "B"))
+        if self.time_s is not None:
+            period_ms = 1000 * self.update_period_s
+            limits.append(Limit("time", 1000 * self.time_s[1], budget.period_share * period_ms, "ms"))
+        return tuple(limits)
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether everything that has a budget was measured."""
+        return self.stack is not None and self.counts is not None
+
+    @property
+    def fits(self) -> bool:
+        """Tell whether all that was measured is within budget, and nothing is linked that must not be."""
+        return not self.forbidden and all(limit.share <= 1 for limit in self.limits)
+
+    def largest(self, count: int) -> list[tuple[str, int]]:
+        """Return the largest symbols of flash and RAM, own and the compiler's."""
+        everything = self.added.own | self.added.helpers
+        return sorted(everything.items(), key=lambda item: -item[1])[:count]
+
+
+def measure_footprint(
+    settings: Settings, board: Board, optimisation: str = "-O2", counted_steps: int = COUNTED_STEPS
+) -> Footprint:
+    """Build the C of `settings` for `board` and measure it.
+
+    Raises BuildError if there is no compiler, FootprintError if the stack has no provable bound.
+    """
+    found = builder(board, optimisation)
+    files = render(plainly_named(settings))
+    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
+        folder = Path(work)
+        firmware = found.firmware(files, folder)
+        image = load(firmware)
+        readable = is_readable(image)
+        sizes = added(firmware, found.firmware(files, folder, empty=True), PREFIX)
+        return Footprint(
+            board=board,
+            compiler=found.compiler,
+            optimisation=optimisation,
+            scalar=settings.code.scalar,
+            added=sizes,
+            instance_bytes=image.symbol("nmpc_controller").size_bytes,
+            stack=worst_case(image, ENTRY) if readable else None,
+            counts=_counts(settings, found, folder, counted_steps)
+            if board.emulated_core.value in CORES
+            else None,
+            forbidden=forbidden(image, settings.code.scalar),
+            update_period_s=settings.horizon.update_period_s,
+        )
+
+
+def _counts(settings: Settings, found: Builder, folder: Path, steps: int) -> InstructionCounts:
+    """Count steps in flight, steps from everywhere, and steps in search of the worst."""
+    trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=_FLIGHT_S), PdController())
+    inputs = in_flight(trace, every=len(trace.time_s) * 6 // steps) + spread(settings, steps // 3)
+    elf = build_guest(settings, found, folder)
+    return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2)
