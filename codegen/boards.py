@@ -6,7 +6,6 @@ same shape is as good as a named board.
 
 import difflib
 import json
-import tomllib
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -15,8 +14,8 @@ from typing import Annotated, Any, Final, Generic, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError, echo
-from codegen.settings.controller_toml import LARGEST_FILE_BYTES
+from codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
+from codegen.toml_file import parse_document, read_text
 
 _FOLDER = resources.files("codegen") / "data" / "boards"
 _PYDANTIC_SUBJECTS: Final = ("Input should", "String should", "Tuple should")
@@ -128,8 +127,8 @@ def load(name_or_path: str) -> Board:
     InvalidSettingsError with every broken rule.
     """
     if name_or_path in names():
-        content = (_FOLDER / f"{name_or_path}.toml").read_bytes()
-        return _parse(content, f"board {name_or_path}", name_or_path)
+        text = (_FOLDER / f"{name_or_path}.toml").read_text("utf-8")
+        return _parse(text, f"board {name_or_path}", name_or_path)
     path = Path(name_or_path)
     try:
         found = path.exists()
@@ -137,27 +136,12 @@ def load(name_or_path: str) -> Board:
         found = False
     if not found:
         raise _not_found(name_or_path)
-    source = echo(name_or_path)
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
-    except OSError as error:
-        raise UnreadableFileError(f"{source}: cannot be read: {error.strerror}") from error
-    return _parse(content, source, path.stem)
+    return _parse(read_text(path), echo(name_or_path), path.stem)
 
 
-def _parse(content: bytes, source: str, name: str) -> Board:
-    """Return the board in `content`; `source` begins every message."""
-    if len(content) > LARGEST_FILE_BYTES:
-        raise UnreadableFileError(
-            f"{source}: is larger than {LARGEST_FILE_BYTES // 1000} kB; a board takes a few"
-        )
-    try:
-        document = tomllib.loads(content.decode("utf-8-sig"))
-    except RecursionError:
-        raise UnreadableFileError(f"{source}: is nested too deeply; a board is [section] and key") from None
-    except ValueError as error:
-        raise UnreadableFileError(f"{source}: is not TOML: {echo(str(error))}") from None
+def _parse(text: str, source: str, name: str) -> Board:
+    """Return the board in `text`; `source` begins every message."""
+    document = parse_document(text, source)
     if "name" in document:
         raise InvalidSettingsError(
             (f"{source}: name is not a key of a board, the file's name is; leave it out",)

@@ -361,9 +361,9 @@ def test_schema_is_valid_and_refuses_what_the_rules_refuse() -> None:
         (b"cost.effort_weight = 1\n[cost]\n", "line 2, column 6: [cost] is there already"),
         (b"cost = {}\ncost.effort_weight = 1\n", "line 2, column 23: cost is set already"),
         (b'x = """\n"""\nx = """\n"""', "line 4: a key is set already; keep one of the two"),
-        (b"a = " + b"[" * 20000, "is nested too deeply; settings are [section] and key"),
+        (b"a = " + b"[" * 20000, "is nested too deeply; write [section] and key = value"),
         (b"# caf\xe9", "line 1: is not UTF-8; save the file as UTF-8"),
-        (b"#" * 64_001, "is larger than 64 kB; settings take a few"),
+        (b"#" * 64_001, "is larger than 64 kB; such files take a few"),
     ],
 )
 def test_file_that_is_not_toml_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
