@@ -2,7 +2,8 @@
 # make test       set up, check style and types, run the tests; with CI=true also the long ones
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
-# make bench      measure against RotorPy and against what peers generate; results on stdout
+# make bench      time flights against RotorPy
+# make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
 
 PYTHON ?= python3
@@ -23,7 +24,7 @@ ifeq ($(CI),true)
 MARKED = -m "long or not long"
 endif
 
-.PHONY: fly test tools generated bench clean
+.PHONY: fly test tools generated bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
@@ -54,7 +55,13 @@ generated: $(SETUP)
 
 bench: $(SETUP_BENCH)
 	$(BIN)/python -m benchmarks.flights
-	$(BIN)/python -m benchmarks.peers
+
+# The generators of others live in an environment of their own; TinyMPC asks for a SciPy that new Pythons lack.
+bench-peers: $(SETUP_TEST)
+	$(PYTHON) -m venv --clear build/peers
+	build/peers/bin/python -m pip install --quiet osqp==1.1.3 casadi==3.8.2 cvxpygen==1.0.2
+	build/peers/bin/python -m pip install --quiet --no-deps tinympc==0.0.8
+	$(BIN)/python -m benchmarks.peers --python build/peers/bin/python
 
 # A virtual environment without pip is what a stopped run left, and is made anew.
 define SET_UP

@@ -1,5 +1,6 @@
 """The commands about boards: footprint, same-bits, sweep and doctor."""
 
+import contextlib
 import json
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -12,6 +13,7 @@ from codegen import boards, presets
 from codegen import cli as generating
 from codegen.boards import Board
 from codegen.errors import BuildError, InvalidSettingsError, echo
+from codegen.settings import Settings
 from sil import footprint_report
 from sil.doctor import doctor_text, examine
 from sil.footprint import Footprint, measure_footprint
@@ -66,21 +68,11 @@ def footprint(
     """Measure flash, RAM, stack and instructions on a board, and hold them against its budget."""
     settings = presets.load(source)
     chosen = _boards(board)
-    measured: list[Footprint] = []
-    missing: list[str] = []
-    with progress_bar("measuring") as progress:
-        for index, one in enumerate(chosen):
-            try:
-                measured.append(measure_footprint(settings, one, optimisation))
-            except BuildError as error:
-                missing.append(str(error))
-            progress((index + 1) / len(chosen))
-    if not measured:
-        raise BuildError("\n".join(missing))
-
-    summary = footprint_report.summary(measured, source, settings)
-    if output is not None:
-        with new_results(output, "footprint", FOOTPRINT_FILES) as folder:
+    with contextlib.ExitStack() as stack:
+        folder = output and stack.enter_context(new_results(output, "footprint", FOOTPRINT_FILES))
+        measured, missing = _measured(settings, chosen, optimisation)
+        summary = footprint_report.summary(measured, source, settings)
+        if folder is not None:
             from sil.board_plots import draw_footprints  # noqa: PLC0415 - loaded when drawing
 
             draw_footprints(measured, folder / "footprint")
@@ -151,13 +143,17 @@ def sweep_command(
 ) -> None:
     """Measure footprint and tracking over a grid of horizons and iterations."""
     settings = presets.load(source)
-    (chosen,) = _boards(board)
+    chosen = boards.load(board)
     grid = Grid(
         _numbers("--prediction", prediction, 50),
         _numbers("--control", control, 50),
         _numbers("--iterations", iterations, 100),
     )
     total = len(grid.points())
+    if total == 0:
+        raise InvalidSettingsError(
+            (f"--control {echo(control)} must be at most --prediction {echo(prediction)}",)
+        )
     points: list[Point] = []
     with new_results(output, "sweep", SWEEP_FILES) as folder:
         with progress_bar(f"sweeping {total} controllers") as progress:
@@ -195,6 +191,27 @@ def doctor(*, as_json: AsJson = False) -> None:
     )
 
 
+def _measured(
+    settings: Settings, chosen: Sequence[Board], optimisation: str
+) -> tuple[list[Footprint], list[str]]:
+    """Measure on every board that has a compiler here; returns footprints, and what is missing for others.
+
+    Raises BuildError if there is no compiler for any.
+    """
+    measured: list[Footprint] = []
+    missing: list[str] = []
+    with progress_bar("measuring") as progress:
+        for index, one in enumerate(chosen):
+            try:
+                measured.append(measure_footprint(settings, one, optimisation))
+            except BuildError as error:
+                missing.append(str(error))
+            progress((index + 1) / len(chosen))
+    if not measured:
+        raise BuildError("\n".join(missing))
+    return measured, missing
+
+
 def _boards(name: str) -> Sequence[Board]:
     return [boards.load(one) for one in (boards.names() if name == "all" else (name,))]
 
@@ -205,7 +222,7 @@ def _numbers(option: str, text: str, most: int) -> tuple[int, ...]:
         if ":" in text:
             first, last, *step = (int(word) for word in text.split(":"))
             (each,) = step or (1,)
-            numbers = tuple(range(first, last + 1, each))
+            numbers = tuple(range(first, min(last, most + 1) + 1, each))
         else:
             numbers = tuple(int(word) for word in text.split(","))
     except ValueError:

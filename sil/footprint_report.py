@@ -19,7 +19,7 @@ def summary(footprints: Sequence[Footprint], source: str, settings: Settings) ->
         "generator": f"mambo-nmpc {codegen.__version__}",
         "command": "footprint",
         "source": source,
-        "digest": settings.digest,
+        "digest": settings.digest[:16],
         "scalar": settings.code.scalar,
         "optimisation": first.optimisation,
         "boards": [_board(footprint) for footprint in footprints],
@@ -125,11 +125,11 @@ def _notes(footprint: Footprint) -> list[str]:
     name, notes = footprint.board.name, []
     for limit in footprint.limits:
         if limit.share > 1:
-            over = limit.value - limit.budget
-            notes.append(
-                f"{name}: {limit.name} {limit.value:.4g} {limit.unit} is over its budget of "
-                f"{limit.budget:.4g} {limit.unit} by {over:.3g} {limit.unit}"
+            value, budget, over = (
+                _spelled(number, limit.unit)
+                for number in (limit.value, limit.budget, limit.value - limit.budget)
             )
+            notes.append(f"{name}: {limit.name} {value} is over its budget of {budget} by {over}")
     if not footprint.fits:
         largest = ", ".join(f"{symbol} {size} B" for symbol, size in footprint.largest(5))
         notes.append(f"{name}: largest symbols: {largest}")
@@ -140,6 +140,10 @@ def _notes(footprint: Footprint) -> list[str]:
         core = footprint.board.core.value
         notes.append(f"{name}: stack, instructions and time are not measured, there is no way yet for {core}")
     return notes
+
+
+def _spelled(value: float, unit: str) -> str:
+    return f"{value:.0f} {unit}" if unit == "B" else f"{value:.4g} {unit}"
 
 
 def _columns(rows: Sequence[tuple[str, ...]]) -> list[str]:

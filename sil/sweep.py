@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, fields
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from codegen.boards import Board
 from codegen.settings import Settings
@@ -57,14 +57,14 @@ class Point:
 
 def sweep(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
     """Yield the points of the grid in order, measured on all processors of this machine."""
-    jobs = [(settings, board, *point) for point in grid.points()]
+    jobs = [(settings.model_dump(), board.model_dump(), *point) for point in grid.points()]
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
         yield from pool.map(_measured, jobs)
 
 
 def largest_fit(points: Sequence[Point]) -> Point | None:
-    """Return the largest horizon within budget: longest prediction, then most moves, then best tracking."""
-    fitting = [point for point in points if point.fits]
+    """Return the largest horizon that fits and flies: longest prediction, most moves, then best tracking."""
+    fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
     return max(fitting, key=lambda p: (p.prediction, p.control, -p.iae_m_s), default=None)
 
 
@@ -76,9 +76,10 @@ def write_points(points: Sequence[Point], path: Path) -> None:
         writer.writerows(asdict(point) for point in points)
 
 
-def _measured(job: tuple[Settings, Board, int, int, int]) -> Point:
-    settings, board, prediction, control, iterations = job
-    document = settings.model_dump()
+def _measured(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Point:
+    """Measure one point, in a process of its own: plain values come in, for generic models do not pickle."""
+    document, board_document, prediction, control, iterations = job
+    board = Board.model_validate(board_document)
     document["horizon"] |= {"prediction": prediction, "control": control}
     document["optimizer"] |= {"iterations": iterations}
     chosen = Settings.model_validate(document)

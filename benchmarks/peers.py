@@ -1,0 +1,451 @@
+"""What the generated C of peers takes of a Crazyflie, measured as ours is, for one problem.
+
+    python -m benchmarks.peers                          # the peers are installed beside us
+    python -m benchmarks.peers --python DIR/bin/python  # the peers are installed elsewhere
+
+The peers are `pip install osqp casadi cvxpygen` and `pip install --no-deps tinympc`, which below Python 3.13
+asks for a SciPy that the others refuse, and imports none. Their C, unlike ours, wants a C library: newlib
+(Debian: libnewlib-arm-none-eabi and, for TinyMPC's C++, libstdc++-arm-none-eabi-newlib). A peer that cannot
+be generated or built gets a row that says why.
+
+`benchmarks/peers_setups.py` is the problem and how each peer is set up; docs/peers.md has the results.
+"""
+
+import argparse
+import ctypes
+import filecmp
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from benchmarks import peers_setups as problem
+from benchmarks.peers_programs import OURS, Program, programs
+from codegen import boards, presets
+from codegen.errors import BuildError
+from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from codegen.footprint.build import ENTRY, PREFIX, Builder, builder
+from codegen.footprint.elf import FootprintError, Image, load
+from codegen.footprint.gate import forbidden
+from codegen.footprint.sizes import added, sections
+from codegen.footprint.stack import worst_case
+from codegen.render import render
+from codegen.settings import Settings
+from codegen.toolchain import host_toolchain
+
+Optima = dict[str, list[list[float]]]
+
+_BOARD: Final = "crazyflie"
+_VEHICLE: Final = "mambo"
+"""The board under whose flags and compiler the C shall build without a warning."""
+_C_ONLY: Final = ("-Wstrict-prototypes", "-Wmissing-prototypes", "-Wunsuffixed-float-constants")
+_STRICT: Final = (*WARNING_FLAGS, "-Wunsuffixed-float-constants")
+_NEWLIB: Final = (
+    "-static",
+    "-nostartfiles",
+    "--specs=nano.specs",
+    "--specs=nosys.specs",
+    "-Wl,--gc-sections",
+    "-Wl,--build-id=none",
+    "-Wl,--defsym=__dso_handle=0",
+)
+"""The C library as the Crazyflie's firmware links it, without start-up code; of that, C++ misses one name."""
+_EMPTY: Final = "void run(void);\n\nvoid run(void)\n{\n}\n"
+_CLOCK_S: Final = 1.1
+"""Between two runs of a generator, so that what writes the time writes another."""
+
+
+class _NotHereError(Exception):
+    """A peer cannot be generated or built here; its text is the reason."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One line of the table; `absent` is the reason why there is none."""
+
+    title: str
+    cost: str
+    scalar: str
+    versions: str = ""
+    flash: int = 0
+    flash_libraries: int = 0
+    ram: int = 0
+    stack: str = ""
+    heap: str = ""
+    double: int = 0
+    libm_printf: str = ""
+    vehicle: str = ""
+    warnings: int = 0
+    same: str = ""
+    above: str = "-"
+    tilt: str = "-"
+    absent: str = ""
+
+
+def _run(line: list[str], folder: Path | None = None) -> str:
+    """Run a command; returns its stdout, raises _NotHereError with its last words."""
+    done = subprocess.run(
+        line,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if done.returncode:
+        said = [text for text in (done.stderr or done.stdout).splitlines() if text.strip()]
+        raise _NotHereError(said[-1] if said else f"exit code {done.returncode}")
+    return done.stdout
+
+
+def _generate(python: str, name: str, folder: Path) -> dict[str, str]:
+    """Let the peer write into `folder`; returns the versions that wrote it."""
+    said = _run([python, "-m", "benchmarks.peers_setups", name, str(folder)], Path(__file__).parents[1])
+    versions: dict[str, str] = json.loads(said.splitlines()[-1])
+    return versions
+
+
+def _sources(program: Program, folder: Path) -> list[Path]:
+    return sorted({path for pattern in program.sources for path in folder.glob(pattern)})
+
+
+def _flags(program: Program, folder: Path) -> list[str]:
+    return [f"-D{name}" for name in program.defines] + [f"-I{folder / name}" for name in program.includes]
+
+
+def _compiler(program: Program, command: str) -> str:
+    """Return the compiler for the language of `program` beside the one for C."""
+    return re.sub(r"gcc$", "g++", command) if program.language == "c++" else command
+
+
+def _link(program: Program, found: Builder, folder: Path, work: Path) -> tuple[Path, Path, frozenset[str]]:
+    """Return the program, the same without the peer, and the names that the peer's own objects define."""
+    compiler = _compiler(program, found.toolchain.command[0])
+    dialect = [program.dialect, *COMPILE_FLAGS[1:]]
+    suffix = "cpp" if program.language == "c++" else "c"
+    flags = [*dialect, *found.board.compiler.flags, "-ffunction-sections", "-fdata-sections", "-fno-pie"]
+    glue, empty = work / f"glue.{suffix}", work / "empty.c"
+    glue.write_text(program.glue, "utf-8")
+    empty.write_text(_EMPTY, "utf-8")
+    objects: list[Path] = []
+    for source in [*_sources(program, folder), glue]:
+        objects.append(work / f"{len(objects)}.o")
+        _compile([compiler, *flags, *_flags(program, folder), "-c", str(source), "-o", str(objects[-1])])
+    tail = [*_NEWLIB, f"-Wl,-e,{ENTRY},-u,{ENTRY}", "-lm", "-o"]
+    with_peer, without = work / "program.elf", work / "empty.elf"
+    _compile([compiler, *flags, *map(str, objects), *tail, str(with_peer)])
+    _compile([found.toolchain.command[0], *flags[1:], str(empty), *tail, str(without)])
+    return with_peer, without, frozenset(name for path in objects for name in _defined(path))
+
+
+def _compile(line: list[str]) -> None:
+    """Run the cross compiler; raises _NotHereError with its first error."""
+    done = subprocess.run(line, capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode:
+        errors = [text for text in done.stderr.splitlines() if re.search("error|cannot find|undefined", text)]
+        first = errors[0] if errors else done.stderr.partition("\n")[0]
+        raise _NotHereError(re.sub(r"^\S*/", "", first))
+
+
+def _defined(path: Path) -> set[str]:
+    """Return the symbols that an object file defines."""
+    with path.open("rb") as stream:
+        table = ELFFile(stream).get_section_by_name(".symtab")
+        assert isinstance(table, SymbolTableSection)
+        return {s.name for s in table.iter_symbols() if s.name and s["st_shndx"] != "SHN_UNDEF"}
+
+
+def _own_flash(image: Image, own: frozenset[str]) -> int:
+    flash = sections(image).flash
+    return sum(s.size_bytes for s in image.symbols if s.section in flash and own.intersection(s.labels))
+
+
+def _warnings(program: Program, compiler: str, flags: tuple[str, ...], folder: Path) -> int:
+    """Count the places that our own warning flags object to."""
+    strict = [flag for flag in _STRICT if program.language == "c" or flag not in _C_ONLY]
+    dialect = [program.dialect, *COMPILE_FLAGS[1:]]
+    places = set()
+    for source in _sources(program, folder):
+        line = [
+            _compiler(program, compiler),
+            *dialect,
+            *flags,
+            *strict,
+            *_flags(program, folder),
+            "-c",
+            str(source),
+        ]
+        said = subprocess.run([*line, "-o", "/dev/null"], capture_output=True, text=True, check=False).stderr
+        places |= {text for text in said.splitlines() if ": warning: " in text}
+    return len(places)
+
+
+def _under_vehicle_flags(program: Program, folder: Path) -> str:
+    """Say how many of the sources the vehicle's own compiler takes under its own flags, -Wall and -Werror."""
+    if program.language == "c++":
+        return "no: C++"
+    try:
+        found = builder(boards.load(_VEHICLE), "-O2")
+    except BuildError:
+        return "no compiler here"
+    refused = 0
+    sources = _sources(program, folder)
+    for source in sources:
+        line = [*found.toolchain.command, *found.board.compiler.flags, "-O2", "-Wall", "-Werror"]
+        line += [*_flags(program, folder), "-c", str(source), "-o", "/dev/null"]
+        refused += subprocess.run(line, capture_output=True, check=False).returncode != 0
+    return "yes" if not refused else f"no: {refused} of {len(sources)} files"
+
+
+def _differing(first: Path, second: Path) -> str:
+    """Compare what two runs wrote; what differs by the time of day alone is counted as such."""
+    names = sorted(
+        {str(p.relative_to(folder)) for folder in (first, second) for p in folder.rglob("*") if p.is_file()}
+    )
+    _, unequal, missing = filecmp.cmpfiles(first, second, names, shallow=False)
+    clock = [name for name in unequal if _timeless(first / name) == _timeless(second / name)]
+    more = len(unequal) + len(missing) - len(clock)
+    said = [f"time of day in {len(clock)}"] * bool(clock) + [f"more in {more}"] * bool(more)
+    return f"no: {', '.join(said)} of {len(names)} files" if said else "yes"
+
+
+def _timeless(path: Path) -> bytes:
+    return re.sub(rb"\d\d:\d\d:\d\d", b"", path.read_bytes())
+
+
+def _clear(program: Program, folder: Path) -> None:
+    """Delete what generating built beside text."""
+    for product in [path for pattern in program.products for path in folder.glob(pattern)]:
+        if product.is_dir():
+            shutil.rmtree(product)
+        else:
+            product.unlink()
+
+
+def _stack(image: Image) -> str:
+    """Return the proven bound of the stack, or the function that has none."""
+    try:
+        return f"{worst_case(image, ENTRY).bytes:,}"
+    except FootprintError as error:
+        return f"no bound: {str(error).removeprefix(f'{image.path.name}: ').partition(':')[0].split()[0]}"
+
+
+def _tried(program: Program, folder: Path, work: Path, optima: Optima) -> tuple[str, str]:
+    """Build for this machine and plan: the cost above the optimum, median and most, and the largest tilt."""
+    suffix = "cpp" if program.language == "c++" else "c"
+    library, glue = work / "host.so", work / f"host.{suffix}"
+    glue.write_text(program.glue, "utf-8")
+    host = [*host_toolchain().command] if program.language == "c" else ["c++"]
+    line = [*host, *COMPILE_FLAGS[1:], "-w", "-shared", "-fPIC", *_flags(program, folder)]
+    _run([*line, *map(str, _sources(program, folder)), str(glue), "-lm", "-o", str(library)])
+    try:
+        with ProcessPoolExecutor(1) as pool:
+            plans = pool.submit(_plans, library, optima["inputs"]).result()
+    except BrokenProcessPool:
+        return "crashes", "-"
+    tilt = f"{np.abs(plans).max():.4f}"
+    if program.cost not in optima:
+        return "-", tilt
+    above = [
+        problem.cost(program.cost, np.array(inputs), np.clip(plan, -problem.TILT_RAD, problem.TILT_RAD))
+        / least[0]
+        - 1
+        for inputs, plan, least in zip(optima["inputs"], plans, optima[program.cost], strict=True)
+    ]
+    return f"{100 * statistics.median(above):.2f} / {100 * max(above):.2f} %", tilt
+
+
+def _plans(library: Path, inputs: list[list[float]]) -> problem.Matrix:
+    """Return the plan (n, 4) that a library makes of each input, one after the other."""
+    call, moves, plans = ctypes.CDLL(str(library)).run, (ctypes.c_float * 4)(), []
+    with Path("/dev/null").open("w") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+    for one in inputs:
+        call((ctypes.c_float * 4)(*one[:4]), (ctypes.c_float * 2)(*one[4:]), moves)
+        plans.append(list(moves))
+    return np.array(plans)
+
+
+def _measure(program: Program, python: str, found: Builder, optima: Optima, work: Path) -> _Row:
+    """Generate, build and measure one peer."""
+    row = _Row(program.title, program.cost, program.scalar)
+    first, folder = work / "first", work / "c"
+    try:
+        versions = _generate(python, program.name, folder)
+        _clear(program, folder)
+        folder.rename(first)
+        time.sleep(_CLOCK_S)
+        _generate(python, program.name, folder)
+        _clear(program, folder)
+        row = replace(row, versions=", ".join(f"{name} {version}" for name, version in versions.items()))
+        elf, empty, own = _link(program, found, folder, work)
+        sizes, image = added(elf, empty, program.name), load(elf)
+        above, tilt = _tried(program, folder, work, optima)
+        return replace(
+            row,
+            flash=sizes.flash.total,
+            flash_libraries=sizes.flash.total - _own_flash(image, own),
+            ram=sizes.ram.total,
+            stack=_stack(image),
+            **_linked(image),
+            vehicle=_under_vehicle_flags(program, folder),
+            warnings=_warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
+            same=_differing(first, folder),
+            above=above,
+            tilt=tilt,
+        )
+    except (_NotHereError, BuildError) as error:
+        return replace(row, absent=str(error))
+
+
+def _linked(image: Image) -> dict[str, Any]:
+    """Return the columns about what is linked: heap, double precision, libm and printf."""
+    found = forbidden(image, "float32")
+    kinds = {
+        kind: [f.symbol for f in found if f.kind == kind]
+        for kind in ("heap", "double precision", "libm", "printf")
+    }
+    return {
+        "heap": "yes" if kinds["heap"] else "no",
+        "double": len(kinds["double precision"]),
+        "libm_printf": " ".join(kind for kind in ("libm", "printf") if kinds[kind]) or "-",
+    }
+
+
+def _ours(title: str, settings: Settings, found: Builder, optima: Optima | None, work: Path) -> _Row:
+    """Measure ours: the least firmware, and the same checks as for the peers."""
+    files = render(settings)
+    sizes = added(found.firmware(files, work), found.firmware(files, work, empty=True), PREFIX)
+    first, folder = work / "first", work / "c"
+    settings_file = work / "controller.toml"
+    settings_file.write_text(files["controller.toml"], "utf-8")
+    line = [sys.executable, "-c", "from sil.cli import main; main()", "generate", str(settings_file)]
+    _run([*line, "-o", str(folder)])
+    folder.rename(first)
+    time.sleep(_CLOCK_S)
+    _run([*line, "-o", str(folder)])
+    program = Program("ours", title, "1-norm", settings.code.scalar, ("src/*.c",), ("include", "src"), OURS)
+    above, tilt = _tried(program, folder, work, optima) if optima else ("-", "-")
+    image = load(work / "firmware" / "program.elf")
+    return _Row(
+        title,
+        program.cost,
+        program.scalar,
+        flash=sizes.flash.total,
+        flash_libraries=sizes.flash.helpers,
+        ram=sizes.ram.total,
+        stack=_stack(image),
+        **_linked(image),
+        vehicle=_under_vehicle_flags(program, folder),
+        warnings=_warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
+        same=_differing(first, folder),
+        above=above,
+        tilt=tilt,
+    )
+
+
+def _optima(python: str, work: Path) -> Optima:
+    """Return inputs and the least cost of each, found by the peers' SciPy."""
+    _run([python, "-m", "benchmarks.peers_setups", "optima", str(work)])
+    found: Optima = json.loads((work / "optima.json").read_text("utf-8"))
+    return found
+
+
+def _table(rows: list[_Row]) -> str:
+    head = (
+        "generator",
+        "cost",
+        "scalar",
+        "flash",
+        "libraries",
+        "RAM",
+        "stack",
+        "heap",
+        "double helpers",
+        "libm, printf",
+        "above the optimum",
+        "largest tilt",
+        "Mambo's flags",
+        "warnings",
+        "same again",
+    )
+    lines = [head, ("---",) * len(head)]
+    for r in rows:
+        if r.absent:
+            lines.append((r.title, r.cost, r.scalar, f"not measured: {r.absent}", *[""] * (len(head) - 4)))
+            continue
+        sizes = (f"{r.flash:,}", f"{r.flash_libraries:,}", f"{r.ram:,}", r.stack, r.heap, str(r.double))
+        lines.append(
+            (
+                r.title,
+                r.cost,
+                r.scalar,
+                *sizes,
+                r.libm_printf,
+                r.above,
+                r.tilt,
+                r.vehicle,
+                f"{r.warnings:,}",
+                r.same,
+            )
+        )
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def main() -> None:
+    """Measure ours and every peer, and print one table and the versions."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--python", default=sys.executable, help="the Python that has the peers")
+    parser.add_argument("--only", help="measure this peer alone")
+    arguments = parser.parse_args()
+    found = builder(boards.load(_BOARD), "-O2")
+    rows = []
+    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as place:
+        work = Path(place)
+        try:
+            optima = _optima(arguments.python, work)
+        except _NotHereError as error:
+            sys.exit(f"the peers' Python lacks NumPy or SciPy: {error}")
+        alike = presets.load("table1")
+        alike = alike.model_copy(
+            update={"horizon": alike.horizon.model_copy(update={"prediction_step_s": problem.STEP_S})}
+        )
+        every: dict[str, Callable[[Path], _Row]] = {
+            "mambo": partial(_ours, "mambo-nmpc, preset mambo", presets.load("mambo"), found, None),
+            "table1": partial(_ours, "mambo-nmpc, the peers' model", alike, found, optima),
+        }
+        for program in programs(*problem.literals()):
+            every[program.name] = partial(_measure, program, arguments.python, found, optima)
+        for name, measure in every.items():
+            if arguments.only in (None, name):
+                (work / name).mkdir()
+                rows.append(measure(work / name))
+    print(f"{found.board.title}, {found.compiler}, -O2; bytes")
+    print(_table(rows))
+    print()
+    for row in rows:
+        if row.versions:
+            print(f"{row.title}: {row.versions}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,295 @@
+"""Let each peer write its C for the one problem of the comparison, set up as its own documentation does.
+
+Runs in whatever Python holds the peer, and needs nothing of ours:
+`python -m benchmarks.peers_setups NAME FOLDER`. The last line on stdout is JSON, the versions that wrote it.
+
+The problem: eq 8 at psi = 0 with a thrust of 9.81 m/s2 and eq 11 subtracted, so that the state is the error
+x, vx, y, vy of the drone against its target, and a move is roll, pitch:
+
+    x'' = -9.81 pitch    y'' = 9.81 roll    |roll|, |pitch| <= 0.35
+
+over 10 steps of 0.055 s, with two moves, the second of them held (Np 10, Nc 2), and the weights of Table I on
+the position error and on the change of the moves.
+"""
+# ruff: noqa: PLC0415 - a set-up imports its own peer, and the others may be missing
+
+import importlib.metadata
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+Matrix = npt.NDArray[np.float64]
+
+PREDICTION: Final = 10
+CONTROL: Final = 2
+STEP_S: Final = 0.055
+GRAVITY_M_S2: Final = 9.81
+TILT_RAD: Final = 0.35
+TRACKING: Final = 2250.0
+EFFORT: Final = 1.0
+STATES: Final = 200
+"""Random inputs that the plans of every peer are tried on."""
+
+_HALF: Final = STEP_S * STEP_S / 2
+A: Final = np.kron(np.eye(2), np.array([[1.0, STEP_S], [0.0, 1.0]]))
+"""(4, 4) state after a step, from the state before."""
+B: Final = GRAVITY_M_S2 * np.array([[0.0, -_HALF], [0.0, -STEP_S], [_HALF, 0.0], [STEP_S, 0.0]])
+"""(4, 2) state after a step, from roll and pitch."""
+POSITIONS: Final = (0, 2)
+"""Of the state, what the cost weighs."""
+
+
+def condensed() -> tuple[Matrix, Matrix]:
+    """Return the predicted positions, (20, 4) from the state and (20, 4) from the moves."""
+    free, forced = np.eye(4), np.zeros((4, 4))
+    from_state, from_moves = [], []
+    for step in range(PREDICTION):
+        move = min(step, CONTROL - 1)
+        free, forced = A @ free, A @ forced
+        forced[:, 2 * move : 2 * move + 2] += B
+        from_state.append(free[POSITIONS, :])
+        from_moves.append(forced[POSITIONS, :])
+    return np.vstack(from_state), np.vstack(from_moves)
+
+
+def changes() -> Matrix:
+    """Return (4, 4) the changes of the moves, from the moves; the last command comes off the first two."""
+    return np.eye(4) - np.eye(4, k=-2)
+
+
+def cost(kind: str, inputs: Matrix, moves: Matrix) -> float:
+    """Return the 1-norm or quadratic cost of `moves` (4,), for `inputs` (6,): state, last command."""
+    from_state, from_moves = condensed()
+    error = from_state @ inputs[:4] + from_moves @ moves
+    change = changes() @ moves - np.concatenate([inputs[4:], [0.0, 0.0]])
+    if kind == "1-norm":
+        return float(TRACKING * np.abs(error).sum() + EFFORT * np.abs(change).sum())
+    return float(TRACKING * error @ error + EFFORT * change @ change)
+
+
+def literals() -> tuple[str, str, str]:
+    """Return literals of C: limit, twice the effort weight, gradient of the quadratic cost from the state."""
+    from_state, from_moves = condensed()
+    gradient = 2 * TRACKING * from_moves.T @ from_state
+    rows = ("{" + ", ".join(f"{float(np.float32(v))!r}f" for v in row) + "}" for row in gradient)
+    return f"{TILT_RAD}f", f"{2 * EFFORT}f", ", ".join(rows)
+
+
+def optima(folder: Path) -> None:
+    """Write optima.json: random inputs, up to 0.5 m and 1 m/s off, and the least cost of each kind."""
+    from scipy import optimize, sparse
+
+    from_state, from_moves = condensed()
+    weights = np.concatenate([np.full(2 * PREDICTION, TRACKING), np.full(4, EFFORT)])
+    rows = np.vstack([from_moves, changes()])
+    random = np.random.default_rng(1)
+    inputs = random.uniform(-1, 1, (STATES, 6)) * np.array([0.5, 1.0, 0.5, 1.0, 0.1, 0.1])
+    found: dict[str, list[list[float]]] = {"inputs": inputs.tolist(), "1-norm": [], "quadratic": []}
+    for one in inputs:
+        right = np.concatenate([-from_state @ one[:4], one[4:], [0.0, 0.0]])
+        root = np.sqrt(weights)
+        squares = optimize.lsq_linear(
+            rows * root[:, None], right * root, (-TILT_RAD, TILT_RAD), method="bvls", tol=1e-14
+        )
+        slack = -sparse.identity(len(rows))
+        least = optimize.linprog(
+            np.concatenate([np.zeros(4), weights]),
+            sparse.vstack([sparse.hstack([rows, slack]), sparse.hstack([-rows, slack])]),
+            np.concatenate([right, -right]),
+            bounds=[(-TILT_RAD, TILT_RAD)] * 4 + [(0, None)] * len(rows),
+        )
+        found["quadratic"].append([cost("quadratic", one, squares.x)])
+        found["1-norm"].append([cost("1-norm", one, least.x[:4])])
+    (folder / "optima.json").write_text(json.dumps(found), "utf-8")
+
+
+def osqp_condensed(folder: Path) -> None:
+    """Write a QP of the four moves alone, condensed by hand: https://osqp.org/docs/codegen/python.html.
+
+    Generated for vectors only, it keeps its rho: of 0.1, the default, 1, 10, 100 and 1000, this one took the
+    fewest iterations.
+    """
+    import osqp
+    from scipy import sparse
+
+    _, moves = condensed()
+    hessian = 2 * (TRACKING * moves.T @ moves + EFFORT * changes().T @ changes())
+    solver = osqp.OSQP()
+    solver.setup(
+        sparse.triu(hessian, format="csc"),
+        np.zeros(4),
+        sparse.identity(4, format="csc"),
+        np.full(4, -TILT_RAD),
+        np.full(4, TILT_RAD),
+        verbose=False,
+        rho=1.0,
+    )
+    solver.codegen(str(folder), parameters="vectors", use_float=True, force_rewrite=True, extension_name=None)
+
+
+def osqp_states(folder: Path) -> None:
+    """Write a QP of states and moves, as https://osqp.org/docs/examples/mpc.html sets one up.
+
+    Of the same rho, this one had an answer to all states. With 0.1 three of four ran out of iterations, up to
+    0.6 rad beyond the limit.
+    """
+    import osqp
+    from scipy import sparse
+
+    states = 4 * (PREDICTION + 1)
+    weight = np.array([TRACKING if i in POSITIONS else 0.0 for i in range(4)])
+    blocks = [
+        sparse.kron(sparse.identity(PREDICTION + 1), sparse.diags(weight)),
+        sparse.csc_matrix(EFFORT * changes().T @ changes()),
+    ]
+    hessian = 2 * sparse.block_diag(blocks)
+    moved = np.zeros((states, 4))
+    for step in range(PREDICTION):
+        move = 2 * min(step, CONTROL - 1)
+        moved[4 * (step + 1) : 4 * (step + 2), move : move + 2] = B
+    stepped = sparse.kron(sparse.identity(PREDICTION + 1), -np.eye(4)) + sparse.kron(
+        sparse.eye(PREDICTION + 1, k=-1), A
+    )
+    bounds = sparse.hstack([sparse.csc_matrix((4, states)), sparse.identity(4)])
+    constraints = sparse.vstack([sparse.hstack([stepped, sparse.csc_matrix(moved)]), bounds], format="csc")
+    solver = osqp.OSQP()
+    solver.setup(
+        sparse.triu(hessian, format="csc"),
+        np.zeros(states + 4),
+        constraints,
+        np.concatenate([np.zeros(states), np.full(4, -TILT_RAD)]),
+        np.concatenate([np.zeros(states), np.full(4, TILT_RAD)]),
+        verbose=False,
+        rho=10.0,
+    )
+    solver.codegen(str(folder), parameters="vectors", use_float=True, force_rewrite=True, extension_name=None)
+
+
+def cvxpygen_osqp(folder: Path) -> None:
+    """Write the 1-norm problem for OSQP: https://github.com/cvxgrp/cvxpygen, its MPC example."""
+    _cvxpygen(folder, "OSQP")
+
+
+def cvxpygen_ecos(folder: Path) -> None:
+    """Write the 1-norm problem for ECOS."""
+    _cvxpygen(folder, "ECOS")
+
+
+def _cvxpygen(folder: Path, solver: str) -> None:
+    import cvxpy
+    from cvxpygen import cpg
+
+    moves = cvxpy.Variable((2, CONTROL), name="moves")
+    states = cvxpy.Variable((4, PREDICTION + 1), name="states")
+    state = cvxpy.Parameter(4, name="state")
+    last = cvxpy.Parameter(2, name="last")
+    held = [moves[:, min(step, CONTROL - 1)] for step in range(PREDICTION)]
+    cost = (
+        TRACKING * cvxpy.norm1(states[list(POSITIONS), 1:])
+        + EFFORT * cvxpy.norm1(moves[:, 0] - last)
+        + EFFORT * cvxpy.norm1(moves[:, 1] - moves[:, 0])
+    )
+    rules = [states[:, 0] == state, cvxpy.abs(moves) <= TILT_RAD]
+    rules += [states[:, k + 1] == A @ states[:, k] + B @ held[k] for k in range(PREDICTION)]
+    state.value, last.value = np.zeros(4), np.zeros(2)
+    problem = cvxpy.Problem(cvxpy.Minimize(cost), rules)
+    cpg.generate_code(problem, code_dir=str(folder), solver=solver, wrapper=False)
+
+
+def casadi_qrqp(folder: Path) -> None:
+    """Write one QP for qrqp, in float32: https://web.casadi.org/docs/#generating-c-code."""
+    _casadi(folder, "qrqp")
+
+
+def casadi_sqp(folder: Path) -> None:
+    """Write sqpmethod on qrqp, in float32."""
+    _casadi(folder, "sqpmethod")
+
+
+def _casadi(folder: Path, solver: str) -> None:
+    import casadi
+
+    parameters = casadi.MX.sym("parameters", 6)
+    moves = casadi.MX.sym("moves", 2 * CONTROL)
+    state, last = parameters[:4], parameters[4:]
+    cost: Any = EFFORT * (casadi.sumsqr(moves[:2] - last) + casadi.sumsqr(moves[2:] - moves[:2]))
+    for step in range(PREDICTION):
+        move = 2 * min(step, CONTROL - 1)
+        state = A @ state + B @ moves[move : move + 2]
+        cost += TRACKING * casadi.sumsqr(state[list(POSITIONS)])
+    problem = {"x": moves, "p": parameters, "f": cost}
+    silent = {"print_header": False, "print_iter": False, "print_info": False, "error_on_fail": False}
+    if solver == "qrqp":
+        solve = casadi.qpsol("solve", "qrqp", problem, silent)
+    else:
+        options = {
+            "qpsol": "qrqp",
+            "qpsol_options": silent,
+            "print_header": False,
+            "print_iteration": False,
+            "print_status": False,
+            "print_time": False,
+            "error_on_fail": False,
+        }
+        solve = casadi.nlpsol("solve", "sqpmethod", problem, options)
+    found = solve(x0=casadi.DM.zeros(4), p=parameters, lbx=-TILT_RAD, ubx=TILT_RAD)["x"]
+    step_function = casadi.Function("mpc", [parameters], [found], ["parameters"], ["moves"])
+    generator = casadi.CodeGenerator(
+        "mpc.c", {"casadi_real": "float", "casadi_int": "int", "with_header": True}
+    )
+    generator.add(step_function)
+    folder.mkdir(parents=True, exist_ok=True)
+    generator.generate(f"{folder}/")
+
+
+def tinympc(folder: Path) -> None:
+    """Write the LQR-like problem that TinyMPC has: https://tinympc.org/docs, code generation.
+
+    It knows no blocked moves and no weight on their change: ten moves, each weighed by itself.
+    """
+    import tinympc
+
+    weight = np.diag([TRACKING if i in POSITIONS else 0.0 for i in range(4)])
+    solver = tinympc.TinyMPC()
+    solver.setup(A, B, weight, EFFORT * np.eye(2), PREDICTION + 1)
+    solver.set_bound_constraints(
+        u_min=np.full(2, -TILT_RAD), u_max=np.full(2, TILT_RAD), x_min=None, x_max=None
+    )
+    try:
+        solver.codegen(str(folder))
+    except subprocess.CalledProcessError:
+        # After the C++ it builds a Python module to try it with, for which it clones pybind11.
+        if not (folder / "src" / "tiny_data.cpp").exists():
+            raise
+
+
+SETUPS: Final[dict[str, tuple[Callable[[Path], None], tuple[str, ...]]]] = {
+    "optima": (optima, ("scipy",)),
+    "osqp-condensed": (osqp_condensed, ("osqp",)),
+    "osqp-states": (osqp_states, ("osqp",)),
+    "cvxpygen-osqp": (cvxpygen_osqp, ("cvxpygen", "cvxpy", "osqp")),
+    "cvxpygen-ecos": (cvxpygen_ecos, ("cvxpygen", "cvxpy", "ecos")),
+    "casadi-qrqp": (casadi_qrqp, ("casadi",)),
+    "casadi-sqp": (casadi_sqp, ("casadi",)),
+    "tinympc": (tinympc, ("tinympc",)),
+}
+"""Who writes into a folder, and the packages whose versions tell what it wrote."""
+
+
+def main() -> None:
+    """Write the C of the peer on the command line into the folder on it."""
+    name, folder = sys.argv[1:]
+    write, packages = SETUPS[name]
+    write(Path(folder))
+    print()
+    print(json.dumps({package: importlib.metadata.version(package) for package in packages}))
+
+
+if __name__ == "__main__":
+    main()
