@@ -17,6 +17,7 @@ from codegen.settings import Settings
 from sil import footprint_report
 from sil.doctor import doctor_text, examine
 from sil.footprint import Footprint, measure_footprint
+from sil.frozen import TOGETHER
 from sil.progress import progress_bar
 from sil.results import SUMMARY, new_results, summary_text
 from sil.same_bits import REFERENCE, BuildDigest, builds, same_bits
@@ -99,6 +100,7 @@ def same_bits_command(
     """Run the same frozen steps in every build at hand; exit 1 unless all digests are one."""
     settings = presets.load(source)
     chosen = [one for name in board.split(",") for one in _boards(name)]
+    steps -= steps % TOGETHER
     found: list[BuildDigest] = []
     with progress_bar("comparing builds") as progress:
         for result in same_bits(settings, chosen, steps):
@@ -175,9 +177,9 @@ def sweep_command(
         (folder / SUMMARY).write_text(summary_text("sweep", summary), "utf-8")
     if as_json:
         typer.echo(summary_text("sweep", summary), nl=False)
-        return
-    shown = ([] if best is None else [best]) if fit else points
-    typer.echo("\n".join(map(_point_line, shown)) or f"nothing fits {chosen.title}")
+    else:
+        shown = ([] if best is None else [best]) if fit else points
+        typer.echo("\n".join(map(_point_line, shown)) or f"nothing fits {chosen.title}")
     typer.echo(f"{echo(str(output))}: {', '.join(SWEEP_FILES)}", err=True)
     if fit and best is None:
         raise typer.Exit(1)
@@ -222,7 +224,7 @@ def _numbers(option: str, text: str, most: int) -> tuple[int, ...]:
         if ":" in text:
             first, last, *step = (int(word) for word in text.split(":"))
             (each,) = step or (1,)
-            numbers = tuple(range(first, min(last, most + 1) + 1, each))
+            numbers = tuple(range(first, min(last, most + 1) + 1, each)) if first > 0 else ()
         else:
             numbers = tuple(int(word) for word in text.split(","))
     except ValueError:

@@ -2,6 +2,7 @@
 
 import tempfile
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -20,11 +21,15 @@ from sil.emulated import build_guest
 from sil.instructions import InstructionCounts, count_instructions, in_flight, spread
 from sil.loop import Flight, fly
 from sil.machine import CORES
+from sil.traces import Trace
 from sil.trajectories import Bernoulli
 
 STEP: Final = "nmpc_step"
 COUNTED_STEPS: Final = 300
 """Steps that are counted: a sixth in flight, a third from everywhere, half in search of the worst."""
+_FEWEST_STEPS: Final = 6
+_USUAL_WORK: Final = 1000
+"""Predicted steps times moves times iterations up to which all steps are counted."""
 _FLIGHT_S: Final = 20.0
 
 
@@ -138,9 +143,17 @@ def measure_footprint(
         )
 
 
+@lru_cache(maxsize=1)
+def _flight() -> Trace:
+    """Fly the figure of eight with the PD: what a controller meets in flight, tracking well or not."""
+    return fly(Flight(Bernoulli(2.0, 0.5), duration_s=_FLIGHT_S), PdController())
+
+
 def _counts(settings: Settings, found: Builder, folder: Path, steps: int) -> InstructionCounts:
-    """Count steps in flight, steps from everywhere, and steps in search of the worst."""
-    trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=_FLIGHT_S), PdController())
+    """Count steps in flight, steps from everywhere, and steps in search of the worst; fewer of long ones."""
+    work = settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
+    steps = max(_FEWEST_STEPS, min(steps, steps * _USUAL_WORK // work))
+    trace = _flight()
     inputs = in_flight(trace, every=len(trace.time_s) * 6 // steps) + spread(settings, steps // 3)
     elf = build_guest(settings, found, folder)
     return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2)

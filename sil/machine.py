@@ -17,6 +17,9 @@ from sil.errors import EmulationError
 
 TIME_LIMIT_S: Final = 1.0
 
+_WATCHED_SLOWDOWN: Final = 30
+"""How much longer a call may take when every run of instructions is reported to Python."""
+
 _CODE_BYTES: Final = 0x100000
 _RETURN_ADDRESS: Final = _CODE_BYTES - 0x1000
 _RAM_ADDRESS: Final = 0x20000000
@@ -115,6 +118,7 @@ class Machine:
         def hook(_engine: Any, address: int, size: int, _data: Any) -> None:
             watch(address, size)
 
+        self._time_limit_s *= _WATCHED_SLOWDOWN
         self._engine.ctl_flush_tb()
         self._engine.hook_add(unicorn.UC_HOOK_BLOCK, hook)
 
