@@ -24,7 +24,6 @@ from sil.machine import CORES
 from sil.traces import Trace
 from sil.trajectories import Bernoulli
 
-STEP: Final = "nmpc_step"
 COUNTED_STEPS: Final = 300
 """Steps that are counted: a sixth in flight, a third from everywhere, half in search of the worst."""
 _FEWEST_STEPS: Final = 6

@@ -94,9 +94,9 @@ def in_flight(trace: Trace, every: int) -> Inputs:
     return Inputs(state, trace.target[chosen, 0], trace.thrust_acceleration_m_s2[chosen, 0])
 
 
-def spread(settings: Settings, count: int, seed: int = 0) -> Inputs:
+def spread(settings: Settings, count: int) -> Inputs:
     """Draw inputs from millimetres off the target to the ends of all ranges, heading anywhere."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     ranges = settings.ranges
     scale = 10.0 ** rng.uniform(-3, 3, (count, 1))
     bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2)

@@ -41,7 +41,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Point:
-    """One controller of the grid on the board; what is not measured there is NaN."""
+    """One controller of the grid on the board; what is not measured is NaN, and then it does not fit."""
 
     prediction: int
     control: int
@@ -97,5 +97,5 @@ def _measured(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Poin
         instructions=math.nan if footprint.counts is None else footprint.counts.most,
         time_ms=math.nan if footprint.time_s is None else 1000 * footprint.time_s[1],
         iae_m_s=float(metrics.iae_m_s[0]),
-        fits=footprint.fits,
+        fits=footprint.fits and footprint.complete,
     )

@@ -166,3 +166,13 @@ def test_a_sweep_yields_the_points_in_order() -> None:
         assert points[less].ram_bytes < points[more].ram_bytes
         assert points[less].instructions < points[more].instructions
     assert points[2].iae_m_s < points[0].iae_m_s
+
+
+@pytest.mark.long
+def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
+    """The AVR has neither stack bound nor time: no horizon fits it, however small."""
+    require_compiler("mega")
+    grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
+    (found,) = sweep(presets.load("mambo"), boards.load("mega"), grid)
+    assert math.isnan(found.time_ms)
+    assert not found.fits
