@@ -1,12 +1,13 @@
-"""Constant prediction tables: eqs 8-11 of the paper, solved over the horizon for a unit of tilt.
+"""Constants of the prediction: eqs 8-11 of the paper, solved for steps of the horizon.
 
-For a given heading and thrust the predicted position is affine in the moves,
+For a given heading and thrust the predicted error is affine in the moves, and along each axis of the world
+it has few differences: a step adds the advance to the error and the bend to the advance. The bend is
+acceleration times the squared prediction step, less what an attitude with lag has yet to come. So the C rolls
+the model out with two additions a step, two more and two multiplications with lag, and reads from a table
+only what the slope of the distance needs.
 
-    error(i) = free error(i) + gain * sum_j response[i, j] * move[j],
-
-so the C never rolls the model out. All arithmetic is float64 in a fixed order; the exponential of the
-attitude lag comes from `decimal`, which rounds alike on every machine. The tables are rounded to the
-scalar type once, where they are spelled or loaded.
+All arithmetic is float64 in a fixed order; the exponential of the lag comes from `decimal`, which rounds
+alike on every machine. Constants are rounded to the scalar type once, where they are spelled or loaded.
 """
 
 from dataclasses import dataclass
@@ -16,92 +17,97 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.settings import Settings
+from codegen.settings.model import Horizon
+
+
+@dataclass(frozen=True)
+class AxisConstants:
+    """How roll or pitch settles after a turn; shares of the bend that the turn ends in.
+
+    at_once: what the turn adds to the next step's advance.
+    delayed: what the bend lacks in the step of the turn.
+    decay:   what of that remains a step later.
+    """
+
+    at_once: float
+    delayed: float
+    decay: float
 
 
 @dataclass(frozen=True)
 class HorizonTables:
-    """Prediction tables of one controller, float64; axes are ordered roll, pitch; row i is step i + 1.
+    """Prediction constants of one controller, float64.
 
-    time_s:       (prediction,) time from now to each predicted step, in s.
-    free_s2:      (prediction, 2) double time integral of a unit measured angle that decays to zero, in s^2;
-                  all zero without attitude lag.
-    response_s2:  (prediction, control, 2) double time integral of the angle that a unit move makes, in s^2;
-                  the last move is held to the end of the horizon.
+    step_squared_s2: square of the prediction step, in s^2: a tilt's bend per acceleration.
+    held:            share of the bend that a tilt held before the first step adds to its advance.
+    axes:            roll and pitch.
+    has_lag:         whether the measured attitude enters the prediction.
+    axes_alike:      axes that share a response, 2 if both lags are equal, else 1.
+    response_sum:    (prediction + 1, responses) sum, over all steps before each, of how far a unit of bend
+                     of each move has carried the error; twice that, but for the last row, the end of the
+                     horizon. Moves are ordered roll, pitch of the first, and so on; where both axes settle
+                     alike, each pair of moves shares one response. The last move is held to the end.
     """
 
-    time_s: NDArray[np.float64]
-    free_s2: NDArray[np.float64]
-    response_s2: NDArray[np.float64]
-
-    @property
-    def has_lag(self) -> bool:
-        """Tell whether the measured attitude enters the prediction."""
-        return bool(np.any(self.free_s2))
-
-
-@dataclass(frozen=True)
-class _AxisStep:
-    """One prediction step of an axis whose angle settles on its command with a first-order lag."""
-
-    period_s: float
-    decay: float
-    velocity_s: float
-    position_s2: float
-    held_position_s2: float
-
-    def advance(
-        self, position: float, velocity: float, angle: float, command: float
-    ) -> tuple[float, float, float]:
-        deviation = angle - command
-        return (
-            ((position + (self.period_s * velocity)) + (self.held_position_s2 * command))
-            + (self.position_s2 * deviation),
-            (velocity + (self.period_s * command)) + (self.velocity_s * deviation),
-            command + (self.decay * deviation),
-        )
+    step_squared_s2: float
+    held: float
+    axes: tuple[AxisConstants, AxisConstants]
+    has_lag: bool
+    axes_alike: int
+    response_sum: NDArray[np.float64]
 
 
 def horizon_tables(settings: Settings) -> HorizonTables:
-    """Derive the prediction tables from the horizon and the model of `settings`."""
-    prediction, control = settings.horizon.prediction, settings.horizon.control
-    period_s = settings.horizon.prediction_step_s
-    axes = [
-        _axis_step(period_s, lag_s, printed=settings.model.position_update == "printed")
-        for lag_s in (settings.model.roll_lag_s, settings.model.pitch_lag_s)
-    ]
-    response = np.empty((prediction, control, 2))
-    free = np.empty((prediction, 2))
-    for axis, step in enumerate(axes):
-        free[:, axis] = _positions(step, 1.0, [0.0] * prediction)
-        for move in range(control):
-            last = prediction if move == control - 1 else move + 1
-            commands = [1.0 if move <= i < last else 0.0 for i in range(prediction)]
-            response[:, move, axis] = _positions(step, 0.0, commands)
-    time_s = np.array([(i + 1) * period_s for i in range(prediction)])
-    return HorizonTables(time_s=time_s, free_s2=free, response_s2=response)
+    """Derive the prediction constants from the horizon and the model of `settings`."""
+    model, period_s = settings.model, settings.horizon.prediction_step_s
+    step_squared_s2 = period_s * period_s
+    held = 0.5 if model.position_update == "exact" else 0.5 / period_s
+    roll, pitch = (_axis(period_s, lag_s, held) for lag_s in (model.roll_lag_s, model.pitch_lag_s))
+    alike = model.roll_lag_s == model.pitch_lag_s
+    return HorizonTables(
+        step_squared_s2=step_squared_s2,
+        held=held,
+        axes=(roll, pitch),
+        has_lag=model.roll_lag_s > 0 or model.pitch_lag_s > 0,
+        axes_alike=2 if alike else 1,
+        response_sum=_response_sum(settings.horizon, (roll,) if alike else (roll, pitch)),
+    )
 
 
-def _axis_step(period_s: float, lag_s: float, *, printed: bool) -> _AxisStep:
-    """Discretise one axis exactly; without lag this is eq 9 with its missing velocity update.
+def _axis(period_s: float, lag_s: float, held: float) -> AxisConstants:
+    """Discretise one axis exactly, an angle that settles on its command with a first-order lag.
 
-    `printed` takes the factor tau/2 of eq 9 as it stands in the paper.
+    With the lag as unit of time, a step d and what settles in it, e = 1 - exp(-d), position lacks d - e after
+    a step and velocity e, so that the second difference lacks (d * e) - (e * (d - e)) = e^2.
     """
-    held_position_s2 = period_s / 2 if printed else (period_s * period_s) / 2
     if lag_s == 0:
-        return _AxisStep(period_s, 0.0, 0.0, 0.0, held_position_s2)
+        return AxisConstants(at_once=held, delayed=0.0, decay=0.0)
     with localcontext() as context:
         context.prec = 50
-        period, lag = Decimal(period_s), Decimal(lag_s)
-        decay = (-period / lag).exp()
-        velocity = lag * (1 - decay)
-        position = lag * (period - velocity)
-        return _AxisStep(period_s, float(decay), float(velocity), float(position), held_position_s2)
+        step = Decimal(period_s) / Decimal(lag_s)
+        decay = (-step).exp()
+        settled = 1 - decay
+        return AxisConstants(
+            at_once=held - float((step - settled) / (step * step)),
+            delayed=float((settled * settled) / (step * step)),
+            decay=float(decay),
+        )
 
 
-def _positions(step: _AxisStep, angle: float, commands: list[float]) -> list[float]:
-    position = velocity = 0.0
-    positions = []
-    for command in commands:
-        position, velocity, angle = step.advance(position, velocity, angle, command)
-        positions.append(position)
-    return positions
+def _response_sum(horizon: Horizon, axes: tuple[AxisConstants, ...]) -> NDArray[np.float64]:
+    """Walk with a unit of bend of each move, taken back by the next, and add up the errors twice."""
+    sums = np.zeros((horizon.prediction + 1, horizon.control, len(axes)))
+    for axis, constants in enumerate(axes):
+        for move in range(horizon.control):
+            error = advance = bend = to_come = 0.0
+            for step in range(horizon.prediction):
+                turn = float(step == move) - float(step == move + 1 < horizon.control)
+                advance = advance + (constants.at_once * turn)
+                bend = bend + turn
+                to_come = to_come - (constants.delayed * turn)
+                error = error + advance
+                advance = advance + (bend + to_come)
+                to_come = to_come * constants.decay
+                sums[step + 1, move, axis] = sums[step, move, axis] + error
+    sums[:-1] *= 2
+    return sums.reshape(horizon.prediction + 1, -1)

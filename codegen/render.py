@@ -85,7 +85,6 @@ def _context(settings: Settings) -> dict[str, object]:
     """Decide everything that the templates only arrange."""
     tables = horizon_tables(settings)
     scalar = settings.code.scalar
-    backtracking = settings.optimizer.variant == "rprop+"
     return {
         "settings": settings,
         "parameters": [
@@ -98,11 +97,11 @@ def _context(settings: Settings) -> dict[str, object]:
         "digest": settings.digest[:16],
         "c_type": literals.C_TYPES[scalar],
         "scalar_bytes": _REAL_BYTES[scalar],
-        "instance_bytes": _instance_bytes(settings, backtracking=backtracking),
-        "backtracking": backtracking,
+        "instance_bytes": _instance_bytes(settings, has_lag=tables.has_lag),
+        "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
         "tables": tables,
-        "response_rows": tables.response_s2.reshape(settings.horizon.prediction, -1),
+        "bits_type": literals.BITS_TYPES[scalar],
         "trigonometry": trigonometry(scalar),
         "sine_error": SINE_ERRORS[scalar],
         "weight_limit": WEIGHT_LIMIT,
@@ -126,13 +125,12 @@ def _context(settings: Settings) -> dict[str, object]:
     }
 
 
-def _instance_bytes(settings: Settings, *, backtracking: bool) -> int:
+def _instance_bytes(settings: Settings, *, has_lag: bool) -> int:
     """Count the members of nmpc_t: scalars, then single bytes, padded to a whole scalar."""
     moves = 2 * settings.horizon.control
-    weights, gains, command, cost = 2, 4, 2, 1
-    arrays_of_moves = 4 if backtracking else 3
-    scalars = weights + gains + (2 * settings.horizon.prediction) + command + cost + (arrays_of_moves * moves)
-    flags = moves + 2
+    weights, gains, tilt, walks, command, cost = 2, 4, 2, 2 * (5 if has_lag else 3), 2, 1
+    flags = 2
+    scalars = weights + gains + tilt + walks + command + cost + (2 * moves)
     scalar_bytes = _REAL_BYTES[settings.code.scalar]
     return (scalars + -(-flags // scalar_bytes)) * scalar_bytes
 

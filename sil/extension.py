@@ -32,9 +32,8 @@ typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
-typedef struct {
-    nmpc_real_t gain_x_m_s2[2], gain_y_m_s2[2], free_x_m[...], free_y_m[...];
-} nmpc_prediction_t;
+typedef struct { nmpc_real_t error_m, advance_m, bend_m; ...; } nmpc_walk_t;
+typedef struct { nmpc_real_t gain_x_m[2], gain_y_m[2]; nmpc_walk_t x, y; ...; } nmpc_prediction_t;
 typedef struct { ...; } nmpc_t;
 typedef struct {
     int *status;
@@ -52,7 +51,8 @@ int nmpc_self_test(nmpc_t *);
 
 void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
-void nmpc_predictor_error(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_real_t *, nmpc_real_t *);
+void nmpc_predictor_turn(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_walk_t *, nmpc_walk_t *);
+void nmpc_predictor_walk(nmpc_walk_t *);
 nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *, const nmpc_weights_t *, const nmpc_real_t *,
                                const nmpc_real_t *, nmpc_real_t *);
 

@@ -23,7 +23,7 @@ from tests.support.tools import require
 MAMBO = presets.load("mambo")
 TINY = {
     "flash_bytes = 16_384": "flash_bytes = 2_000",
-    "ram_bytes = 1_024": "ram_bytes = 150",
+    "ram_bytes = 1_024": "ram_bytes = 100",
     "stack_bytes = 1_024": "stack_bytes = 100",
     "period_share = 0.1": "period_share = 0.002",
 }
@@ -120,7 +120,7 @@ def test_a_tiny_budget_is_exceeded_everywhere(tmp_path: Path) -> None:
     assert not footprint.fits
     text = footprint_report.text([footprint])
     assert re.search(r"^tiny .* OVER$", text, re.MULTILINE)
-    for limit, budget in (("flash", 2000), ("RAM", 150), ("stack", 100)):
+    for limit, budget in (("flash", 2000), ("RAM", 100), ("stack", 100)):
         found = re.search(rf"^tiny: {limit} (\d+) B is over its budget of {budget} B by (\d+) B$", text, re.M)
         assert found, text
         assert int(found[1]) == budget + int(found[2]) > budget

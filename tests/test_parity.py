@@ -78,15 +78,14 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", FEW_SETTINGS)
 def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None:
-    """Gains, free errors, predicted errors, cost and its gradient have the same bits."""
+    """Gains, the starts of the walks, predicted errors, cost and its gradient have the same bits."""
     settings = settings_case(index, scalar)
     blocks = SubBlocks(settings)
     ffi, lib = blocks.ffi, blocks.lib
-    prediction_horizon, moves_count = settings.horizon.prediction, 2 * settings.horizon.control
+    moves_count = 2 * settings.horizon.control
     predictor = Predictor(settings, horizon_tables(settings), blocks.scalar)
     rng = np.random.default_rng(index)
     prediction = ffi.new("nmpc_prediction_t *")
-    (error_x, x_pointer), (error_y, y_pointer) = blocks.reals(1), blocks.reals(1)
 
     for _ in range(50):
         state = (rng.normal(0, 1, (1, 7)) * [1, 1, 1, 1, 0.3, 0.3, 10]).astype(blocks.scalar)
@@ -104,17 +103,20 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
             thrust[0],
             prediction,
         )
-        gains = [blocks.unpack(prediction.gain_x_m_s2), blocks.unpack(prediction.gain_y_m_s2)]
-        frees = [blocks.unpack(prediction.free_x_m), blocks.unpack(prediction.free_y_m)]
-        assert bits(gains) == bits(expected.gain_m_s2[0])
-        assert bits(frees) == bits(expected.free_error_m[0])
+        gains = [blocks.unpack(prediction.gain_x_m), blocks.unpack(prediction.gain_y_m)]
+        starts = [[walk.error_m, walk.advance_m, walk.bend_m] for walk in (prediction.x, prediction.y)]
+        assert bits(gains) == bits(expected.gain_m[0])
+        assert bits(np.array(starts, blocks.scalar).T) == bits(
+            np.concatenate([expected.error_m, expected.advance_m, expected.bend_m])
+        )
 
-        errors = predictor.error(expected, moves)[0]
-        for i in range(prediction_horizon):
-            lib.nmpc_predictor_error(
-                prediction, blocks.pointer("nmpc_real_t", moves), i, x_pointer, y_pointer
-            )
-            assert bits([error_x[0], error_y[0]]) == bits(errors[:, i])
+        x, y = ffi.new("nmpc_walk_t *", prediction.x), ffi.new("nmpc_walk_t *", prediction.y)
+        for i, errors in enumerate(predictor.errors(expected, moves)):
+            if i < settings.horizon.control:
+                lib.nmpc_predictor_turn(prediction, blocks.pointer("nmpc_real_t", moves), i, x, y)
+            for walk in (x, y):
+                lib.nmpc_predictor_walk(walk)
+            assert bits(np.array([x.error_m, y.error_m], blocks.scalar)) == bits(errors[0])
 
         gradient, gradient_pointer = blocks.reals(moves_count)
         c_cost = lib.nmpc_cost_evaluate(

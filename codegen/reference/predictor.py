@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from codegen.horizon import HorizonTables
-from codegen.reference.math import Real, ordered_sum, sine_cosine
+from codegen.reference.math import Real, sine_cosine
 from codegen.settings import Settings
 from codegen.trigonometry import trigonometry
 
@@ -14,56 +14,79 @@ from codegen.trigonometry import trigonometry
 class Prediction:
     """What a control step knows before it chooses moves, for n controllers.
 
-    gain_m_s2:     (n, 2, 2) acceleration along world x, y per radian of roll, pitch (eq 8).
-    free_error_m:  (n, 2, prediction) position less target along x, y if all moves were zero.
+    gain_m:     (n, 2, 2) bend along world x, y per radian of roll, pitch (eq 8 over a prediction step).
+    tilt_rad:   (n, 2) the roll, pitch that the first move turns from: measured, or zero without lag.
+    error_m:    (n, 2) position less target along x, y.
+    advance_m:  (n, 2) what the first step adds to that, if tilt is held.
+    bend_m:     (n, 2) what each step adds to the advance, if tilt is held.
     """
 
-    gain_m_s2: Real
-    free_error_m: Real
+    gain_m: Real
+    tilt_rad: Real
+    error_m: Real
+    advance_m: Real
+    bend_m: Real
 
 
 class Predictor:
-    """The prediction tables of one set of settings, in its scalar type."""
+    """The prediction constants of one set of settings, in its scalar type."""
 
     def __init__(self, settings: Settings, tables: HorizonTables, scalar: type[np.floating]) -> None:
-        self._time_s = tables.time_s.astype(scalar)
-        self._free_s2 = tables.free_s2.T.astype(scalar)
-        self._response_s2 = np.moveaxis(tables.response_s2, 2, 0).astype(scalar)
-        self._has_lag = tables.has_lag
+        self._steps = settings.horizon.prediction
+        self._moves = settings.horizon.control
         self._printed_yaw = settings.model.yaw_convention == "printed"
         self._trigonometry = trigonometry(settings.code.scalar)
+        self._step_s = scalar(settings.horizon.prediction_step_s)
+        self._step_squared_s2 = scalar(tables.step_squared_s2)
+        self._held = scalar(tables.held)
+        self._has_lag = tables.has_lag
+        self._axes = np.array([(axis.at_once, axis.delayed, axis.decay) for axis in tables.axes], scalar).T
+        self.axes_alike = tables.axes_alike
+        self.response_sum = tables.response_sum.astype(scalar)
 
     def prepare(self, state: Real, target: Real, thrust_acceleration_m_s2: Real) -> Prediction:
-        """Evaluate eq 8 at the present heading and thrust, and roll robot and target out without moves.
+        """Evaluate eq 8 at the present heading and thrust, and find where the walks start without moves.
 
         state is (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
         """
+        push = thrust_acceleration_m_s2 * self._step_squared_s2
         sine, cosine = sine_cosine(state[:, 6], self._trigonometry)
-        across = thrust_acceleration_m_s2 * sine
-        along = thrust_acceleration_m_s2 * cosine
+        across, along = push * sine, push * cosine
         turned = across if self._printed_yaw else -across
         gain = np.stack([np.stack([turned, -along], 1), np.stack([along, turned], 1)], 1)
-        position_error = state[:, 0:2] - target[:, 0:2]
-        velocity_error = state[:, 2:4] - target[:, 2:4]
-        free = position_error[:, :, None] + (self._time_s * velocity_error[:, :, None])
+        advance = self._step_s * (state[:, 2:4] - target[:, 2:4])
+        tilt, bend = np.zeros_like(advance), np.zeros_like(advance)
         if self._has_lag:
-            push = gain * state[:, None, 4:6]
-            free = free + _world(push, np.broadcast_to(self._free_s2, (len(push), *self._free_s2.shape)))
-        return Prediction(gain_m_s2=gain, free_error_m=free)
+            tilt = state[:, 4:6]
+            shares = gain * tilt[:, None]
+            bend = shares[:, :, 0] + shares[:, :, 1]
+            advance = advance + (self._held * bend)
+        return Prediction(gain, tilt, state[:, 0:2] - target[:, 0:2], advance, bend)
 
-    def error(self, prediction: Prediction, moves_rad: Real) -> Real:
-        """Predict position less target for `moves_rad` (n, control, 2): (n, 2, prediction), in m."""
-        reach = self._response_s2 * np.swapaxes(moves_rad, 1, 2)[:, :, None, :]
-        tilt = np.take(np.add.accumulate(reach, axis=3), -1, axis=3)
-        return prediction.free_error_m + _world(prediction.gain_m_s2, tilt)
-
-    def gradient(self, prediction: Prediction, slope: Real) -> Real:
-        """Carry `slope`, the signs of the errors (n, 2, prediction), to the moves: (n, control, 2), in m."""
-        sums = ordered_sum(slope[:, :, None, :, None] * self._response_s2, axis=3)
-        gain = prediction.gain_m_s2[..., None]
-        return np.swapaxes((gain[:, 0] * sums[:, 0]) + (gain[:, 1] * sums[:, 1]), 1, 2)
-
-
-def _world(gain: Real, tilt: Real) -> Real:
-    """Turn double integrals of roll and pitch (n, 2, prediction) into displacements along x and y."""
-    return (gain[:, :, 0, None] * tilt[:, None, 0]) + (gain[:, :, 1, None] * tilt[:, None, 1])
+    def errors(self, prediction: Prediction, moves_rad: Real) -> Real:
+        """Predict position less target for `moves_rad` (n, control, 2): (prediction, n, 2), in m."""
+        error, advance, bend = prediction.error_m, prediction.advance_m, prediction.bend_m
+        at_once, delayed, decay = self._axes
+        to_come = np.zeros_like(prediction.gain_m)
+        errors = np.empty((self._steps, *error.shape), error.dtype)
+        before = prediction.tilt_rad
+        for i in range(self._steps):
+            if i < self._moves:
+                shares = prediction.gain_m * (moves_rad[:, i] - before)[:, None]
+                before = moves_rad[:, i]
+                both = shares[:, :, 0] + shares[:, :, 1]
+                if self._has_lag:
+                    sooner = at_once * shares
+                    advance = advance + (sooner[:, :, 0] + sooner[:, :, 1])
+                    to_come = to_come - (delayed * shares)
+                else:
+                    advance = advance + (at_once[0] * both)
+                bend = bend + both
+            error = error + advance
+            if self._has_lag:
+                advance = advance + (bend + (to_come[:, :, 0] + to_come[:, :, 1]))
+                to_come = to_come * decay
+            else:
+                advance = advance + bend
+            errors[i] = error
+        return errors

@@ -45,8 +45,10 @@ typedef double nmpc_real_t;
 #define NMPC_MOVES (NMPC_AXES * NMPC_CONTROL_HORIZON)
 #define NMPC_ITERATIONS 5
 
-/* Call nmpc_step() once in this time; the prediction step is in the tables of the predictor. */
+/* Call nmpc_step() once in this time; predicted steps are this far apart. */
 #define NMPC_UPDATE_PERIOD_S 0.01
+#define NMPC_PREDICTION_STEP_S 0.055
+#define NMPC_PREDICTION_STEP_SQUARED_S2 0.003025
 
 /* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest to replace them. */
 #define NMPC_TRACKING_WEIGHT 2250.0
@@ -73,6 +75,6 @@ typedef double nmpc_real_t;
 #define NMPC_THRUST_ACCELERATION_MAX_M_S2 50.0
 
 /* Room that one nmpc_t takes at most; nmpc.c asserts it. */
-#define NMPC_INSTANCE_BYTES 368
+#define NMPC_INSTANCE_BYTES 240
 
 #endif

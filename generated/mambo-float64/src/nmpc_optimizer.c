@@ -8,43 +8,52 @@
 #include "nmpc_cost.h"
 #include "nmpc_math.h"
 
-/* Update move `k`, downhill and within the tilt limit: RPROP reads nothing of the gradient but its sign, now
- * and before. Once the cost has come to rest all slopes are level: the plan stays, and the work goes on. */
-static void update_move(nmpc_t *self, int k)
+/* What RPROP remembers of a move from one iteration to the next. */
+typedef struct {
+    nmpc_real_t step_rad;
+    nmpc_real_t before_rad; /* the move before its last update */
+    int direction;          /* sign of the slope at its last update, 0 after a step back */
+} nmpc_rprop_t;
+
+/* Update a move, downhill and within the tilt limit: RPROP reads nothing of the gradient but its sign, the
+ * slope, now and before. */
+static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int slope)
 {
-    const int slope = (self->converged == 0U) ? nmpc_sign(self->gradient[k]) : 0;
-    const int agreement = slope * (int)self->direction[k];
-    const nmpc_real_t move_rad = self->plan_rad[k];
+    const int agreement = slope * rprop->direction;
+    nmpc_real_t next_rad = move_rad;
 
     if (agreement < 0) {
         /* The last update crossed a minimum: take it back, and go on with a shorter step. */
-        self->step_rad[k] = nmpc_larger(self->step_rad[k] * NMPC_DECREASE, NMPC_STEP_MIN_RAD);
-        self->plan_rad[k] = self->before_rad[k];
-        self->direction[k] = 0;
+        next_rad = rprop->before_rad;
+        rprop->step_rad = nmpc_larger(rprop->step_rad * NMPC_DECREASE, NMPC_STEP_MIN_RAD);
+        rprop->direction = 0;
     } else {
         if (agreement > 0) {
-            self->step_rad[k] = nmpc_smaller(self->step_rad[k] * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
+            rprop->step_rad = nmpc_smaller(rprop->step_rad * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
         }
-        self->before_rad[k] = move_rad;
         if (slope > 0) {
-            self->plan_rad[k] = nmpc_larger(move_rad - self->step_rad[k], -NMPC_TILT_LIMIT_RAD);
+            next_rad = nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD);
         } else if (slope < 0) {
-            self->plan_rad[k] = nmpc_smaller(move_rad + self->step_rad[k], NMPC_TILT_LIMIT_RAD);
+            next_rad = nmpc_smaller(move_rad + rprop->step_rad, NMPC_TILT_LIMIT_RAD);
         } else {
             /* Level ground: stay. */
         }
-        self->direction[k] = (signed char)slope;
+        rprop->before_rad = move_rad;
+        rprop->direction = slope;
     }
+    return next_rad;
 }
 
 void nmpc_optimizer_minimize(nmpc_t *self)
 {
+    nmpc_rprop_t rprop[NMPC_MOVES];
     int iteration;
     int k;
 
     for (k = 0; k < NMPC_MOVES; k++) {
-        self->step_rad[k] = NMPC_INITIAL_STEP_RAD;
-        self->direction[k] = 0;
+        rprop[k].step_rad = NMPC_INITIAL_STEP_RAD;
+        rprop[k].before_rad = self->plan_rad[k];
+        rprop[k].direction = 0;
     }
     self->iterations = 0U;
     self->converged = 0U;
@@ -57,11 +66,14 @@ void nmpc_optimizer_minimize(nmpc_t *self)
         if ((iteration > 0) && (nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
             self->converged = 1U;
         }
-        for (k = 0; k < NMPC_MOVES; k++) {
-            update_move(self, k);
-        }
         if (self->converged == 0U) {
             self->iterations++;
+        }
+        /* Once the cost has come to rest all slopes are level: the plan stays, and the work goes on. */
+        for (k = 0; k < NMPC_MOVES; k++) {
+            const int slope = (self->converged == 0U) ? nmpc_sign(self->gradient[k]) : 0;
+
+            self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], slope);
         }
     }
 }

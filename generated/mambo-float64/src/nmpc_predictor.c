@@ -6,75 +6,54 @@
  */
 #include "nmpc_predictor.h"
 
-/* Time from now to each predicted step, in s. */
-static const nmpc_real_t time_s[NMPC_PREDICTION_HORIZON] = {
-    0.055, 0.11, 0.165, 0.22, 0.275, 0.33, 0.385, 0.44, 0.495, 0.55
+const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_RESPONSES] = {
+    { 0.0, 0.0, 0.0, 0.0 },
+    { 0.06457953288686658, 0.11179242846615922, 0.0, 0.0 },
+    { 0.49210190603011394, 0.8219046118872821, 0.06457953288686658, 0.11179242846615922 },
+    { 1.584270164051719, 2.560595449119478, 0.5566814389169805, 0.9336970403534414 },
+    { 3.5871846949453303, 5.626051834223693, 2.1409516029686992, 3.4942924894729193 },
+    { 6.701590575866238, 10.224929397161578, 5.72813629791403, 9.120344323696612 },
+    { 11.091236374342595, 16.500448883866106, 12.429726873780268, 19.345273720858188 },
+    { 16.889692456071494, 24.551868088907913, 23.52096324812286, 35.845722604724294 },
+    { 24.205912706035082, 34.44797669578464, 40.410655704194355, 60.3975906936322 },
+    { 33.12877124680352, 46.23644874940304, 64.61656841022943, 94.84556738941683 },
+    { 21.86538152895854, 29.975162149703664, 48.87266982851648, 70.54100806940993 }
 };
 
-/* Double time integral of a unit of measured roll, pitch as it decays, at each predicted step, in s^2. */
-static const nmpc_real_t free_s2[NMPC_PREDICTION_HORIZON][NMPC_AXES] = {
-    { 0.0014148234565086143, 0.0013434139519449342 },
-    { 0.005305695867129453, 0.004806869274520486 },
-    { 0.011216291376871777, 0.00973959938320679 },
-    { 0.01877438314889519, 0.015690596600736663 },
-    { 0.02767634425400232, 0.02234729428679311 },
-    { 0.03767450498380683, 0.029493071063152507 },
-    { 0.048566840160191874, 0.03697779951552678 },
-    { 0.06018855703212195, 0.04469743524762573 },
-    { 0.07240523348920969, 0.0525798712665279 },
-    { 0.08510722087490043, 0.06057513449714641 }
-};
-
-/* The last move is held to the end of the horizon. */
-const nmpc_real_t nmpc_predictor_response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
-    { 9.767654349138568e-05, 0.00016908604805506572, 0.0, 0.0 },
-    { 0.0006466275893791617, 0.0010740446774244485, 9.767654349138568e-05, 0.00016908604805506572 },
-    { 0.0016519044902576774, 0.002629769891313696, 0.0007443041328705473, 0.001243130725479514 },
-    { 0.003029408227976587, 0.004636502782470127, 0.002396208623128225, 0.0038729006167932106 },
-    { 0.004710538894892872, 0.006955802313943552, 0.005425616851104812, 0.008509403399263338 },
-    { 0.00663933927019549, 0.009491723223640603, 0.010136155745997685, 0.015465205713206889 },
-    { 0.008770164823614958, 0.012177771547625733, 0.016775495016193173, 0.02495692893684749 },
-    { 0.011065783128069929, 0.014967864267901051, 0.02554565983980813, 0.03713470048447322 },
-    { 0.01349582354291226, 0.017830063981097835, 0.036611442967878056, 0.052102564752374264 },
-    { 0.016035512614309265, 0.020742236769381486, 0.05010726651079032, 0.0699326287334721 }
-};
+/* Start a walk: robot and target keep their velocity, and the robot its tilt. */
+static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t velocity_m_s,
+                       const nmpc_real_t gain_m[NMPC_AXES], const nmpc_real_t tilt_rad[NMPC_AXES])
+{
+    walk->error_m = error_m;
+    walk->bend_m = (gain_m[NMPC_ROLL] * tilt_rad[NMPC_ROLL]) + (gain_m[NMPC_PITCH] * tilt_rad[NMPC_PITCH]);
+    walk->advance_m = (NMPC_PREDICTION_STEP_S * velocity_m_s) + (0.5 * walk->bend_m);
+    walk->roll_to_come_m = (nmpc_real_t)0;
+    walk->pitch_to_come_m = (nmpc_real_t)0;
+}
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
-    const nmpc_real_t error_x_m = state->position_m[0] - target->position_m[0];
-    const nmpc_real_t error_y_m = state->position_m[1] - target->position_m[1];
-    const nmpc_real_t error_x_m_s = state->velocity_m_s[0] - target->velocity_m_s[0];
-    const nmpc_real_t error_y_m_s = state->velocity_m_s[1] - target->velocity_m_s[1];
+    const nmpc_real_t push_m = thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
     nmpc_real_t sine;
     nmpc_real_t cosine;
-    nmpc_real_t across_m_s2;
-    nmpc_real_t along_m_s2;
-    nmpc_real_t push_x_m_s2[NMPC_AXES];
-    nmpc_real_t push_y_m_s2[NMPC_AXES];
-    int i;
+    nmpc_real_t across_m;
+    nmpc_real_t along_m;
 
-    /* Eq 8 with the signs of eq 3. */
+    /* Eq 8 with the signs of eq 3, over one step. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
-    across_m_s2 = thrust_acceleration_m_s2 * sine;
-    along_m_s2 = thrust_acceleration_m_s2 * cosine;
-    prediction->gain_x_m_s2[NMPC_ROLL] = -across_m_s2;
-    prediction->gain_x_m_s2[NMPC_PITCH] = -along_m_s2;
-    prediction->gain_y_m_s2[NMPC_ROLL] = along_m_s2;
-    prediction->gain_y_m_s2[NMPC_PITCH] = -across_m_s2;
-    push_x_m_s2[NMPC_ROLL] = prediction->gain_x_m_s2[NMPC_ROLL] * state->roll_rad;
-    push_x_m_s2[NMPC_PITCH] = prediction->gain_x_m_s2[NMPC_PITCH] * state->pitch_rad;
-    push_y_m_s2[NMPC_ROLL] = prediction->gain_y_m_s2[NMPC_ROLL] * state->roll_rad;
-    push_y_m_s2[NMPC_PITCH] = prediction->gain_y_m_s2[NMPC_PITCH] * state->pitch_rad;
+    across_m = push_m * sine;
+    along_m = push_m * cosine;
+    prediction->gain_x_m[NMPC_ROLL] = -across_m;
+    prediction->gain_x_m[NMPC_PITCH] = -along_m;
+    prediction->gain_y_m[NMPC_ROLL] = along_m;
+    prediction->gain_y_m[NMPC_PITCH] = -across_m;
 
-    /* Eqs 9-11 without moves: both robot and target keep their velocity, and the present tilt keeps pushing
-     * while it decays. */
-    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        prediction->free_x_m[i] =
-            (error_x_m + (time_s[i] * error_x_m_s))
-            + nmpc_predictor_displacement(push_x_m_s2, free_s2[i][NMPC_ROLL], free_s2[i][NMPC_PITCH]);
-        prediction->free_y_m[i] =
-            (error_y_m + (time_s[i] * error_y_m_s))
-            + nmpc_predictor_displacement(push_y_m_s2, free_s2[i][NMPC_ROLL], free_s2[i][NMPC_PITCH]);
-    }
+    /* Eqs 9-11 without moves. */
+    prediction->tilt_rad[NMPC_ROLL] = state->roll_rad;
+    prediction->tilt_rad[NMPC_PITCH] = state->pitch_rad;
+    start_walk(&prediction->x, state->position_m[0] - target->position_m[0],
+               state->velocity_m_s[0] - target->velocity_m_s[0], prediction->gain_x_m, prediction->tilt_rad);
+    start_walk(&prediction->y, state->position_m[1] - target->position_m[1],
+               state->velocity_m_s[1] - target->velocity_m_s[1], prediction->gain_y_m, prediction->tilt_rad);
 }

@@ -56,12 +56,22 @@ typedef struct {
     nmpc_real_t effort;   /* 1/rad */
 } nmpc_weights_t;
 
-/* What a step knows before it chooses moves: error = free error + gain * double integral of the angles. */
+/* The error along one axis of the world, on its way from one predicted step to the next. */
 typedef struct {
-    nmpc_real_t gain_x_m_s2[NMPC_AXES]; /* acceleration along x per radian of roll, pitch */
-    nmpc_real_t gain_y_m_s2[NMPC_AXES]; /* acceleration along y per radian of roll, pitch */
-    nmpc_real_t free_x_m[NMPC_PREDICTION_HORIZON];
-    nmpc_real_t free_y_m[NMPC_PREDICTION_HORIZON];
+    nmpc_real_t error_m;        /* position less target */
+    nmpc_real_t advance_m;      /* what the next step adds to the error */
+    nmpc_real_t bend_m;         /* what each step adds to the advance, once the tilt has settled */
+    nmpc_real_t roll_to_come_m; /* what that still lacks of roll, and of pitch */
+    nmpc_real_t pitch_to_come_m;
+} nmpc_walk_t;
+
+/* What a step knows before it chooses moves: where both walks start, and what moves do to them. */
+typedef struct {
+    nmpc_real_t gain_x_m[NMPC_AXES]; /* bend along x per radian of roll, pitch */
+    nmpc_real_t gain_y_m[NMPC_AXES]; /* bend along y per radian of roll, pitch */
+    nmpc_real_t tilt_rad[NMPC_AXES]; /* roll, pitch to turn from: measured */
+    nmpc_walk_t x;
+    nmpc_walk_t y;
 } nmpc_prediction_t;
 
 /* One controller. Read it in a debugger; change it through the functions below. Moves are ordered roll,
@@ -69,13 +79,10 @@ typedef struct {
 typedef struct {
     nmpc_weights_t weights;
     nmpc_prediction_t prediction;
-    nmpc_real_t command_rad[NMPC_AXES];  /* the last command given out */
-    nmpc_real_t plan_rad[NMPC_MOVES];    /* the moves of the last step */
-    nmpc_real_t gradient[NMPC_MOVES];    /* cost per radian, as the last iteration saw it */
-    nmpc_real_t step_rad[NMPC_MOVES];    /* RPROP: step sizes */
-    nmpc_real_t before_rad[NMPC_MOVES];  /* RPROP: each move before its last update */
-    nmpc_real_t cost;                    /* eq 12, as the last iteration saw it */
-    signed char direction[NMPC_MOVES];   /* RPROP: signs of the stored gradient */
+    nmpc_real_t command_rad[NMPC_AXES]; /* the last command given out */
+    nmpc_real_t plan_rad[NMPC_MOVES];   /* the moves of the last step */
+    nmpc_real_t gradient[NMPC_MOVES];   /* cost per radian, as the last iteration saw it */
+    nmpc_real_t cost;                   /* eq 12, as the last iteration saw it */
     unsigned char iterations;
     unsigned char converged;
 } nmpc_t;

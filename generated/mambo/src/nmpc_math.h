@@ -5,6 +5,8 @@
 #ifndef NMPC_MATH_H
 #define NMPC_MATH_H
 
+#include <stdint.h>
+
 #include "nmpc_config.h"
 
 /* Flags that would change the arithmetic of this library. */
@@ -39,6 +41,22 @@ static inline nmpc_real_t nmpc_absolute(nmpc_real_t value)
 static inline int nmpc_sign(nmpc_real_t value)
 {
     return (value > (nmpc_real_t)0) ? 1 : ((value < (nmpc_real_t)0) ? -1 : 0);
+}
+
+/* The bits of a value; the highest is its sign. Where there is no FPU, reading that is much cheaper than a
+ * comparison. */
+typedef uint32_t nmpc_bits_t;
+#define NMPC_SIGN_BIT ((nmpc_bits_t)1 << 31)
+
+static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
+{
+    union {
+        nmpc_real_t real;
+        nmpc_bits_t bits;
+    } view;
+
+    view.real = value;
+    return view.bits;
 }
 
 static inline nmpc_real_t nmpc_smaller(nmpc_real_t a, nmpc_real_t b)

@@ -2,7 +2,8 @@
  *
  * Predictor: how far robot and target will be apart, given the moves (eqs 8-11).
  *
- * Position is affine in the moves, so the roll-out of eq 9 over the horizon stands in constant tables.
+ * Along each axis of the world the error walks over the horizon by its differences: a step adds the advance
+ * to the error and the bend to the advance. That is eq 9 with its velocity update, sums of constants apart.
  */
 #ifndef NMPC_PREDICTOR_H
 #define NMPC_PREDICTOR_H
@@ -18,39 +19,59 @@ extern "C" {
 #define NMPC_ROLL 0
 #define NMPC_PITCH 1
 
-/* Double time integral of the angle that a unit of each move makes, at each predicted step, in s^2. */
-extern const nmpc_real_t nmpc_predictor_response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES];
+/* What a turn of roll, pitch adds to the advance at once, what it delays, and what remains of that a step
+ * later: shares of the bend that it ends in. */
+#define NMPC_ROLL_AT_ONCE 0.032289766f
+#define NMPC_PITCH_AT_ONCE 0.055896215f
+#define NMPC_ROLL_DELAYED 0.8185286f
+#define NMPC_PITCH_DELAYED 0.7008401f
+#define NMPC_ROLL_DECAY 0.81570405f
+#define NMPC_PITCH_DECAY 0.6930406f
 
-/* Evaluate eq 8 at the present heading and thrust, and roll robot and target out without moves. */
+/* How far a unit of bend of each move has carried the error, summed over all steps before each; twice that, but
+ * once at the end of the horizon. Axes that settle alike share their responses. */
+#define NMPC_AXES_ALIKE 1
+#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_ALIKE)
+extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_RESPONSES];
+
+/* Evaluate eq 8 at the present heading and thrust, and find where the walks start without moves. */
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction);
 
-/* Add up what roll and pitch displace along one axis: acceleration times double time integral, in m. */
-static inline nmpc_real_t nmpc_predictor_displacement(const nmpc_real_t gain_m_s2[NMPC_AXES],
-                                                      nmpc_real_t roll_s2, nmpc_real_t pitch_s2)
+/* Bend a walk by a turn of roll and pitch. */
+static inline void nmpc_predictor_bend(nmpc_walk_t *walk, const nmpc_real_t gain_m[NMPC_AXES],
+                                       nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
 {
-    return (gain_m_s2[NMPC_ROLL] * roll_s2) + (gain_m_s2[NMPC_PITCH] * pitch_s2);
+    const nmpc_real_t roll_m = gain_m[NMPC_ROLL] * roll_rad;
+    const nmpc_real_t pitch_m = gain_m[NMPC_PITCH] * pitch_rad;
+
+    walk->advance_m = walk->advance_m + ((NMPC_ROLL_AT_ONCE * roll_m) + (NMPC_PITCH_AT_ONCE * pitch_m));
+    walk->bend_m = walk->bend_m + (roll_m + pitch_m);
+    walk->roll_to_come_m = walk->roll_to_come_m - (NMPC_ROLL_DELAYED * roll_m);
+    walk->pitch_to_come_m = walk->pitch_to_come_m - (NMPC_PITCH_DELAYED * pitch_m);
 }
 
-/* Predict position less target at step `i`, 0 .. NMPC_PREDICTION_HORIZON - 1, in m. */
-static inline void nmpc_predictor_error(const nmpc_prediction_t *prediction,
-                                        const nmpc_real_t moves_rad[NMPC_MOVES], int i,
-                                        nmpc_real_t *error_x_m, nmpc_real_t *error_y_m)
+/* Make move `i` of the control horizon, a turn from the move before. */
+static inline void nmpc_predictor_turn(const nmpc_prediction_t *prediction,
+                                       const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_walk_t *x,
+                                       nmpc_walk_t *y)
 {
-    const nmpc_real_t *response_s2 = nmpc_predictor_response_s2[i];
-    nmpc_real_t roll_rad_s2 = response_s2[NMPC_ROLL] * moves_rad[NMPC_ROLL];
-    nmpc_real_t pitch_rad_s2 = response_s2[NMPC_PITCH] * moves_rad[NMPC_PITCH];
-    int k;
+    const nmpc_real_t *move_rad = &moves_rad[NMPC_AXES * i];
+    const nmpc_real_t *before_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;
+    const nmpc_real_t roll_rad = move_rad[NMPC_ROLL] - before_rad[NMPC_ROLL];
+    const nmpc_real_t pitch_rad = move_rad[NMPC_PITCH] - before_rad[NMPC_PITCH];
 
-    NMPC_UNROLL
-    for (k = NMPC_AXES; k < NMPC_MOVES; k += NMPC_AXES) {
-        roll_rad_s2 = roll_rad_s2 + (response_s2[k + NMPC_ROLL] * moves_rad[k + NMPC_ROLL]);
-        pitch_rad_s2 = pitch_rad_s2 + (response_s2[k + NMPC_PITCH] * moves_rad[k + NMPC_PITCH]);
-    }
-    *error_x_m = prediction->free_x_m[i]
-                 + nmpc_predictor_displacement(prediction->gain_x_m_s2, roll_rad_s2, pitch_rad_s2);
-    *error_y_m = prediction->free_y_m[i]
-                 + nmpc_predictor_displacement(prediction->gain_y_m_s2, roll_rad_s2, pitch_rad_s2);
+    nmpc_predictor_bend(x, prediction->gain_x_m, roll_rad, pitch_rad);
+    nmpc_predictor_bend(y, prediction->gain_y_m, roll_rad, pitch_rad);
+}
+
+/* Go to the next predicted step. */
+static inline void nmpc_predictor_walk(nmpc_walk_t *walk)
+{
+    walk->error_m = walk->error_m + walk->advance_m;
+    walk->advance_m = walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m));
+    walk->roll_to_come_m = walk->roll_to_come_m * NMPC_ROLL_DECAY;
+    walk->pitch_to_come_m = walk->pitch_to_come_m * NMPC_PITCH_DECAY;
 }
 
 #ifdef __cplusplus

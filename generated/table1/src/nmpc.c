@@ -56,9 +56,15 @@ static nmpc_status_t check_input(const nmpc_state_t *state, const nmpc_target_t 
     return status;
 }
 
+static void level(nmpc_walk_t *walk)
+{
+    walk->error_m = (nmpc_real_t)0;
+    walk->advance_m = (nmpc_real_t)0;
+    walk->bend_m = (nmpc_real_t)0;
+}
+
 void nmpc_init(nmpc_t *self)
 {
-    int i;
     int k;
 
     if (self == 0) {
@@ -67,21 +73,17 @@ void nmpc_init(nmpc_t *self)
 
     self->weights.tracking = NMPC_TRACKING_WEIGHT;
     self->weights.effort = NMPC_EFFORT_WEIGHT;
+    level(&self->prediction.x);
+    level(&self->prediction.y);
     for (k = 0; k < NMPC_AXES; k++) {
-        self->prediction.gain_x_m_s2[k] = (nmpc_real_t)0;
-        self->prediction.gain_y_m_s2[k] = (nmpc_real_t)0;
+        self->prediction.gain_x_m[k] = (nmpc_real_t)0;
+        self->prediction.gain_y_m[k] = (nmpc_real_t)0;
+        self->prediction.tilt_rad[k] = (nmpc_real_t)0;
         self->command_rad[k] = (nmpc_real_t)0;
-    }
-    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        self->prediction.free_x_m[i] = (nmpc_real_t)0;
-        self->prediction.free_y_m[i] = (nmpc_real_t)0;
     }
     for (k = 0; k < NMPC_MOVES; k++) {
         self->plan_rad[k] = (nmpc_real_t)0;
         self->gradient[k] = (nmpc_real_t)0;
-        self->step_rad[k] = (nmpc_real_t)0;
-        self->before_rad[k] = (nmpc_real_t)0;
-        self->direction[k] = 0;
     }
     self->cost = (nmpc_real_t)0;
     self->iterations = 0U;

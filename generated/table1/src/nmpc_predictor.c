@@ -6,50 +6,51 @@
  */
 #include "nmpc_predictor.h"
 
-/* Time from now to each predicted step, in s. */
-static const nmpc_real_t time_s[NMPC_PREDICTION_HORIZON] = {
-    0.07f, 0.14f, 0.21f, 0.28f, 0.35f, 0.42f, 0.49f, 0.56f, 0.63f, 0.7f
+const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_RESPONSES] = {
+    { 0.0f, 0.0f },
+    { 1.0f, 0.0f },
+    { 4.0f, 1.0f },
+    { 9.0f, 5.0f },
+    { 16.0f, 14.0f },
+    { 25.0f, 30.0f },
+    { 36.0f, 55.0f },
+    { 49.0f, 91.0f },
+    { 64.0f, 140.0f },
+    { 81.0f, 204.0f },
+    { 50.0f, 142.5f }
 };
 
-/* The last move is held to the end of the horizon. */
-const nmpc_real_t nmpc_predictor_response_s2[NMPC_PREDICTION_HORIZON][NMPC_MOVES] = {
-    { 0.00245f, 0.00245f, 0.0f, 0.0f },
-    { 0.00735f, 0.00735f, 0.00245f, 0.00245f },
-    { 0.01225f, 0.01225f, 0.0098f, 0.0098f },
-    { 0.01715f, 0.01715f, 0.02205f, 0.02205f },
-    { 0.02205f, 0.02205f, 0.0392f, 0.0392f },
-    { 0.02695f, 0.02695f, 0.06125f, 0.06125f },
-    { 0.03185f, 0.03185f, 0.0882f, 0.0882f },
-    { 0.03675f, 0.03675f, 0.12005f, 0.12005f },
-    { 0.04165f, 0.04165f, 0.1568f, 0.1568f },
-    { 0.04655f, 0.04655f, 0.19845f, 0.19845f }
-};
+/* Start a walk: robot and target keep their velocity. */
+static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t velocity_m_s)
+{
+    walk->error_m = error_m;
+    walk->advance_m = NMPC_PREDICTION_STEP_S * velocity_m_s;
+    walk->bend_m = (nmpc_real_t)0;
+}
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
-    const nmpc_real_t error_x_m = state->position_m[0] - target->position_m[0];
-    const nmpc_real_t error_y_m = state->position_m[1] - target->position_m[1];
-    const nmpc_real_t error_x_m_s = state->velocity_m_s[0] - target->velocity_m_s[0];
-    const nmpc_real_t error_y_m_s = state->velocity_m_s[1] - target->velocity_m_s[1];
+    const nmpc_real_t push_m = thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
     nmpc_real_t sine;
     nmpc_real_t cosine;
-    nmpc_real_t across_m_s2;
-    nmpc_real_t along_m_s2;
-    int i;
+    nmpc_real_t across_m;
+    nmpc_real_t along_m;
 
-    /* Eq 8 with the signs of eq 3. */
+    /* Eq 8 with the signs of eq 3, over one step. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
-    across_m_s2 = thrust_acceleration_m_s2 * sine;
-    along_m_s2 = thrust_acceleration_m_s2 * cosine;
-    prediction->gain_x_m_s2[NMPC_ROLL] = -across_m_s2;
-    prediction->gain_x_m_s2[NMPC_PITCH] = -along_m_s2;
-    prediction->gain_y_m_s2[NMPC_ROLL] = along_m_s2;
-    prediction->gain_y_m_s2[NMPC_PITCH] = -across_m_s2;
+    across_m = push_m * sine;
+    along_m = push_m * cosine;
+    prediction->gain_x_m[NMPC_ROLL] = -across_m;
+    prediction->gain_x_m[NMPC_PITCH] = -along_m;
+    prediction->gain_y_m[NMPC_ROLL] = along_m;
+    prediction->gain_y_m[NMPC_PITCH] = -across_m;
 
-    /* Eqs 9-11 without moves: both robot and target keep their velocity. */
-    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
-        prediction->free_x_m[i] = error_x_m + (time_s[i] * error_x_m_s);
-        prediction->free_y_m[i] = error_y_m + (time_s[i] * error_y_m_s);
-    }
+    /* Eqs 9-11 without moves. */
+    prediction->tilt_rad[NMPC_ROLL] = (nmpc_real_t)0;
+    prediction->tilt_rad[NMPC_PITCH] = (nmpc_real_t)0;
+    start_walk(&prediction->x, state->position_m[0] - target->position_m[0],
+               state->velocity_m_s[0] - target->velocity_m_s[0]);
+    start_walk(&prediction->y, state->position_m[1] - target->position_m[1],
+               state->velocity_m_s[1] - target->velocity_m_s[1]);
 }
