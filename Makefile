@@ -51,7 +51,6 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o generated/mambo
 	$(BIN)/mambo-nmpc generate mambo --scalar float64 -o generated/mambo-float64
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1
-	$(BIN)/python -m tests.support.digests
 
 bench: $(SETUP_BENCH)
 	$(BIN)/python -m benchmarks.flights

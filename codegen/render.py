@@ -9,6 +9,7 @@ import jinja2
 import codegen
 from codegen import boards, literals
 from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from codegen.frozen import HELD, HOVER_M_S2, TICKS, episodes, frozen_digest, spread
 from codegen.horizon import horizon_tables
 from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
 from codegen.self_test import hover_thrust, self_test
@@ -31,10 +32,11 @@ _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
 _REAL_BYTES: Final = {"float32": 4, "float64": 8}
 
 
-def render(settings: Settings, *, amalgamate: bool = False) -> dict[str, str]:
+def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = True) -> dict[str, str]:
     """Render the bundle of `settings`: {relative POSIX path: text}.
 
-    With `amalgamate` the library is one header and one source in the bundle's folder.
+    With `amalgamate` the library is one header and one source in the bundle's folder. Only `with_digest` does
+    the header state the digest of the frozen steps: what is compiled to run at once need not wait for it.
     """
     environment = _environment(settings.code.scalar)
     headers = {name: environment.get_template(f"include/{name}.j2") for name in PUBLIC_HEADERS}
@@ -42,7 +44,10 @@ def render(settings: Settings, *, amalgamate: bool = False) -> dict[str, str]:
     sources = {name: environment.get_template(f"src/{name}.j2") for name in SOURCES}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in PROJECT.items()}
 
-    context = _context(settings) | {"amalgamated": amalgamate}
+    context = _context(settings) | {
+        "amalgamated": amalgamate,
+        "frozen_digest": frozen_digest(settings, episodes(settings)) if with_digest else None,
+    }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "sources": ["nmpc.c"]}
@@ -108,6 +113,12 @@ def _context(settings: Settings) -> dict[str, object]:
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
         "vectors": self_test(settings),
+        "episodes": episodes(settings),
+        "ticks": TICKS,
+        "held": HELD,
+        "hover_m_s2": HOVER_M_S2,
+        "frozen_steps": TICKS * episodes(settings),
+        "spread": spread(settings),
         "boards": [
             {
                 "name": board.name,

@@ -13,11 +13,11 @@ from codegen import boards, presets
 from codegen import cli as generating
 from codegen.boards import Board
 from codegen.errors import BuildError, InvalidSettingsError, echo
+from codegen.frozen import TICKS, episodes
 from codegen.settings import Settings
 from sil import footprint_report
 from sil.doctor import doctor_text, examine
 from sil.footprint import Footprint, measure_footprint
-from sil.frozen import TOGETHER
 from sil.progress import progress_bar
 from sil.results import SUMMARY, new_results, summary_text
 from sil.same_bits import REFERENCE, BuildDigest, builds, same_bits
@@ -94,30 +94,37 @@ def same_bits_command(
     board: Annotated[
         str, typer.Option("--boards", help="Boards, separated by commas, or all.", metavar="NAME,NAME")
     ] = "all",
-    steps: Annotated[int, typer.Option(min=100, help="Frozen steps, a hundred at a time.")] = 100_000,
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            min=TICKS,
+            help="Frozen steps, a hundred at a time; those of the bundle's own digest if none are named.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Run the same frozen steps in every build at hand; exit 1 unless all digests are one."""
     settings = presets.load(source)
     chosen = [one for name in board.split(",") for one in _boards(name)]
-    steps -= steps % TOGETHER
+    count = episodes(settings) if steps is None else steps // TICKS
     found: list[BuildDigest] = []
     with progress_bar("comparing builds") as progress:
-        for result in same_bits(settings, chosen, steps):
+        for result in same_bits(settings, chosen, count):
             found.append(result)
             progress(len(found) / builds(chosen))
             if not as_json:
                 typer.echo(_digest_line(result))
+    total = count * TICKS
     reference = next(result.digest for result in found if result.where == REFERENCE)
     ran = [result for result in found if result.digest is not None]
     others = [result for result in ran if result.digest != reference]
     if as_json:
         typer.echo(
-            json.dumps({"steps": steps, "same": not others, "builds": [asdict(r) for r in found]}, indent=2)
+            json.dumps({"steps": total, "same": not others, "builds": [asdict(r) for r in found]}, indent=2)
         )
     else:
         typer.echo(
-            f"{len(ran) - len(others)} of {len(ran)} have the bits of the reference over {steps} steps; "
+            f"{len(ran) - len(others)} of {len(ran)} have the bits of the reference over {total} steps; "
             f"{len(found) - len(ran)} not run"
         )
     if others:

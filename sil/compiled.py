@@ -21,7 +21,16 @@ def plainly_named(settings: Settings) -> Settings:
 
 def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
     """Generate and build the C of `settings` for this machine."""
-    return load_extension(render(plainly_named(settings)), settings.code.scalar, toolchain)
+    return load_extension(render(plainly_named(settings), with_digest=False), settings.code.scalar, toolchain)
+
+
+def compiled_digest(extension: ModuleType, episodes: int) -> int:
+    """Return the digest of the frozen steps on this machine."""
+    scratch = extension.ffi.new("nmpc_t *")
+    digest = 0
+    for episode in range(episodes):
+        digest = extension.lib.nmpc_self_test_episode(scratch, episode, digest)
+    return digest
 
 
 def as_array(values: ArrayLike, scalar: Scalar, shape: tuple[int, ...]) -> NDArray[Any]:

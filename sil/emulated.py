@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.footprint.build import Builder
+from codegen.frozen import TICKS
 from codegen.literals import SCALARS
 from codegen.reference import Step
 from codegen.render import render
@@ -15,7 +16,7 @@ from codegen.settings import Settings
 from sil.compiled import DIRT, as_array, plainly_named
 from sil.machine import TIME_LIMIT_S, Machine
 
-GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes")
+GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
 """Functions of the guest that are called from outside."""
 
 _WORK_A_CALL: Final = 2_000
@@ -28,7 +29,7 @@ _SECONDS_A_WORK: Final = 2e-4
 def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
     """Build the program for an emulated core: the bundle of `settings` and the loop over n controllers."""
     glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
-    return builder.guest(render(plainly_named(settings)), glue, GUEST, folder)
+    return builder.guest(render(plainly_named(settings), with_digest=False), glue, GUEST, folder)
 
 
 class EmulatedController:
@@ -48,7 +49,7 @@ class EmulatedController:
             "iterations": (np.dtype(np.int32), ()),
             "converged": (np.dtype(np.int32), ()),
         }
-        work = horizon.prediction * horizon.control * settings.optimizer.iterations
+        work = _work(settings)
         self._together = max(1, _WORK_A_CALL // work)
         limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * max(work, _WORK_A_CALL)
         self.machine = Machine(elf, core, n * _bytes_each(settings) + 4096, limit_s)
@@ -92,6 +93,21 @@ class EmulatedController:
         kind, shape = self._shapes[name]
         address, size = self._outputs[name]
         return np.frombuffer(self.machine.read(address, self._n * size), kind).reshape(self._n, *shape)
+
+
+def emulated_digest(settings: Settings, elf: Path, core: str, episodes: int) -> int:
+    """Return the digest of the frozen steps on an emulated core, from a program of `build_guest`."""
+    limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * _work(settings) * TICKS
+    machine = Machine(elf, core, _bytes_each(settings), limit_s)
+    scratch = machine.allocate(machine.call("nmpc_batch_instance_bytes"))
+    digest = 0
+    for episode in range(episodes):
+        digest = machine.call("nmpc_self_test_episode", scratch, episode, digest)
+    return digest
+
+
+def _work(settings: Settings) -> int:
+    return settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
 
 
 def _size(kind: np.dtype[Any], shape: tuple[int, ...]) -> int:

@@ -48,6 +48,7 @@ nmpc_status_t nmpc_set_weights(nmpc_t *, const nmpc_weights_t *);
 nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_command_t *);
 const char *nmpc_version(void);
 int nmpc_self_test(nmpc_t *);
+unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
 
 void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);

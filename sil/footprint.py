@@ -119,7 +119,7 @@ def measure_footprint(
     Raises BuildError if there is no compiler, FootprintError if the stack has no provable bound.
     """
     found = builder(board, optimisation)
-    files = render(plainly_named(settings))
+    files = render(plainly_named(settings), with_digest=False)
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
         folder = Path(work)
         firmware = found.firmware(files, folder)

@@ -2,29 +2,29 @@
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from codegen.boards import Board
 from codegen.errors import BuildError
-from codegen.footprint.build import OPTIMISATIONS, builder
-from codegen.reference import ReferenceController
+from codegen.footprint.build import OPTIMISATIONS, Builder, builder, clang_builder
+from codegen.frozen import frozen_digest
 from codegen.settings import Settings
 from codegen.toolchain import Toolchain
-from sil.compiled import CompiledController, compiled
-from sil.emulated import EmulatedController, build_guest
-from sil.frozen import TOGETHER, frozen_digest
+from sil.compiled import compiled, compiled_digest
+from sil.emulated import build_guest, emulated_digest
 from sil.machine import CORES
 
 HOST_COMPILERS: Final = ("gcc", "clang")
+BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}
 REFERENCE: Final = "reference"
 
 
 @dataclass(frozen=True)
 class BuildDigest:
-    """The digest of one build; None, and why, where there is none."""
+    """The digest of one build, in C's spelling; None, and why, where there is none."""
 
     where: str
     compiler: str
@@ -33,41 +33,44 @@ class BuildDigest:
     reason: str = ""
 
 
-def same_bits(settings: Settings, boards: Sequence[Board], steps: int) -> Iterator[BuildDigest]:
+def same_bits(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
     """Yield the digest of the reference first, then of every build on this machine and on `boards`."""
-    yield BuildDigest(
-        REFERENCE, "NumPy", "", frozen_digest(settings, ReferenceController(settings, TOGETHER), steps)
-    )
+    yield BuildDigest(REFERENCE, "NumPy", "", _spelled(frozen_digest(settings, episodes)))
     for name in HOST_COMPILERS:
         for optimisation in OPTIMISATIONS:
-            yield _on_host(settings, name, optimisation, steps)
+            yield _on_host(settings, name, optimisation, episodes)
     for board in boards:
-        for optimisation in OPTIMISATIONS:
-            yield _on_board(settings, board, optimisation, steps)
+        for name in BOARD_COMPILERS:
+            for optimisation in OPTIMISATIONS:
+                yield _on_board(settings, board, name, optimisation, episodes)
 
 
 def builds(boards: Sequence[Board]) -> int:
     """Count what `same_bits` yields."""
-    return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(boards))
+    return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(BOARD_COMPILERS) * len(boards))
 
 
-def _on_host(settings: Settings, compiler: str, optimisation: str, steps: int) -> BuildDigest:
+def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int) -> BuildDigest:
     if shutil.which(compiler) is None:
         return BuildDigest("host", compiler, optimisation, None, f"{compiler} is not here")
     extension = compiled(settings, Toolchain((compiler,), optimisation))
-    controller = CompiledController(settings, TOGETHER, extension)
-    return BuildDigest("host", compiler, optimisation, frozen_digest(settings, controller, steps))
+    return BuildDigest("host", compiler, optimisation, _spelled(compiled_digest(extension, episodes)))
 
 
-def _on_board(settings: Settings, board: Board, optimisation: str, steps: int) -> BuildDigest:
+def _on_board(
+    settings: Settings, board: Board, compiler: str, optimisation: str, episodes: int
+) -> BuildDigest:
     core = board.emulated_core.value
     if core not in CORES:
-        return BuildDigest(board.name, "", optimisation, None, f"{core} is not emulated here")
+        return BuildDigest(board.name, compiler, optimisation, None, f"{core} is not emulated here")
     try:
-        found = builder(board, optimisation)
+        found = BOARD_COMPILERS[compiler](board, optimisation)
     except BuildError as error:
-        return BuildDigest(board.name, "", optimisation, None, str(error))
+        return BuildDigest(board.name, compiler, optimisation, None, str(error))
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
-        controller = EmulatedController(settings, build_guest(settings, found, Path(work)), core, TOGETHER)
-    command = found.toolchain.command[0]
-    return BuildDigest(board.name, command, optimisation, frozen_digest(settings, controller, steps))
+        digest = emulated_digest(settings, build_guest(settings, found, Path(work)), core, episodes)
+    return BuildDigest(board.name, found.toolchain.command[0], optimisation, _spelled(digest))
+
+
+def _spelled(digest: int) -> str:
+    return f"0x{digest:08X}"

@@ -1,0 +1,175 @@
+"""Frozen steps: inputs that C and NumPy make alike from whole numbers, and the digest of their outcomes.
+
+An episode is one controller, stepped TICKS times from nmpc_init. `templates/src/nmpc_self_test.c.j2` runs the
+same episodes one after the other; here they run side by side, so that the digest is known when the C is
+generated.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.literals import SCALARS, Scalar
+from codegen.reference import ReferenceController, Step
+from codegen.reference.controller import ATTITUDE_LIMIT_RAD
+from codegen.reference.math import Real
+from codegen.settings import Settings
+from codegen.trigonometry import YAW_LIMIT_RAD
+
+TICKS: Final = 100
+"""Steps of an episode."""
+HELD: Final = 4
+"""Ticks that see the same input: plans reach their limits, and costs come to rest."""
+HOVER_M_S2: Final = 9.81
+
+_MOST_EPISODES: Final = 1000
+_USUAL_WORK: Final = 100
+"""Predicted steps times moves times iterations up to which a digest is of _MOST_EPISODES."""
+_LEAST_WORK: Final = 20
+"""What an iteration of few predicted steps and moves takes the reference all the same."""
+_TOGETHER: Final = 250
+"""Episodes side by side: few enough for the caches, many enough for NumPy."""
+_UNIT: Final = 1 << 23
+"""A draw is a whole number in -_UNIT.._UNIT - 1, which every scalar type holds exactly."""
+_MULTIPLIER: Final = 2654435761
+"""The prime next to 2**32 over the golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
+
+Words = NDArray[np.uint32]
+Inputs = tuple[Real, Real, Real]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far the frozen inputs lie apart, for each unit of a draw; errors come in four sizes."""
+
+    target_position_m: float
+    target_velocity_m_s: float
+    error_position_m: tuple[float, ...]
+    error_velocity_m_s: tuple[float, ...]
+    attitude_rad: float
+    yaw_rad: float
+    thrust_acceleration_m_s2: float
+
+
+def spread(settings: Settings) -> Spread:
+    """Spread the inputs over what a flight meets, all within the ranges of `settings`."""
+    half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
+    position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
+    near = 0.25, 0.025, 0.0025
+    return Spread(
+        target_position_m=position_m / _UNIT,
+        target_velocity_m_s=velocity_m_s / _UNIT,
+        error_position_m=tuple(
+            error / _UNIT for error in (min(20.0, half_m), *(size * position_m for size in near))
+        ),
+        error_velocity_m_s=tuple(
+            error / _UNIT for error in (min(10.0, half_m_s), *(size * velocity_m_s for size in near))
+        ),
+        attitude_rad=0.5 / _UNIT,
+        yaw_rad=100.0 / _UNIT,
+        thrust_acceleration_m_s2=3.0 / _UNIT,
+    )
+
+
+def episodes(settings: Settings) -> int:
+    """Return how many episodes the digest in a bundle covers: fewer where a step is much work."""
+    horizon = settings.horizon
+    work = max(horizon.prediction * horizon.control, _LEAST_WORK) * settings.optimizer.iterations
+    return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
+
+
+@lru_cache(maxsize=64)
+def frozen_digest(settings: Settings, count: int) -> int:
+    """Return the digest of the first `count` episodes, 32 bits, as the reference computes it."""
+    digest = 0
+    for first in range(0, count, _TOGETHER):
+        for seen in _episodes(settings, np.arange(first, min(first + _TOGETHER, count), dtype=np.uint32)):
+            digest = int(_fold(np.array([digest], np.uint32), np.array([seen], np.uint32))[0])
+    return digest
+
+
+def frozen_inputs(settings: Settings, episode: Words) -> Iterator[Inputs]:
+    """Yield the inputs of each tick of n episodes: states (n, 7), targets (n, 4), thrusts (n,)."""
+    source = _Source(episode)
+    for _ in range(TICKS // HELD):
+        inputs = _next_inputs(settings, source)
+        for _ in range(HELD):
+            yield inputs
+
+
+class _Source:
+    """n streams of 32-bit numbers: Marsaglia's xorshift (Journal of Statistical Software 8(14), 2003)."""
+
+    def __init__(self, episode: Words) -> None:
+        self._state = _fold(np.zeros_like(episode), episode + np.uint32(1))
+
+    def next(self) -> Words:
+        """Return the next number of every stream."""
+        state = self._state
+        state = state ^ (state << 13)
+        state = state ^ (state >> 17)
+        self._state = state ^ (state << 5)
+        return self._state
+
+    def draw(self, scalar: Scalar, scale: float | Real) -> Real:
+        """Return the upper 24 bits of the next number, signed, times `scale`: the one rounding of a draw."""
+        whole = (self.next() >> 8).astype(np.int32) - _UNIT
+        drawn: Real = whole.astype(scalar) * np.asarray(scale, scalar)
+        return drawn
+
+
+def _next_inputs(settings: Settings, source: _Source) -> Inputs:
+    """Draw states, targets and thrusts; five in 64 will be refused."""
+    scalar, scales, ranges = SCALARS[settings.code.scalar], spread(settings), settings.ranges
+    choice = source.next()
+    size = choice & 3
+    target = [source.draw(scalar, scales.target_position_m) for _ in range(2)]
+    target += [source.draw(scalar, scales.target_velocity_m_s) for _ in range(2)]
+    position, velocity = (
+        np.array(sizes, scalar)[size] for sizes in (scales.error_position_m, scales.error_velocity_m_s)
+    )
+    state = [target[axis] + source.draw(scalar, position) for axis in (0, 1)]
+    state += [target[axis] + source.draw(scalar, velocity) for axis in (2, 3)]
+    state += [source.draw(scalar, scales.attitude_rad) for _ in range(2)]
+    state += [source.draw(scalar, scales.yaw_rad)]
+    thrust = scalar(HOVER_M_S2) + source.draw(scalar, scales.thrust_acceleration_m_s2)
+    thrust = np.maximum(thrust, scalar(ranges.thrust_acceleration_min_m_s2))
+    thrust = np.minimum(thrust, scalar(ranges.thrust_acceleration_max_m_s2))
+
+    refusal = (choice >> 8) & 63
+    state[0] = np.where(refusal == 0, scalar(np.nan), state[0])
+    state[5] = np.where(refusal == 1, scalar(2) * scalar(ATTITUDE_LIMIT_RAD), state[5])
+    state[6] = np.where(refusal == 2, scalar(2) * scalar(YAW_LIMIT_RAD), state[6])
+    target[3] = np.where(refusal == 3, scalar(-2) * scalar(ranges.velocity_m_s), target[3])
+    thrust = np.where(refusal == 4, scalar(0), thrust)
+    return np.stack(state, axis=1), np.stack(target, axis=1), thrust
+
+
+def _episodes(settings: Settings, episode: Words) -> Words:
+    """Return the digests (n,) of n episodes, each by itself."""
+    controller = ReferenceController(settings, len(episode))
+    seen = np.zeros_like(episode)
+    for inputs in frozen_inputs(settings, episode):
+        for word in _words(controller.step(*inputs)):
+            seen = _fold(seen, word)
+    return seen
+
+
+def _words(step: Step) -> Iterator[Words]:
+    """Yield the outcome of a step in words (n,), the upper one first where a number has two."""
+    for whole in (step.status, step.iterations, step.converged):
+        yield whole.astype(np.uint32)
+    for real in (step.command_rad, step.cost, step.gradient, step.plan_rad):
+        rows = np.ascontiguousarray(real.reshape(len(real), -1))
+        yield from rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T
+
+
+def _fold(digest: NDArray[Any], word: NDArray[Any]) -> Words:
+    """Fold a word into a digest: no two words give the same, and upper bits reach lower ones."""
+    mixed = (digest ^ word) * np.uint32(_MULTIPLIER)
+    folded: Words = mixed ^ (mixed >> np.uint32(15))
+    return folded
