@@ -17,11 +17,19 @@ from typer.core import TyperGroup
 
 import codegen
 from codegen import bundle, exchange, presets
-from codegen.errors import DriftError, FileExistsRefusedError, MamboNmpcError, UnwritableError, echo
+from codegen.errors import (
+    BAD_INPUT,
+    INTERRUPTED,
+    NO_READER,
+    DriftError,
+    FileExistsRefusedError,
+    MamboNmpcError,
+    UnwritableError,
+    echo,
+)
 from codegen.render import render
 from codegen.settings import Settings, controller_toml
 
-BAD_INPUT, INTERRUPTED, NO_READER = 2, 130, 141
 EXIT_CODES = (
     "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "
     "130 interrupted; 141 nobody reads the output."
@@ -42,6 +50,10 @@ class RootGroup(TyperGroup):
                 sys.stdout.flush()
         except OSError as error:
             sys.exit(_exit_code(error))
+        except SystemExit as leaving:
+            if isinstance(leaving.__context__, BrokenPipeError):  # typer and rich meet it first, and exit 1
+                sys.exit(_exit_code(leaving.__context__))
+            raise
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
         """Run a command; with `--debug` an error shows its traceback first."""

@@ -2,6 +2,9 @@
 
 from typing import ClassVar
 
+BAD_INPUT, INTERRUPTED, NO_READER = 2, 130, 141
+"""Exit codes beside 0 and 1; the last two are what a shell makes of SIGINT and SIGPIPE."""
+
 LONGEST_ECHO = 60
 """Characters of a foreign value that a message repeats."""
 
@@ -19,7 +22,7 @@ def echo(text: str) -> str:
 class MamboNmpcError(Exception):
     """Something the user can put right; its text is the whole message, without a traceback."""
 
-    exit_code: ClassVar[int] = 2
+    exit_code: ClassVar[int] = BAD_INPUT
 
 
 class SourceNotFoundError(MamboNmpcError):

@@ -12,7 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from codegen import cli, presets
+from codegen import cli, errors, presets
 from codegen.settings import Settings, controller_toml
 
 COMMAND = "from codegen import cli; app = cli.root(); cli.register(app); app()"
@@ -230,14 +230,15 @@ def test_debug_shows_the_traceback() -> None:
     assert "SourceNotFoundError: nope is neither" in result.stderr
 
 
-def test_output_that_nobody_reads_ends_quietly() -> None:
-    """A closed pipe (| head) ends the command as the signal would, without a traceback."""
+@pytest.mark.parametrize("arguments", ["schema", "--help", "generate --help", "--version", ""])
+def test_output_that_nobody_reads_ends_quietly(arguments: str) -> None:
+    """A closed pipe (| head) ends the command as the signal would, without a traceback, help included."""
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-c", COMMAND, "schema"]
+    command = [sys.executable, "-c", COMMAND, *arguments.split()]
     with os.fdopen(writer, "wb") as closed:
         result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False)
-    assert (result.returncode, result.stderr) == (cli.NO_READER, b"")
+    assert (result.returncode, result.stderr) == (errors.NO_READER, b"")
 
 
 @pytest.mark.parametrize("arguments", [["schema"], ["--help"], ["generate", "-o", "out", "--json"]])
@@ -274,14 +275,14 @@ def test_what_the_system_refuses_gets_a_message(error: str, message: str) -> Non
 def test_root_help_names_the_exit_codes(app: typer.Typer) -> None:
     """Whoever writes a script finds them without the source."""
     text = run(app, "--help")[0]
-    assert all(str(number) in text for number in (cli.BAD_INPUT, cli.INTERRUPTED, cli.NO_READER))
+    assert all(str(number) in text for number in (errors.BAD_INPUT, errors.INTERRUPTED, errors.NO_READER))
 
 
 def test_ctrl_c_exits_130() -> None:
     """An interrupted command says so by its exit code, without a traceback."""
     command = [sys.executable, "-c", INTERRUPTED, "stop"]
     result = subprocess.run(command, capture_output=True, check=False)
-    assert (result.returncode, result.stderr) == (cli.INTERRUPTED, b"")
+    assert (result.returncode, result.stderr) == (errors.INTERRUPTED, b"")
 
 
 @pytest.mark.parametrize("command", ["init", "presets", "schema", "generate"])

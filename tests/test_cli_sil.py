@@ -2,12 +2,14 @@
 
 import csv
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from codegen.errors import INTERRUPTED
 from sil.loop import Flight
 from sil.report import table2_text
 from sil.table2 import Claim, Row, Table2
@@ -19,6 +21,21 @@ def command(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess
     script = "from sil.cli import main; main()"
     line = [sys.executable, "-c", script, *map(str, arguments)]
     return subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
+    """A signal in the middle of the imports: no traceback."""
+    (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    search = os.pathsep.join([str(tmp_path), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-m", "sil", "presets"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": search},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (INTERRUPTED, "", "")
 
 
 def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
