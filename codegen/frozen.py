@@ -109,11 +109,12 @@ class _Source:
 
     def next(self) -> Words:
         """Return the next number of every stream."""
-        state = self._state
-        state = state ^ (state << 13)
-        state = state ^ (state >> 17)
-        self._state = state ^ (state << 5)
-        return self._state
+        number = self._state
+        number = number ^ (number << np.uint32(13))
+        number = number ^ (number >> np.uint32(17))
+        number = number ^ (number << np.uint32(5))
+        self._state = number
+        return number
 
     def draw(self, scalar: Scalar, scale: float | Real) -> Real:
         """Return the upper 24 bits of the next number, signed, times `scale`: the one rounding of a draw."""
@@ -132,7 +133,7 @@ def _next_inputs(settings: Settings, source: _Source) -> Inputs:
     position, velocity = (
         np.array(sizes, scalar)[size] for sizes in (scales.error_position_m, scales.error_velocity_m_s)
     )
-    state = [target[axis] + source.draw(scalar, position) for axis in (0, 1)]
+    state: list[Real] = [target[axis] + source.draw(scalar, position) for axis in (0, 1)]
     state += [target[axis] + source.draw(scalar, velocity) for axis in (2, 3)]
     state += [source.draw(scalar, scales.attitude_rad) for _ in range(2)]
     state += [source.draw(scalar, scales.yaw_rad)]

@@ -1,4 +1,4 @@
-"""Eight bits: the self-test on an emulated ATmega2560, whose float library has the bits of the reference."""
+"""Eight bits: self-test and digest on an ATmega2560, whose float library has the bits of the reference."""
 
 import subprocess
 from pathlib import Path
@@ -8,12 +8,15 @@ import pytest
 
 from codegen import boards, presets
 from codegen.flags import COMPILE_FLAGS
+from codegen.frozen import frozen_digest
 from codegen.render import render
 from tests.support.tools import require
 
 MAIN = Path(__file__).parent / "support" / "avr.c"
 LONGEST_S = 60.0
-"""A guard against a program that prints nothing; the self-test takes well below a second."""
+"""A guard against a program that prints nothing; the tests take a second or two."""
+EPISODES = 2
+"""Frozen episodes that the program runs."""
 EFFORT = "return (weights->tracking * distance_m) + (weights->effort * variation_rad);"
 HARMED = (
     "return (weights->effort * variation_rad) + (weights->tracking * (distance_m + (nmpc_real_t)0.001f));"
@@ -64,14 +67,19 @@ def printed(program: Path) -> str:
 
 
 @pytest.mark.parametrize("preset", ["mambo", "table1"])
-def test_the_self_test_passes_on_eight_bits(preset: str, tmp_path: Path) -> None:
-    """Every step of it has the bits of the reference: zero, no first difference."""
-    assert printed(linked(render(presets.load(preset)), tmp_path)) == "0000"
+def test_eight_bits_have_the_bits_of_the_reference(preset: str, tmp_path: Path) -> None:
+    """No first difference in the self-test, and the digest of the same steps."""
+    settings = presets.load(preset)
+    expected = f"0000 {frozen_digest(settings, EPISODES):08X}"
+    assert printed(linked(render(settings, with_digest=False), tmp_path)) == expected
 
 
-def test_the_self_test_sees_a_harmed_controller_on_eight_bits(tmp_path: Path) -> None:
-    """A cost with a millimetre too much differs in the first step."""
-    files = render(presets.load("mambo"))
+def test_a_harmed_controller_shows_on_eight_bits(tmp_path: Path) -> None:
+    """A cost with a millimetre too much differs in the first step, and in the digest."""
+    settings = presets.load("mambo")
+    files = render(settings, with_digest=False)
     assert files["src/nmpc_cost.c"].count(EFFORT) == 1
     harmed = files | {"src/nmpc_cost.c": files["src/nmpc_cost.c"].replace(EFFORT, HARMED)}
-    assert printed(linked(harmed, tmp_path)) == "0001"
+    first, digest = printed(linked(harmed, tmp_path)).split()
+    assert first == "0001"
+    assert int(digest, 16) != frozen_digest(settings, EPISODES)

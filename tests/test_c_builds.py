@@ -10,6 +10,7 @@ import pytest
 
 from codegen import presets
 from codegen.flags import WARNING_FLAGS
+from codegen.frozen import frozen_digest
 from codegen.render import render
 from codegen.settings import Settings
 from tests.support.cases import settings_case
@@ -135,11 +136,29 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     placed(renamed(presets.load("mambo"), "drone"), tmp_path, amalgamate=amalgamate)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
+    digest = frozen_digest(presets.load("mambo"), 1000)
+    assert f"digest: 0x{digest:08X} after 100000 steps\n" in printed
     last = [float(word) for word in printed.splitlines()[-1].split()]
     assert abs(last[1] - last[3]) < 0.05
     assert abs(last[2] - 1.0) < 0.05
     shell("make", "-s", "clean", folder=tmp_path)
     assert not (tmp_path / "build").exists()
+
+
+def test_another_digest_than_the_reference_s_fails_the_example(tmp_path: Path) -> None:
+    """Both digests are said, and the example goes no further."""
+    require("make", "make")
+    header = placed(presets.load("mambo"), tmp_path) / "include" / "nmpc_self_test.h"
+    text = header.read_text()
+    stated = re.findall(r"#define NMPC_SELF_TEST_DIGEST 0x(\w{8})UL\n", text)
+    assert len(stated) == 1
+    header.write_text(text.replace(stated[0], "0BADC0DE"))
+    done = subprocess.run(["make", "-s", "run"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert done.stdout.splitlines()[2:] == [
+        f"digest: 0x{stated[0]} after 100000 steps",
+        "digest: the reference has 0x0BADC0DE",
+    ]
 
 
 def test_a_changed_header_is_built_anew(tmp_path: Path) -> None:

@@ -186,7 +186,7 @@ def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: 
 
 def test_the_self_test_passes_and_names_the_first_difference() -> None:
     """Zero for the unharmed code; with an expectation changed, its number."""
-    files = render(MAMBO)
+    files = render(MAMBO, with_digest=False)
     vectors = files["src/nmpc_self_test.c"]
     third = vectors.split("NMPC_OK,\n")[2]
     harmed = vectors.replace(third, third.replace("{ ", "{ 0.001f + ", 1))

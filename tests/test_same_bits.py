@@ -1,6 +1,6 @@
 """Same bits: every build has the digest of the reference, and nothing else has."""
 
-import json
+import re
 import shutil
 from importlib import resources
 from pathlib import Path
@@ -9,25 +9,24 @@ import numpy as np
 import pytest
 
 from codegen import boards, presets
-from codegen.footprint.build import OPTIMISATIONS, builder
-from codegen.reference import ReferenceController
+from codegen.errors import BuildError
+from codegen.footprint.build import OPTIMISATIONS, builder, clang_builder
+from codegen.frozen import TICKS, episodes, frozen_digest, frozen_inputs
+from codegen.reference import ReferenceController, Status
 from codegen.render import render
 from codegen.settings import Settings
 from codegen.settings.controller_toml import read
 from codegen.toolchain import host_toolchain
-from sil.compiled import CompiledController
-from sil.emulated import GUEST, EmulatedController
+from sil.compiled import compiled_digest
+from sil.emulated import GUEST, emulated_digest
 from sil.extension import load_extension
-from sil.frozen import TOGETHER, frozen_digest
-from sil.same_bits import HOST_COMPILERS, REFERENCE, builds, same_bits
+from sil.same_bits import BOARD_COMPILERS, HOST_COMPILERS, REFERENCE, builds, same_bits
 from tests.support.cases import settings_case
 from tests.support.tools import require, toolchain
 
 MAMBO = presets.load("mambo")
 EMULATED = ("mambo", "rp2040", "crazyflie", "teensy41", "rv32")
 GENERATED = Path(__file__).parent.parent / "generated"
-DIGESTS = GENERATED / "digests.json"
-FROZEN_STEPS = 100_000
 
 HARM = {
     "another order": (
@@ -42,11 +41,6 @@ HARM = {
 """Faults by name: file, the line, what it becomes."""
 
 
-def digest(settings: Settings, steps: int = 300) -> str:
-    """Return the digest of the reference."""
-    return frozen_digest(settings, ReferenceController(settings, TOGETHER), steps)
-
-
 def require_compiler(name: str) -> None:
     """Skip without a compiler for a board."""
     compiler = boards.load(name).compiler
@@ -55,20 +49,22 @@ def require_compiler(name: str) -> None:
 
 
 def check_every_build(names: tuple[str, ...], scalar: str) -> None:
-    """Compare the digests of all host compilers and of some boards at all optimisations."""
+    """Compare the digests of all host compilers and of some boards, by all compilers at all optimisations."""
     for compiler in HOST_COMPILERS:
         require(compiler, compiler)
     for name in names:
         require_compiler(name)
     settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
     chosen = [boards.load(name) for name in names]
-    found = list(same_bits(settings, chosen, 300))
-    assert [(one.where, one.optimisation) for one in found] == [
-        (REFERENCE, ""),
-        *((where, flag) for where in ("host", "host", *names) for flag in OPTIMISATIONS),
-    ]
+    found = list(same_bits(settings, chosen, 3))
+    expected = [(REFERENCE, "NumPy", "")]
+    expected += [("host", compiler, flag) for compiler in HOST_COMPILERS for flag in OPTIMISATIONS]
+    for board in chosen:
+        for compiler in (builder(board).toolchain.command[0], "clang"):
+            expected += [(board.name, compiler, flag) for flag in OPTIMISATIONS]
+    assert [(one.where, one.compiler, one.optimisation) for one in found] == expected
     assert len(found) == builds(chosen)
-    assert {one.digest for one in found} == {digest(settings)}
+    assert {one.digest for one in found} == {f"0x{frozen_digest(settings, 3):08X}"}
 
 
 def test_compilers_and_boards_share_one_digest() -> None:
@@ -83,26 +79,24 @@ def test_everything_shares_one_digest(scalar: str) -> None:
     check_every_build(EMULATED, scalar)
 
 
-@pytest.mark.parametrize("harm", HARM)
-def test_a_harmed_bundle_has_another_digest(harm: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("harm", "compiler"), zip(HARM, BOARD_COMPILERS, strict=True))
+def test_a_harmed_bundle_has_another_digest(harm: str, compiler: str, tmp_path: Path) -> None:
     """Even the order of an addition shows."""
     require_compiler("crazyflie")
+    require(compiler, compiler)
     path, line, instead = HARM[harm]
-    files = render(MAMBO)
+    files = render(MAMBO, with_digest=False)
     assert files[path].count(line) == 1
     glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
     good, harmed = (
-        builder(boards.load("crazyflie")).guest(bundle, glue, GUEST, tmp_path / name)
+        BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2").guest(bundle, glue, GUEST, tmp_path / name)
         for name, bundle in {
             "good": files,
             "harmed": files | {path: files[path].replace(line, instead)},
         }.items()
     )
-    digests = [
-        frozen_digest(MAMBO, EmulatedController(MAMBO, elf, "cortex-m4", TOGETHER), 200)
-        for elf in (good, harmed)
-    ]
-    assert digests[0] == digest(MAMBO, 200) != digests[1]
+    digests = [emulated_digest(MAMBO, elf, "cortex-m4", 2) for elf in (good, harmed)]
+    assert digests[0] == frozen_digest(MAMBO, 2) != digests[1]
 
 
 def test_other_settings_and_other_steps_have_other_digests() -> None:
@@ -115,27 +109,45 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
         document | {"optimizer": document["optimizer"] | {"variant": "irprop-"}},
         document | {"code": {"scalar": "float64"}},
     ]
-    digests = [digest(Settings.model_validate(one)) for one in (document, *changed)]
-    assert len({*digests, digest(MAMBO, 400)}) == len(digests) + 1
-    assert digests[0] == digest(MAMBO)
+    digests = [frozen_digest(Settings.model_validate(one), 3) for one in (document, *changed)]
+    assert len({*digests, frozen_digest(MAMBO, 4)}) == len(digests) + 1
+    assert digests[0] == frozen_digest(MAMBO, 3)
 
 
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", [0, 3, 7, 9])
-def test_frozen_steps_visit_every_answer(index: int) -> None:
-    """Whatever the settings, most inputs are good, and every thirteenth is refused."""
-    settings = settings_case(index, "float32")
-    reference = ReferenceController(settings, TOGETHER)
-    statuses: list[int] = []
+def test_c_makes_the_frozen_steps_of_the_reference(index: int, scalar: str) -> None:
+    """Whatever the settings, the ends of the horizon and narrow ranges among them."""
+    settings = settings_case(index, scalar)
+    extension = load_extension(render(settings, with_digest=False), scalar, toolchain("gcc"))
+    assert compiled_digest(extension, 5) == frozen_digest(settings, 5)
 
-    class Watched:
-        def step(self, *inputs: object) -> object:
-            outcome = reference.step(*inputs)  # type: ignore[arg-type] # handed on as they come
-            statuses.extend(outcome.status)
-            return outcome
 
-    frozen_digest(settings, Watched(), 1300)  # type: ignore[arg-type] # handed on as they come
-    assert len(statuses) == 1300
-    assert sum(status != 0 for status in statuses) == 100
+def test_frozen_steps_end_in_every_way() -> None:
+    """Near one in thirteen is refused, for each reason; searches rest early, commands reach their limit."""
+    episode = np.arange(50, dtype=np.uint32)
+    reference = ReferenceController(MAMBO, len(episode))
+    steps = [reference.step(*inputs) for inputs in frozen_inputs(MAMBO, episode)]
+    assert len(steps) == TICKS
+    status = np.array([step.status for step in steps])
+    assert set(status.flat) == {Status.OK, Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST}
+    assert 0.05 < np.mean(status != Status.OK) < 0.11
+    assert 0.005 < np.mean([step.converged for step in steps]) < 0.5
+    assert {int(count) for step in steps for count in step.iterations} == {0, 1, 2, 3, 4, 5}
+    limit = np.float32(MAMBO.limits.tilt_rad)
+    assert 0.05 < np.mean([np.abs(step.command_rad) == limit for step in steps]) < 0.5
+
+
+def test_frozen_inputs_are_spread_alike_and_never_twice() -> None:
+    """Every input of an episode fills its range evenly, and no two episodes share one."""
+    inputs = list(frozen_inputs(MAMBO, np.arange(400, dtype=np.uint32)))[::4]
+    yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
+    yaw = yaw[np.abs(yaw) <= 100]
+    shares = np.histogram(yaw, bins=10, range=(-100, 100))[0] / len(yaw)
+    assert np.all(np.abs(shares - 0.1) < 0.015)
+    targets = np.concatenate([target[:, 0] for _, target, _ in inputs])
+    assert len(np.unique(targets)) > 0.99 * len(targets)
+    assert np.all(np.abs(np.corrcoef(inputs[0][1], rowvar=False) - np.eye(4))[:3, :3] < 0.2)
 
 
 def test_a_missing_compiler_and_another_core_are_reasons(
@@ -143,26 +155,38 @@ def test_a_missing_compiler_and_another_core_are_reasons(
 ) -> None:
     """What did not run has no digest and says why; the reference always runs."""
     monkeypatch.setenv("PATH", str(tmp_path))
-    found = list(same_bits(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 100))
-    assert found[0].digest == digest(MAMBO, 100)
-    reasons = {(one.where, one.reason) for one in found[1:]}
+    found = list(same_bits(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
+    assert found[0].digest == f"0x{frozen_digest(MAMBO, 1):08X}"
+    reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
     assert all(one.digest is None for one in found[1:])
-    assert ("host", "clang is not here") in reasons
-    assert ("mega", "avr is not emulated here") in reasons
-    assert any(where == "crazyflie" and "gcc-arm-none-eabi" in reason for where, reason in reasons)
+    assert ("host", "clang", "clang is not here") in reasons
+    assert ("mega", "clang", "avr is not emulated here") in reasons
+    for where, compiler, package in (
+        ("crazyflie", "gcc", "gcc-arm-none-eabi"),
+        ("crazyflie", "clang", "clang"),
+    ):
+        assert any((one[0], one[1]) == (where, compiler) and package in one[2] for one in reasons)
 
 
-@pytest.mark.long
+def test_clang_needs_the_compiler_of_the_board_to_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clang alone brings no arithmetic for a board: the package that does is named."""
+    (tmp_path / "clang").symlink_to(require("clang", "clang"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BuildError, match="gcc-arm-none-eabi"):
+        clang_builder(boards.load("crazyflie"), "-O2")
+
+
 @pytest.mark.parametrize("name", ["mambo", "mambo-float64", "table1"])
-def test_a_committed_bundle_has_its_committed_digest(name: str) -> None:
-    """The C as it lies in generated/, over 100,000 steps; the reference has written the digest."""
-    toolchain(host_toolchain().command[0])
+def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
+    """The C as it lies in generated/, over all steps of its digest; the reference has written that."""
     settings = read(GENERATED / name / "controller.toml")
     files = {
         path.relative_to(GENERATED / name).as_posix(): path.read_text("utf-8")
         for path in (GENERATED / name).rglob("*.[ch]")
     }
-    extension = load_extension(files, settings.code.scalar, host_toolchain())
-    controller = CompiledController(settings, TOGETHER, extension)
-    expected = json.loads(DIGESTS.read_text("utf-8"))[name]
-    assert frozen_digest(settings, controller, FROZEN_STEPS) == expected
+    stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
+    assert stated
+    extension = load_extension(files, settings.code.scalar, toolchain(host_toolchain().command[0]))
+    assert compiled_digest(extension, episodes(settings)) == int(stated[1], 16)

@@ -7,12 +7,15 @@ from pathlib import Path
 import pytest
 
 from codegen import presets
+from codegen.frozen import frozen_digest
 from codegen.render import render
 from codegen.settings import Settings
 from tests.support.cases import CORNER_HORIZONS, settings_case
 from tests.support.tools import require
 
 ADVERSARY = Path(__file__).parent / "support" / "adversary.c"
+EPISODES = 3
+"""Frozen episodes that the adversary runs."""
 SANITIZERS = ["-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all"]
 SETTINGS = {name: presets.load(name) for name in presets.names()} | {
     f"case {index} {scalar}": settings_case(index, scalar)
@@ -57,20 +60,21 @@ def watched(files: dict[str, str], folder: Path) -> subprocess.CompletedProcess[
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_undefined_happens(name: str, tmp_path: Path) -> None:
-    """20,000 steps, half of them good or more: no report, no wild command, and the self-test passes after."""
+    """20,000 steps, half of them good or more: no report, no wild command; self-test and digest agree after."""
     settings: Settings = SETTINGS[name]
-    done = watched(render(settings), tmp_path)
+    done = watched(render(settings, with_digest=False), tmp_path)
     assert done.returncode == 0, done.stderr
-    found = re.fullmatch(r"good (\d+) wild 0 self-test 0\n", done.stdout)
+    found = re.fullmatch(r"good (\d+) wild 0 self-test 0 digest (\d+)\n", done.stdout)
     assert found, done.stdout
     assert int(found[1]) > 5000
+    assert int(found[2]) == frozen_digest(settings, EPISODES)
 
 
 @pytest.mark.parametrize("fault", BEYOND_THE_END)
 def test_a_step_beyond_the_end_is_reported(fault: str, tmp_path: Path) -> None:
     """Faults that parity may not see, for the memory beyond happens to be harmless."""
     path, right, wrong = BEYOND_THE_END[fault]
-    files = render(presets.load("mambo"))
+    files = render(presets.load("mambo"), with_digest=False)
     assert right in files[path]
     done = watched(files | {path: files[path].replace(right, wrong)}, tmp_path)
     assert done.returncode != 0

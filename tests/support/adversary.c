@@ -7,6 +7,7 @@
 #include "nmpc_self_test.h"
 
 #define STEPS 20000
+#define EPISODES 3
 
 static uint64_t seed = 1;
 
@@ -54,6 +55,7 @@ int main(void)
     nmpc_weights_t weights;
     int good = 0;
     int wild = 0;
+    unsigned long digest = 0UL;
     int i;
 
     (void)memset(&controller, 0xA5, sizeof(controller));
@@ -87,6 +89,9 @@ int main(void)
             wild++;
         }
     }
-    (void)printf("good %d wild %d self-test %d\n", good, wild, nmpc_self_test(&controller));
+    for (i = 0; i < EPISODES; i++) {
+        digest = nmpc_self_test_episode(&controller, i, digest);
+    }
+    (void)printf("good %d wild %d self-test %d digest %lu\n", good, wild, nmpc_self_test(&controller), digest);
     return 0;
 }

@@ -119,7 +119,7 @@ def linked_controller(
     """Link the guest with the controller of preset mambo, and leave gcc's figures of the stack beside it."""
     settings = presets.load("mambo")
     code = settings.code.model_copy(update={"scalar": scalar})
-    for path, text in render(settings.model_copy(update={"code": code})).items():
+    for path, text in render(settings.model_copy(update={"code": code}), with_digest=False).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)
     sources = sorted(str(path.relative_to(folder)) for path in folder.glob("src/*.c"))
