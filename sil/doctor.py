@@ -86,6 +86,7 @@ def _needs() -> tuple[_Need, ...]:
     on_others = [board.name for board in known if board.emulated_core.value != "avr"]
     return (
         _Need("compiler", _host_compilers(), "flies the C here: fly, table2", "Debian", ("gcc",)),
+        _Need("compiler", ("clang",), "builds for all but the AVR: same-bits", "Debian", ("clang",)),
         *_cross_compilers(known),
         _Need("emulator", ("unicorn",), f"runs the C of {', '.join(on_others)}", "PyPI", ("unicorn",)),
         _Need(

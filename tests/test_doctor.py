@@ -64,7 +64,7 @@ def test_a_bare_machine_is_told_what_to_install(bare: Path) -> None:
     assert not any(finding.here or finding.version for finding in commands)
     assert "cc or gcc or clang" in text
     for finding in commands:
-        line = next(line for line in text.splitlines() if f" {finding.tool} " in line)
+        line = next(line for line in text.splitlines() if f"  {finding.tool}  " in line)
         assert "  missing  " in line
         assert line.endswith(finding.enables)
         install = next(line for line in text.splitlines() if "apt install" in line)

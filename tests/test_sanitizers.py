@@ -60,7 +60,7 @@ def watched(files: dict[str, str], folder: Path) -> subprocess.CompletedProcess[
 
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_undefined_happens(name: str, tmp_path: Path) -> None:
-    """20,000 steps, half of them good or more: no report, no wild command; self-test and digest agree after."""
+    """20,000 steps, half of them good or more: no report, no wild command, and the bits of the reference."""
     settings: Settings = SETTINGS[name]
     done = watched(render(settings, with_digest=False), tmp_path)
     assert done.returncode == 0, done.stderr
