@@ -79,7 +79,7 @@ def test_everything_shares_one_digest(scalar: str) -> None:
     check_every_build(EMULATED, scalar)
 
 
-@pytest.mark.parametrize(("harm", "compiler"), zip(HARM, BOARD_COMPILERS, strict=True))
+@pytest.mark.parametrize(("harm", "compiler"), list(zip(HARM, BOARD_COMPILERS, strict=True)))
 def test_a_harmed_bundle_has_another_digest(harm: str, compiler: str, tmp_path: Path) -> None:
     """Even the order of an addition shows."""
     require_compiler("crazyflie")
