@@ -1,6 +1,7 @@
 """Building and caching the C: private, once, and with messages that say what is missing."""
 
 import os
+import stat
 import subprocess
 import sys
 import time
@@ -19,6 +20,12 @@ from tests.support.tools import require
 MAMBO = presets.load("mambo")
 
 
+def make(folder: Path) -> Path:
+    """Build the file that the tests of the cache ask for."""
+    (folder / "made").write_text("made")
+    return folder / "made"
+
+
 @pytest.fixture
 def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Give the test a cache folder of its own."""
@@ -33,6 +40,87 @@ def test_the_cache_is_private(empty_cache: Path) -> None:
     empty_cache.chmod(0o770)
     with pytest.raises(CacheError, match="others may write"):
         cache_folder()
+
+
+AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+STRANGER = 1234
+
+
+@pytest.mark.parametrize("mode", [0o770, 0o777])
+def test_a_cache_below_what_others_may_write_is_refused(empty_cache: Path, mode: int) -> None:
+    """They could put their own in its place; nothing is made there. A sticky /tmp is no danger."""
+    empty_cache.parent.chmod(mode)
+    with pytest.raises(CacheError, match=f"others may write to {empty_cache.parent}, "):
+        cache_folder()
+    assert not empty_cache.exists()
+    empty_cache.parent.chmod(mode | stat.S_ISVTX)
+    assert cache_folder() == empty_cache
+
+
+@AS_ROOT
+def test_root_leaves_the_cache_of_somebody_else_alone(empty_cache: Path) -> None:
+    """Neither loads from it, nor makes a folder in it that its owner could then not use."""
+    os.chown(empty_cache.parent, STRANGER, STRANGER)
+    with pytest.raises(CacheError, match="belongs to somebody else"):
+        cache_folder()
+    assert not empty_cache.exists()
+
+
+def test_folders_made_for_the_cache_are_private_whatever_the_umask(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a group shares what its members make, the cache is still one's own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
+    before = os.umask(0o002)
+    try:
+        made = cached("name", make)
+    finally:
+        os.umask(before)
+    assert made.stat().st_mode & 0o777 == 0o600
+    assert {place.stat().st_mode & 0o777 for place in list(made.parents)[:3]} == {0o700}
+
+
+def test_the_cache_is_used_where_its_path_leads(empty_cache: Path, tmp_path: Path) -> None:
+    """A link in its path, which somebody may turn round later, is followed once."""
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    empty_cache.symlink_to(tmp_path / "elsewhere")
+    assert cached("name", make).parent == tmp_path / "elsewhere"
+
+
+@pytest.mark.parametrize("plant", ["writable by others", "link", pytest.param("foreign", marks=AS_ROOT)])
+def test_a_planted_build_is_not_trusted(empty_cache: Path, tmp_path: Path, plant: str) -> None:
+    """Put there while others could write to the folder, under the name that its content asks for."""
+    planted = cached("name", make)
+    before = planted.stat().st_ino
+    match plant:
+        case "writable by others":
+            planted.chmod(0o666)
+        case "link":
+            planted.rename(tmp_path / "theirs")
+            planted.symlink_to(tmp_path / "theirs")
+        case _:
+            os.chown(planted, STRANGER, STRANGER)
+    found = cached("name", make)
+    assert found.lstat().st_ino != before
+    assert (found.is_symlink(), found.stat().st_uid, found.stat().st_mode & 0o777) == (
+        False,
+        os.getuid(),
+        0o600,
+    )
+    assert list(empty_cache.iterdir()) == [found]
+
+
+def test_a_cache_named_by_a_relative_path_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be another in every folder, such as one that came with somebody's sources."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
+    with pytest.raises(CacheError, match="cache/mambo-nmpc must be an absolute path; set XDG_CACHE_HOME"):
+        cache_folder()
+
+
+def test_a_build_that_ends_meanwhile_disturbs_no_other(empty_cache: Path) -> None:
+    """The work folder of another process may go between being listed and being looked at."""
+    (cache_folder() / "build-gone").symlink_to("gone")
+    assert cached("name", make).parent == empty_cache
 
 
 def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None:
@@ -53,14 +141,9 @@ def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None
 
 def test_a_damaged_build_is_built_anew(empty_cache: Path) -> None:
     """Cut short by a full disk or a crash, it would kill the process that loads it."""
-
-    def build(folder: Path) -> Path:
-        (folder / "made").write_text("made")
-        return folder / "made"
-
     for damage in ("", "ma"):
-        cached("name", build).write_text(damage)
-        assert cached("name", build).read_text() == "made"
+        cached("name", make).write_text(damage)
+        assert cached("name", make).read_text() == "made"
     assert len(list(empty_cache.iterdir())) == 1
 
 
@@ -78,11 +161,7 @@ def test_what_killed_builds_left_is_cleared(empty_cache: Path) -> None:
         then = time.time() - age_s
         os.utime(empty_cache / name, (then, then))
 
-    def build(folder: Path) -> Path:
-        (folder / "made").write_text("made")
-        return folder / "made"
-
-    made = cached("name", build)
+    made = cached("name", make)
     assert set(empty_cache.iterdir()) == {made, empty_cache / "build-young"}
 
 
