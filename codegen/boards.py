@@ -1,17 +1,27 @@
 """The named boards: TOML files with what a board has, how C is built for it, what a controller may take.
 
 Every section of such a file says where its values come from and how sure they are. A file of one's own in the
-same shape is as good as a named board.
+same shape is as good as a named board, and need not be trusted: it chooses among the compilers on the PATH and
+for which core they build, but can run no other program and name no file.
 """
 
 import difflib
 import json
+import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Final, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
@@ -21,10 +31,50 @@ _FOLDER = resources.files("codegen") / "data" / "boards"
 _PYDANTIC_SUBJECTS: Final = ("Input should", "String should", "Tuple should")
 
 Value = TypeVar("Value")
-Words = Annotated[str, Field(min_length=1)]
+
+
+def _matching(pattern: str, rule: str) -> AfterValidator:
+    """Refuse text that `pattern` does not match as a whole; `rule` says what it must be."""
+
+    def check(text: str) -> str:
+        if not re.fullmatch(pattern, text, re.ASCII):
+            raise PydanticCustomError("text", f"must be {rule}")
+        return text
+
+    return AfterValidator(check)
+
+
+def _printable(text: str) -> str:
+    """Refuse what moves the cursor of a terminal or breaks a line."""
+    if not text.isprintable():
+        raise PydanticCustomError("text", "must be printable, without line ends and control characters")
+    return text
+
+
+Words = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
+Command = Annotated[
+    str,
+    _matching(
+        r"([\w.]+-)*(gcc|cc|clang)(-[\w.]+)?",
+        "the name of a GCC or Clang on the PATH, as in arm-none-eabi-gcc",
+    ),
+]
+Flag = Annotated[
+    str,
+    _matching(
+        r"-m[\w=+.,-]+|-f[\w-]+|-std=[\w+]+|--target=[\w.-]+|-shared",
+        "a flag for core, FPU or dialect: -m..., -f... without a value, -std=, --target= or -shared",
+    ),
+]
+Library = Annotated[str, _matching(r"-l[\w.+-]+", "a library, as in -lgcc")]
 Bytes = Annotated[int, Field(ge=1, le=2**40)]
 Share = Annotated[float, Field(gt=0, le=1)]
-ManyWords = Annotated[tuple[Words, ...], Field(strict=False)]
+
+_MANY: Final = Field(strict=False)
+Commands = Annotated[tuple[Command, ...], _MANY]
+Packages = Annotated[tuple[Words, ...], _MANY]
+Flags = Annotated[tuple[Flag, ...], _MANY]
+Libraries = Annotated[tuple[Library, ...], _MANY]
 
 
 class _Section(BaseModel):
@@ -45,11 +95,11 @@ class Fact(_Section, Generic[Value]):
 class Compiler(_Section):
     """How C is built for a board."""
 
-    candidates: ManyWords = Field(min_length=1, description="commands, the first that is there is taken")
-    packages: ManyWords = Field(min_length=1, description="Debian packages that bring one of the candidates")
-    flags: ManyWords = Field(description="what compiling and linking add: core, FPU, dialect")
-    link_flags: ManyWords = Field((), description="what linking for the firmware adds to that")
-    libraries: ManyWords = Field(("-lgcc",), description="libraries that hold the compiler's own helpers")
+    candidates: Commands = Field(min_length=1, description="commands, the first that is there is taken")
+    packages: Packages = Field(min_length=1, description="Debian packages that bring one of the candidates")
+    flags: Flags = Field(description="what compiling and linking add: core, FPU, dialect")
+    link_flags: Flags = Field((), description="what linking for the firmware adds to that")
+    libraries: Libraries = Field(("-lgcc",), description="libraries that hold the compiler's own helpers")
 
     @property
     def common(self) -> str:
@@ -81,7 +131,7 @@ class Board(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    name: str = Field(description="the stem of the file")
+    name: Words = Field(description="the stem of the file")
     title: Words = Field(description="the name of the board in full")
     core: Fact[Words] = Field(description="the core and its architecture")
     fpu: Fact[Literal["none", "single", "double"]] = Field(
@@ -192,6 +242,8 @@ def _spelled(value: object) -> str:
         return echo(json.dumps(value, ensure_ascii=False, default=str))
     except ValueError:
         return "a number too long to repeat"
+    except RecursionError:
+        return "a value too deep to repeat"
 
 
 def _not_found(name: str) -> SourceNotFoundError:

@@ -1,5 +1,6 @@
 """Boards: what their files say, whether compilers agree, and what is said about a bad file."""
 
+import json
 import shutil
 import subprocess
 import tomllib
@@ -206,6 +207,16 @@ def test_unknown_board_lists_those_there_are(
             "compiler.candidates = [] must have at least 1 item",
         ),
         ('"-mthumb"', "7", "compiler.flags.1 = 7 must be a valid string"),
+        (
+            'title = "Bitcraze Crazyflie 2.1"',
+            'title = "two\\nlines"',
+            'title = "two\\nlines" must be printable, without line ends and control characters',
+        ),
+        (
+            'value = "single"',
+            f"value{'.a' * 2_000} = 1",
+            "fpu.value = a value too deep to repeat must be 'none', 'single' or 'double'",
+        ),
         ("title =", "fpu_bits = 32\ntitle =", "fpu_bits is not a key of a board; there are title, core, fpu"),
         ("title =", "core = 5\ntitle =", "[core] is there already"),
         (
@@ -224,6 +235,62 @@ def test_bad_file_is_told_key_value_and_rule(old: str, new: str, fault: str, tmp
     lines = str(caught.value).splitlines()
     assert all("own.toml: " in line for line in lines)
     assert any(fault in line for line in lines), lines
+
+
+@pytest.mark.parametrize(
+    "command", ["sh", "./gcc", "/tmp/gcc", "rm", "gcc ", "touch", "gcc;id", "gcc\n", "a\0-gcc", "", "-gcc"]
+)
+def test_a_board_runs_compilers_of_the_path_alone(command: str, tmp_path: Path) -> None:
+    """A board's file may come from anywhere: no program beside it is run, and none that is no compiler."""
+    text = changed('candidates = ["arm-none-eabi-gcc"]', f"candidates = [{json.dumps(command)}]")
+    with pytest.raises(InvalidSettingsError, match=r"candidates\.0 = .* must be the name of a GCC or Clang"):
+        boards.load(own(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    "flag",
+    [
+        *("-fplugin=x.so", "-fpass-plugin=x.so", "-wrapper", "-fuse-ld=/tmp/ld", "-B.", "-specs=x", "@flags"),
+        *("-o/tmp/x", "-o", "/tmp/x", "-I/", "-L/", "-Wl,-T,x", "-Xlinker", "-save-temps", "-include", "x.c"),
+        *(
+            "-fdump-tree-all=/tmp/x",
+            "-fprofile-dir=/",
+            "-mcpu=x/../y",
+            "-m a",
+            "-mx\n",
+            "-m\0x",
+            "",
+            "-D$(id)",
+        ),
+    ],
+)
+def test_a_board_s_flags_name_no_file_and_no_program(flag: str, tmp_path: Path) -> None:
+    """They choose core, FPU and dialect: no plug-in, wrapper, linker, specification, include or output."""
+    for text in (
+        changed('"-mthumb"', json.dumps(flag)),
+        changed('flags = ["-mcpu', f'link_flags = [{json.dumps(flag)}]\nflags = ["-mcpu'),
+    ):
+        with pytest.raises(InvalidSettingsError, match=r"flags\.\d = .* must be a flag for core, FPU"):
+            boards.load(own(tmp_path, text))
+    library = changed('flags = ["-mcpu', f'libraries = [{json.dumps(flag)}]\nflags = ["-mcpu')
+    with pytest.raises(InvalidSettingsError, match=r"libraries\.0 = .* must be a library"):
+        boards.load(own(tmp_path, library))
+
+
+@pytest.mark.parametrize(
+    ("command", "flags"),
+    [
+        ("clang", ["--target=arm-none-eabi", "-mcpu=cortex-m4"]),
+        ("arm-none-eabi-gcc-12.2", ["-ffreestanding"]),
+        ("gcc-12", ["-march=rv32imac_zicsr", "-mtune=sifive-7-series", "-std=gnu++17", "-fshort-enums"]),
+        ("xtensa-esp32-elf-cc", ["-mlongcalls", "-mno-unaligned-access", "-mcpu=x+nofp"]),
+    ],
+)
+def test_a_board_s_compiler_may_be_any_of_the_usual(command: str, flags: list[str], tmp_path: Path) -> None:
+    """Cross compilers by their usual names, and the options of their machines."""
+    text = changed('candidates = ["arm-none-eabi-gcc"]', f'candidates = ["{command}"]')
+    text = text.replace('"-mthumb"', ", ".join(json.dumps(flag) for flag in flags))
+    assert set(flags) <= set(boards.load(own(tmp_path, text)).compiler.flags)
 
 
 def test_section_without_keys_is_told_to_be_a_section(tmp_path: Path) -> None:
