@@ -1,7 +1,7 @@
 """The named boards: TOML files with what a board has, how C is built for it, what a controller may take.
 
 Every section of such a file says where its values come from and how sure they are. A file of one's own in the
-same shape is as good as a named board, and need not be trusted: it chooses among the compilers on the PATH and
+same shape is as good as a named board, and need not be trusted: it chooses among compilers on the PATH and
 for which core they build, but can run no other program and name no file.
 """
 
