@@ -1,5 +1,6 @@
 """The generated C as firmware people build it: dialects, warnings, symbols, two controllers in one image."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -9,10 +10,12 @@ from pathlib import Path
 import pytest
 
 from codegen import presets
+from codegen.errors import InvalidSettingsError
 from codegen.flags import WARNING_FLAGS
 from codegen.frozen import frozen_digest
 from codegen.render import render
 from codegen.settings import Settings
+from codegen.settings.controller_toml import with_option
 from tests.support.cases import settings_case
 from tests.support.tools import require
 
@@ -40,6 +43,13 @@ PACKAGES = {"gcc": "gcc", "g++": "g++", "clang": "clang", "clang++": "clang"}
 SETTINGS = {name: presets.load(name) for name in presets.names()} | {
     f"case {index}": settings_case(index, "float32") for index in (0, 3, 9)
 }
+SYSTEM_HEADERS = """
+    assert complex ctype dirent dlfcn errno fcntl fenv float fmtmsg glob iconv inttypes limits locale
+    math mqueue netinet/in poll pthread regex sched semaphore setjmp signal spawn stdarg stdatomic
+    stdbool stddef stdint stdio stdlib string strings sys/mman sys/resource sys/select sys/shm
+    sys/socket sys/stat sys/time sys/types sys/wait termios threads time uchar unistd wchar wctype
+    wordexp
+"""
 COMPILER_HELPERS = {"memcpy", "memset"}
 
 
@@ -127,6 +137,31 @@ def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
         folder=tmp_path,
     )
     shell("./image", folder=tmp_path)
+
+
+def test_no_prefix_that_is_admitted_takes_a_name_of_the_system(tmp_path: Path) -> None:
+    """pid_t, sem_init or R_OK would be declared twice wherever the system's headers are included too."""
+    require("gcc", "gcc")
+    headers = "".join(
+        f"#if __has_include(<{name}.h>)\n#include <{name}.h>\n#endif\n" for name in SYSTEM_HEADERS.split()
+    )
+    (tmp_path / "all.c").write_text(headers)
+    taken = set()
+    for mode in ("-P", "-dM"):
+        taken |= set(re.findall(r"\b[A-Za-z]\w*", shell("gcc", "-E", mode, "all.c", folder=tmp_path)))
+    library = "\n".join(text for path, text in render(Settings()).items() if path.endswith((".c", ".h")))
+    ours = set(re.findall(r"\b(?:nmpc|NMPC)(?:_(?!sign)\w+)", library))  # lconv has a member negative_sign
+    assert {"nmpc_t", "nmpc_init", "NMPC_OK"} <= ours
+    endings = {name[len("nmpc") :] for name in ours}
+    prefixes = {
+        name.removesuffix(ending).lower() for name in taken for ending in endings if name.endswith(ending)
+    }
+    admitted = []
+    for prefix in sorted(prefixes):
+        with contextlib.suppress(InvalidSettingsError):
+            with_option(Settings(), "code.prefix", prefix, "")
+            admitted.append(prefix)
+    assert admitted == []
 
 
 @pytest.mark.parametrize("amalgamate", [False, True])

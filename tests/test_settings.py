@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
 from codegen.settings import Settings, controller_toml
 from codegen.settings.keys import KEYS, Key, spelled
-from codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
+from codegen.settings.reserved import DEVICES, KEYWORDS, STANDARD_NAMES
 
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 COMPANIONS: dict[str, dict[str, float]] = {
@@ -66,7 +66,7 @@ def any_settings(draw: st.DrawFn) -> Settings:
         "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(
             st.from_regex(r"[a-z][a-z0-9]{0,7}(_[a-z0-9]{1,7}){0,2}", fullmatch=True).filter(
-                lambda word: word not in KEYWORDS | STANDARD_NAMES
+                lambda word: word not in KEYWORDS | STANDARD_NAMES | DEVICES
             )
         ),
     }
@@ -223,6 +223,16 @@ def test_bounds_are_closed(key: Key) -> None:
             'code.prefix = "int"',
             'code.prefix = "int" must not be a keyword of C or C++; write for example int_nmpc',
         ),
+        (
+            'code.prefix = "pid"',
+            'code.prefix = "pid" must not be a header or a name of the C library or POSIX; '
+            "write for example pid_nmpc",
+        ),
+        (
+            'code.prefix = "aux"',
+            'code.prefix = "aux" must not be a device of Windows, no file\'s name there; '
+            "write for example aux_nmpc",
+        ),
     ],
 )
 def test_fault_names_key_value_rule_and_fix(text: str, fault: str) -> None:
@@ -279,7 +289,7 @@ def test_odd_value_gets_short_printable_line(value: str) -> None:
         "nmpc\n",
         "naïve",
         "a" * 25,
-        *sorted(KEYWORDS | STANDARD_NAMES),
+        *sorted(KEYWORDS | STANDARD_NAMES | DEVICES),
     ],
 )
 def test_prefix_that_is_no_c_name_is_refused(prefix: str) -> None:

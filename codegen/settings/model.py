@@ -18,17 +18,6 @@ from codegen.settings import reserved
 SHORTEST_LAG_S = 0.001
 """An attitude lag is 0 (none) or at least this: below it the exact discretisation is a unit step."""
 
-_WORDS = """
-    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
-    char32_t class co_await co_return co_yield compl concept const const_cast consteval constexpr
-    constinit continue decltype default delete do double dynamic_cast else enum explicit export
-    extern false final float for friend goto if import inline int long module mutable namespace new
-    noexcept not not_eq nullptr operator or or_eq override private protected public register
-    reinterpret_cast requires restrict return short signed sizeof static static_assert static_cast
-    struct switch template this thread_local throw true try typedef typeid typename typeof
-    typeof_unqual union unsigned using virtual void volatile wchar_t while xor xor_eq
-"""
-
 
 def _without_minus_zero(value: float) -> float:
     """Return `value` with -0.0 as 0.0, so that equal settings have equal digests and equal C."""
@@ -310,7 +299,12 @@ class Code(_Section):
         if prefix in reserved.STANDARD_NAMES:
             raise PydanticCustomError(
                 "keyword",
-                f"must not be a header or a type of the C library; write for example {prefix}_nmpc",
+                f"must not be a header or a name of the C library or POSIX; write for example {prefix}_nmpc",
+            )
+        if prefix in reserved.DEVICES:
+            raise PydanticCustomError(
+                "keyword",
+                f"must not be a device of Windows, no file's name there; write for example {prefix}_nmpc",
             )
         return prefix
 

@@ -19,6 +19,19 @@ _TYPES = """
     clock div fpos imaxdiv intmax intptr ldiv lldiv max_align mbstate off ptrdiff rsize sig_atomic size ssize
     uintmax uintptr wctrans wint
 """
+_ATOMIC = "bool char char16 char32 flag llong long schar short uchar uint ullong ulong ushort wchar"
+_THREADS = "cnd mtx once thrd thrd_start tss tss_dtor"
+_POSIX = """
+    active_reg blkcnt blksize caddr cc char16 char32 clockid cpu_set daddr dev f fexcept fpregset
+    fsblkcnt fsfilcnt fsid gid glob greg gregset iconv id idtype in_addr in_port ino key loff mcontext
+    mm mode mqd msglen msgqnum nfds nlink pid posix_spawn_file_actions posix_spawnattr quad r re_dfa
+    reg_errcode reg_syntax regex regmatch regoff rlim s_reg sa_family sem shmatt sig sigevent siginfo
+    sigset sigval socklen speed stack suseconds tcflag timer u_int16 u_int32 u_int64 u_int8 u_quad
+    ucontext uid useconds w wordexp x
+"""
+_PTHREAD = """
+    attr barrier barrierattr cond condattr destructor key mutex mutexattr once rwlock rwlockattr spin spinlock
+"""
 _WIDTHS = [
     f"{sign}int{kind}{bits}"
     for sign in ("", "u")
@@ -29,5 +42,22 @@ _WIDTHS = [
 KEYWORDS = frozenset(_KEYWORDS.split())
 """The words of C23 and C++23, the contextual ones included."""
 
-STANDARD_NAMES = frozenset([*_HEADERS.split(), *_TYPES.split(), *_WIDTHS])
-"""Prefixes that would shadow a header of the C library (stdio.h) or define one of its types (size_t)."""
+STANDARD_NAMES = frozenset(
+    [
+        *_HEADERS.split(),
+        *_TYPES.split(),
+        *_WIDTHS,
+        *_THREADS.split(),
+        *_POSIX.split(),
+        "atomic",
+        *(f"atomic_{word}" for word in (*_ATOMIC.split(), *_TYPES.split(), *_WIDTHS)),
+        "pthread",
+        *(f"pthread_{word}" for word in _PTHREAD.split()),
+    ]
+)
+"""Prefixes that would shadow a header of the C library (stdio.h) or take a name of it or of POSIX (pid_t)."""
+
+DEVICES = frozenset(
+    ["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))]
+)
+"""Prefixes of which Windows makes no file, whatever its ending: a bundle with aux.h cannot be checked out."""
