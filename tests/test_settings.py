@@ -3,7 +3,6 @@
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import jsonschema
 import pytest
@@ -13,9 +12,8 @@ from hypothesis import strategies as st
 from codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
 from codegen.settings import Settings, controller_toml
 from codegen.settings.keys import KEYS, Key, spelled
-from codegen.settings.reserved import DEVICES, KEYWORDS, STANDARD_NAMES
+from tests.support.strategies import NUMBERS, RESERVED, any_settings, nested, toml
 
-NUMBERS = [key for key in KEYS.values() if key.low is not None]
 COMPANIONS: dict[str, dict[str, float]] = {
     "horizon.prediction = 1": {"horizon.control": 1},
     "horizon.control = 50": {"horizon.prediction": 50},
@@ -29,63 +27,6 @@ COMPANIONS: dict[str, dict[str, float]] = {
 SCHEMA = jsonschema.Draft202012Validator(Settings.json_schema())
 ODD_VALUES = ("nan", "-inf", "-1", "1e300", "true", '"1"', '"\\u001b[31m"', "[]", "{a = 1}", "1979-05-27")
 HUGE_VALUES = ("0x" + "f" * 6000, '"' + "x" * 9000 + '"')
-
-
-def numbers(path: str, low: float | None = None, high: float | None = None) -> st.SearchStrategy[float]:
-    """Draw a number that the key at `path` admits, within narrower bounds if given."""
-    key = KEYS[path]
-    assert key.low is not None
-    assert key.high is not None
-    return st.floats(max(low or key.low, key.low), high or key.high)
-
-
-@st.composite
-def any_settings(draw: st.DrawFn) -> Settings:
-    """Draw valid settings, every key free within the rules."""
-    prediction = draw(st.integers(1, 50))
-    update = draw(st.sampled_from(["exact", "printed"]))
-    lag = st.just(0.0) if update == "printed" else st.just(0.0) | st.floats(0.001, 2)
-    step_min = draw(numbers("optimizer.step_min_rad"))
-    initial = draw(numbers("optimizer.initial_step_rad", low=step_min))
-    thrust_min = draw(numbers("ranges.thrust_acceleration_min_m_s2"))
-    constrained: dict[str, Any] = {
-        "horizon.prediction": prediction,
-        "horizon.control": draw(st.integers(1, prediction)),
-        "model.position_update": update,
-        "model.yaw_convention": draw(st.sampled_from(["rotation", "printed"])),
-        "model.roll_lag_s": draw(lag),
-        "model.pitch_lag_s": draw(lag),
-        "optimizer.variant": draw(st.sampled_from(["rprop+", "irprop-"])),
-        "optimizer.iterations": draw(st.integers(1, 100)),
-        "optimizer.initial_step_rad": initial,
-        "optimizer.step_max_rad": draw(numbers("optimizer.step_max_rad", low=initial)),
-        "optimizer.step_min_rad": step_min,
-        "optimizer.warm_start": draw(st.sampled_from(["last_command", "plan"])),
-        "ranges.thrust_acceleration_min_m_s2": thrust_min,
-        "ranges.thrust_acceleration_max_m_s2": draw(st.floats(thrust_min, 1000, exclude_min=True)),
-        "code.scalar": draw(st.sampled_from(["float32", "float64"])),
-        "code.prefix": draw(
-            st.from_regex(r"[a-z][a-z0-9]{0,7}(_[a-z0-9]{1,7}){0,2}", fullmatch=True).filter(
-                lambda word: word not in KEYWORDS | STANDARD_NAMES | DEVICES
-            )
-        ),
-    }
-    free = {path: draw(numbers(path)) for path in KEYS if path not in constrained}
-    return Settings.model_validate(nested(constrained | free))
-
-
-def nested(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return {section: {key: value}} of {"section.key": value}."""
-    document: dict[str, dict[str, Any]] = {}
-    for path, value in values.items():
-        section, name = path.split(".")
-        document.setdefault(section, {})[name] = value
-    return document
-
-
-def toml(values: dict[str, Any]) -> str:
-    """Return TOML text of {"section.key": value}."""
-    return "".join(f"{path} = {spelled(value)}\n" for path, value in values.items())
 
 
 def faults_of(text: str) -> list[str]:
@@ -289,7 +230,7 @@ def test_odd_value_gets_short_printable_line(value: str) -> None:
         "nmpc\n",
         "naïve",
         "a" * 25,
-        *sorted(KEYWORDS | STANDARD_NAMES | DEVICES),
+        *sorted(RESERVED),
     ],
 )
 def test_prefix_that_is_no_c_name_is_refused(prefix: str) -> None:

@@ -1,0 +1,255 @@
+"""Settings drawn by hypothesis: any valid ones, and any valid ones but for one broken rule."""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from hypothesis import strategies as st
+
+from codegen.settings import Settings
+from codegen.settings.keys import KEYS, Key, spelled
+from codegen.settings.reserved import DEVICES, KEYWORDS, STANDARD_NAMES
+
+Values = dict[str, Any]
+"""Settings by their dotted paths."""
+
+RESERVED = KEYWORDS | STANDARD_NAMES | DEVICES
+NUMBERS = [key for key in KEYS.values() if key.low is not None]
+CHOICES = [key for key in KEYS.values() if key.kind == "one of"]
+
+
+def numbers(path: str, low: float | None = None, high: float | None = None) -> st.SearchStrategy[float]:
+    """Draw a number that the key at `path` admits, within narrower bounds if given; often a bound."""
+    least, most = _bounds(KEYS[path])
+    least, most = max(least, low or least), min(most, high or most)
+    smallest = max(least, most * 1e-12)
+    across_decades = st.floats(math.log(smallest), math.log(most)).map(
+        lambda logarithm: min(max(math.exp(logarithm), least), most)
+    )
+    return st.sampled_from([least, most]) | st.floats(least, most) | across_decades
+
+
+@st.composite
+def valid_values(draw: st.DrawFn) -> Values:
+    """Draw valid settings, every key free within the rules, by their dotted paths."""
+    prediction = draw(st.integers(1, 50))
+    update = draw(st.sampled_from(["exact", "printed"]))
+    no_lag = st.just(0.0)
+    lag = no_lag if update == "printed" else no_lag | numbers("model.roll_lag_s", low=0.001)
+    step_min = draw(numbers("optimizer.step_min_rad"))
+    initial = draw(numbers("optimizer.initial_step_rad", low=step_min))
+    thrust_min = draw(numbers("ranges.thrust_acceleration_min_m_s2"))
+    constrained: Values = {
+        "horizon.prediction": prediction,
+        "horizon.control": draw(st.integers(1, prediction)),
+        "model.position_update": update,
+        "model.roll_lag_s": draw(lag),
+        "model.pitch_lag_s": draw(lag),
+        "optimizer.iterations": draw(st.integers(1, 100)),
+        "optimizer.initial_step_rad": initial,
+        "optimizer.step_max_rad": draw(numbers("optimizer.step_max_rad", low=initial)),
+        "optimizer.step_min_rad": step_min,
+        "ranges.thrust_acceleration_min_m_s2": thrust_min,
+        "ranges.thrust_acceleration_max_m_s2": draw(
+            numbers("ranges.thrust_acceleration_max_m_s2", low=math.nextafter(thrust_min, math.inf))
+        ),
+        "code.prefix": draw(prefixes()),
+    }
+    choices = {
+        key.path: draw(st.sampled_from(choices_of(key))) for key in CHOICES if key.path not in constrained
+    }
+    free = {key.path: draw(numbers(key.path)) for key in NUMBERS if key.path not in constrained}
+    drawn = constrained | choices | free
+    return {path: drawn[path] for path in KEYS}
+
+
+def prefixes() -> st.SearchStrategy[str]:
+    """Draw a prefix, of up to three words and 24 letters."""
+    word = st.text("abcdefghijklmnopqrstuvwxyz0123456789", min_size=1, max_size=7)
+    begun = st.lists(word, min_size=1, max_size=3).map("_".join)
+    return begun.filter(lambda prefix: prefix[0].isalpha() and prefix not in RESERVED)
+
+
+def any_settings() -> st.SearchStrategy[Settings]:
+    """Draw valid settings, every key free within the rules."""
+    return valid_values().map(lambda values: Settings.model_validate(nested(values)))
+
+
+def choices_of(key: Key) -> list[str]:
+    """Return what a key with named values admits."""
+    return [choice.strip('"') for choice in key.domain.split(" or ")]
+
+
+def nested(values: Values) -> dict[str, Values]:
+    """Return {section: {key: value}} of {"section.key": value}."""
+    document: dict[str, Values] = {}
+    for path, value in values.items():
+        section, name = path.split(".")
+        document.setdefault(section, {})[name] = value
+    return document
+
+
+def toml(values: Values) -> str:
+    """Return TOML text of {"section.key": value}."""
+    return "".join(f"{path} = {spelled(value)}\n" for path, value in values.items())
+
+
+def _bounds(key: Key) -> tuple[float, float]:
+    assert key.low is not None
+    assert key.high is not None
+    return key.low, key.high
+
+
+@dataclass(frozen=True)
+class Broken:
+    """TOML text that breaks one rule, and what the message about it says: key, value, words of the rule."""
+
+    text: str
+    key: str
+    value: str
+    rule: str
+
+
+@st.composite
+def broken_settings(draw: st.DrawFn) -> Broken:
+    """Draw settings that are valid but for one rule."""
+    values = draw(valid_values())
+    breakers: list[Callable[[st.DrawFn, Values], Broken]] = [
+        *(_beyond, _no_number, _of_another_type, _misspelt, _unknown),
+        *(_steps_at_odds, _lag_at_odds, _others_at_odds),
+    ]
+    return draw(st.sampled_from(breakers))(draw, values)
+
+
+def _with(values: Values, path: str, value: Any, rule: str, spelling: str | None = None) -> Broken:
+    """Return `values` with `value` at `path`, which breaks `rule`."""
+    told = spelling or (f'"{value}"' if isinstance(value, str) else str(value))
+    text = toml({key: other for key, other in values.items() if key != path})
+    return Broken(f"{text}{path} = {spelling or spelled(value)}\n", path, f" = {told} ", rule)
+
+
+def _beyond(draw: st.DrawFn, values: Values) -> Broken:
+    """Put a number just or far outside its bounds."""
+    key = draw(st.sampled_from(NUMBERS))
+    low, high = _bounds(key)
+    if key.kind == "whole number":
+        beyond: float = draw(st.integers(-(10**9), int(low) - 1) | st.integers(int(high) + 1, 10**9))
+    else:
+        beyond = draw(
+            st.sampled_from([math.nextafter(low, -math.inf), math.nextafter(high, math.inf)])
+            | st.floats(max_value=low, exclude_max=True, allow_infinity=False)
+            | st.floats(min_value=high, exclude_min=True, allow_infinity=False)
+        )
+    return _with(values, key.path, beyond, f"must {key.rule}")
+
+
+def _no_number(draw: st.DrawFn, values: Values) -> Broken:
+    """Put what is no finite number, or a fraction where a whole number belongs."""
+    key = draw(st.sampled_from(NUMBERS))
+    if key.kind == "whole number":
+        fraction = draw(st.floats(1, 50))
+        return _with(values, key.path, fraction, f"must be a whole number and {key.rule}")
+    word = draw(st.sampled_from(["nan", "inf", "-inf"]))
+    return _with(values, key.path, None, f"must be a finite number; it must {key.rule}", word)
+
+
+def _of_another_type(draw: st.DrawFn, values: Values) -> Broken:
+    """Put a value of a type that the key does not have."""
+    key = draw(st.sampled_from(list(KEYS.values())))
+    told, spelling = draw(
+        st.sampled_from(
+            [
+                ("true", "true"),
+                ("a list", "[1, 2]"),
+                ("a list", "[]"),
+                ("a table", "{a = 1}"),
+                ("1979-05-27", "1979-05-27"),
+                ('"10"', '"10"') if key.low is not None else ("10", "10"),
+            ]
+        )
+    )
+    rule = key.rule if key.low is None else f"be a {key.kind} and {key.rule}"
+    broken = _with(values, key.path, None, f"must {rule}", spelling)
+    return replace(broken, value=f" = {told} ")
+
+
+def _misspelt(draw: st.DrawFn, values: Values) -> Broken:
+    """Put a word that is none of the choices, or a prefix that is no C name."""
+    letters = st.text(
+        st.characters(min_codepoint=32, max_codepoint=126, exclude_characters='"\\'), max_size=40
+    )
+    if draw(st.booleans()):
+        key = draw(st.sampled_from(CHOICES))
+        word = draw(letters.filter(lambda word: word not in choices_of(key)))
+        return _with(values, key.path, word, f"must {key.rule}")
+    key = KEYS["code.prefix"]
+    if draw(st.booleans()):
+        return _with(values, key.path, draw(st.sampled_from(sorted(RESERVED))), "must not be a ")
+    no_name = letters.filter(lambda word: not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", word))
+    return _with(values, key.path, draw(no_name), f"must {key.rule}")
+
+
+def _unknown(draw: st.DrawFn, values: Values) -> Broken:
+    """Add a key or a section that does not exist, or a value where a section belongs."""
+    section, name = draw(st.sampled_from(list(KEYS))).split(".")
+    what = draw(st.sampled_from(["key", "section", "no section"]))
+    text = toml(values)
+    if what == "no section":
+        others = {path: value for path, value in values.items() if not path.startswith(f"{section}.")}
+        return Broken(
+            f"{toml(others)}{section} = 3\n", section, " = 3 ", f"must be a section; write [{section}]"
+        )
+    word = name if what == "key" else section
+    place = draw(st.integers(0, len(word) - 1))
+    word = word[:place] + draw(st.sampled_from("_xyz")) + word[place:]
+    if what == "key":
+        return Broken(f"{text}{section}.{word} = 1\n", f"{section}.{word}", "", "is not a setting; ")
+    return Broken(f"{text}{word}.{name} = 1\n", word, "", "is not a section; ")
+
+
+def _steps_at_odds(draw: st.DrawFn, values: Values) -> Broken:
+    """Put the first step size above the largest, or below the smallest."""
+    path = draw(st.sampled_from(["optimizer.step_max_rad", "optimizer.step_min_rad"]))
+    initial = draw(st.floats(1e-6, 1, exclude_min=True, exclude_max=True))
+    rest = values | {
+        "optimizer.initial_step_rad": initial,
+        "optimizer.step_max_rad": 1.0,
+        "optimizer.step_min_rad": 1e-9,
+    }
+    if path == "optimizer.step_max_rad":
+        step = draw(st.floats(1e-6, initial, exclude_max=True))
+        return _with(rest, path, step, f"must lie in {initial!r}..1 (from optimizer.initial_step_rad up)")
+    step = draw(st.floats(initial, 1, exclude_min=True))
+    return _with(rest, path, step, f"must lie in 1e-9..{initial!r} (up to optimizer.initial_step_rad)")
+
+
+def _lag_at_odds(draw: st.DrawFn, values: Values) -> Broken:
+    """Put a lag where the printed model has none, or one too short to compute with."""
+    path = draw(st.sampled_from(["model.roll_lag_s", "model.pitch_lag_s"]))
+    rest = values | {"model.roll_lag_s": 0.0, "model.pitch_lag_s": 0.0}
+    if draw(st.booleans()):
+        rest["model.position_update"] = "printed"
+        lag = draw(st.floats(0.001, 2))
+        return _with(rest, path, lag, 'must be 0 with model.position_update = "printed"')
+    lag = draw(st.floats(0, 0.001, exclude_min=True, exclude_max=True))
+    return _with(rest, path, lag, "must be 0 or lie in 0.001..2; 0 means no lag")
+
+
+def _others_at_odds(draw: st.DrawFn, values: Values) -> Broken:
+    """Put more moves than predictions, a largest thrust not above the smallest, or a key twice."""
+    path = draw(st.sampled_from(["horizon.control", "ranges.thrust_acceleration_max_m_s2", *list(KEYS)[::5]]))
+    if path == "horizon.control":
+        prediction = draw(st.integers(1, 49))
+        control = draw(st.integers(prediction + 1, 50))
+        rest = values | {"horizon.prediction": prediction}
+        return _with(rest, path, control, f"must lie in 1..{prediction} (horizon.prediction)")
+    if path == "ranges.thrust_acceleration_max_m_s2":
+        least = draw(st.floats(0.1, 100))
+        most = draw(st.floats(0.1, least))
+        rest = values | {"ranges.thrust_acceleration_min_m_s2": least}
+        return _with(rest, path, most, f"must be more than {least!r} (ranges.thrust_acceleration_min_m_s2)")
+    text = toml(values)
+    line = f"line {len(values) + 1}, column "
+    return Broken(f"{text}{path} = 1\n", line, path, "is set already; keep one of the two")
