@@ -117,6 +117,10 @@ def _is_safe(path: object) -> bool:
     """Whether `path` is relative, in normal form, and stays inside its folder."""
     if not isinstance(path, str) or "\0" in path:
         return False
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        return False
     pure = PurePosixPath(path)
     return bool(pure.parts) and not pure.is_absolute() and ".." not in pure.parts and str(pure) == path
 

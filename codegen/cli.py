@@ -4,6 +4,7 @@ Results go to stdout, talk to stderr.
 """
 
 import errno
+import io
 import json
 import os
 import sys
@@ -44,6 +45,8 @@ class RootGroup(TyperGroup):
         try:
             if sys.stdout is None:
                 raise OSError(errno.EBADF, "is closed", "stdout")
+            if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that the terminal has not is no error
+                sys.stdout.reconfigure(errors="backslashreplace")
             try:
                 return super().main(*arguments, **options)
             finally:
@@ -240,7 +243,7 @@ def _report_changes(
         return
     for verb in ("created", "changed", "removed"):
         for path in getattr(changes, verb):
-            typer.echo(f"{verb} {path}")
+            typer.echo(f"{verb} {echo(path)}")
     would = "would be " if dry_run else ""
     state = f"{would}written" if changes.any else "unchanged"
     typer.echo(f"{echo(str(output))}: {state}, settings {settings.digest[:16]}", err=True)

@@ -168,7 +168,20 @@ def test_manifest_cannot_point_outside_its_folder(folder: Path) -> None:
     assert content(folder) == expected(NEXT)
 
 
-@pytest.mark.parametrize("path", ["/etc/x", "../x", "a/../x", "a//b", "./a", "", "a\0b", "manifest.json"])
+def test_manifest_may_list_any_text(folder: Path) -> None:
+    """A doctored manifest whose paths no file can have is read over, and put right."""
+    listed = json.loads(bundle.manifest(FILES))
+    for path in ("\ud800/x", "\udfff", "nul\0/x", "\n/\x1b[31m", ""):
+        listed["files"][path] = sha256(b"").hexdigest()
+    (folder / "manifest.json").write_text(json.dumps(listed), encoding="utf-8")
+    assert bundle.check(FILES, folder)[0].path == "manifest.json"
+    bundle.write(NEXT, folder)
+    assert content(folder) == expected(NEXT)
+
+
+@pytest.mark.parametrize(
+    "path", ["/etc/x", "../x", "a/../x", "a//b", "./a", "", "a\0b", "a\ud800", "manifest.json"]
+)
 def test_bundle_cannot_point_outside_its_folder(tmp_path: Path, path: str) -> None:
     """A path that is not plainly inside the folder is a mistake of the caller."""
     with pytest.raises(ValueError, match="not a path of a bundle"):

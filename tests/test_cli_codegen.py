@@ -1,5 +1,6 @@
 """The commands that generate: what they print where, what they write, and how they fail."""
 
+import hashlib
 import json
 import os
 import shlex
@@ -174,6 +175,29 @@ def test_generate_keeps_edited_files_until_forced(app: typer.Typer) -> None:
     Path("out/Makefile").write_text("mine", encoding="utf-8")
     assert "Makefile (edited by hand)" in run(app, "generate", "-o", "out", code=2)[1]
     assert run(app, "generate", "-o", "out", "--force")[0] == "changed Makefile\n"
+
+
+def test_letters_that_the_terminal_has_not_are_shown_by_number() -> None:
+    """An edit in another script, on a terminal of another: the diff is shown, not a traceback."""
+    subprocess.run([sys.executable, "-c", COMMAND, "generate", "-o", "out"], capture_output=True, check=True)
+    with Path("out/README.md").open("a", encoding="utf-8") as file:
+        file.write("\N{EURO SIGN}\n")
+    command = [sys.executable, "-c", COMMAND, "generate", "-o", "out", "--check"]
+    latin = os.environ | {"PYTHONIOENCODING": "latin-1"}
+    result = subprocess.run(command, capture_output=True, env=latin, check=False)
+    assert result.returncode == 1, result.stderr
+    assert b"\n-\\u20ac\n" in result.stdout
+
+
+def test_name_of_a_removed_file_moves_no_cursor(app: typer.Typer) -> None:
+    """A manifest may have come from elsewhere, with any names in it."""
+    name = "a\x1b[31m\udcffb"
+    run(app, "generate", "-o", "out")
+    Path("out", name).write_bytes(b"")
+    listed = json.loads(Path("out/manifest.json").read_text("utf-8"))
+    listed["files"][name] = hashlib.sha256(b"").hexdigest()
+    Path("out/manifest.json").write_text(json.dumps(listed), "utf-8")
+    assert run(app, "generate", "-o", "out")[0] == "changed manifest.json\nremoved a\\x1b[31m\\udcffb\n"
 
 
 def test_check_refuses_options_that_write(app: typer.Typer) -> None:
