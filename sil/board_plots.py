@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from codegen.boards import Board
@@ -14,7 +15,7 @@ from sil.sweep import Point
 
 def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, Path]:
     """Draw each limit as a bar per board, as a share of its budget; write stem.png and stem.svg."""
-    with style():
+    with style(), mpl.rc_context({"text.parse_math": False}):  # a board's name is no formula
         figure = Figure(figsize=(7.2, 1.2 + 1.0 * len(footprints)), layout="constrained")
         axes = figure.subplots()
         labels, shares, colours, texts = [], [], [], []
@@ -80,5 +81,5 @@ def draw_sweep(
             axes.set_yscale("log" if name in ("iae_m_s", "time_ms") else "linear")
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
-        figure.suptitle(board.title)
+        figure.suptitle(board.title, parse_math=False)
         return save(figure, stem)

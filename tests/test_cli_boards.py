@@ -8,8 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 import sil.cli
-from codegen import boards, cli
+from codegen import boards, cli, presets
 from sil import cli_boards
+from sil.board_plots import draw_footprints
+from sil.footprint import measure_footprint
 from tests.support.tools import require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
@@ -91,6 +93,15 @@ def test_over_budget_is_exit_1_with_names_and_excess(tmp_path: Path) -> None:
     assert f"own: flash {flash} B is over its budget of 2000 B by {flash - 2000} B" in lines
     assert any(line.startswith("own: largest symbols: nmpc_") for line in lines)
     assert not any("RAM" in line or "stack" in line for line in lines[2:] if "budget" in line)
+
+
+@pytest.mark.usefixtures("_crazyflie")
+def test_the_name_of_a_board_is_no_formula(tmp_path: Path) -> None:
+    """Nor is it markup: a board's file may have any name."""
+    odd = boards.load("crazyflie").model_copy(update={"name": r"$\frac{$ <b>"})
+    measured = measure_footprint(presets.load("table1"), odd, counted_steps=6)
+    draw_footprints([measured], tmp_path / "footprint")
+    assert r"$\frac{$ &lt;b&gt;  flash" in (tmp_path / "footprint.svg").read_text("utf-8")
 
 
 @pytest.mark.usefixtures("_no_compiler")

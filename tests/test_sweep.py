@@ -116,6 +116,13 @@ def test_any_points_can_be_drawn(points: list[Point], tmp_path: Path) -> None:
     assert "<svg" in (tmp_path / "sweep.svg").read_text("utf-8")
 
 
+def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
+    """Dollar signs in the title of a board's file are drawn as they are."""
+    odd = boards.load("crazyflie").model_copy(update={"title": r"$\frac{$ <b>"})
+    draw_sweep([POINT], odd, 0.01, tmp_path / "sweep")
+    assert r"$\frac{$ &lt;b&gt;" in (tmp_path / "sweep.svg").read_text("utf-8")
+
+
 def test_the_command_writes_table_and_pictures_and_answers_with_the_largest(tmp_path: Path) -> None:
     """A small controller on the Crazyflie, where it fits."""
     require_compiler("crazyflie")
