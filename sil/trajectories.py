@@ -5,6 +5,7 @@ there at rest. Half-width and radius are in metres, angular rate in rad/s.
 """
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ COLUMNS = ("time_s", "x_m", "y_m")
 LARGEST = (1e6, 1e4, 1e4)
 """Largest magnitude of a waypoint's time in s and position in m, column by column."""
 
+LARGEST_FILE_BYTES = 10_000_000
 SHORTEST_LEG_S = 1e-6
 """Least time from one waypoint to the next: no velocity is infinite."""
 
@@ -171,8 +173,12 @@ class Waypoints:
         """
         name = echo(str(path))
         try:
-            with path.open(newline="", encoding="utf-8-sig") as file:
-                lines, points = _read(csv.DictReader(file, strict=True))
+            with path.open("rb") as file:
+                content = file.read(LARGEST_FILE_BYTES + 1)
+            if len(content) > LARGEST_FILE_BYTES:
+                raise TrajectoryError("is larger than 10 MB; some thousand waypoints take less")
+            text = io.StringIO(content.decode("utf-8-sig"), newline="")
+            lines, points = _read(csv.DictReader(text, strict=True))
             _check(lines, points)
         except OSError as error:
             raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error

@@ -1,5 +1,6 @@
 """Trajectories: shapes, velocities, the wait before the start, and waypoint files."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -157,6 +158,14 @@ def test_unreadable_waypoint_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x80")
     with pytest.raises(TrajectoryError, match=r"binary\.csv: is not UTF-8"):
         Waypoints.read(tmp_path / "binary.csv")
+
+
+def test_huge_waypoint_file_is_refused(tmp_path: Path) -> None:
+    """A file without an end, such as a device, is not read into memory."""
+    (tmp_path / "zero.csv").touch()
+    os.truncate(tmp_path / "zero.csv", 2**40)
+    with pytest.raises(TrajectoryError, match=r"zero\.csv: is larger than 10 MB"):
+        Waypoints.read(tmp_path / "zero.csv")
 
 
 def test_flights_may_follow_different_trajectories() -> None:
