@@ -151,12 +151,13 @@ def init(
     place = Path(os.path.realpath(output))
     if place.exists() and not place.is_file():
         raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
-    if os.path.lexists(output) and not force:
-        raise FileExistsRefusedError(
-            f"{name}: already exists; name another with -o, or overwrite it with --force"
-        )
     try:
-        exchange.put(place, text.encode())
+        with exchange.exclusive(place.parent, echo(str(place.parent))):
+            if os.path.lexists(output) and not force:
+                raise FileExistsRefusedError(
+                    f"{name}: already exists; name another with -o, or overwrite it with --force"
+                )
+            exchange.put(place, text.encode())
     except OSError as error:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
     typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)

@@ -1,8 +1,8 @@
 """Result folders: made for one run, replaced as a whole, and never on top of somebody's work.
 
 A run writes into a hidden folder inside its result folder. When it is complete its files are moved into
-place, the summary last; until then earlier results stay as they were. A killed run leaves the hidden folder,
-which the next run clears.
+place, the summary last; until then earlier results stay as they were. A run that is killed, or stopped while
+it moves, leaves the hidden folder, which the next run clears.
 """
 
 import contextlib
@@ -40,11 +40,16 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
             _refuse_other_work(folder, command, (*names, SUMMARY))
             for left_over in folder.glob(f"{_NEW}*"):
                 shutil.rmtree(left_over)
-            with tempfile.TemporaryDirectory(prefix=_NEW, dir=folder) as fresh:
-                yield Path(fresh)
-                (folder / SUMMARY).unlink(missing_ok=True)
-                for name in (*names, SUMMARY):
-                    Path(fresh, name).replace(folder / name)
+            fresh = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder))
+            try:
+                yield fresh
+            except BaseException:
+                shutil.rmtree(fresh)
+                raise
+            (folder / SUMMARY).unlink(missing_ok=True)
+            for name in (*names, SUMMARY):
+                (fresh / name).replace(folder / name)
+            shutil.rmtree(fresh)
     except OSError as error:
         raise UnwritableError(f"{echo(str(folder))}: cannot be written: {error.strerror or error}") from error
 

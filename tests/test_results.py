@@ -47,6 +47,22 @@ def test_nothing_moves_before_the_run_is_complete(tmp_path: Path) -> None:
     assert files(tmp_path) == before
 
 
+def test_a_run_stopped_while_its_files_move_does_not_block_the_next(tmp_path: Path) -> None:
+    """By Ctrl-C, or by the disk: a mixture without a summary is left, and is known as ours."""
+    run(tmp_path, "old")
+
+    def stop() -> None:
+        with new_results(tmp_path, "fly", ("trace.csv", "missing.csv")) as fresh:
+            (fresh / "trace.csv").write_text("new")
+            (fresh / SUMMARY).write_text(summary_text("fly", {}))
+
+    with pytest.raises(UnwritableError, match="cannot be written: No such file"):
+        stop()
+    assert not (tmp_path / SUMMARY).exists()
+    run(tmp_path)
+    assert files(tmp_path) == {"trace.csv": "new", SUMMARY: summary_text("fly", {"content": "new"})}
+
+
 def test_a_failed_run_leaves_no_folder_of_its_own(tmp_path: Path) -> None:
     """Neither the result folder nor the parents that it needed."""
     with pytest.raises(KeyboardInterrupt), new_results(tmp_path / "a" / "b", "fly", ()):
