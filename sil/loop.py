@@ -80,7 +80,9 @@ class Flight:
     flights: int = 1
     start: Start = Start.HOVER
     yaw_rad: PerFlight = 0.0
-    """Heading at the start, held from there on."""
+    """Heading at the start, which the yaw loop holds."""
+    yaw_rate_rad_s: PerFlight = 0.0
+    """Rate at which the heading held turns, from t = 0 on."""
     vehicle: Vehicle = field(default_factory=Vehicle)
     update_period_s: float = 0.01
     """Period of the position controller: a whole number of ticks of 5 ms."""
@@ -133,9 +135,10 @@ def fly(
         state = _without_lost(state)
         lifting = time_s < open_loop_until_s - STEP_S / 2.0
         command_rad = _record(trace, update, state, _thrust_n(state, lifting), controller)
+        heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(time_s, 0.0)
         for _ in range(ticks_per_update):
             with np.errstate(all="ignore"):
-                state = vehicle.step(state, command_rad, _thrust_n(state, lifting), flight.yaw_rad)
+                state = vehicle.step(state, command_rad, _thrust_n(state, lifting), heading_rad)
         if progress is not None:
             progress((update + 1) / len(times_s))
     return trace
