@@ -1,0 +1,79 @@
+"""Check: whatever fails in flight, commands stay bounded, bad input is refused, and the drone comes back."""
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+from codegen.literals import SCALARS
+from codegen.settings import Settings
+from codegen.toolchain import host_toolchain
+from sil.fault_flights import STRAY_M, End, Verdict, fly_faults
+from sil.fault_report import records, table, write_csv
+from sil.fault_scenarios import TO_THE_END, scenarios
+from sil.verify.bundle import controller
+from sil.verify.check import Outcome, Result, Subject
+
+
+def faults(subject: Subject) -> Result:
+    """Fly every fault; raises BuildError, CacheError and FlightError."""
+    settings = subject.settings
+    verdicts = fly_faults(settings, partial(controller, subject))
+    (subject.folder / "faults.md").write_text(table(verdicts) + "\n", "utf-8")
+    write_csv(verdicts, subject.folder / "faults.csv")
+    return judge(verdicts, settings)
+
+
+def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
+    """Judge the verdicts on the flights of a controller.
+
+    A controller that strays without a fault cannot show that it comes back: INCOMPLETE, unless it failed.
+    """
+    limit = float(SCALARS[settings.code.scalar](settings.limits.tilt_rad))
+    ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
+    strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
+    wrong = []
+    for verdict in verdicts:
+        where = f"{verdict.fault} ({verdict.course})"
+        if not verdict.largest_command_rad <= limit:
+            wrong.append(f"{where}: a command of {verdict.largest_command_rad:g} rad")
+        if not verdict.expected:
+            wrong.append(f"{where}: statuses {verdict.statuses}")
+        if verdict.end is End.CRASHED and not strays:
+            wrong.append(f"{where}: crashed")
+        if verdict.end is End.AWAY and not strays and verdict.fault in ending:
+            wrong.append(f"{where}: never came back")
+    if wrong:
+        outcome, evidence = (
+            Outcome.FAILED,
+            "; ".join(wrong[:3]) + (f"; {len(wrong)} in all" if wrong[3:] else ""),
+        )
+    elif strays:
+        outcome = Outcome.INCOMPLETE
+        evidence = f"strays further than {STRAY_M:g} m without a fault, so coming back means nothing"
+    else:
+        outcome = Outcome.PASSED
+        evidence = _evidence(verdicts, ending)
+    figures: dict[str, Any] = {"wrong": wrong, "flights": _finite(records(verdicts))}
+    return Result(outcome, evidence, figures, {"compiler": host_toolchain().identity().splitlines()[0]})
+
+
+def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
+    back = [verdict for verdict in verdicts if verdict.end is End.BACK]
+    slowest = max((v for v in back if v.fault in ending), key=lambda verdict: verdict.recovery_s)
+    return (
+        f"{len(verdicts)} faults: no crash, command at most "
+        f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "
+        f"the slowest {slowest.recovery_s:.1f} s after '{slowest.fault}'"
+    )
+
+
+def _finite(flights: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the records with None for what is not a number: JSON knows none."""
+    return [
+        {
+            key: None if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in flight.items()
+        }
+        for flight in flights
+    ]
