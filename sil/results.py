@@ -57,18 +57,18 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
 def summary_text(command: str, summary: dict[str, Any]) -> str:
     """Return what a run of `command` found as JSON, after the version that found it; no number is NaN."""
     whole = {"generator": f"{_GENERATOR}{codegen.__version__}", "command": command, **summary}
-    return json.dumps(_finite(whole), indent=2, allow_nan=False) + "\n"
+    return json.dumps(finite(whole), indent=2, allow_nan=False) + "\n"
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """Return `value` with None for every number that JSON cannot spell."""
     match value:
         case float() if not math.isfinite(value):
             return None
         case dict():
-            return {key: _finite(item) for key, item in value.items()}
+            return {key: finite(item) for key, item in value.items()}
         case list() | tuple():
-            return [_finite(item) for item in value]
+            return [finite(item) for item in value]
         case _:
             return value
 

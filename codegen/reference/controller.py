@@ -74,10 +74,16 @@ class Step:
 
 
 class ReferenceController:
-    """n controllers in NumPy, bit for bit what the generated C computes."""
+    """n controllers in NumPy, bit for bit what the generated C computes.
 
-    def __init__(self, settings: Settings, n: int = 1) -> None:
+    `minimize` may be wrapped, to watch the optimizer's inner steps.
+    """
+
+    def __init__(
+        self, settings: Settings, n: int = 1, minimize: optimizer.Minimize = optimizer.minimize
+    ) -> None:
         self.settings = settings
+        self._minimize = minimize
         self.scalar = SCALARS[settings.code.scalar]
         self._predictor = Predictor(settings, horizon_tables(settings), self.scalar)
         control = settings.horizon.control
@@ -163,7 +169,7 @@ class ReferenceController:
         start = memory.plan_rad
         if self.settings.optimizer.warm_start == "last_command":
             start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
-        return optimizer.minimize(self.settings, evaluate, start)
+        return self._minimize(self.settings, evaluate, start)
 
     def _check(self, state: Real, target: Real, thrust: Real) -> NDArray[np.int64]:
         ranges = self.settings.ranges

@@ -31,6 +31,10 @@ class Search:
     converged: NDArray[np.bool_]
 
 
+Minimize = Callable[[Settings, Evaluate, Real], Search]
+"""The interface of `minimize`."""
+
+
 def minimize(settings: Settings, evaluate: Evaluate, moves_rad: Real) -> Search:
     """Search from `moves_rad` for exactly `optimizer.iterations` evaluations.
 

@@ -1,9 +1,7 @@
 """Check: whatever fails in flight, commands stay bounded, bad input is refused, and the drone comes back."""
 
-import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 from codegen.literals import SCALARS
 from codegen.settings import Settings
@@ -11,6 +9,7 @@ from codegen.toolchain import host_toolchain
 from sil.fault_flights import STRAY_M, End, Verdict, fly_faults
 from sil.fault_report import records, table, write_csv
 from sil.fault_scenarios import TO_THE_END, scenarios
+from sil.results import finite
 from sil.verify.bundle import controller
 from sil.verify.check import Outcome, Result, Subject
 
@@ -54,7 +53,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
     else:
         outcome = Outcome.PASSED
         evidence = _evidence(verdicts, ending)
-    figures: dict[str, Any] = {"wrong": wrong, "flights": _finite(records(verdicts))}
+    figures = finite({"wrong": wrong, "flights": records(verdicts)})
     return Result(outcome, evidence, figures, {"compiler": host_toolchain().identity().splitlines()[0]})
 
 
@@ -66,14 +65,3 @@ def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
         f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "
         f"the slowest {slowest.recovery_s:.1f} s after '{slowest.fault}'"
     )
-
-
-def _finite(flights: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return the records with None for what is not a number: JSON knows none."""
-    return [
-        {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in flight.items()
-        }
-        for flight in flights
-    ]

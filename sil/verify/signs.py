@@ -1,0 +1,124 @@
+"""Check: float32 and float64 decide alike but for ties, and fly alike."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Final
+
+import numpy as np
+
+from codegen.settings import Settings
+from codegen.toolchain import host_toolchain
+from sil.compiled import CompiledController
+from sil.fault_flights import STRAY_M
+from sil.results import finite
+from sil.sign_decisions import (
+    Disagreement,
+    Flown,
+    Moments,
+    at_the_edge,
+    disagreement,
+    fly_both,
+    with_random_memory,
+)
+from sil.verify.bundle import controller
+from sil.verify.check import Outcome, Result, Subject
+from sil.verify.inputs import random_inputs
+
+RANDOM_STEPS: Final = 100_000
+EDGE_SEEDS: Final = 10_000
+ALIKE: Final = 0.05
+"""Largest relative difference of the IAE that still counts as flying alike."""
+
+
+def signs(subject: Subject) -> Result:
+    """Compare both scalar types on random, adversarial and flown steps, and in flight.
+
+    Raises BuildError, CacheError and FlightError.
+    """
+    settings = subject.settings
+
+    def make(chosen: Settings, n: int) -> CompiledController:
+        own = chosen.code.scalar == settings.code.scalar
+        return controller(subject, n) if own else CompiledController(chosen, n)
+
+    flown, moments = fly_both(settings, make)
+    rng = np.random.default_rng(0)
+    found = (
+        disagreement(settings, "random", _random(settings, RANDOM_STEPS, rng)),
+        disagreement(settings, "at an edge", at_the_edge(settings, _random(settings, EDGE_SEEDS, rng))),
+        disagreement(settings, "in flight", moments),
+    )
+    (subject.folder / "signs.md").write_text(text(found, flown), "utf-8")
+    return judge(found, flown, settings)
+
+
+def _random(settings: Settings, n: int, rng: np.random.Generator) -> Moments:
+    drawn = random_inputs(settings, n, rng)
+    return with_random_memory(settings, (drawn.state, drawn.target, drawn.thrust), rng)
+
+
+def judge(found: Sequence[Disagreement], flown: Sequence[Flown], settings: Settings) -> Result:
+    """Judge: steps that decide alike command alike but for rounding, and the flights differ by ALIKE at most.
+
+    A controller that strays in both scalar types cannot show that it flies alike: INCOMPLETE.
+    """
+    epsilon = float(np.finfo(np.float32).eps)
+    largest_rad = max(settings.limits.tilt_rad, settings.optimizer.step_max_rad)
+    rounding_rad = 4 * settings.optimizer.iterations * epsilon * largest_rad
+    wrong = [
+        f"{one.inputs}: commands {one.rounding_rad:.2g} rad apart without a differing decision"
+        for one in found
+        if not one.rounding_rad <= rounding_rad
+    ]
+    strays = all(not error_m <= STRAY_M for one in flown for error_m in one.largest_error_m)
+    if not strays:
+        wrong += [
+            f"{one.case}: IAE {one.few[0]:.4g} in float32, {one.many[0]:.4g} in float64"
+            for one in flown
+            if not abs(one.few[0] / one.many[0] - 1.0) <= ALIKE
+        ]
+    figures = finite(
+        {
+            "decisions": [asdict(one) for one in found],
+            "flights": [asdict(one) for one in flown],
+            "wrong": wrong,
+        }
+    )
+    tools = {"numpy": np.__version__, "compiler": host_toolchain().identity().splitlines()[0]}
+    if wrong:
+        return Result(Outcome.FAILED, "; ".join(wrong), figures, tools)
+    if strays:
+        return Result(Outcome.INCOMPLETE, "strays in both scalar types, nothing to compare", figures, tools)
+    evidence = "steps with another decision: " + ", ".join(
+        f"{one.differing_steps} of {one.steps} {one.inputs}" for one in found
+    )
+    worst = max(abs(one.few[0] / one.many[0] - 1.0) for one in flown)
+    return Result(
+        Outcome.PASSED, f"{evidence}; IAE of whole flights within {100 * worst:.1f} %", figures, tools
+    )
+
+
+def text(found: Sequence[Disagreement], flown: Sequence[Flown]) -> str:
+    """Spell both comparisons as Markdown tables."""
+    lines = [
+        "| inputs | steps | of these decide otherwise | first in iteration 1, 2, ... "
+        "| decisions that differ | command changes by: median, 99 %, largest, rad | by rounding alone, rad |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for one in found:
+        spread = ", ".join(f"{value:.3f}" for value in one.command_rad) if one.differing_steps else "-"
+        lines.append(
+            f"| {one.inputs} | {one.steps} | {one.differing_steps} | "
+            f"{', '.join(map(str, one.first_by_iteration))} | {one.differing} of {one.decisions} | "
+            f"{spread} | {one.rounding_rad:.1e} |"
+        )
+    lines += [
+        "",
+        "| Table II case | IAE float32 | IAE float64 | ISE | ITSE | ITAE | paths apart, m |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for case in flown:
+        pairs = [f"{few:.4g} / {many:.4g}" for few, many in zip(case.few[1:], case.many[1:], strict=True)]
+        iae = f"{case.few[0]:.4g} | {case.many[0]:.4g}"
+        lines.append(f"| {case.case} | {iae} | {' | '.join(pairs)} | {case.apart_m:.3f} |")
+    return "\n".join(lines) + "\n"
