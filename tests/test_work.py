@@ -51,6 +51,7 @@ def test_passes_of_a_loop_are_those_of_python(tmp_path: Path, head: str, passes:
     assert list(found.trips.values()) == [passes]
 
 
+TWO_LOOPS = "for (i = 0; i < 3; i++) { } for (i = 0; i < 4; i++) { }"
 FAULTS = {
     "a bound from data": ("i < 8", "i < x", "from a constant to a constant"),
     "a begin from data": ("i = 0", "i = x", "from a constant to a constant"),
@@ -83,7 +84,7 @@ FAULTS = {
     "recursion": ("sum += x;", "sum += f(x - 1);", "f calls itself"),
     "a library function": ("sum += x;", "sum += abs(x);", "does not define"),
     "a function pointer": ("int f(int x)", "int f(int x, int (*g)(int))", "does not define"),
-    "two loops a line": ("sum += x;\n}", "} for (i = 0; i < 3; i++) {} for (i = 0; i < 4; i++) {}", "on a line"),
+    "two loops a line": ("sum += x;\n}", f"}} {TWO_LOOPS}", "on a line"),
 }  # fmt: skip
 """What in LOOP becomes what, and what is said of it."""
 
