@@ -30,11 +30,9 @@ GENERATED = Path(__file__).parent.parent / "generated"
 
 HARM = {
     "another order": (
-        "src/nmpc_cost.c",
-        "distance_m = distance_m\n                     + (weigh(error_x_m, nmpc_predictor_response_s2[i], "
-        "sums_x_s2)\n                        + weigh(error_y_m, nmpc_predictor_response_s2[i], sums_y_s2));",
-        "distance_m = (distance_m + weigh(error_x_m, nmpc_predictor_response_s2[i], sums_x_s2))"
-        " + weigh(error_y_m, nmpc_predictor_response_s2[i], sums_y_s2);",
+        "src/nmpc_predictor.h",
+        "walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m))",
+        "(walk->advance_m + walk->bend_m) + (walk->roll_to_come_m + walk->pitch_to_come_m)",
     ),
     "another sign": ("src/nmpc_cost.c", "effort = -weights->effort;", "effort = weights->effort;"),
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Example: test the build, then fly a point mass to a target that walks away along x. The mass takes on
+ * Example: test the build, print its digest, then fly a point mass to a target that walks away along x. The mass takes on
  * each commanded angle at once; a flight on the model of the vehicle is `mambo-nmpc fly`.
  */
 #include <stdio.h>
@@ -35,6 +35,8 @@ int main(void)
     nmpc_target_t target = { { 1.0f, 1.0f }, { 0.2f, 0 } };
     nmpc_command_t command = { 0, 0 };
     const int first_difference = nmpc_self_test(&controller);
+    unsigned long digest = 0UL;
+    int episode;
     int refused = 0;
     int line;
     int step;
@@ -44,7 +46,17 @@ int main(void)
         (void)printf("self-test: step %d differs from the reference\n", first_difference);
         return 1;
     }
-    (void)printf("self-test: all steps equal the reference\n\n");
+    (void)printf("self-test: all steps equal the reference\n");
+    for (episode = 0; episode < NMPC_SELF_TEST_EPISODES; episode++) {
+        digest = nmpc_self_test_episode(&controller, episode, digest);
+    }
+    (void)printf("digest: 0x%08lX after %ld steps\n", digest,
+                 (long)NMPC_SELF_TEST_EPISODES * (long)NMPC_SELF_TEST_TICKS);
+    if (digest != NMPC_SELF_TEST_DIGEST) {
+        (void)printf("digest: the reference has 0x%08lX\n", NMPC_SELF_TEST_DIGEST);
+        return 1;
+    }
+    (void)printf("\n");
 
     (void)printf("  time s    x m      y m    target x  roll rad  pitch rad  cost\n");
     nmpc_init(&controller);

@@ -7,6 +7,13 @@
 
 #include "nmpc.h"
 
+/* Frozen steps: an episode is a controller stepped NMPC_SELF_TEST_TICKS times from nmpc_init(). */
+#define NMPC_SELF_TEST_EPISODES 1000
+#define NMPC_SELF_TEST_TICKS 100
+
+/* The digest of all episodes, as the reference computed it. */
+#define NMPC_SELF_TEST_DIGEST 0x3BCFCB6DUL
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -16,6 +23,19 @@ extern "C" {
  * first step that does not. Call it at start-up, with the controller that will fly if there is no room for
  * another: it is initialised before and after. `scratch` must not be null. */
 int nmpc_self_test(nmpc_t *scratch);
+
+/* Step `scratch` through one episode, from 0, of built-in inputs, good and bad ones, and fold every bit of every
+ * outcome into `digest`: status, iterations, convergence, command, cost, gradient and plan. Returns the new
+ * digest, of 32 bits. Begin with digest 0, go through all episodes in order, on the board and with the flags
+ * that will fly, and compare with NMPC_SELF_TEST_DIGEST:
+ *
+ *     for (episode = 0; episode < NMPC_SELF_TEST_EPISODES; episode++) {
+ *         digest = nmpc_self_test_episode(&scratch, episode, digest);
+ *     }
+ *
+ * Between two episodes there is time to feed a watchdog. `scratch` is initialised before and after; it must not
+ * be null. Work: NMPC_SELF_TEST_TICKS calls of nmpc_step(). */
+unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long digest);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Self-test: inputs of consecutive steps of one controller, and what the reference controller made of them.
+ * Self-test: inputs of consecutive steps of one controller, and what the reference controller made of them;
+ * and many more steps, from inputs made of whole numbers, of which the reference made a digest.
  */
 #include "nmpc_self_test.h"
+
+#include "nmpc_math.h"
 
 #define NMPC_SELF_TEST_STEPS 24
 
@@ -186,4 +189,176 @@ int nmpc_self_test(nmpc_t *scratch)
     }
     nmpc_init(scratch);
     return first_difference;
+}
+
+/* What one unit of a draw, a whole number of 24 bits, is in each input. */
+#define NMPC_SELF_TEST_TARGET_M 2.3841858e-07f
+#define NMPC_SELF_TEST_TARGET_M_S 1.1920929e-07f
+#define NMPC_SELF_TEST_ATTITUDE_RAD 5.9604645e-08f
+#define NMPC_SELF_TEST_YAW_RAD 1.1920929e-05f
+#define NMPC_SELF_TEST_THRUST_M_S2 3.5762787e-07f
+#define NMPC_SELF_TEST_HOVER_M_S2 9.81f
+
+/* Steps that see the same input: plans reach their limits, and costs come to rest. */
+#define NMPC_SELF_TEST_HELD 4
+
+/* The same for the errors, far to near. */
+static const nmpc_real_t self_test_error_m[4] = { 2.3841858e-06f, 5.9604645e-08f, 5.9604646e-09f, 5.9604643e-10f };
+static const nmpc_real_t self_test_error_m_s[4] = { 1.1920929e-06f, 2.9802322e-08f, 2.9802323e-09f, 2.9802322e-10f };
+
+/* The lower 32 bits of an unsigned long, which may have more. */
+static unsigned long word_of(unsigned long value)
+{
+    return value & 0xFFFFFFFFUL;
+}
+
+/* Fold a word into a digest: no two words give the same, and upper bits reach lower ones. */
+static unsigned long fold(unsigned long digest, unsigned long word)
+{
+    const unsigned long mixed = word_of((digest ^ word) * 2654435761UL);
+
+    return mixed ^ (mixed >> 15);
+}
+
+/* Fold the bits of a number, the upper ones first, in whatever order this processor keeps its bytes. */
+static unsigned long fold_real(unsigned long digest, nmpc_real_t value)
+{
+    const unsigned int one = 1U;
+    const int lowest_first = (*(const unsigned char *)&one == 1U);
+    const unsigned char *bytes = (const unsigned char *)&value;
+    const int last = (int)sizeof(value) - 1;
+    unsigned long word = 0UL;
+    int i;
+
+    for (i = 0; i <= last; i++) {
+        word = word_of(word << 8) | (unsigned long)bytes[lowest_first ? (last - i) : i];
+        if ((i % 4) == 3) {
+            digest = fold(digest, word);
+        }
+    }
+    return digest;
+}
+
+static unsigned long fold_outcome(unsigned long digest, const nmpc_t *self, nmpc_status_t status,
+                                  const nmpc_command_t *command)
+{
+    int k;
+
+    digest = fold(digest, (unsigned long)status);
+    digest = fold(digest, (unsigned long)nmpc_last_iterations(self));
+    digest = fold(digest, (unsigned long)nmpc_has_converged(self));
+    digest = fold_real(digest, command->roll_rad);
+    digest = fold_real(digest, command->pitch_rad);
+    digest = fold_real(digest, nmpc_last_cost(self));
+    for (k = 0; k < NMPC_MOVES; k++) {
+        digest = fold_real(digest, self->gradient[k]);
+    }
+    for (k = 0; k < NMPC_MOVES; k++) {
+        digest = fold_real(digest, self->plan_rad[k]);
+    }
+    return digest;
+}
+
+/* The next of all 32-bit numbers but zero: xorshift (Marsaglia, Journal of Statistical Software 8(14), 2003). */
+static unsigned long next_number(unsigned long *stream)
+{
+    unsigned long number = *stream;
+
+    number ^= word_of(number << 13);
+    number ^= number >> 17;
+    number ^= word_of(number << 5);
+    *stream = number;
+    return number;
+}
+
+/* Draw a number of 24 bits, which nmpc_real_t holds exactly, times `scale`: one rounding. */
+static nmpc_real_t draw(unsigned long *stream, nmpc_real_t scale)
+{
+    return (nmpc_real_t)((long)(next_number(stream) >> 8) - 8388608L) * scale;
+}
+
+/* A number with every bit set, which no range contains. */
+static nmpc_real_t no_number(void)
+{
+    nmpc_real_t value;
+    unsigned char *bytes = (unsigned char *)&value;
+    int i;
+
+    for (i = 0; i < (int)sizeof(value); i++) {
+        bytes[i] = 0xFFU;
+    }
+    return value;
+}
+
+/* Make the next input; five in 64 are refused. Returns the thrust acceleration, in m/s^2. */
+static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_target_t *target)
+{
+    const unsigned long choice = next_number(stream);
+    const unsigned long size = choice & 3UL;
+    nmpc_real_t thrust_m_s2;
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        target->position_m[axis] = draw(stream, NMPC_SELF_TEST_TARGET_M);
+    }
+    for (axis = 0; axis < 2; axis++) {
+        target->velocity_m_s[axis] = draw(stream, NMPC_SELF_TEST_TARGET_M_S);
+    }
+    for (axis = 0; axis < 2; axis++) {
+        state->position_m[axis] = target->position_m[axis] + draw(stream, self_test_error_m[size]);
+    }
+    for (axis = 0; axis < 2; axis++) {
+        state->velocity_m_s[axis] = target->velocity_m_s[axis] + draw(stream, self_test_error_m_s[size]);
+    }
+    state->roll_rad = draw(stream, NMPC_SELF_TEST_ATTITUDE_RAD);
+    state->pitch_rad = draw(stream, NMPC_SELF_TEST_ATTITUDE_RAD);
+    state->yaw_rad = draw(stream, NMPC_SELF_TEST_YAW_RAD);
+    thrust_m_s2 = NMPC_SELF_TEST_HOVER_M_S2 + draw(stream, NMPC_SELF_TEST_THRUST_M_S2);
+    thrust_m_s2 = nmpc_smaller(nmpc_larger(thrust_m_s2, NMPC_THRUST_ACCELERATION_MIN_M_S2),
+                               NMPC_THRUST_ACCELERATION_MAX_M_S2);
+
+    switch ((choice >> 8) & 63UL) {
+    case 0UL:
+        state->position_m[0] = no_number();
+        break;
+    case 1UL:
+        state->pitch_rad = (nmpc_real_t)2 * NMPC_ATTITUDE_RANGE_RAD;
+        break;
+    case 2UL:
+        state->yaw_rad = (nmpc_real_t)2 * NMPC_YAW_RANGE_RAD;
+        break;
+    case 3UL:
+        target->velocity_m_s[1] = (nmpc_real_t)-2 * NMPC_VELOCITY_RANGE_M_S;
+        break;
+    case 4UL:
+        thrust_m_s2 = (nmpc_real_t)0;
+        break;
+    default: /* good as it is */
+        break;
+    }
+    return thrust_m_s2;
+}
+
+unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long digest)
+{
+    unsigned long stream = fold(0UL, (unsigned long)episode + 1UL);
+    unsigned long seen = 0UL;
+    int tick;
+    int again;
+
+    nmpc_init(scratch);
+    for (tick = 0; tick < NMPC_SELF_TEST_TICKS; tick += NMPC_SELF_TEST_HELD) {
+        nmpc_state_t state;
+        nmpc_target_t target;
+        const nmpc_real_t thrust_m_s2 = next_input(&stream, &state, &target);
+
+        for (again = 0; again < NMPC_SELF_TEST_HELD; again++) {
+            nmpc_command_t command;
+            const nmpc_status_t status = nmpc_step(scratch, &state, &target, thrust_m_s2, &command);
+
+            seen = fold_outcome(seen, scratch, status, &command);
+        }
+    }
+    nmpc_init(scratch);
+    return fold(digest, seen);
 }
