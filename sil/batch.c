@@ -45,7 +45,7 @@ void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, cons
     }
 }
 
-int nmpc_batch_instance_bytes(void)
+unsigned long nmpc_batch_instance_bytes(void)
 {
-    return (int)sizeof(nmpc_t);
+    return (unsigned long)sizeof(nmpc_t);
 }

@@ -1,11 +1,13 @@
 """The emulated controller: the C as built for a board, on an emulated core, behind the same interface."""
 
+import math
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from codegen.footprint.build import Builder
 from codegen.frozen import TICKS
@@ -14,7 +16,9 @@ from codegen.reference import Step
 from codegen.render import render
 from codegen.settings import Settings
 from sil.compiled import DIRT, as_array, plainly_named
-from sil.machine import TIME_LIMIT_S, Machine
+from sil.errors import EmulatorError
+from sil.machine import TIME_LIMIT_S, start
+from sil.machine_avr import Long
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
 """Functions of the guest that are called from outside."""
@@ -25,6 +29,9 @@ _WORK_A_CALL: Final = 2_000
 _SECONDS_A_WORK: Final = 2e-4
 """What is granted for it on top of TIME_LIMIT_S: ten times what the slowest core takes on a slow machine."""
 
+_MOST_PADDING: Final = 16
+"""Bytes that the alignment of an array may take."""
+
 
 def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
     """Build the program for an emulated core: the bundle of `settings` and the loop over n controllers."""
@@ -33,46 +40,62 @@ def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
 
 
 class EmulatedController:
-    """n controllers on one emulated core, in a program that `build_guest` made for it."""
+    """n controllers on one emulated core, in a program that `build_guest` made for it.
 
-    def __init__(self, settings: Settings, elf: Path, core: str, n: int = 1) -> None:
+    They rest in this process and visit the core a few at a time, so that its memory holds any number of them.
+    """
+
+    def __init__(
+        self, settings: Settings, elf: Path, core: str, n: int = 1, *, counting: bool = False
+    ) -> None:
         self.settings = settings
         self.scalar = SCALARS[settings.code.scalar]
         self._n = n
         horizon = settings.horizon
+        work = _work(settings)
+        limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * max(work, _WORK_A_CALL)
+        self.machine = start(elf, core, limit_s, counting=counting)
+        integer = np.dtype(f"<i{self.machine.word_bytes}")
         self._shapes = {
-            "status": (np.dtype(np.int32), ()),
+            "status": (integer, ()),
             "command_rad": (np.dtype(self.scalar), (2,)),
             "cost": (np.dtype(self.scalar), ()),
             "gradient": (np.dtype(self.scalar), (horizon.control, 2)),
             "plan_rad": (np.dtype(self.scalar), (horizon.control, 2)),
-            "iterations": (np.dtype(np.int32), ()),
-            "converged": (np.dtype(np.int32), ()),
+            "iterations": (integer, ()),
+            "converged": (integer, ()),
         }
-        work = _work(settings)
-        self._together = max(1, _WORK_A_CALL // work)
-        limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * max(work, _WORK_A_CALL)
-        self.machine = Machine(elf, core, n * _bytes_each(settings) + 4096, limit_s)
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
-        self._controllers = self.machine.allocate(n * self._instance_bytes)
         real = np.dtype(self.scalar).itemsize
-        self._inputs = [(self.machine.allocate(n * width * real), width * real) for width in (7, 4, 1)]
-        self._outputs = {
-            name: (self.machine.allocate(n * _size(kind, shape)), _size(kind, shape))
-            for name, (kind, shape) in self._shapes.items()
-        }
-        self._outcome = self.machine.allocate(len(self._outputs) * 4)
-        self.machine.write(self._controllers, DIRT * (n * self._instance_bytes))
-        self.machine.call("nmpc_batch_init", self._controllers, n)
+        sizes = [self._instance_bytes, 7 * real, 4 * real, real]
+        sizes += [kind.itemsize * math.prod(shape) for kind, shape in self._shapes.values()]
+        self._together = min(n, max(1, _WORK_A_CALL // work), self._room(sizes) // sum(sizes))
+        if self._together < 1:
+            raise EmulatorError(
+                f"a controller and what it is given take {sum(sizes)} B, "
+                f"of which the emulated core has {self.machine.free_bytes} B free"
+            )
+        addresses = [self.machine.allocate(self._together * size) for size in sizes]
+        self._controller, self._inputs, outputs = addresses[0], addresses[1:4], addresses[4:]
+        self._outputs = dict(zip(self._shapes, outputs, strict=True))
+        self._outcome = self.machine.allocate(len(outputs) * self.machine.word_bytes)
+        self.machine.write(self._outcome, np.array(outputs, f"<u{self.machine.word_bytes}").tobytes())
+        self._resting = bytearray(DIRT * (n * self._instance_bytes))
+        for few in self._visits():
+            self._visit(few, "nmpc_batch_init")
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
         given = (state, (self._n, 7)), (target, (self._n, 4)), (thrust_acceleration_m_s2, (self._n,))
-        for (values, shape), (address, _) in zip(given, self._inputs, strict=True):
-            self.machine.write(address, as_array(values, self.scalar, shape).tobytes())
-        for first in range(0, self._n, self._together):
-            self._step_few(first, min(self._together, self._n - first))
-        outcome = {name: self._read(name) for name in self._outputs}
+        inputs = [as_array(values, self.scalar, shape) for values, shape in given]
+        outcome = {name: np.empty((self._n, *shape), kind) for name, (kind, shape) in self._shapes.items()}
+        for few in self._visits():
+            for address, values in zip(self._inputs, inputs, strict=True):
+                self.machine.write(address, values[few].tobytes())
+            self._visit(few, "nmpc_batch_step", *self._inputs, self._outcome)
+            for name, values in outcome.items():
+                content = self.machine.read(self._outputs[name], values[few].nbytes)
+                values[few] = np.frombuffer(content, values.dtype).reshape(values[few].shape)
         return Step(
             **outcome
             | {
@@ -82,39 +105,36 @@ class EmulatedController:
             }
         )
 
-    def _step_few(self, first: int, count: int) -> None:
-        pointers = [address + (first * size) for address, size in self._outputs.values()]
-        self.machine.write(self._outcome, np.array(pointers, "<u4").tobytes())
-        controllers = self._controllers + (first * self._instance_bytes)
-        inputs = [address + (first * size) for address, size in self._inputs]
-        self.machine.call("nmpc_batch_step", controllers, count, *inputs, self._outcome)
+    def _room(self, sizes: list[int]) -> int:
+        """Return the bytes for controllers: what is free less the pointers, and what alignment may take."""
+        return (
+            self.machine.free_bytes - len(sizes) * (self.machine.word_bytes + _MOST_PADDING) - _MOST_PADDING
+        )
 
-    def _read(self, name: str) -> NDArray[Any]:
-        kind, shape = self._shapes[name]
-        address, size = self._outputs[name]
-        return np.frombuffer(self.machine.read(address, self._n * size), kind).reshape(self._n, *shape)
+    def _visits(self) -> Iterator[slice]:
+        """Yield which controllers are on the core together, in turn."""
+        for first in range(0, self._n, self._together):
+            yield slice(first, min(first + self._together, self._n))
+
+    def _visit(self, few: slice, function: str, *arguments: int) -> None:
+        """Take a few controllers to the core, call `function` on them, and take them back."""
+        size, count = self._instance_bytes, few.stop - few.start
+        place = slice(few.start * size, few.stop * size)
+        self.machine.write(self._controller, bytes(self._resting[place]))
+        self.machine.call(function, self._controller, count, *arguments)
+        self._resting[place] = self.machine.read(self._controller, count * size)
 
 
 def emulated_digest(settings: Settings, elf: Path, core: str, episodes: int) -> int:
     """Return the digest of the frozen steps on an emulated core, from a program of `build_guest`."""
     limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * _work(settings) * TICKS
-    machine = Machine(elf, core, _bytes_each(settings), limit_s)
+    machine = start(elf, core, limit_s)
     scratch = machine.allocate(machine.call("nmpc_batch_instance_bytes"))
     digest = 0
     for episode in range(episodes):
-        digest = machine.call("nmpc_self_test_episode", scratch, episode, digest)
+        digest = machine.call("nmpc_self_test_episode", scratch, episode, Long(digest))
     return digest
 
 
 def _work(settings: Settings) -> int:
     return settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
-
-
-def _size(kind: np.dtype[Any], shape: tuple[int, ...]) -> int:
-    return kind.itemsize * int(np.prod(shape, dtype=np.int64))
-
-
-def _bytes_each(settings: Settings) -> int:
-    """Bound what one controller needs in the guest: instance, inputs and outcome, 8 bytes a number."""
-    moves = 2 * settings.horizon.control
-    return 8 * (40 + 6 * moves + 2 * settings.horizon.prediction)

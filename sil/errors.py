@@ -23,5 +23,9 @@ class BusyError(MamboNmpcError):
     """Another run holds the result folder."""
 
 
+class EmulatorError(MamboNmpcError):
+    """A program cannot be emulated here: the emulator is missing, or the core too small for it."""
+
+
 class EmulationError(MamboNmpcError):
     """The program on the emulated core died, or did not return in time."""

@@ -18,9 +18,9 @@ from codegen.settings import Settings
 from sil.baseline import PdController
 from sil.compiled import plainly_named
 from sil.emulated import build_guest
+from sil.errors import EmulatorError
 from sil.instructions import InstructionCounts, count_instructions, in_flight, spread
 from sil.loop import Flight, fly
-from sil.machine import CORES
 from sil.traces import Trace
 from sil.trajectories import Bernoulli
 
@@ -51,8 +51,9 @@ class Limit:
 class Footprint:
     """The measured controller on one board.
 
-    `added` is what it adds to a program without it, its instance in static memory included. `stack` and
-    `counts` are None where the code of the processor cannot be taken apart or emulated here.
+    `added` is what it adds to a program without it, its instance in static memory included. `stack` is None
+    where the code of the processor cannot be taken apart here, `counts` where it cannot be emulated, and then
+    `uncounted` says why.
     """
 
     board: Board
@@ -63,6 +64,7 @@ class Footprint:
     instance_bytes: int
     stack: StackReport | None
     counts: InstructionCounts | None
+    uncounted: str
     forbidden: tuple[Forbidden, ...]
     update_period_s: float
 
@@ -126,6 +128,7 @@ def measure_footprint(
         image = load(firmware)
         readable = is_readable(image)
         sizes = added(firmware, found.firmware(files, folder, empty=True), PREFIX)
+        counts, uncounted = _counts(settings, found, folder, counted_steps)
         return Footprint(
             board=board,
             compiler=found.compiler,
@@ -134,9 +137,8 @@ def measure_footprint(
             added=sizes,
             instance_bytes=image.symbol("nmpc_controller").size_bytes,
             stack=worst_case(image, ENTRY) if readable else None,
-            counts=_counts(settings, found, folder, counted_steps)
-            if board.emulated_core.value in CORES
-            else None,
+            counts=counts,
+            uncounted=uncounted,
             forbidden=forbidden(image, settings.code.scalar),
             update_period_s=settings.horizon.update_period_s,
         )
@@ -148,11 +150,19 @@ def _flight() -> Trace:
     return fly(Flight(Bernoulli(2.0, 0.5), duration_s=_FLIGHT_S), PdController())
 
 
-def _counts(settings: Settings, found: Builder, folder: Path, steps: int) -> InstructionCounts:
-    """Count steps in flight, steps from everywhere, and steps in search of the worst; fewer of long ones."""
+def _counts(
+    settings: Settings, found: Builder, folder: Path, steps: int
+) -> tuple[InstructionCounts | None, str]:
+    """Count steps in flight, steps from everywhere, and steps in search of the worst; fewer of long ones.
+
+    Returns None, and why, where the board cannot be emulated here.
+    """
     work = settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
     steps = max(_FEWEST_STEPS, min(steps, steps * _USUAL_WORK // work))
     trace = _flight()
     inputs = in_flight(trace, every=len(trace.time_s) * 6 // steps) + spread(settings, steps // 3)
     elf = build_guest(settings, found, folder)
-    return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2)
+    try:
+        return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2), ""
+    except EmulatorError as error:
+        return None, str(error)

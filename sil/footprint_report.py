@@ -136,9 +136,11 @@ def _notes(footprint: Footprint) -> list[str]:
     for found in footprint.forbidden:
         callers = ", ".join(found.callers) or "an unknown function"
         notes.append(f"{name}: {found.symbol} ({found.kind}) must not be linked; called by {callers}")
-    if footprint.counts is None:
+    if footprint.stack is None:
         core = footprint.board.core.value
-        notes.append(f"{name}: stack, instructions and time are not measured, there is no way yet for {core}")
+        notes.append(f"{name}: stack is not measured, there is no way yet for {core}")
+    if footprint.counts is None:
+        notes.append(f"{name}: instructions and time are not measured: {footprint.uncounted}")
     return notes
 
 

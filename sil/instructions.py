@@ -1,15 +1,14 @@
 """Exact instruction counts of one control step on an emulated core, and a search for the worst input."""
 
-import bisect
 from collections import Counter
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.footprint.disassembly import disassemble
 from codegen.footprint.elf import load
 from codegen.settings import Settings
 from sil.arrays import FloatArray
@@ -59,29 +58,20 @@ class CountingController:
     """One emulated controller whose instructions are counted, step by step."""
 
     def __init__(self, settings: Settings, elf: Path, core: str) -> None:
-        self._emulated = EmulatedController(settings, elf, core)
+        self._emulated = EmulatedController(settings, elf, core, counting=True)
         image = load(elf)
-        self._name_of = image.name_of
-        self._starts = sorted(disassemble(image).instructions)
-        self._runs: Counter[tuple[int, int]] = Counter()
-        self._emulated.machine.watch_blocks(self._watch)
+        self._name_of = lru_cache(None)(image.name_of)
 
     def step(self, state: FloatArray, target: FloatArray, thrust: float) -> tuple[int, Counter[str]]:
         """Step once; returns the status and the instructions by function."""
-        self._runs.clear()
+        self._emulated.machine.counted()
         outcome = self._emulated.step(state[None], target[None], [thrust])
         by_function: Counter[str] = Counter()
-        for (address, size), times in self._runs.items():
+        for address, instructions in self._emulated.machine.counted().items():
             name = self._name_of(address).partition("+")[0]
             if name not in HARNESS:
-                by_function[name] += times * self._instructions(address, size)
+                by_function[name] += instructions
         return int(outcome.status[0]), by_function
-
-    def _instructions(self, address: int, size: int) -> int:
-        return bisect.bisect_left(self._starts, address + size) - bisect.bisect_left(self._starts, address)
-
-    def _watch(self, address: int, size: int) -> None:
-        self._runs[address, size] += 1
 
 
 def in_flight(trace: Trace, every: int) -> Inputs:

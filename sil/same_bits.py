@@ -15,7 +15,7 @@ from codegen.settings import Settings
 from codegen.toolchain import Toolchain
 from sil.compiled import compiled, compiled_digest
 from sil.emulated import build_guest, emulated_digest
-from sil.machine import CORES
+from sil.errors import EmulatorError
 
 HOST_COMPILERS: Final = ("gcc", "clang")
 BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}
@@ -60,15 +60,13 @@ def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int
 def _on_board(
     settings: Settings, board: Board, compiler: str, optimisation: str, episodes: int
 ) -> BuildDigest:
-    core = board.emulated_core.value
-    if core not in CORES:
-        return BuildDigest(board.name, compiler, optimisation, None, f"{core} is not emulated here")
     try:
         found = BOARD_COMPILERS[compiler](board, optimisation)
-    except BuildError as error:
+        with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
+            elf = build_guest(settings, found, Path(work))
+            digest = emulated_digest(settings, elf, board.emulated_core.value, episodes)
+    except (BuildError, EmulatorError) as error:
         return BuildDigest(board.name, compiler, optimisation, None, str(error))
-    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
-        digest = emulated_digest(settings, build_guest(settings, found, Path(work)), core, episodes)
     return BuildDigest(board.name, found.toolchain.command[0], optimisation, _spelled(digest))
 
 

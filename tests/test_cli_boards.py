@@ -12,7 +12,7 @@ from codegen import boards, cli, presets
 from sil import cli_boards
 from sil.board_plots import draw_footprints
 from sil.footprint import measure_footprint
-from tests.support.tools import require
+from tests.support.tools import board_builder, only, require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
 
@@ -115,11 +115,9 @@ def test_missing_compilers_are_named() -> None:
 
 def test_what_has_a_compiler_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others are named on stderr; the table and the exit code are about what was measured."""
-    compiler = Path(require("avr-gcc", "gcc-avr")).resolve()
+    require("avr-gcc", "gcc-avr")
     (tmp_path / "bin").mkdir()
-    for tool in compiler.parent.glob("avr-*"):
-        (tmp_path / "bin" / tool.name).symlink_to(tool)
-    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    monkeypatch.setenv("PATH", only(tmp_path / "bin", "avr-*"))
     said, talk = run("footprint")
     assert [line.split()[0] for line in said.splitlines()[:2]] == ["board", "mega"]
     for package in ("gcc-arm-none-eabi", "gcc-arm-linux-gnueabi", "gcc-riscv64-unknown-elf"):
@@ -139,10 +137,30 @@ def test_flying_on_a_board_is_the_flight_of_this_machine(tmp_path: Path) -> None
     assert (tmp_path / "plain" / "trace.csv").read_bytes() == (tmp_path / "flight" / "trace.csv").read_bytes()
 
 
+def test_flying_on_the_mega_is_the_flight_of_this_machine(tmp_path: Path) -> None:
+    """Eight bits with a floating-point library of their own, in a process of its own."""
+    board_builder("mega")
+    run("fly", "--on", "mega", "--duration-s", "1")
+    summary = json.loads((tmp_path / "flight" / "summary.json").read_text("utf-8"))
+    assert (summary["board"], summary["same_bits_as_host"]) == ("mega", True)
+
+
+@pytest.mark.parametrize(
+    "command", [["fly", "--on", "mega"], ["same-bits", "--boards", "mega", "--steps", "100"]]
+)
+def test_a_missing_emulator_is_named(
+    command: list[str], tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was looked for, and what brings it: an error of a flight, a reason for one build among many."""
+    board_builder("mega")
+    monkeypatch.setenv("PATH", only(tmp_path_factory.mktemp("bin"), "avr-*"))
+    said, talk = run(*command, code=2 if command[0] == "fly" else 0)
+    assert "no qemu-system-avr found to emulate an ATmega2560; Debian's qemu-system-misc" in said + talk
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["fly", "--on", "mega"], "--on mega: avr is not emulated here; arm926, cortex-m0, cortex-m4"),
         (["fly", "--on", "crazyfly"], "did you mean crazyflie?"),
         (["fly", "--on", "crazyflie", "--controller", "pd"], "it goes with --controller nmpc alone"),
         (["footprint", "--board", "teensy"], "did you mean teensy41?"),
@@ -179,7 +197,7 @@ def test_same_bits_compares_and_says_what_did_not_run() -> None:
     assert all(one["digest"] is None and one["reason"] for one in others)
     text, _ = run("same-bits", *options)
     assert reference["digest"] in text
-    assert "avr is not emulated here" in text
+    assert "no compiler for Arduino Mega 2560 found" in text
     assert "over 100 steps" in text.splitlines()[-1]
     assert "24 not run" in text.splitlines()[-1]
 

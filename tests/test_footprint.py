@@ -1,7 +1,6 @@
 """Footprints: what the presets promise on the boards, and that nothing over budget stays unsaid."""
 
 import re
-import shutil
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -9,16 +8,14 @@ from pathlib import Path
 import pytest
 
 from codegen import boards, presets
-from codegen.boards import Board
 from codegen.errors import BuildError
-from codegen.footprint.build import Builder, builder
 from codegen.footprint.elf import load
 from codegen.footprint.gate import Forbidden, forbidden
 from codegen.render import render
 from codegen.settings import Settings
 from sil import footprint_report
 from sil.footprint import Footprint, measure_footprint
-from tests.support.tools import require
+from tests.support.tools import board_builder, only
 
 MAMBO = presets.load("mambo")
 TINY = {
@@ -32,17 +29,10 @@ COST = "return (weights->tracking * distance_m) + (weights->effort * variation_r
 WIDENED = "return 1.0000001 * ((weights->tracking * distance_m) + (weights->effort * variation_rad));"
 
 
-def compiler_of(board: Board) -> Builder:
-    """Return the builder for a board, or skip."""
-    if not any(shutil.which(command) for command in board.compiler.candidates):
-        require(board.compiler.candidates[0], board.compiler.packages[0])
-    return builder(board)
-
-
 @lru_cache
 def measured(board: str, preset: str = "mambo", steps: int = 300) -> Footprint:
     """Measure a preset on a board, once."""
-    compiler_of(boards.load(board))
+    board_builder(board)
     return measure_footprint(presets.load(preset), boards.load(board), counted_steps=steps)
 
 
@@ -105,17 +95,43 @@ def test_time_follows_from_instructions_clock_and_band() -> None:
     assert (time.value, time.budget) == pytest.approx((1000 * time_s[1], 1.0))
 
 
-def test_what_cannot_be_measured_is_said() -> None:
-    """The AVR has neither stack nor instructions, and no limit on them is claimed to hold."""
+def test_the_mega_is_measured_whole() -> None:
+    """Eight bits take as few bytes as others, and avr-libc's arithmetic most of the instructions."""
     footprint = measured("mega", steps=6)
-    assert (footprint.stack, footprint.counts, footprint.time_s) == (None, None, None)
-    assert [limit.name for limit in footprint.limits] == ["flash", "RAM"]
-    assert "mega: stack, instructions and time are not measured" in footprint_report.text([footprint])
+    assert footprint.complete
+    assert footprint.stack is not None
+    assert footprint.counts is not None
+    assert footprint.stack.bytes <= footprint.board.budget.stack_bytes
+    assert footprint.counts.by_function["__addsf3x"] > footprint.counts.mean / 5
+
+
+@pytest.mark.parametrize(
+    ("here", "missing"),
+    [
+        (["avr-*"], "no qemu-system-avr found"),
+        (["avr-*", "qemu-system-avr", "setpriv"], "no C compiler found"),
+    ],
+    ids=["emulator", "compiler"],
+)
+def test_what_cannot_be_measured_is_said(
+    here: list[str], missing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its emulator the AVR has no instructions, and no limit on them is claimed to hold."""
+    board_builder("mega")
+    monkeypatch.setenv("PATH", only(tmp_path, *here))
+    monkeypatch.delenv("CC", raising=False)
+    footprint = measure_footprint(MAMBO, boards.load("mega"), counted_steps=6)
+    assert footprint.stack is not None
+    assert (footprint.counts, footprint.time_s) == (None, None)
+    assert [limit.name for limit in footprint.limits] == ["flash", "RAM", "stack"]
+    text = footprint_report.text([footprint])
+    assert re.search(f"^mega: instructions and time are not measured: .*{missing}", text, re.MULTILINE)
+    assert "incomplete" in text
 
 
 def test_a_tiny_budget_is_exceeded_everywhere(tmp_path: Path) -> None:
     """Each limit is named with its excess, then the largest symbols, largest first."""
-    compiler_of(boards.load("crazyflie"))
+    board_builder("crazyflie")
     footprint = measure_footprint(MAMBO, boards.load(str(tiny(tmp_path))), counted_steps=6)
     assert not footprint.fits
     text = footprint_report.text([footprint])
@@ -139,7 +155,7 @@ def test_a_sneaked_in_double_is_reported_with_its_caller(name: str, tmp_path: Pa
     source = files["src/nmpc_cost.c"]
     assert source.count(COST) == 1
     harmed = files | {"src/nmpc_cost.c": source.replace(COST, WIDENED)}
-    build = compiler_of(boards.load(name))
+    build = board_builder(name)
     assert forbidden(load(build.firmware(files, tmp_path / "good")), "float32") == ()
 
     image = load(build.firmware(harmed, tmp_path / "harmed"))
@@ -175,7 +191,7 @@ def test_sizes_of_five_digits_are_written_out() -> None:
 def test_doubles_may_be_linked_for_float64() -> None:
     """On a core with single precision alone the double arithmetic is the compiler's, and counts as flash."""
     settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": "float64"}})
-    compiler_of(boards.load("crazyflie"))
+    board_builder("crazyflie")
     footprint = measure_footprint(settings, boards.load("crazyflie"), counted_steps=6)
     assert footprint.forbidden == ()
     assert footprint.added.flash.helpers > 500
@@ -185,7 +201,7 @@ def test_doubles_may_be_linked_for_float64() -> None:
 def test_doubles_that_are_none_are_refused() -> None:
     """The AVR's double has the width of its float: the C does not compile, rather than lose its bits."""
     settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": "float64"}})
-    compiler_of(boards.load("mega"))
+    board_builder("mega")
     with pytest.raises(BuildError, match="nmpc_assert_scalar_has_8_bytes"):
         measure_footprint(settings, boards.load("mega"), counted_steps=6)
 
@@ -214,9 +230,9 @@ def test_a_missing_compiler_is_named(name: str, tmp_path: Path, monkeypatch: pyt
 )
 def test_every_build_can_be_measured(name: str, scalar: str, optimisation: str) -> None:
     """No optimisation makes code whose stack has no provable bound."""
-    compiler_of(boards.load(name))
+    board_builder(name)
     settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
     footprint = measure_footprint(settings, boards.load(name), optimisation, counted_steps=6)
-    assert (footprint.stack is None) == (footprint.counts is None) == (name == "mega")
+    assert footprint.complete
     assert footprint.added.flash.total == sum(footprint.added.sections.flash.values())
     assert footprint.forbidden == ()

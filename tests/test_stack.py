@@ -4,86 +4,56 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import unicorn
-from elftools.elf.elffile import ELFFile
-from unicorn import arm_const, riscv_const
 
 from codegen.footprint.elf import FootprintError, Image, load
 from codegen.footprint.stack import Frame, StackReport, direct_callers, worst_case
+from sil.machine import start
 from tests.support.linking import BOARDS, Board, linked, linked_controller
+from tests.support.tools import require
 
 OPTIMISATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
 GRID = [(board, optimisation) for board in BOARDS for optimisation in OPTIMISATIONS]
-QUICK = {("arm926", "-O2"), ("m4f", "-O2"), ("m0plus", "-Os"), ("rv32imac", "-O0")}
-CPUS = {
-    "arm926": arm_const.UC_CPU_ARM_926,
-    "m4f": arm_const.UC_CPU_ARM_CORTEX_M4,
-    "m7": arm_const.UC_CPU_ARM_CORTEX_M7,
-    "m0plus": arm_const.UC_CPU_ARM_CORTEX_M0,
+QUICK = {("arm926", "-O2"), ("m4f", "-O2"), ("m0plus", "-Os"), ("rv32imac", "-O0"), ("avr", "-O2")}
+CORES = {
+    "arm926": "arm926",
+    "m4f": "cortex-m4",
+    "m7": "cortex-m7",
+    "m0plus": "cortex-m0",
+    "rv32imac": "rv32",
+    "avr": "avr",
 }
-STACK_TOP = 0x20008000
-STACK_BYTES = 0x1000
-RETURN_TO = 0x1F0000
 PAINT = b"\xa5"
-LONGEST_US = 1_000_000
 UNSEEN_BYTES = 16
 """Bytes that paint may outlast: on paths not taken, and at the bottom of frames that is never written."""
 
 
-class Emulator:
-    """A program in memory, and a painted stack; `call` runs one of its functions."""
+class Painted:
+    """A program on an emulated core, and a painted stack."""
 
     def __init__(self, board: Board, image: Image) -> None:
-        self.image = image
-        self.thumb = "-mthumb" in board.flags
-        if board.name in CPUS:
-            mode = unicorn.UC_MODE_THUMB if self.thumb else unicorn.UC_MODE_ARM
-            self.machine = unicorn.Uc(unicorn.UC_ARCH_ARM, mode)
-            self.machine.ctl_set_cpu_model(CPUS[board.name])
-            self.registers = (arm_const.UC_ARM_REG_SP, arm_const.UC_ARM_REG_LR, arm_const.UC_ARM_REG_R0)
-        else:
-            self.machine = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32)
-            self.registers = (
-                riscv_const.UC_RISCV_REG_SP,
-                riscv_const.UC_RISCV_REG_RA,
-                riscv_const.UC_RISCV_REG_A0,
-            )
-            self.machine.reg_write(riscv_const.UC_RISCV_REG_GP, global_pointer(image.path))
-        self.machine.mem_map(0, RETURN_TO + 0x1000)
-        self.machine.mem_map(STACK_TOP - STACK_BYTES, STACK_BYTES)
-        for section in image.sections:
-            self.machine.mem_write(section.address, section.contents)
-        self.machine.mem_write(STACK_TOP - STACK_BYTES, PAINT * STACK_BYTES)
+        if board.name == "avr":
+            require("qemu-system-avr", "qemu-system-misc")
+        self._image = image
+        self._machine = start(image.path, CORES[board.name])
+        self._stack = self._machine.stack
+        self._machine.write(self._stack.start, PAINT * len(self._stack))
 
     def call(self, function: str) -> int:
         """Run a function without arguments to its end; returns what it returns."""
-        pointer, link, result = self.registers
-        self.machine.reg_write(pointer, STACK_TOP)
-        self.machine.reg_write(link, RETURN_TO | self.thumb)
-        entry = self.image.symbol(function).address
-        self.machine.emu_start(entry | self.thumb, RETURN_TO, timeout=LONGEST_US)
-        return int(self.machine.reg_read(result))
+        return self._machine.call(function)
 
     def write(self, variable: str, content: bytes) -> None:
         """Set a variable, whole."""
-        symbol = self.image.symbol(variable)
+        symbol = self._image.symbol(variable)
         assert symbol.size_bytes == len(content)
-        self.machine.mem_write(symbol.address, content)
+        self._machine.write(symbol.address, content)
 
     def high_water_bytes(self) -> int:
         """Return how far down the paint is gone."""
-        stack = bytes(self.machine.mem_read(STACK_TOP - STACK_BYTES, STACK_BYTES))
-        return len(stack.lstrip(PAINT))
+        return len(self._machine.read(self._stack.start, len(self._stack)).lstrip(PAINT))
 
 
-def global_pointer(program: Path) -> int:
-    """Return what start-up code puts into gp, from which a RISC-V linker makes code reach variables."""
-    with program.open("rb") as stream:
-        table = ELFFile(stream).get_section_by_name(".symtab")
-        return int(table.get_symbol_by_name("__global_pointer$")[0]["st_value"])
-
-
-def fly(emulator: Emulator, steps: int) -> None:
+def fly(emulator: Painted, steps: int) -> None:
     """Step through plausible inputs of all sizes, and through bits that mean nothing."""
     rng = np.random.default_rng(7)
     for _ in range(steps):
@@ -117,12 +87,12 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
     image = load(linked_controller(BOARDS[board], tmp_path, optimisation))
     report, step = worst_case(image, "run"), worst_case(image, "fly")
 
-    emulator = Emulator(BOARDS[board], image)
+    emulator = Painted(BOARDS[board], image)
     assert emulator.call("run") == 0
     seen = emulator.high_water_bytes()
     assert seen <= report.bytes <= seen + UNSEEN_BYTES
 
-    emulator = Emulator(BOARDS[board], image)
+    emulator = Painted(BOARDS[board], image)
     fly(emulator, 60)
     seen = emulator.high_water_bytes()
     assert seen <= step.bytes <= seen + UNSEEN_BYTES
@@ -133,11 +103,11 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
     assert all(known.get(name, size) == size for name, size in frames.items())
 
 
-@pytest.mark.parametrize("board", BOARDS)
+@pytest.mark.parametrize("board", [name for name in BOARDS if name != "avr"])
 def test_double_precision_has_a_bound_too(board: str, tmp_path: Path) -> None:
     """The compiler's long helpers are walked as any other code."""
     image = load(linked_controller(BOARDS[board], tmp_path, scalar="float64"))
-    emulator = Emulator(BOARDS[board], image)
+    emulator = Painted(BOARDS[board], image)
     assert emulator.call("run") == 0
     assert 0 <= worst_case(image, "run").bytes - emulator.high_water_bytes() <= UNSEEN_BYTES
 
@@ -169,7 +139,7 @@ volatile int seen;
 NOINLINE int deep(int of) { volatile int a[50]; a[seen] = of; return a[1]; }
 int run(void) { volatile int a[5]; a[seen] = 2; return deep(a[1]); }
 """
-WIDE = "volatile int seen; int run(void) { volatile int a[3000]; a[seen] = 3; return a[seen + 1]; }"
+WIDE = "volatile int seen; int run(void) { volatile long a[3000]; a[seen] = 3; return a[seen + 1]; }"
 
 
 @pytest.mark.parametrize("board", BOARDS)
@@ -177,8 +147,8 @@ class TestSmallPrograms:
     """Shapes of a call graph, each small enough to count by hand."""
 
     def test_a_leaf_needs_nothing(self, board: str, tmp_path: Path) -> None:
-        """A function that keeps everything in registers holds no byte, and its call pushes none."""
-        assert report_of(board, LEAF, tmp_path).bytes == 0
+        """A function that keeps everything in registers holds no byte but what its call pushes: on AVR 3."""
+        assert report_of(board, LEAF, tmp_path).bytes == (3 if board == "avr" else 0)
 
     def test_a_chain_adds_up(self, board: str, tmp_path: Path) -> None:
         """The path names every function with its bytes, which gcc knows as well."""
@@ -204,7 +174,7 @@ class TestSmallPrograms:
         [
             (
                 "volatile int seen; int run(void) { volatile int a[seen]; a[0] = 1; return a[seen]; }",
-                r"guest\.elf: run: `.*sp.*` at 0x1.* only run time knows; alloca",
+                r"guest\.elf: run: `(.*sp.*|out 0x3d, r\d+)` at 0x1.* only run time knows; alloca",
             ),
             (
                 "int run(void); volatile int seen;"
@@ -214,17 +184,17 @@ class TestSmallPrograms:
             ),
             (
                 "int (*volatile hook)(void); int run(void) { return hook() + 1; }",
-                r"run: `.*(jalr|blx) .*` at 0x1.* only run time knows; call functions by name",
+                r"run: `.*((jalr|blx) .*|eicall)` at 0x1.* only run time knows; call functions by name",
             ),
             (
                 "int (*volatile hook)(void); int run(void) { return hook(); }",
-                r"run: `.*(jr|bx|blx) .*` at 0x1.* only run time knows; call functions by name",
+                r"run: `.*((jr|bx|blx) .*|eijmp)` at 0x1.* only run time knows; call functions by name",
             ),
             (
                 "volatile int seen; int run(void) { switch (seen) {"
                 + "".join(f"case {n}: seen = {n * n * 7 % 13}; return {n * n % 11};" for n in range(20))
                 + "} return seen; }",
-                r"run: `.*` at 0x1.* compile with -fno-jump-tables",
+                r"(run|__tablejump2__): `.*` at 0x1.* compile with -fno-jump-tables",
             ),
         ],
         ids=["variable array", "recursion", "function pointer", "tail call of a pointer", "jump table"],
@@ -235,9 +205,9 @@ class TestSmallPrograms:
             report_of(board, text, tmp_path, "-fno-tree-switch-conversion")
 
 
-@pytest.mark.parametrize("board", [name for name in BOARDS if name != "m0plus"])
+@pytest.mark.parametrize("board", [name for name in BOARDS if name not in {"m0plus", "avr"}])
 def test_a_tail_call_replaces_the_frame(board: str, tmp_path: Path) -> None:
-    """What is given back before the jump does not add to what the callee takes; gcc has none for Thumb-1."""
+    """What is given back before the jump does not add to what the callee takes; gcc has none elsewhere."""
     report = report_of(board, TAIL, tmp_path)
     assert report.path == (Frame("run", 0), Frame("deep", report.frames["deep"]))
     assert report.bytes == report.frames["deep"] > report.frames["run"] > 0
@@ -300,10 +270,11 @@ def test_callers_are_named(tmp_path: Path) -> None:
 
 
 def test_other_processors_are_refused(tmp_path: Path) -> None:
-    """A program for AVR can be measured, but its stack cannot be bounded."""
-    board = Board("mega", "avr-gcc", "gcc-avr", ("-mmcu=atmega2560",))
-    image = load(linked(board, "int run(void) { return 1; }", tmp_path))
-    with pytest.raises(FootprintError, match=r"guest\.elf: code for AVR cannot be read here"):
+    """A program for this machine can be measured, but its stack cannot be bounded."""
+    image = load(linked(Board("host", "gcc", "gcc", ()), "int run(void) { return 1; }", tmp_path))
+    with pytest.raises(
+        FootprintError, match=r"guest\.elf: code for .* cannot be read here, only ARM, AVR and"
+    ):
         worst_case(image, "run")
 
 

@@ -11,10 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from codegen import boards, cli, presets
+from codegen.boards import Board
 from sil import cli_boards
 from sil.board_plots import draw_sweep
 from sil.sweep import Grid, Point, largest_fit, sweep, write_points
-from tests.support.tools import require
+from tests.support.tools import board_builder, require
 
 POINT = Point(
     prediction=10,
@@ -177,9 +178,24 @@ def test_a_sweep_yields_the_points_in_order() -> None:
 
 @pytest.mark.long
 def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
-    """The AVR has neither stack bound nor time: no horizon fits it, however small."""
-    require_compiler("mega")
-    grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
-    (found,) = sweep(presets.load("mambo"), boards.load("mega"), grid)
+    """More tables than the emulated AVR has RAM: no time, and no fit, though the board be generous."""
+    board_builder("mega")
+    document = boards.load("mega").model_dump()
+    document["ram_bytes"]["value"] = 65_536
+    document["budget"] |= {"flash_bytes": 131_072, "ram_bytes": 32_768}
+    grid = Grid(prediction=(50,), control=(50,), iterations=(1,))
+    (found,) = sweep(presets.load("mambo"), Board.model_validate(document), grid)
+    assert found.ram_bytes <= 32_768
+    assert found.stack_bytes > 0
     assert math.isnan(found.time_ms)
     assert not found.fits
+
+
+@pytest.mark.long
+def test_a_small_controller_fits_the_mega() -> None:
+    """Five steps, one move, three iterations: half of the period is enough for them."""
+    board_builder("mega")
+    grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
+    (found,) = sweep(presets.load("mambo"), boards.load("mega"), grid)
+    assert found.time_ms < 5
+    assert found.fits

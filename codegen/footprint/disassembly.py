@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import capstone
 
-from codegen.footprint import arm, riscv
+from codegen.footprint import arm, avr, riscv
 from codegen.footprint.elf import Image, Section
 from codegen.footprint.instructions import Convention, Instruction
 
@@ -26,17 +26,19 @@ class Code:
 
 
 def is_readable(image: Image) -> bool:
-    """Say whether the code of a program can be taken apart here: ARM or 32-bit RISC-V."""
-    return image.machine in {"EM_ARM", "EM_RISCV"} and image.address_bits == 32
+    """Say whether the code of a program can be taken apart here: ARM, AVR or 32-bit RISC-V."""
+    return image.machine in {"EM_ARM", "EM_AVR", "EM_RISCV"} and image.address_bits == 32
 
 
 def disassemble(image: Image) -> Code:
-    """Return the code of an ARM or a 32-bit RISC-V program; raises FootprintError for other processors."""
+    """Return the code of an ARM, AVR or 32-bit RISC-V program; raises FootprintError for other processors."""
     if not is_readable(image):
         name = image.machine.removeprefix("EM_")
         raise image.error(
-            f"code for {name} cannot be read here, only ARM and 32-bit RISC-V; measure its sizes"
+            f"code for {name} cannot be read here, only ARM, AVR and 32-bit RISC-V; measure its sizes"
         )
+    if image.machine == "EM_AVR":
+        return Code(*avr.disassembled(image))
     if image.machine == "EM_ARM":
         return Code({instruction.address: instruction for instruction in _arm(image)}, arm.CONVENTION)
     return Code({instruction.address: instruction for instruction in _riscv(image)}, riscv.CONVENTION)

@@ -47,7 +47,7 @@ class Forbidden:
 def forbidden(image: Image, scalar: str) -> tuple[Forbidden, ...]:
     """Return every function that a controller of scalar type float32 or float64 must not link.
 
-    Callers are found in ARM and RISC-V code only; a function that is called through a pointer has none.
+    Callers are found in ARM, AVR and RISC-V code only; a function that is called through a pointer has none.
     """
     rules = _ALWAYS | _WIDER[scalar]
     found = {symbol: kind for symbol in image.symbols if (kind := _kind(symbol, rules))}

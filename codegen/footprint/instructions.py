@@ -50,13 +50,22 @@ class Store:
 
 
 @dataclass(frozen=True)
+class Same:
+    """Register becomes what two others both hold, the halves of one value; anything if they differ."""
+
+    register: str
+    first: str
+    second: str
+
+
+@dataclass(frozen=True)
 class Forget:
     """Register becomes anything."""
 
     register: str
 
 
-Effect = Put | Sum | Load | Store | Forget
+Effect = Put | Sum | Load | Store | Same | Forget
 Flow = Literal["next", "jump", "call", "stop"]
 """After the effects: go on, go to `pc`, call `pc` and go on, or end here."""
 
@@ -85,8 +94,11 @@ class Instruction:
 class Convention:
     """The registers of a calling convention: where a call leaves the return address, what it preserves.
 
-    On these processors a call itself pushes nothing.
+    Where a call itself pushes the return address, that takes `return_bytes`, and `link` names what is there
+    as if it were a register. Registers are saved on the stack in places of `word_bytes`.
     """
 
     link: str
     preserved: frozenset[str]
+    word_bytes: int = WORD_BYTES
+    return_bytes: int = 0

@@ -7,12 +7,12 @@ from codegen.footprint.elf import Image
 from codegen.footprint.instructions import (
     PC,
     SP,
-    WORD_BYTES,
     Convention,
     Effect,
     Forget,
     Load,
     Put,
+    Same,
     Store,
     Sum,
 )
@@ -36,13 +36,15 @@ class Value:
 class Knowledge:
     """Registers by name, and words of the stack by their offset in bytes to the stack pointer on entry."""
 
+    convention: Convention
     registers: dict[str, Value]
     words: dict[int, Value]
 
     @classmethod
     def on_entry(cls, convention: Convention) -> "Knowledge":
         """Every register that matters holds what it held on entry."""
-        return cls({name: Value(name, 0) for name in (SP, convention.link, *convention.preserved)}, {})
+        names = (SP, convention.link, *convention.preserved)
+        return cls(convention, {name: Value(name, 0) for name in names}, {})
 
     @property
     def knows_depth(self) -> bool:
@@ -52,8 +54,8 @@ class Knowledge:
 
     @property
     def depth(self) -> int:
-        """Return the bytes held on the stack."""
-        return -self.registers[SP].offset
+        """Return the bytes held on the stack, the return address included where a call pushes it."""
+        return self.convention.return_bytes - self.registers[SP].offset
 
     def unchanged(self, *names: str) -> bool:
         """Say whether registers hold what they held on entry."""
@@ -62,13 +64,14 @@ class Knowledge:
     def common(self, other: "Knowledge") -> "Knowledge":
         """Keep what holds on both of two paths."""
         return Knowledge(
+            self.convention,
             dict(self.registers.items() & other.registers.items()),
             dict(self.words.items() & other.words.items()),
         )
 
-    def after_call(self, convention: Convention) -> "Knowledge":
+    def after_call(self) -> "Knowledge":
         """Keep what a call preserves."""
-        kept = convention.preserved | {SP}
+        kept = self.convention.preserved | {SP}
         return replace(self, registers={name: self.registers[name] for name in self.registers.keys() & kept})
 
     def departed(self) -> tuple[Value | None, "Knowledge"]:
@@ -89,6 +92,9 @@ class Knowledge:
                 value = self._sum(left, right, sign)
             case Load(register, base, offset):
                 value = self._loaded(base, offset, image)
+            case Same(register, first, second):
+                one = self.registers.get(first)
+                value = one if one == self.registers.get(second) else None
             case Forget(register):
                 value = None
         return replace(self, registers=_with(self.registers, register, value))
@@ -122,7 +128,7 @@ class Knowledge:
         if value is None or value.register != SP:
             return None
         place = value.offset + offset
-        return place - place % WORD_BYTES
+        return place - place % self.convention.word_bytes
 
 
 def _with(known: dict[_Key, Value], key: _Key, value: Value | None) -> dict[_Key, Value]:

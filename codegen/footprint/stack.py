@@ -31,8 +31,8 @@ class Frame:
 class StackReport:
     """The worst case of `entry`: `bytes` below the stack pointer that it is called with.
 
-    Its own frame counts. The call that starts it takes no stack: ARM and RISC-V leave the return address in a
-    register, and where a function saves it, it is in that function's frame. Interrupts come on top.
+    Its own frame counts, and in that its return address: where it saves it on ARM and RISC-V, whose calls
+    leave it in a register; always on AVR, whose calls push it. Interrupts come on top.
 
     `path` is a way down to `bytes`, its frames add up to it. `frames` has the most that each reachable
     function ever holds itself, `depths` the same with all that it calls.
@@ -133,7 +133,7 @@ class _Walker:
         self._functions = {symbol.address for symbol in image.symbols if symbol.kind == "function"}
         self._known: dict[int, dict[int, Knowledge]] = defaultdict(dict)
         self._waiting: list[tuple[int, int]] = []
-        self._frame = 0
+        self._frame = code.convention.return_bytes
         self._calls: dict[int, int] = {}
 
     def walked(self) -> _Walk:
@@ -195,7 +195,7 @@ class _Walker:
             return
         place = self._place(instruction, target)
         if finished and after.unchanged(convention.link) and place in self._functions - {self._function}:
-            self._note(place, after.depth)
+            self._note(place, 0)
         else:
             self._arrive(place, after)
 
@@ -204,9 +204,11 @@ class _Walker:
         convention = self._code.convention
         if place in self._functions:
             self._note(place, after.depth)
-            self._arrive(following, after.after_call(convention))
+            self._arrive(following, after.after_call())
         else:
-            self._arrive(place, after.after(Put(convention.link, None, following), self._image))
+            for effect in (Put(convention.link, None, following), Put(SP, SP, -convention.return_bytes)):
+                after = after.after(effect, self._image)
+            self._arrive(place, after)
 
     def _note(self, callee: int, held: int) -> None:
         self._calls[callee] = max(held, self._calls.get(callee, 0))

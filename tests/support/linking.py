@@ -17,8 +17,8 @@ nmpc_state_t state;
 nmpc_target_t target;
 nmpc_real_t thrust;
 nmpc_command_t command;
-int run(void) { return nmpc_self_test(&nmpc_instance); }
-int fly(void) { return nmpc_step(&nmpc_instance, &state, &target, thrust, &command); }
+long run(void) { return nmpc_self_test(&nmpc_instance); }
+long fly(void) { return nmpc_step(&nmpc_instance, &state, &target, thrust, &command); }
 """
 """A program that runs the self-test, or one step from variables."""
 
@@ -63,6 +63,7 @@ class Board:
     compiler: str
     package: str
     flags: tuple[str, ...]
+    libraries: tuple[str, ...] = ("-lgcc",)
 
 
 def _board(name: str, compiler: str, package: str, flags: str) -> Board:
@@ -89,6 +90,7 @@ BOARDS = {
             "gcc-riscv64-unknown-elf",
             "-march=rv32imac -mabi=ilp32 -ffreestanding",
         ),
+        Board("avr", "avr-gcc", "gcc-avr and avr-libc", ("-mmcu=atmega2560",), ("-lm", "-lgcc")),
     )
 }
 
@@ -104,7 +106,7 @@ def linked(board: Board, text: str, folder: Path, *flags: str, name: str = "gues
         *_LINK,
         f"{name}.c",
         *flags,
-        "-lgcc",
+        *board.libraries,
         "-o",
         f"{name}.elf",
     ]

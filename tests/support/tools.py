@@ -2,9 +2,12 @@
 
 import os
 import shutil
+from pathlib import Path
 
 import pytest
 
+from codegen import boards
+from codegen.footprint.build import Builder, builder
 from codegen.toolchain import Toolchain
 
 
@@ -17,6 +20,25 @@ def require(tool: str, package: str) -> str:
             pytest.fail(message)
         pytest.skip(message)
     return path
+
+
+def board_builder(name: str) -> Builder:
+    """Return the builder for a board whose compiler and emulator are here."""
+    board = boards.load(name)
+    if not any(shutil.which(command) for command in board.compiler.candidates):
+        require(board.compiler.candidates[0], " and ".join(board.compiler.packages))
+    if board.emulated_core.value == "avr":
+        require("qemu-system-avr", "qemu-system-misc")
+    return builder(board)
+
+
+def only(folder: Path, *patterns: str) -> str:
+    """Return a PATH that has nothing but the tools that match `patterns`, linked in `folder`."""
+    for place in os.environ["PATH"].split(os.pathsep):
+        for tool in (path for pattern in patterns for path in Path(place).glob(pattern)):
+            if not (folder / tool.name).exists():
+                (folder / tool.name).symlink_to(tool)
+    return str(folder)
 
 
 def toolchain(compiler: str, optimisation: str | None = None) -> Toolchain:
