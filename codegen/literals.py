@@ -10,7 +10,6 @@ Scalar = type[np.floating[Any]]
 
 SCALARS: Final[dict[str, Scalar]] = {"float32": np.float32, "float64": np.float64}
 C_TYPES: Final[dict[str, str]] = {"float32": "float", "float64": "double"}
-BITS_TYPES: Final[dict[str, str]] = {"float32": "uint32_t", "float64": "uint64_t"}
 _SUFFIXES: Final[dict[str, str]] = {"float32": "f", "float64": ""}
 
 

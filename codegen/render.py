@@ -106,7 +106,6 @@ def _context(settings: Settings) -> dict[str, object]:
         "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
         "tables": tables,
-        "bits_type": literals.BITS_TYPES[scalar],
         "trigonometry": trigonometry(scalar),
         "sine_error": SINE_ERRORS[scalar],
         "weight_limit": WEIGHT_LIMIT,

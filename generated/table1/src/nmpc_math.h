@@ -5,8 +5,6 @@
 #ifndef NMPC_MATH_H
 #define NMPC_MATH_H
 
-#include <stdint.h>
-
 #include "nmpc_config.h"
 
 /* Flags that would change the arithmetic of this library. */
@@ -45,7 +43,12 @@ static inline int nmpc_sign(nmpc_real_t value)
 
 /* The bits of a value; the highest is its sign. Where there is no FPU, reading that is much cheaper than a
  * comparison. */
-typedef uint32_t nmpc_bits_t;
+#if defined(__SIZEOF_INT__) && (__SIZEOF_INT__ < 4)
+typedef unsigned long nmpc_bits_t;
+#else
+typedef unsigned int nmpc_bits_t;
+#endif
+typedef char nmpc_assert_bits[(sizeof(nmpc_bits_t) == sizeof(nmpc_real_t)) ? 1 : -1];
 #define NMPC_SIGN_BIT ((nmpc_bits_t)1 << 31)
 
 static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
