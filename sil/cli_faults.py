@@ -7,8 +7,10 @@ import typer
 
 from codegen import cli as generating
 from codegen import presets
+from codegen.errors import echo
 from sil.cli_boards import AsJson, Source
 from sil.compiled import CompiledController
+from sil.errors import FlightError
 from sil.fault_flights import End, fly_faults
 from sil.fault_report import records, table, write_csv
 from sil.progress import progress_bar
@@ -34,8 +36,11 @@ def faults(
     """Fly with faults of sensors, timing, target and operator; exit 1 if one crashes the drone."""
     settings = presets.load(source)
     with new_results(output, "faults", FAULT_FILES) as folder:
-        with progress_bar("flying with faults") as progress:
-            verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), progress)
+        try:
+            with progress_bar("flying with faults") as progress:
+                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), progress)
+        except FlightError as error:
+            raise FlightError(f"{echo(source)}: {error}") from error
         from sil.fault_plots import draw_faults  # noqa: PLC0415 - loaded when drawing
 
         draw_faults(verdicts, folder / "faults")

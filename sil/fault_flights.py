@@ -16,6 +16,7 @@ from codegen.reference import Status
 from codegen.settings import Settings
 from sil.arrays import FloatArray
 from sil.compiled import CompiledController
+from sil.errors import FlightError
 from sil.fault_scenarios import TO_THE_END, Scenario, scenarios
 from sil.faults import Fault, FaultyController, LevellingCaller, ReweightedController, WeightChange
 from sil.loop import Flight, fly
@@ -37,8 +38,8 @@ STRAY_M: Final = 10.0
 """Distance at which the stock code of the Mambo shuts the motors down."""
 
 BAND_FACTOR: Final = 1.5
-PATIENCE: Final = 20
-"""Refused steps in a row after which a levelling caller levels out: 0.2 s at 100 Hz."""
+PATIENCE: Final = 5
+"""Refused steps in a row at which a levelling caller levels out: 0.05 s at 100 Hz."""
 
 TURN_RATE_RAD_S: Final = 1.0
 HOVER_WIND_M_S2: Final = (0.5, 0.3)
@@ -110,25 +111,38 @@ def fly_faults(
 ) -> tuple[Verdict, ...]:
     """Fly every scenario, or those `chosen`, on every course at every moment; course by course, in order.
 
-    `controller` makes n controllers of `settings`. Raises FlightError.
+    `controller` makes n controllers of `settings`. Raises FlightError for settings that cannot be flown.
     """
     period_s = settings.horizon.update_period_s
     sorties = _sorties(scenarios(settings) if chosen is None else chosen, period_s)
-    hovering = np.array([sortie.course == HOVER for sortie in sorties], np.float64)
-    flight = Flight(
-        Trajectories(tuple(COURSES[sortie.course] for sortie in sorties)),
-        duration_s=DURATION_S,
-        flights=len(sorties),
-        yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.turning for sortie in sorties]),
-        vehicle=Vehicle(wind_m_s2=(HOVER_WIND_M_S2[0] * hovering, HOVER_WIND_M_S2[1] * hovering)),
-        update_period_s=period_s,
-    )
+    flight = _flight(sorties, period_s)
     compiled = controller(len(sorties))
     reweighted = ReweightedController(compiled, len(sorties), _weight_changes(sorties, settings))
     patience = np.array([PATIENCE if _levelled(sortie) else NEVER for sortie in sorties])
     caller = LevellingCaller(reweighted, compiled.reset, patience)
     trace = fly(flight, FaultyController(caller, [_fault(sortie) for sortie in sorties]), progress)
+    healthy = [sortie.scenario is None for sortie in sorties]
+    if (trace.status[:, healthy] == Status.BAD_TARGET).any():
+        raise FlightError(
+            f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
+            f"{settings.ranges.velocity_m_s:g}: the figure of eight of Table II lies beyond, to 2 m and 1 m/s"
+        )
     return _judged(trace, sorties, reweighted.answers)
+
+
+def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
+    hovering = np.array([sortie.course == HOVER for sortie in sorties], np.float64)
+    try:
+        return Flight(
+            Trajectories(tuple(COURSES[sortie.course] for sortie in sorties)),
+            duration_s=DURATION_S,
+            flights=len(sorties),
+            yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.turning for sortie in sorties]),
+            vehicle=Vehicle(wind_m_s2=(HOVER_WIND_M_S2[0] * hovering, HOVER_WIND_M_S2[1] * hovering)),
+            update_period_s=period_s,
+        )
+    except FlightError as error:
+        raise FlightError(f"horizon.{error}") from error
 
 
 def _sorties(chosen: Sequence[Scenario], period_s: float) -> list[_Sortie]:

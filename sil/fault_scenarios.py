@@ -34,7 +34,7 @@ class Scenario:
     weights: tracking and effort weight set when it begins; the right ones come back when it ends.
     moved_m: how far along x the target has truly moved, once it has begun.
     turning: whether the drone turns its heading throughout.
-    levelled: whether the caller levels out after `sil.fault_flights.PATIENCE` refused steps.
+    levelled: whether the caller levels out at `sil.fault_flights.PATIENCE` refused steps.
     """
 
     name: str
@@ -69,6 +69,7 @@ def scenarios(settings: Settings) -> tuple[Scenario, ...]:
         Scenario("state NaN in 3 of 10 steps, 5 s", 5.0, bursts, answers=_only(Status.OK, Status.BAD_STATE)),
         Scenario("state NaN, 0.2 s", 0.2, outage, answers=bad_state),
         Scenario("state NaN, 1 s", 1.0, outage, answers=bad_state),
+        Scenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
         Scenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
         Scenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
         Scenario("state NaN to the end", TO_THE_END, outage, answers=bad_state),

@@ -2,6 +2,8 @@
 
 import json
 import math
+import re
+import subprocess
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from codegen import bundle, presets
+from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from codegen.reference import Status
 from codegen.render import render
 from sil.compiled import CompiledController
@@ -42,6 +45,7 @@ from sil.traces import Trace
 from sil.trajectories import Hover
 from sil.verify.check import Outcome, Subject
 from sil.verify.faults import faults, judge
+from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
 EIGHT = next(iter(CASES.values()))
@@ -312,6 +316,50 @@ def test_the_check_fails_a_controller_that_does_not_refuse(tmp_path: Path) -> No
     right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
     chosen = subject(tmp_path, right=right, becomes="if (!((state != 0)")
     assert faults(chosen).outcome is Outcome.FAILED
+
+
+def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:
+    """The lines in the documentation, in a program whose every state after the first is refused."""
+    compiler = require("gcc", "gcc")
+    lines = re.search(r"```c\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)
+    assert lines is not None
+    bundle.write(render(MAMBO), tmp_path / "bundle")
+    (tmp_path / "caller.c").write_text(CALLER.replace("LINES", lines[1]), "utf-8")
+    sources = sorted(map(str, (tmp_path / "bundle" / "src").glob("*.c")))
+    command = [compiler, *COMPILE_FLAGS, *WARNING_FLAGS, "-Werror", "-Ibundle/include", "caller.c", *sources]
+    built = subprocess.run(
+        [*command, "-o", "caller"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert built.returncode == 0, built.stderr
+    said = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True).stdout.split()
+    good, *refused = map(float, said)
+    assert good != 0
+    assert refused == [good] * 4 + [0.0] * 2
+
+
+CALLER = """
+#include <stdio.h>
+#include "nmpc.h"
+int main(void)
+{
+    nmpc_t controller;
+    nmpc_state_t state = { { 1.0f, 1.0f }, { 0.0f, 0.0f }, 0.0f, 0.0f, 0.0f };
+    const nmpc_target_t target = { { 0.0f, 0.0f }, { 0.0f, 0.0f } };
+    const nmpc_real_t thrust_acceleration_m_s2 = 9.81f;
+    nmpc_command_t command;
+    nmpc_status_t status;
+    int refused = 0;
+    int step;
+
+    nmpc_init(&controller);
+    for (step = 0; step < 7; step++) {
+LINES
+        printf("%.9g\\n", (double)command.pitch_rad);
+        state.yaw_rad = 2000.0f;
+    }
+    return 0;
+}
+"""
 
 
 def test_the_table_has_a_row_a_fault() -> None:
