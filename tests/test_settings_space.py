@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from hypothesis import given, seed, settings
+from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -66,7 +66,7 @@ def is_refused_in_words(app: typer.Typer, broken: Broken, folder: Path) -> None:
 def over_valid_settings(examples: int) -> Callable[[], None]:
     """Return the test of `examples` drawn settings, with each compiler and layout."""
 
-    @settings(max_examples=examples)
+    @settings(max_examples=examples, phases=[Phase.generate])  # to shrink takes minutes of compiling
     @given(any_settings(), st.sampled_from(["gcc", "clang"]), st.booleans())
     def test(drawn: Settings, compiler: str, amalgamate: bool) -> None:
         goes_the_whole_way(drawn, compiler, amalgamate=amalgamate)
@@ -87,12 +87,12 @@ def over_broken_settings(app: typer.Typer, examples: int, folder: Path) -> Calla
 
 def test_a_handful_of_settings_goes_the_whole_way() -> None:
     """Any valid settings: no warning, the self-test passes, and C and reference differ in no bit."""
-    over_valid_settings(6)()
+    over_valid_settings(5)()
 
 
 def test_some_broken_settings_are_refused_in_words(app: typer.Typer, tmp_path: Path) -> None:
     """Any one broken rule: a line that names file, key, value and rule, exit code 2, nothing written."""
-    over_broken_settings(app, 60, tmp_path)()
+    over_broken_settings(app, 40, tmp_path)()
 
 
 @pytest.mark.long
