@@ -25,6 +25,7 @@ PROJECT: Final = {
     "Makefile": "Makefile",
     "CMakeLists.txt": "CMakeLists.txt",
     "main.c": "example/main.c",
+    "nmpc_fuzz.c": "fuzz/nmpc_fuzz.c",
 }
 
 _OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")

@@ -125,7 +125,7 @@ def _cross_compilers(known: Sequence[Board]) -> tuple[_Need, ...]:
 def _look(need: _Need) -> Finding:
     """Return the first candidate that is here, or all of them as missing."""
     for candidate in need.candidates:
-        version = _package_version(candidate) if need.registry == "PyPI" else _command_version(candidate)
+        version = _package_version(candidate) if need.registry == "PyPI" else command_version(candidate)
         if version is not None:
             return Finding(need.kind, candidate, True, version, need.enables, need.registry, need.packages)
     tools = " or ".join(need.candidates)
@@ -139,7 +139,7 @@ def _package_version(package: str) -> str | None:
         return None
 
 
-def _command_version(candidate: str) -> str | None:
+def command_version(candidate: str) -> str | None:
     """Return the version that the command tells, "" if it tells none in time, None if it is missing."""
     command = shlex.split(candidate)
     if shutil.which(command[0]) is None:

@@ -10,7 +10,7 @@ from codegen.render import render
 from codegen.settings import Settings
 from sil.compiled import CompiledController
 from sil.extension import load_extension
-from tests.support.cases import Inputs
+from sil.verify.inputs import Inputs
 from tests.support.parity import Run, differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 

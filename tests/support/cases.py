@@ -1,86 +1,10 @@
-"""Inputs and settings for parity: seeded random values, and the corners that random values miss."""
+"""Settings for parity: seeded random values, and the corners that random values miss."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.settings import Settings
-
-Array = NDArray[np.float64]
-
-NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """Inputs of one step of n controllers: state (n, 7), target (n, 4), thrust (n,)."""
-
-    state: Array
-    target: Array
-    thrust: Array
-
-
-def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> Inputs:
-    """Draw inputs with errors from 0.1 mm to 10 m, a tenth of them with a corner in one place."""
-    ranges = settings.ranges
-    scale = 10.0 ** rng.uniform(-4, 1, (n, 1))
-    target = rng.normal(0, 1, (n, 4)) * [2, 2, 1, 1]
-    error = rng.normal(0, 1, (n, 4)) * scale
-    state = np.concatenate(
-        [
-            target + error,
-            rng.uniform(-0.5, 0.5, (n, 2)),
-            rng.choice([1.0, 10.0, 1000.0], (n, 1)) * rng.uniform(-1, 1, (n, 1)),
-        ],
-        axis=1,
-    )
-    state[:, 0:2] = np.clip(state[:, 0:2], -ranges.position_m, ranges.position_m)
-    state[:, 2:4] = np.clip(state[:, 2:4], -ranges.velocity_m_s, ranges.velocity_m_s)
-    target[:, 0:2] = np.clip(target[:, 0:2], -ranges.position_m, ranges.position_m)
-    target[:, 2:4] = np.clip(target[:, 2:4], -ranges.velocity_m_s, ranges.velocity_m_s)
-    low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
-    thrust = rng.uniform(low, high, n)
-    thrust[::3] = np.clip(9.81, low, high)
-
-    for row in np.flatnonzero(rng.random(n) < 0.1):
-        _corner(settings, state[row], target[row], thrust[row : row + 1], rng)
-    return Inputs(state, target, thrust)
-
-
-def _corner(settings: Settings, state: Array, target: Array, thrust: Array, rng: np.random.Generator) -> None:
-    """Put one corner into one case, in place."""
-    ranges = settings.ranges
-    bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0])
-    match rng.integers(10):
-        case 0:  # no error at all: every slope is zero
-            state[:4] = target
-            state[4:6] = 0
-        case 1:  # an error along one axis only, heading along it
-            state[:4] = target
-            state[0] += 0.1
-            state[4:] = 0
-        case 2:  # equal errors, equal slopes
-            state[:4] = target + 0.25
-        case 3:  # headings at the seams of the sine, and far around
-            turned = rng.integers(-600, 601) * np.pi / 2
-            state[6] = rng.choice([turned, -1000.0, 1000.0, -1024.0, 1024.0, 0.0, -0.0])
-        case 4:  # at the very end of a range, and just beyond
-            axis = rng.integers(7)
-            state[axis] = rng.choice([-1, 1]) * bounds[axis] * rng.choice([1, 1.001])
-        case 5:  # as far from the target as can be
-            state[:2], target[:2] = ranges.position_m, -ranges.position_m
-        case 6:
-            state[rng.integers(7)] = rng.choice(NOT_IN_RANGE)
-        case 7:
-            target[rng.integers(4)] = rng.choice(NOT_IN_RANGE)
-        case 8:
-            low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
-            thrust[0] = rng.choice([*NOT_IN_RANGE, 0.0, -0.0, -9.81, low, high])
-        case _:  # too small for a normal number
-            target[:], state[:4] = 0, rng.normal(0, 1, 4) * 1e-40
-
 
 CORNER_HORIZONS = ((1, 1, 5), (2, 2, 5), (10, 10, 5), (50, 1, 5), (50, 50, 2))
 """Np, Nc and iterations of the first settings that `settings_case` makes."""

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from codegen.reference import Step
 from codegen.settings import Settings
-from tests.support.cases import Inputs, random_inputs
+from sil.verify.inputs import Inputs, random_inputs
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
 

@@ -1,0 +1,141 @@
+"""Calls of the C interface as bytes: what a fuzzer mutates, what is replayed, and what the reference answers.
+
+A call is one byte and twelve numbers of the controller's scalar type, as `fuzz/nmpc_fuzz.c` of a bundle
+decodes them. A tape is a sequence of calls of one controller, which is initialised before the first.
+"""
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from enum import IntEnum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.literals import SCALARS
+from codegen.reference import Memory, ReferenceController, Status
+from codegen.settings import Settings
+
+Tape = NDArray[Any]
+"""Calls one after the other, an array of `call_type`."""
+
+Outcomes = NDArray[Any]
+"""What came of every call of a tape, an array of `outcome_type`."""
+
+NULL_SELF: Final = 1
+NULL_FIRST: Final = 2
+NULL_SECOND: Final = 4
+NULL_COMMAND: Final = 8
+
+
+class Function(IntEnum):
+    """Which function is called."""
+
+    STEP = 0
+    RESET = 1
+    SET_WEIGHTS = 2
+    INIT = 3
+
+
+_POINTERS: Final = {
+    Function.STEP: NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND,
+    Function.RESET: NULL_SELF | NULL_FIRST,
+    Function.SET_WEIGHTS: NULL_SELF | NULL_FIRST,
+    Function.INIT: NULL_SELF,
+}
+
+
+def call_type(settings: Settings) -> np.dtype[Any]:
+    """Return the layout of a call: function in bits 0 and 1 of the byte, null pointers in bits 2 to 5."""
+    return np.dtype([("call", np.uint8), ("values", SCALARS[settings.code.scalar], 12)])
+
+
+def outcome_type(settings: Settings) -> np.dtype[Any]:
+    """Return the layout of an outcome, as `replay.c` writes it."""
+    scalar, moves = SCALARS[settings.code.scalar], 2 * settings.horizon.control
+    return np.dtype(
+        [
+            ("status", np.int32),
+            ("iterations", np.int32),
+            ("converged", np.int32),
+            ("command_rad", scalar, 2),
+            ("cost", scalar),
+            ("gradient", scalar, moves),
+            ("plan_rad", scalar, moves),
+        ]
+    )
+
+
+def calls(settings: Settings, function: Function, values: NDArray[Any], nulls: int = 0) -> Tape:
+    """Return a call of `function` for each row of values (n, 1..12), with `nulls` among its pointers."""
+    made = np.zeros(len(values), call_type(settings))
+    made["call"] = function | (nulls << 2)
+    made["values"][:, : values.shape[1]] = values
+    return made
+
+
+def tape_from(settings: Settings, content: bytes) -> Tape:
+    """Return the whole calls in `content`; a rest is dropped, as the harness drops it."""
+    layout = call_type(settings)
+    return np.frombuffer(content, layout, len(content) // layout.itemsize)
+
+
+def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
+    """Run the reference controller through all `tapes` side by side, and return what came of every call."""
+    longest = max((len(tape) for tape in tapes), default=0)
+    padded = np.zeros((len(tapes), longest), call_type(settings))
+    padded["call"] = Function.RESET | (NULL_SELF << 2)
+    for row, tape in zip(padded, tapes, strict=True):
+        row[: len(tape)] = tape
+    runs = _Runs(settings, len(tapes))
+    made = np.stack([runs.make(padded[:, at]) for at in range(longest)], axis=1) if longest else padded
+    return [row[: len(tape)] for row, tape in zip(made, tapes, strict=True)]
+
+
+class _Runs:
+    """n reference controllers, each of which may be called by another function at a time.
+
+    A controller that is not called is given NaN, which changes nothing.
+    """
+
+    def __init__(self, settings: Settings, n: int) -> None:
+        self._settings = settings
+        self._controller = ReferenceController(settings, n)
+        self._fresh = self._controller.memory
+
+    def make(self, now: Tape) -> Outcomes:
+        """Make one call for each controller."""
+        function = now["call"] & 3
+        nulls = (now["call"] >> 2) & 15
+        null = (nulls & np.array([_POINTERS[f] for f in Function])[function]) != 0
+        values = now["values"]
+
+        def given(wanted: Function) -> NDArray[Any]:
+            return np.where(((function == wanted) & ~null)[:, None], values, np.nan).astype(values.dtype)
+
+        outcome = np.zeros(len(now), outcome_type(self._settings))
+        with np.errstate(all="ignore"):
+            resets = self._controller.reset(given(Function.RESET)[:, 0:2])
+            weights = self._controller.set_weights(given(Function.SET_WEIGHTS)[:, 0:2])
+            step = given(Function.STEP)
+            steps = self._controller.step(step[:, 0:7], step[:, 7:11], step[:, 11]).status
+        self._initialise((function == Function.INIT) & ~null)
+
+        status = np.choose(function, [steps, resets, weights, np.zeros_like(steps)])
+        outcome["status"] = np.where(null & (function != Function.INIT), Status.NULL_POINTER, status)
+        memory = self._controller.memory
+        writes = (function == Function.STEP) & ((nulls & (NULL_SELF | NULL_COMMAND)) == 0)
+        outcome["command_rad"] = np.where(writes[:, None], memory.command_rad, 0)
+        for name in ("iterations", "converged", "cost"):
+            outcome[name] = getattr(memory, name)
+        for name in ("gradient", "plan_rad"):
+            outcome[name] = getattr(memory, name).reshape(len(now), -1)
+        return outcome
+
+    def _initialise(self, chosen: NDArray[np.bool_]) -> None:
+        def renewed(name: str) -> NDArray[Any]:
+            old, new = getattr(self._controller.memory, name), getattr(self._fresh, name)
+            return np.where(chosen.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+
+        names = [field.name for field in fields(Memory)]
+        self._controller.memory = replace(self._controller.memory, **{name: renewed(name) for name in names})

@@ -1,0 +1,132 @@
+"""The project's cases: tapes that every run-time check plays, random ones and one for every edge by name."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen.literals import SCALARS
+from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
+from codegen.settings import Settings
+from codegen.trigonometry import YAW_LIMIT_RAD
+from sil.verify.calls import (
+    NULL_COMMAND,
+    NULL_FIRST,
+    NULL_SECOND,
+    NULL_SELF,
+    Function,
+    Tape,
+    calls,
+)
+from sil.verify.inputs import Inputs, random_inputs
+
+Array = NDArray[np.float64]
+
+
+def cases(settings: Settings, n: int, seed: int = 0) -> list[Tape]:
+    """Return n random tapes, and after them a tape for every edge of every input."""
+    rng = np.random.default_rng(seed)
+    return [*_random(settings, n, rng), *_edges(settings, rng), *_nulls(settings, rng)]
+
+
+def _random(settings: Settings, n: int, rng: np.random.Generator) -> list[Tape]:
+    """Step through random inputs, reset and reweighted on the way; every fourth tape keeps its input."""
+    draws = [_rows(random_inputs(settings, n, rng)) for _ in range(8)]
+    steps = [
+        np.where((np.arange(n) % 4 == 3)[:, None], draws[index // 2 * 2], drawn)
+        for index, drawn in enumerate(draws)
+    ]
+    command = rng.uniform(-1.5, 1.5, (n, 2)) * settings.limits.tilt_rad
+    command[::5, 0] = rng.choice([np.nan, np.inf, 4.0, -4.0], len(command[::5]))
+    weights = 10.0 ** rng.uniform(-3, 6, (n, 2))
+    weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
+    weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
+    columns = [
+        *(calls(settings, Function.STEP, rows) for rows in steps[:3]),
+        calls(settings, Function.RESET, command),
+        *(calls(settings, Function.STEP, rows) for rows in steps[3:5]),
+        calls(settings, Function.SET_WEIGHTS, weights),
+        *(calls(settings, Function.STEP, rows) for rows in steps[5:]),
+    ]
+    return list(np.stack(columns, axis=1))
+
+
+def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Put one input at the end of its range, a number further in, one further out, or to no number at all.
+
+    A good step stands before it, and two after it.
+    """
+    ranges, tilt = settings.ranges, settings.limits.tilt_rad
+    symmetric = [
+        *[ranges.position_m] * 2,
+        *[ranges.velocity_m_s] * 2,
+        *[ATTITUDE_LIMIT_RAD] * 2,
+        YAW_LIMIT_RAD,
+        *[ranges.position_m] * 2,
+        *[ranges.velocity_m_s] * 2,
+    ]
+    bounds = [(-limit, limit) for limit in symmetric]
+    bounds.append((ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2))
+    for index, ends in enumerate(bounds):
+        for value in _around(settings, *ends):
+            good = _good(settings, rng, 4)
+            good[1, index] = value
+            yield calls(settings, Function.STEP, good)
+    for function, ends in (
+        (Function.SET_WEIGHTS, (0.0, WEIGHT_LIMIT)),
+        (Function.RESET, (-ATTITUDE_LIMIT_RAD, ATTITUDE_LIMIT_RAD)),
+        (Function.RESET, (-tilt, tilt)),
+    ):
+        for index in range(2):
+            for value in _around(settings, *ends):
+                pair = np.full((1, 2), 0.1 * tilt)
+                pair[0, index] = value
+                yield _between(settings, rng, calls(settings, function, pair))
+
+
+def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Leave out every set of pointers, in every function, and initialise again."""
+    every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
+    for function, pointers in (
+        (Function.STEP, every),
+        (Function.RESET, NULL_SELF | NULL_FIRST),
+        (Function.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
+        (Function.INIT, NULL_SELF),
+    ):
+        for nulls in range(pointers + 1):
+            made = calls(settings, function, np.array([[0.1, 0.2]]), nulls)
+            yield _between(settings, rng, made)
+
+
+def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
+    """Put a call between good steps, and have it followed by a step that repeats the last command."""
+    steps = calls(settings, Function.STEP, _good(settings, rng, 4))
+    refused = calls(settings, Function.STEP, np.full((1, 12), np.nan))
+    return np.concatenate([steps[:2], made, refused, steps[2:]])
+
+
+def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
+    """Draw good steps (n, 12)."""
+    ranges = settings.ranges
+    position_m, speed_m_s = min(1.0, ranges.position_m / 4), min(1.0, ranges.velocity_m_s / 4)
+    scale = np.array([position_m] * 2 + [speed_m_s] * 2 + [0.3, 0.3, 3.0])
+    state = rng.uniform(-1, 1, (n, 7)) * scale
+    target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
+    low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
+    return np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
+
+
+def _around(settings: Settings, low: float, high: float) -> Array:
+    """Return both ends of a range, their neighbours in the scalar type, and what is no number or no size."""
+    scalar = SCALARS[settings.code.scalar]
+    ends = np.array([low, high], scalar)
+    beyond = np.array([-np.inf, np.inf], scalar)
+    neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
+    tiny = np.finfo(scalar).smallest_subnormal
+    odd = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, tiny, -tiny], scalar)
+    return np.concatenate([ends, *neighbours, odd]).astype(np.float64)
+
+
+def _rows(inputs: Inputs) -> Array:
+    """Join state, target and thrust to rows (n, 12)."""
+    return np.concatenate([inputs.state, inputs.target, inputs.thrust[:, None]], axis=1)

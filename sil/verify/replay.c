@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Makes the calls in the files named, one controller a file, and writes what came of every call to the
+ * standard output. Compiled together with a bundle, never part of one.
+ */
+#include "nmpc_fuzz.c"
+
+#include <sys/resource.h>
+
+#include "nmpc_self_test.h"
+
+#if defined(__has_feature)
+#if __has_feature(memory_sanitizer)
+#define NMPC_REPLAY_POISONED 1
+#include <sanitizer/msan_interface.h>
+#endif
+#endif
+
+#define NMPC_REPLAY_CPU_S 5U
+
+/* Make memory such that reading it before writing it shows: in the outcome, or to the sanitizer. */
+static void nmpc_replay_spoil(nmpc_t *self)
+{
+    (void)memset(self, 0xA5, sizeof(*self));
+#if defined(NMPC_REPLAY_POISONED)
+    __msan_poison(self, sizeof(*self));
+#endif
+}
+
+static void nmpc_replay_write(const void *values, size_t bytes)
+{
+    if (fwrite(values, bytes, 1, stdout) != 1) {
+        exit(2);
+    }
+}
+
+static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
+{
+    const nmpc_fuzz_call_t call = nmpc_fuzz_decode(bytes);
+    nmpc_command_t command = { (nmpc_real_t)0, (nmpc_real_t)0 };
+    int32_t numbers[3];
+    nmpc_real_t cost;
+
+    if ((call.function == NMPC_FUZZ_INIT) && ((call.nulls & NMPC_FUZZ_NULL_SELF) == 0U)) {
+        nmpc_replay_spoil(self);
+    }
+    numbers[0] = (int32_t)nmpc_fuzz_make(self, &call, &command);
+    numbers[1] = (int32_t)nmpc_last_iterations(self);
+    numbers[2] = (int32_t)nmpc_has_converged(self);
+    cost = nmpc_last_cost(self);
+    nmpc_replay_write(numbers, sizeof(numbers));
+    nmpc_replay_write(&command, sizeof(command));
+    nmpc_replay_write(&cost, sizeof(cost));
+    nmpc_replay_write(self->gradient, sizeof(self->gradient));
+    nmpc_replay_write(self->plan_rad, sizeof(self->plan_rad));
+}
+
+/* Returns 0, 2 if a file cannot be read or the output not written, 3 if the self-test fails. A controller that
+ * never returns is killed. */
+int main(int count, char **paths)
+{
+    const struct rlimit limit = { NMPC_REPLAY_CPU_S, NMPC_REPLAY_CPU_S };
+    static nmpc_t self;
+    int i;
+
+    (void)setrlimit(RLIMIT_CPU, &limit);
+    for (i = 1; i < count; i++) {
+        uint8_t bytes[NMPC_FUZZ_BYTES];
+        FILE *file = fopen(paths[i], "rb");
+
+        if (file == 0) {
+            return 2;
+        }
+        nmpc_replay_spoil(&self);
+        nmpc_init(&self);
+        while (fread(bytes, sizeof(bytes), 1, file) == 1) {
+            nmpc_replay_call(&self, bytes);
+        }
+        (void)fclose(file);
+    }
+    return ((nmpc_version()[0] != '\0') && (nmpc_self_test(&self) == 0)) ? 0 : 3;
+}

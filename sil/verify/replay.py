@@ -1,0 +1,106 @@
+"""Play tapes on a bundle's C, built with any compiler and flags, and compare with the reference."""
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from codegen.errors import BuildError
+from codegen.render import with_prefix
+from codegen.settings import Settings
+from codegen.toolchain import Toolchain
+from sil.verify.calls import Function, Outcomes, Tape, calls, outcome_type
+from sil.verify.check import Subject
+
+PATIENCE_S: Final = 300.0
+"""Time that a program gets, in seconds, where the machine has much else to do."""
+
+FLAGS: Final = ("-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L")
+
+
+@dataclass(frozen=True)
+class Replay:
+    """How a program ended: outcomes of the tapes, as many as it made, its return code and its report."""
+
+    outcomes: list[Outcomes]
+    returncode: int
+    report: str
+
+
+def sources(subject: Subject) -> list[Path]:
+    """Return the C sources of a bundle in folders; raises BuildError if there are none."""
+    found = sorted((subject.bundle / "src").glob("*.c"))
+    if not found:
+        raise BuildError(f"{subject.bundle}: has no src/*.c; generate the bundle in folders")
+    return found
+
+
+def missing(tool: str, package: str, flags: Sequence[str], folder: Path) -> str | None:
+    """Say what is missing to build with `tool` and `flags`, and which package of Debian brings it."""
+    if shutil.which(tool) is None:
+        return f"{tool} is missing; Debian's package {tool} brings it"
+    (folder / "probe.c").write_text(
+        "int LLVMFuzzerTestOneInput(void);\nint LLVMFuzzerTestOneInput(void) { return 0; }\n"
+        + ("" if any("fuzzer" in flag for flag in flags) else "int main(void) { return 0; }\n")
+    )
+    try:
+        Toolchain((tool,)).run([*flags, "probe.c", "-o", "probe"], folder)
+    except BuildError:
+        return f"{tool} cannot link with {' '.join(flags)}; Debian's package {package} brings what it wants"
+    return None
+
+
+def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
+    """Build the program that replays tapes in `folder`, and return it; raises BuildError."""
+    program = folder / "replay.c"
+    text = resources.files("sil.verify").joinpath("replay.c").read_text("utf-8")
+    program.write_text(with_prefix(text, subject.settings.code.prefix), "utf-8")
+    includes = [f"-I{(subject.bundle / part).resolve()}" for part in ("include", "fuzz")]
+    units = [str(path.resolve()) for path in sources(subject)]
+    Toolchain((tool,)).run([*FLAGS, *flags, *includes, program.name, *units, "-o", "replay"], folder)
+    return folder / "replay"
+
+
+def write_tapes(settings: Settings, tapes: Sequence[Tape], path: Path) -> None:
+    """Write tapes into one file, an initialisation before each."""
+    init = calls(settings, Function.INIT, np.zeros((1, 1)))
+    path.write_bytes(b"".join(init.tobytes() + tape.tobytes() for tape in tapes))
+
+
+def play(program: Path, tapes_file: Path, settings: Settings, tapes: Sequence[Tape]) -> Replay:
+    """Run `program` on the tapes that `write_tapes` put into a file."""
+    try:
+        done = subprocess.run(
+            [str(program.resolve()), str(tapes_file.resolve())],
+            capture_output=True,
+            cwd=program.parent,
+            timeout=PATIENCE_S,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return Replay([], -1, f"did not end within {PATIENCE_S:g} s")
+    layout = outcome_type(settings)
+    made = np.frombuffer(done.stdout, layout, len(done.stdout) // layout.itemsize)
+    starts = np.cumsum([0, *(1 + len(tape) for tape in tapes)])
+    outcomes = [made[start + 1 : start + 1 + len(t)] for start, t in zip(starts[:-1], tapes, strict=True)]
+    return Replay(outcomes, done.returncode, done.stderr.decode(errors="replace"))
+
+
+def difference(expected: Sequence[Outcomes], found: Sequence[Outcomes]) -> str | None:
+    """Name the first call whose outcome has another bit than expected; None if there is none."""
+    for tape, (ours, theirs) in enumerate(zip(expected, found, strict=True)):
+        if ours.tobytes() == theirs.tobytes():
+            continue
+        for call, (right, wrong) in enumerate(zip(ours, theirs, strict=False)):
+            if right.tobytes() != wrong.tobytes():
+                names = right.dtype.names or ()
+                wrongs = [name for name in names if right[name].tobytes() != wrong[name].tobytes()]
+                values = f"{wrong[wrongs[0]]!s}, reference {right[wrongs[0]]!s}"
+                return f"tape {tape}, call {call}: {', '.join(wrongs)} differ ({values})"
+        return f"tape {tape}: {len(theirs)} of {len(ours)} calls were made"
+    return None
