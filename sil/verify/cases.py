@@ -26,11 +26,12 @@ Array = NDArray[np.float64]
 def cases(settings: Settings, n: int, seed: int = 0) -> list[Tape]:
     """Return n random tapes, and after them a tape for every edge of every input."""
     rng = np.random.default_rng(seed)
-    return [*_random(settings, n, rng), *_edges(settings, rng), *_nulls(settings, rng)]
+    return [*random_tapes(settings, n, seed), *_edges(settings, rng), *_nulls(settings, rng)]
 
 
-def _random(settings: Settings, n: int, rng: np.random.Generator) -> list[Tape]:
+def random_tapes(settings: Settings, n: int, seed: int = 0) -> list[Tape]:
     """Step through random inputs, reset and reweighted on the way; every fourth tape keeps its input."""
+    rng = np.random.default_rng(seed)
     draws = [_rows(random_inputs(settings, n, rng)) for _ in range(8)]
     steps = [
         np.where((np.arange(n) % 4 == 3)[:, None], draws[index // 2 * 2], drawn)

@@ -16,7 +16,9 @@
 #endif
 #endif
 
-#define NMPC_REPLAY_CPU_S 5U
+#if !defined(NMPC_REPLAY_CPU_S)
+#define NMPC_REPLAY_CPU_S 240U
+#endif
 
 /* Make memory such that reading it before writing it shows: in the outcome, or to the sanitizer. */
 static void nmpc_replay_spoil(nmpc_t *self)

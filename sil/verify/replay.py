@@ -20,6 +20,9 @@ from sil.verify.check import Subject
 PATIENCE_S: Final = 300.0
 """Time that a program gets, in seconds, where the machine has much else to do."""
 
+PACKAGES: Final = {"gcc": "gcc", "clang": "libclang-rt-dev"}
+"""What brings the run-time libraries of the sanitizers in Debian, by compiler."""
+
 FLAGS: Final = ("-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L")
 
 
@@ -32,6 +35,18 @@ class Replay:
     report: str
 
 
+@dataclass(frozen=True)
+class Difference:
+    """Where C and reference part: tape and call count from 0."""
+
+    tape: int
+    call: int
+    what: str
+
+    def __str__(self) -> str:
+        return f"tape {self.tape}, call {self.call}: {self.what}"
+
+
 def sources(subject: Subject) -> list[Path]:
     """Return the C sources of a bundle in folders; raises BuildError if there are none."""
     found = sorted((subject.bundle / "src").glob("*.c"))
@@ -40,8 +55,8 @@ def sources(subject: Subject) -> list[Path]:
     return found
 
 
-def missing(tool: str, package: str, flags: Sequence[str], folder: Path) -> str | None:
-    """Say what is missing to build with `tool` and `flags`, and which package of Debian brings it."""
+def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
+    """Say what is missing to build with gcc or clang and `flags`, and which package of Debian brings it."""
     if shutil.which(tool) is None:
         return f"{tool} is missing; Debian's package {tool} brings it"
     (folder / "probe.c").write_text(
@@ -51,19 +66,25 @@ def missing(tool: str, package: str, flags: Sequence[str], folder: Path) -> str 
     try:
         Toolchain((tool,)).run([*flags, "probe.c", "-o", "probe"], folder)
     except BuildError:
-        return f"{tool} cannot link with {' '.join(flags)}; Debian's package {package} brings what it wants"
+        return f"{tool} cannot link with {' '.join(flags)}; Debian's package {PACKAGES[tool]} brings that"
     return None
 
 
 def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
     """Build the program that replays tapes in `folder`, and return it; raises BuildError."""
-    program = folder / "replay.c"
-    text = resources.files("sil.verify").joinpath("replay.c").read_text("utf-8")
-    program.write_text(with_prefix(text, subject.settings.code.prefix), "utf-8")
+    program = write_program(subject.settings.code.prefix, folder)
     includes = [f"-I{(subject.bundle / part).resolve()}" for part in ("include", "fuzz")]
     units = [str(path.resolve()) for path in sources(subject)]
     Toolchain((tool,)).run([*FLAGS, *flags, *includes, program.name, *units, "-o", "replay"], folder)
     return folder / "replay"
+
+
+def write_program(prefix: str, folder: Path) -> Path:
+    """Write the C that replays tapes into `folder`."""
+    text = resources.files("sil.verify").joinpath("replay.c").read_text("utf-8")
+    program = folder / "replay.c"
+    program.write_text(with_prefix(text, prefix), "utf-8")
+    return program
 
 
 def write_tapes(settings: Settings, tapes: Sequence[Tape], path: Path) -> None:
@@ -91,16 +112,16 @@ def play(program: Path, tapes_file: Path, settings: Settings, tapes: Sequence[Ta
     return Replay(outcomes, done.returncode, done.stderr.decode(errors="replace"))
 
 
-def difference(expected: Sequence[Outcomes], found: Sequence[Outcomes]) -> str | None:
-    """Name the first call whose outcome has another bit than expected; None if there is none."""
+def difference(expected: Sequence[Outcomes], found: Sequence[Outcomes]) -> Difference | None:
+    """Find the first call whose outcome has another bit than expected; None if there is none."""
     for tape, (ours, theirs) in enumerate(zip(expected, found, strict=True)):
         if ours.tobytes() == theirs.tobytes():
             continue
         for call, (right, wrong) in enumerate(zip(ours, theirs, strict=False)):
-            if right.tobytes() != wrong.tobytes():
-                names = right.dtype.names or ()
-                wrongs = [name for name in names if right[name].tobytes() != wrong[name].tobytes()]
-                values = f"{wrong[wrongs[0]]!s}, reference {right[wrongs[0]]!s}"
-                return f"tape {tape}, call {call}: {', '.join(wrongs)} differ ({values})"
-        return f"tape {tape}: {len(theirs)} of {len(ours)} calls were made"
+            names = [name for name in right.dtype.names if right[name].tobytes() != wrong[name].tobytes()]
+            if names:
+                first = names[0]
+                what = f"{', '.join(names)} differ ({first} {wrong[first]}, reference {right[first]})"
+                return Difference(tape, call, what)
+        return Difference(tape, len(theirs), "was not made")
     return None
