@@ -22,6 +22,9 @@ Tape = NDArray[Any]
 Outcomes = NDArray[Any]
 """What came of every call of a tape, an array of `outcome_type`."""
 
+UNWRITTEN_RAD: Final = 9.0
+"""What `replay.c` puts into a command before a call."""
+
 NULL_SELF: Final = 1
 NULL_FIRST: Final = 2
 NULL_SECOND: Final = 4
@@ -124,8 +127,11 @@ class _Runs:
         status = np.choose(function, [steps, resets, weights, np.zeros_like(steps)])
         outcome["status"] = np.where(null & (function != Function.INIT), Status.NULL_POINTER, status)
         memory = self._controller.memory
-        writes = (function == Function.STEP) & ((nulls & (NULL_SELF | NULL_COMMAND)) == 0)
-        outcome["command_rad"] = np.where(writes[:, None], memory.command_rad, 0)
+        writes = (function == Function.STEP) & ((nulls & NULL_COMMAND) == 0)
+        level = ((nulls & NULL_SELF) != 0)[:, None]
+        outcome["command_rad"] = np.where(
+            writes[:, None], np.where(level, 0, memory.command_rad), UNWRITTEN_RAD
+        )
         for name in ("iterations", "converged", "cost"):
             outcome[name] = getattr(memory, name)
         for name in ("gradient", "plan_rad"):
@@ -135,7 +141,8 @@ class _Runs:
     def _initialise(self, chosen: NDArray[np.bool_]) -> None:
         def renewed(name: str) -> NDArray[Any]:
             old, new = getattr(self._controller.memory, name), getattr(self._fresh, name)
-            return np.where(chosen.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+            mixed: NDArray[Any] = np.where(chosen.reshape(-1, *[1] * (old.ndim - 1)), new, old)
+            return mixed
 
         names = [field.name for field in fields(Memory)]
         self._controller.memory = replace(self._controller.memory, **{name: renewed(name) for name in names})

@@ -29,7 +29,7 @@ FLAGS: Final = (
 )
 
 
-def check(subject: Subject) -> Result:
+def check(subject: Subject, *, runs: int = RUNS) -> Result:
     """Fuzz the bundle's harness for a fixed number of runs, then replay all it kept against the reference."""
     tools = {"clang": command_version("clang") or ""}
     gap = replay.missing("clang", FLAGS, subject.folder)
@@ -39,16 +39,16 @@ def check(subject: Subject) -> Result:
     _write_seeds(subject.settings, seeds)
     corpus.mkdir()
     try:
-        done = _fuzz(subject)
+        done = _fuzz(subject, runs)
     except BuildError as error:
         return Result(Outcome.FAILED, f"the harness does not build: {error}", tools=tools)
     log = done.stderr.decode(errors="replace")
     (subject.folder / "fuzzer.txt").write_text(log)
     files = sorted([*seeds.iterdir(), *corpus.iterdir()])
     tapes = [tape_from(subject.settings, file.read_bytes()) for file in files]
-    runs = _statistic(log, "number_of_executed_units")
+    made = _statistic(log, "number_of_executed_units")
     figures = {
-        "runs": runs,
+        "runs": made,
         "runs_per_second": _statistic(log, "average_exec_per_sec"),
         "seed": SEED,
         "seeds": SEEDS,
@@ -62,7 +62,7 @@ def check(subject: Subject) -> Result:
         return Result(Outcome.FAILED, finding, figures=figures, tools=tools)
     return Result(
         Outcome.PASSED,
-        f"{runs} runs from seed {SEED} broke no promise; {figures['replayed_calls']} calls of the "
+        f"{made} runs from seed {SEED} broke no promise; {figures['replayed_calls']} calls of the "
         f"{len(files)} tapes kept have the bits of the reference",
         figures=figures,
         tools=tools,
@@ -76,7 +76,7 @@ def _write_seeds(settings: Settings, folder: Path) -> None:
         (folder / f"seed-{index:02}").write_bytes(tape.tobytes())
 
 
-def _fuzz(subject: Subject) -> "subprocess.CompletedProcess[bytes]":
+def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
     """Build and run the harness; raises BuildError."""
     bundle = subject.bundle.resolve()
     harness = bundle / "fuzz" / f"{subject.settings.code.prefix}_fuzz.c"
@@ -88,7 +88,7 @@ def _fuzz(subject: Subject) -> "subprocess.CompletedProcess[bytes]":
     return subprocess.run(
         [
             "./fuzz",
-            f"-runs={RUNS}",
+            f"-runs={runs}",
             f"-seed={SEED}",
             f"-max_len={longest}",
             "-len_control=0",
@@ -122,10 +122,10 @@ def _beside_the_reference(subject: Subject, files: Sequence[Path], tapes: Sequen
     joined = subject.folder / "tapes.bin"
     replay.write_tapes(subject.settings, tapes, joined)
     played = replay.play(program, joined, subject.settings, tapes)
-    found = replay.difference(answers(subject.settings, tapes), played.outcomes)
-    if found is None:
-        return None if played.returncode == 0 else f"the replay ended with {played.returncode}"
-    return f"{files[found.tape]}: {found}"
+    expected = answers(subject.settings, tapes)
+    fault = replay.fault(played, expected)
+    found = replay.difference(expected, played.outcomes)
+    return f"{files[found.tape]}: {found}" if found else fault
 
 
 def _statistic(log: str, name: str) -> int:

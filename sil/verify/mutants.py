@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from codegen import literals
+from sil.verify.reasons import Key, plain
 
 _TOKEN: Final = re.compile(
     r"""(?P<space>\s+|/\*.*?\*/|//[^\n]*)
@@ -60,7 +61,7 @@ class Mutant:
     end: int
     wrong: str
     rule: str
-    key: tuple[str, str, str]
+    key: Key
     right_line: str
     wrong_line: str
 
@@ -110,10 +111,10 @@ def mutants(file: str, text: str, prefix: str) -> list[Mutant]:
         right = text[change.start : change.end]
         number = text.count("\n", 0, change.start) + 1
         line = text[text.rfind("\n", 0, change.start) + 1 :].partition("\n")[0].strip()
-        described = _plain(line, prefix), _plain(change.name or f"{right} -> {change.wrong}", prefix)
+        described = plain(line, prefix), plain(change.name or f"{right} -> {change.wrong}", prefix)
         name = described[0], f"{described[1]} #{seen[described]}" if seen[described] else described[1]
         seen[described] += 1
-        key = (_plain(file, prefix), *name)
+        key = (plain(file, prefix), *name)
         begin = text.rfind("\n", 0, change.start) + 1
         after = text.find("\n", change.end)
         lines = (
@@ -122,14 +123,6 @@ def mutants(file: str, text: str, prefix: str) -> list[Mutant]:
         )
         found.append(Mutant(file, number, change.start, change.end, change.wrong, change.rule, key, *lines))
     return found
-
-
-def _plain(text: str, prefix: str) -> str:
-    """Return `text` on one line, with the default prefix, and real numbers left out."""
-    named = re.sub(
-        rf"\b({prefix}|{prefix.upper()})(?=[_.])", lambda name: "nmpc" if name[1] == prefix else "NMPC", text
-    )
-    return " ".join(re.sub(r"-?\b\d+\.\d*(e[-+]?\d+)?f?|\b\d+e-?\d+f?", "<real>", named).split())
 
 
 def _tokens(text: str) -> list[_Token]:
@@ -193,14 +186,14 @@ def _of_tokens(tokens: Sequence[_Token]) -> Iterator[_Change]:
 
 
 def _numbers(token: _Token) -> Iterator[tuple[str, str]]:
-    """Yield what replaces a constant, and its name: a whole number's neighbours, a real's next and negative."""
+    """Yield what replaces a constant, and its name: neighbours of a whole number, or of a real."""
     if token.kind == "integer":
         found = re.fullmatch(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)", token.text)
         assert found is not None
-        value, suffix = int(found[1], 0), found[2]
-        yield f"{value + 1}{suffix}", ""
-        if value > 0 or not suffix:
-            yield f"{value - 1}{suffix}" if value > 0 else "(-1)", ""
+        whole, suffix = int(found[1], 0), found[2]
+        yield f"{whole + 1}{suffix}", ""
+        if whole > 0 or not suffix:
+            yield f"{whole - 1}{suffix}" if whole > 0 else "(-1)", ""
         return
     scalar = "float32" if token.text[-1] in "fF" else "float64"
     of_type = literals.SCALARS[scalar]
@@ -208,7 +201,7 @@ def _numbers(token: _Token) -> Iterator[tuple[str, str]]:
     if value == 0:
         yield literals.real(1.0, scalar), "zero -> one"
     else:
-        yield literals.real(np.nextafter(value, of_type(np.inf)), scalar), "next number"
+        yield literals.real(float(np.nextafter(value, of_type(np.inf))), scalar), "next number"
         yield f"(-{token.text})", "negative"
 
 

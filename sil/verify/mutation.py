@@ -1,6 +1,5 @@
 """Check: every small fault of the generated C shows in the bits, or is listed with why it cannot."""
 
-import json
 import shutil
 import threading
 from collections import Counter
@@ -16,13 +15,12 @@ from codegen.render import SUB_BLOCKS
 from codegen.toolchain import Toolchain
 from sil.doctor import command_version
 from sil.verify import replay
-from sil.verify.calls import Outcomes, Tape, answers
 from sil.verify.cases import cases
 from sil.verify.check import Outcome, Result, Subject
 from sil.verify.mutants import Mutant, mutants
 from sil.verify.mutation_reasons import REASONS
+from sil.verify.reasons import reason_for, row
 
-RANDOM_TAPES: Final = 600
 AT_ONCE: Final = 2
 CPU_S: Final = 1
 """Time of the processor that a mutant gets, in seconds; the original takes about a hundredth."""
@@ -83,8 +81,7 @@ class Bench:
             *(f"src/{block}.h" for block in blocks),
             *self._units,
         ]
-        self._tapes: list[Tape] = cases(subject.settings, RANDOM_TAPES)
-        self._expected: list[Outcomes] = answers(subject.settings, self._tapes)
+        self._tapes, self._expected = cases(subject.settings)
         self._tapes_file = subject.folder / "tapes.bin"
         replay.write_tapes(subject.settings, self._tapes, self._tapes_file)
         self._own = threading.local()
@@ -118,9 +115,9 @@ class Bench:
         finally:
             file.write_text(text, "utf-8")
         if fate is Fate.SURVIVED:
-            reason = next((r for r in REASONS if r.explains(mutant, self._subject.settings)), None)
+            reason = reason_for(mutant.key, REASONS, self._subject.settings)
             if reason is not None:
-                return Judged(mutant, Fate.EXPLAINED, reason.reason)
+                return Judged(mutant, Fate.EXPLAINED, reason)
         return Judged(mutant, fate)
 
     def _fate(self, folder: Path, mutant: Mutant) -> Fate:
@@ -150,10 +147,7 @@ class Bench:
             self._gcc(folder, *anew, _LIMIT, "all.c", *self._harness, "-o", "replay")
         settings = self._subject.settings
         played = replay.play(folder / "replay", self._tapes_file, settings, self._tapes)
-        if played.returncode != 0:
-            return f"ended with {played.returncode}"
-        found = replay.difference(self._expected, played.outcomes)
-        return None if found is None else str(found)
+        return replay.fault(played, self._expected)
 
     def _folder(self) -> Path:
         """Return this thread's copy of the bundle, with what does not change compiled."""
@@ -196,10 +190,7 @@ def _result(subject: Subject, judged: Sequence[Judged], tools: dict[str, str]) -
         ],
         "survivors": [_described(mutant) for mutant in survivors],
     }
-    rows = "".join(
-        f'    Reason({", ".join(map(json.dumps, m.key))},\n           "why it cannot show"),\n'
-        for m in survivors
-    )
+    rows = "".join(row(mutant.key) for mutant in survivors)
     (subject.folder / "survivors.txt").write_text(
         "".join(
             f"{d['where']}: {d['rule']}: {d['key'][2]}\n- {d['right']}\n+ {d['wrong']}\n\n"

@@ -1,30 +1,53 @@
-"""Why a fault cannot show: a row for each mutant that survives, and the settings for which it holds."""
+"""Faults that change no bit, and why: a row for every mutant that survives."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 from codegen.settings import Settings
-from sil.verify.mutants import Mutant
+from sil.verify.reasons import Reason
 
 
-def _always(_: Settings) -> bool:
-    return True
+def _steps_stay_short(settings: Settings) -> bool:
+    """Whether no number of iterations makes a step reach the largest."""
+    optimizer = settings.optimizer
+    longest = optimizer.initial_step_rad * optimizer.increase ** (optimizer.iterations - 1)
+    return longest < 0.99 * optimizer.step_max_rad
 
 
-@dataclass(frozen=True)
-class Reason:
-    """A mutant, by its key, why it changes no bit, and for which settings that is so."""
-
-    file: str
-    line: str
-    change: str
-    reason: str
-    holds: Callable[[Settings], bool] = _always
-
-    def explains(self, mutant: Mutant, settings: Settings) -> bool:
-        """Whether this is the reason of `mutant`."""
-        return mutant.key == (self.file, self.line, self.change) and self.holds(settings)
+def _steps_stay_long(settings: Settings) -> bool:
+    """Whether no number of iterations makes a step reach the smallest."""
+    optimizer = settings.optimizer
+    shortest = optimizer.initial_step_rad * optimizer.decrease ** (optimizer.iterations - 1)
+    return shortest > 1.01 * optimizer.step_min_rad
 
 
-REASONS: Final[tuple[Reason, ...]] = ()
+_STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
+_EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
+_ZERO: Final = "minus zero is compared, and nothing else is done with it"
+_SIGN: Final = "of a slope and of a direction only the sign is read"
+_TERMS: Final = "the table grows by a zero, and a polynomial by a term of zero, which changes no bit"
+
+REASONS: Final[tuple[Reason, ...]] = (
+    Reason(
+        "include/nmpc_config.h",
+        "#define NMPC_STEP_MAX_RAD <real>",
+        "next number",
+        _STEPS,
+        _steps_stay_short,
+    ),
+    *(
+        Reason("include/nmpc_config.h", "#define NMPC_STEP_MIN_RAD <real>", what, _STEPS, _steps_stay_long)
+        for what in ("next number", "negative")
+    ),
+    Reason("src/nmpc_math.h", "return (value < (nmpc_real_t)0) ? -value : value;", "< -> <=", _ZERO),
+    *(
+        Reason(
+            "src/nmpc_math.h",
+            "return (value > (nmpc_real_t)0) ? 1 : ((value < (nmpc_real_t)0) ? -1 : 0);",
+            what,
+            _SIGN,
+        )
+        for what in ("1 -> 2", "1 -> 2 #1")
+    ),
+    Reason("src/nmpc_math.h", "return (a < b) ? a : b;", "< -> <=", _EQUAL),
+    Reason("src/nmpc_math.h", "return (a > b) ? a : b;", "> -> >=", _EQUAL),
+)

@@ -20,13 +20,48 @@
 #define NMPC_REPLAY_CPU_S 240U
 #endif
 
-/* Make memory such that reading it before writing it shows: in the outcome, or to the sanitizer. */
-static void nmpc_replay_spoil(nmpc_t *self)
+/* What a command holds that no step wrote. */
+#define NMPC_REPLAY_UNWRITTEN ((nmpc_real_t)9)
+
+/* Initialise memory that held something else, such that reading what is not set shows: in the outcome, or to
+ * the sanitizer. Returns 0 if all is as promised: the weights of the settings, all else zero but padding. */
+static int nmpc_replay_init(nmpc_t *self)
 {
+    int wrong = 0;
+
     (void)memset(self, 0xA5, sizeof(*self));
 #if defined(NMPC_REPLAY_POISONED)
     __msan_poison(self, sizeof(*self));
+    nmpc_init(self);
+#else
+    {
+        static union {
+            nmpc_t controller;
+            uint8_t bytes[sizeof(nmpc_t)];
+        } one, other;
+        size_t untouched = 0;
+        size_t i;
+
+        (void)memset(&other, 0x5A, sizeof(other));
+        nmpc_init(self);
+        nmpc_init(&other.controller);
+        wrong = (self->weights.tracking != NMPC_TRACKING_WEIGHT) || (self->weights.effort != NMPC_EFFORT_WEIGHT);
+        (void)memcpy(&one, self, sizeof(one));
+        (void)memset(&one.controller.weights, 0, sizeof(nmpc_weights_t));
+        (void)memset(&other.controller.weights, 0, sizeof(nmpc_weights_t));
+        for (i = 0; i < sizeof(nmpc_t); i++) {
+            if (one.bytes[i] != other.bytes[i]) {
+                untouched++;
+            } else if (one.bytes[i] != 0U) {
+                wrong = 1;
+            } else {
+                /* As promised. */
+            }
+        }
+        wrong = wrong || (untouched >= sizeof(nmpc_real_t));
+    }
 #endif
+    return wrong;
 }
 
 static void nmpc_replay_write(const void *values, size_t bytes)
@@ -39,14 +74,15 @@ static void nmpc_replay_write(const void *values, size_t bytes)
 static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
 {
     const nmpc_fuzz_call_t call = nmpc_fuzz_decode(bytes);
-    nmpc_command_t command = { (nmpc_real_t)0, (nmpc_real_t)0 };
+    nmpc_command_t command = { NMPC_REPLAY_UNWRITTEN, NMPC_REPLAY_UNWRITTEN };
     int32_t numbers[3];
     nmpc_real_t cost;
 
     if ((call.function == NMPC_FUZZ_INIT) && ((call.nulls & NMPC_FUZZ_NULL_SELF) == 0U)) {
-        nmpc_replay_spoil(self);
+        numbers[0] = (int32_t)nmpc_replay_init(self);
+    } else {
+        numbers[0] = (int32_t)nmpc_fuzz_make(self, &call, &command);
     }
-    numbers[0] = (int32_t)nmpc_fuzz_make(self, &call, &command);
     numbers[1] = (int32_t)nmpc_last_iterations(self);
     numbers[2] = (int32_t)nmpc_has_converged(self);
     cost = nmpc_last_cost(self);
@@ -73,8 +109,7 @@ int main(int count, char **paths)
         if (file == 0) {
             return 2;
         }
-        nmpc_replay_spoil(&self);
-        nmpc_init(&self);
+        (void)nmpc_replay_init(&self);
         while (fread(bytes, sizeof(bytes), 1, file) == 1) {
             nmpc_replay_call(&self, bytes);
         }

@@ -1,5 +1,6 @@
 """Play tapes on a bundle's C, built with any compiler and flags, and compare with the reference."""
 
+import re
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -22,6 +23,9 @@ PATIENCE_S: Final = 300.0
 
 PACKAGES: Final = {"gcc": "gcc", "clang": "libclang-rt-dev"}
 """What brings the run-time libraries of the sanitizers in Debian, by compiler."""
+
+_SELF_TEST_FAILED: Final = 3
+_REPORT: Final = re.compile(r"runtime error:|ERROR: |WARNING: |did not end")
 
 FLAGS: Final = ("-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L")
 
@@ -57,8 +61,9 @@ def sources(subject: Subject) -> list[Path]:
 
 def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
     """Say what is missing to build with gcc or clang and `flags`, and which package of Debian brings it."""
-    if shutil.which(tool) is None:
-        return f"{tool} is missing; Debian's package {tool} brings it"
+    gap = missing_command(tool, tool)
+    if gap:
+        return gap
     (folder / "probe.c").write_text(
         "int LLVMFuzzerTestOneInput(void);\nint LLVMFuzzerTestOneInput(void) { return 0; }\n"
         + ("" if any("fuzzer" in flag for flag in flags) else "int main(void) { return 0; }\n")
@@ -68,6 +73,11 @@ def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
     except BuildError:
         return f"{tool} cannot link with {' '.join(flags)}; Debian's package {PACKAGES[tool]} brings that"
     return None
+
+
+def missing_command(tool: str, package: str) -> str | None:
+    """Say that `tool` is missing, and which package of Debian brings it; None if it is here."""
+    return None if shutil.which(tool) else f"{tool} is missing; Debian's package {package} brings it"
 
 
 def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
@@ -110,6 +120,17 @@ def play(program: Path, tapes_file: Path, settings: Settings, tapes: Sequence[Ta
     starts = np.cumsum([0, *(1 + len(tape) for tape in tapes)])
     outcomes = [made[start + 1 : start + 1 + len(t)] for start, t in zip(starts[:-1], tapes, strict=True)]
     return Replay(outcomes, done.returncode, done.stderr.decode(errors="replace"))
+
+
+def fault(played: Replay, expected: Sequence[Outcomes]) -> str | None:
+    """Say what is wrong with a replay: a report, another bit, or a failed self-test; None if nothing is."""
+    if played.returncode not in {0, _SELF_TEST_FAILED}:
+        reports = [line.strip() for line in played.report.splitlines() if _REPORT.search(line)]
+        return reports[0] if reports else f"ended with {played.returncode}"
+    found = difference(expected, played.outcomes)
+    if found is not None:
+        return str(found)
+    return "the self-test fails" if played.returncode else None
 
 
 def difference(expected: Sequence[Outcomes], found: Sequence[Outcomes]) -> Difference | None:

@@ -5,11 +5,8 @@ from typing import Final, NamedTuple
 from codegen.errors import BuildError
 from sil.doctor import command_version
 from sil.verify import replay
-from sil.verify.calls import answers
 from sil.verify.cases import cases
 from sil.verify.check import Outcome, Result, Subject
-
-RANDOM_TAPES: Final = 2000
 
 
 class Watch(NamedTuple):
@@ -41,8 +38,7 @@ WATCHES: Final = (
 
 def check(subject: Subject) -> Result:
     """Play the cases on every watching build: no report, and the bits of the reference."""
-    tapes = cases(subject.settings, RANDOM_TAPES)
-    expected = answers(subject.settings, tapes)
+    tapes, expected = cases(subject.settings)
     calls = sum(len(tape) for tape in tapes)
     tapes_file = subject.folder / "tapes.bin"
     replay.write_tapes(subject.settings, tapes, tapes_file)
@@ -61,7 +57,7 @@ def check(subject: Subject) -> Result:
             continue
         played = replay.play(program, tapes_file, subject.settings, tapes)
         (folder / "report.txt").write_text(played.report)
-        fault = _fault(played) or replay.difference(expected, played.outcomes)
+        fault = replay.fault(played, expected)
         if fault:
             faults.append(f"{watch.name}: {fault}; {folder / 'report.txt'}")
         else:
@@ -76,15 +72,3 @@ def check(subject: Subject) -> Result:
         figures={"tapes": len(tapes), "calls": calls, "builds": passed, "faults": faults, "missing": gaps},
         tools={tool: command_version(tool) or "" for tool in sorted({watch.tool for watch in WATCHES})},
     )
-
-
-def _fault(played: replay.Replay) -> str | None:
-    """Return the line of a report that says what is wrong; None if the program ended well."""
-    if played.returncode == 0:
-        return None
-    lines = [
-        line
-        for line in played.report.splitlines()
-        if "runtime error" in line or "ERROR:" in line or "WARNING:" in line
-    ]
-    return lines[0].strip() if lines else f"ended with {played.returncode}"

@@ -1,0 +1,29 @@
+"""Lines and branches of the generated C that no input reaches, and why."""
+
+from typing import Final
+
+from sil.verify.reasons import Reason
+
+_SELF_TEST: Final = (
+    "a build that computes the bits of the reference passes its self-test: it never finds a difference"
+)
+
+REASONS: Final[tuple[Reason, ...]] = tuple(
+    Reason("src/nmpc_self_test.c", line, what, _SELF_TEST)
+    for line, what in (
+        ("if ((first_difference == 0)", "branch 1 never taken"),
+        (
+            "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)",
+            "branch 1 never taken",
+        ),
+        (
+            "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)",
+            "branch 3 never taken",
+        ),
+        ("&& (command.pitch_rad == expected->command.pitch_rad)", "branch 1 never taken"),
+        ("&& (nmpc_last_cost(scratch) == expected->cost)", "branch 1 never taken"),
+        ("&& (scratch->gradient[0] == expected->gradient[0])", "branch 1 never taken"),
+        ("&& (scratch->gradient[1] == expected->gradient[1]))) {", "branch 0 never taken"),
+        ("first_difference = i + 1;", "never run"),
+    )
+)
