@@ -16,9 +16,9 @@ from codegen import literals
 from sil.verify.reasons import Key, plain
 
 _TOKEN: Final = re.compile(
-    r"""(?P<space>\s+|/\*.*?\*/|//[^\n]*)
-      | (?P<define>^[ \t]*\#[ \t]*define[ \t]+\w+(\([^)]*\))?(?=[ \t]))
+    r"""(?P<define>^[ \t]*\#[ \t]*define[ \t]+\w+(\([^)]*\))?(?=[ \t]))
       | (?P<directive>^[ \t]*\#(?:[^\n\\]|\\.)*)
+      | (?P<space>\n|[ \t]+|/\*.*?\*/|//[^\n]*)
       | (?P<real>(?:\d+\.\d*(?:[eE][-+]?\d+)?|\d+[eE][-+]?\d+)[fF]?)
       | (?P<integer>0[xX][0-9a-fA-F]+[uUlL]*|\d+[uUlL]*)
       | (?P<word>[A-Za-z_]\w*)
@@ -116,7 +116,7 @@ def mutants(file: str, text: str, prefix: str) -> list[Mutant]:
         seen[described] += 1
         key = (plain(file, prefix), *name)
         begin = text.rfind("\n", 0, change.start) + 1
-        after = text.find("\n", change.end)
+        after = change.end + len(text[change.end :].partition("\n")[0])
         lines = (
             " ".join((text[begin : change.start] + part + text[change.end : after]).split())
             for part in (right, change.wrong)

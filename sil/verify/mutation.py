@@ -64,7 +64,7 @@ def check(subject: Subject) -> Result:
     found = [mutant for path in bench.files for mutant in bench.mutants_of(path)]
     with ThreadPoolExecutor(AT_ONCE) as pool:
         judged = list(pool.map(bench.judge, found))
-    return _result(subject, judged, tools)
+    return summary(subject, judged, tools)
 
 
 class Bench:
@@ -125,14 +125,16 @@ class Bench:
             made = self._machine_code(folder, "-O1")
         except BuildError:
             return Fate.REFUSED
-        if made == self._originals["-O1"]:
-            return Fate.SAME
+        same = made == self._originals["-O1"]
         whole = mutant.file.startswith("include/")
-        if self._fault(folder, ("-O1",) if whole else None) is not None:
+        if not same and self._fault(folder, ("-O1",) if whole else None) is not None:
             return Fate.KILLED
-        if self._machine_code(folder, "-O3") == self._originals["-O3"]:
-            return Fate.SAME
-        return Fate.SURVIVED if self._fault(folder, _WATCHED) is None else Fate.WATCHED
+        if (
+            self._fault(folder, _WATCHED) is not None
+        ):  # a compiler may take what is undefined for what was meant
+            return Fate.WATCHED
+        same = same or self._machine_code(folder, "-O3") == self._originals["-O3"]
+        return Fate.SAME if same else Fate.SURVIVED
 
     def _machine_code(self, folder: Path, level: str) -> bytes:
         """Compile the library as one unit, and return the object file."""
@@ -168,7 +170,8 @@ class Bench:
         Toolchain(("gcc",)).run([*_FLAGS, *arguments], folder)
 
 
-def _result(subject: Subject, judged: Sequence[Judged], tools: dict[str, str]) -> Result:
+def summary(subject: Subject, judged: Sequence[Judged], tools: dict[str, str]) -> Result:
+    """Count fates, and list survivors with their diffs and the rows that would explain them."""
     counts = Counter(one.fate for one in judged)
     survivors = [one.mutant for one in judged if one.fate is Fate.SURVIVED]
     killed = counts[Fate.KILLED] + counts[Fate.WATCHED]
