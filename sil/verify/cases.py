@@ -122,15 +122,20 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
 
 def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
-    """Head for every eighth of a turn in range, and its neighbours: there sine and cosine change hands."""
+    """Head for eighths of a turn, near and far, and their neighbours: there sine and cosine change hands."""
     scalar = SCALARS[settings.code.scalar]
-    eighths = np.arange(-1303, 1304) * (np.pi / 4)
-    yaw = eighths.astype(scalar)
-    yaws = np.stack([np.nextafter(yaw, scalar(-np.inf)), yaw, np.nextafter(yaw, scalar(np.inf))], axis=1)
+    eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 17)])
+    yaws = [(eighths * (np.pi / 4)).astype(scalar)]
+    for _ in range(3):
+        yaws = [
+            np.nextafter(yaws[0], scalar(-np.inf)),
+            *yaws,
+            np.nextafter(yaws[-1], scalar(np.inf)),
+        ]
     columns = []
-    for column in yaws.T:
-        good = _good(settings, rng, len(yaws))
-        good[:, 6] = column
+    for yaw in yaws:
+        good = _good(settings, rng, len(eighths))
+        good[:, 6] = yaw
         columns.append(calls(settings, Function.STEP, good))
     return list(np.stack(columns, axis=1))
 

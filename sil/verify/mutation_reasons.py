@@ -50,4 +50,24 @@ REASONS: Final[tuple[Reason, ...]] = (
     ),
     Reason("src/nmpc_math.h", "return (a < b) ? a : b;", "< -> <=", _EQUAL),
     Reason("src/nmpc_math.h", "return (a > b) ? a : b;", "> -> >=", _EQUAL),
+    *(
+        Reason("src/nmpc_math.c", f"#define NMPC_{series}_TERMS {terms}", f"{terms} -> {terms + 1}", _TERMS)
+        for series, terms in (("SINE", 4), ("COSINE", 5), ("SINE", 8), ("COSINE", 8))
+    ),
+    Reason(
+        "src/nmpc_math.c",
+        "const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));",
+        "< -> <=",
+        "no turn at all, less or more a half, is quadrant 0 either way",
+    ),
+    *(
+        Reason(
+            "src/nmpc_cost.c",
+            "const nmpc_real_t before_rad = (k < NMPC_AXES) ? last_rad[k] : moves_rad[k - NMPC_AXES];",
+            what,
+            "undefined, and hidden by the layout of nmpc_t: the last command stands before the plan, so one "
+            "array's neighbour is the other",
+        )
+        for what in ("< -> <=", "< -> >=")
+    ),
 )
