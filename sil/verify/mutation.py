@@ -71,6 +71,7 @@ class Bench:
     """Compiles and runs mutants of one bundle, each thread in a copy of its own."""
 
     def __init__(self, subject: Subject) -> None:
+        replay.sources(subject)
         self._subject = subject
         self._prefix = subject.settings.code.prefix
         blocks = [name.replace("nmpc", self._prefix, 1) for name in SUB_BLOCKS]

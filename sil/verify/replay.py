@@ -52,10 +52,11 @@ class Difference:
 
 
 def sources(subject: Subject) -> list[Path]:
-    """Return the C sources of a bundle in folders; raises BuildError if there are none."""
+    """Return the C sources of a bundle; raises BuildError unless it is one in folders, with its harness."""
     found = sorted((subject.bundle / "src").glob("*.c"))
-    if not found:
-        raise BuildError(f"{subject.bundle}: has no src/*.c; generate the bundle in folders")
+    harness = f"fuzz/{subject.settings.code.prefix}_fuzz.c"
+    if not found or not (subject.bundle / harness).is_file():
+        raise BuildError(f"{subject.bundle}: has no src/*.c or no {harness}; generate the bundle in folders")
     return found
 
 
