@@ -124,7 +124,7 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
     """Head for eighths of a turn, near and far, and their neighbours: there sine and cosine change hands."""
     scalar = SCALARS[settings.code.scalar]
-    eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 17)])
+    eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 4)])
     yaws = [(eighths * (np.pi / 4)).astype(scalar)]
     for _ in range(3):
         yaws = [

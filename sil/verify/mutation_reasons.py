@@ -20,6 +20,10 @@ def _steps_stay_long(settings: Settings) -> bool:
     return shortest > 1.01 * optimizer.step_min_rad
 
 
+def _is_float32(settings: Settings) -> bool:
+    return settings.code.scalar == "float32"
+
+
 _STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
 _EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
 _ZERO: Final = "minus zero is compared, and nothing else is done with it"
@@ -59,6 +63,14 @@ REASONS: Final[tuple[Reason, ...]] = (
         "const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));",
         "< -> <=",
         "no turn at all, less or more a half, is quadrant 0 either way",
+    ),
+    Reason(
+        "src/nmpc_math.c",
+        "const nmpc_real_t half = <real>;",
+        "next number",
+        "of all float32 numbers in range, tried one by one, only +-0.78539807 falls into another quadrant; "
+        "its sine and cosine have the same bits in both",
+        _is_float32,
     ),
     *(
         Reason(
