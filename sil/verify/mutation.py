@@ -1,5 +1,7 @@
 """Check: every small fault of the generated C shows in the bits, or is listed with why it cannot."""
 
+import math
+import resource
 import shutil
 import threading
 from collections import Counter
@@ -22,11 +24,10 @@ from sil.verify.mutation_reasons import REASONS
 from sil.verify.reasons import reason_for, row
 
 AT_ONCE: Final = 2
-CPU_S: Final = 1
-"""Time of the processor that a mutant gets, in seconds; the original takes about a hundredth."""
+SLOWER: Final = 20
+"""Processor time of a mutant, in times of the original's and beside a second; watched, as often that."""
 
 _FLAGS: Final = (*replay.FLAGS, "-Werror=return-type", "-Iinclude", "-Isrc", "-I.")
-_LIMIT: Final = f"-DNMPC_REPLAY_CPU_S={CPU_S}U"
 _HARNESS_OBJECTS: Final = ("replay.o", "self_test.o")
 _WATCHED: Final = ("-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 
@@ -89,6 +90,7 @@ class Bench:
         self._lock = threading.Lock()
         self._benches = 0
         self._originals: dict[str, bytes] = {}
+        self._limit_s = replay.LIMIT_S
 
     def mutants_of(self, path: str) -> list[Mutant]:
         """Return the mutants of one file; none if the bundle has not got it."""
@@ -103,7 +105,11 @@ class Bench:
                 self._originals[level] = self._machine_code(folder, level)
             except BuildError as error:
                 return str(error)
-        return self._fault(folder)
+        before_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+        fault = self._fault(folder)
+        taken_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before_s
+        self._limit_s = 1 + math.ceil(SLOWER * taken_s)
+        return fault
 
     def judge(self, mutant: Mutant) -> Judged:
         """Compile and run one mutant, and put the file right again."""
@@ -130,9 +136,8 @@ class Bench:
         whole = mutant.file.startswith("include/")
         if not same and self._fault(folder, ("-O1",) if whole else None) is not None:
             return Fate.KILLED
-        if (
-            self._fault(folder, _WATCHED) is not None
-        ):  # a compiler may take what is undefined for what was meant
+        # Same machine code or not: a compiler may take what is undefined for what was meant.
+        if self._fault(folder, _WATCHED) is not None:
             return Fate.WATCHED
         same = same or self._machine_code(folder, "-O3") == self._originals["-O3"]
         return Fate.SAME if same else Fate.SURVIVED
@@ -147,9 +152,10 @@ class Bench:
         if anew is None:
             self._gcc(folder, *_HARNESS_OBJECTS, "all.o", "-o", "replay")
         else:
-            self._gcc(folder, *anew, _LIMIT, "all.c", *self._harness, "-o", "replay")
-        settings = self._subject.settings
-        played = replay.play(folder / "replay", self._tapes_file, settings, self._tapes)
+            self._gcc(folder, *anew, "all.c", *self._harness, "-o", "replay")
+        limit_s = self._limit_s * (SLOWER if anew == _WATCHED else 1)
+        program = folder / "replay"
+        played = replay.play(program, self._tapes_file, self._subject.settings, self._tapes, limit_s)
         return replay.fault(played, self._expected)
 
     def _folder(self) -> Path:
@@ -163,7 +169,7 @@ class Bench:
             (folder / "all.c").write_text("".join(f'#include "{unit}"\n' for unit in self._units))
             replay.write_program(self._prefix, folder / "fuzz")
             for source, made in zip(self._harness, _HARNESS_OBJECTS, strict=True):
-                self._gcc(folder, "-O1", _LIMIT, "-c", source, "-o", made)
+                self._gcc(folder, "-O1", "-c", source, "-o", made)
             self._own.folder = folder
         return Path(self._own.folder)
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Makes the calls in the files named, one controller a file, and writes what came of every call to the
- * standard output. Compiled together with a bundle, never part of one.
+ * Makes the calls in a file, the first argument, and writes what came of every call to the standard output. The
+ * second is the time of the processor that this may take, in seconds. Compiled together with a bundle, never
+ * part of one.
  */
 #include "nmpc_fuzz.c"
 
@@ -14,10 +15,6 @@
 #define NMPC_REPLAY_POISONED 1
 #include <sanitizer/msan_interface.h>
 #endif
-#endif
-
-#if !defined(NMPC_REPLAY_CPU_S)
-#define NMPC_REPLAY_CPU_S 240U
 #endif
 
 /* What a command holds that no step wrote. */
@@ -93,27 +90,28 @@ static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
     nmpc_replay_write(self->plan_rad, sizeof(self->plan_rad));
 }
 
-/* Returns 0, 2 if a file cannot be read or the output not written, 3 if the self-test fails. A controller that
- * never returns is killed. */
-int main(int count, char **paths)
+/* Returns 0, 2 if the file cannot be read or the output not written, 3 if the self-test fails. */
+int main(int count, char **arguments)
 {
-    const struct rlimit limit = { NMPC_REPLAY_CPU_S, NMPC_REPLAY_CPU_S };
     static nmpc_t self;
-    int i;
+    uint8_t bytes[NMPC_FUZZ_BYTES];
+    struct rlimit limit;
+    FILE *file;
 
-    (void)setrlimit(RLIMIT_CPU, &limit);
-    for (i = 1; i < count; i++) {
-        uint8_t bytes[NMPC_FUZZ_BYTES];
-        FILE *file = fopen(paths[i], "rb");
-
-        if (file == 0) {
-            return 2;
-        }
-        (void)nmpc_replay_init(&self);
-        while (fread(bytes, sizeof(bytes), 1, file) == 1) {
-            nmpc_replay_call(&self, bytes);
-        }
-        (void)fclose(file);
+    if (count != 3) {
+        return 2;
     }
+    limit.rlim_cur = (rlim_t)strtoul(arguments[2], 0, 10);
+    limit.rlim_max = limit.rlim_cur;
+    (void)setrlimit(RLIMIT_CPU, &limit);
+    file = fopen(arguments[1], "rb");
+    if (file == 0) {
+        return 2;
+    }
+    (void)nmpc_replay_init(&self);
+    while (fread(bytes, sizeof(bytes), 1, file) == 1) {
+        nmpc_replay_call(&self, bytes);
+    }
+    (void)fclose(file);
     return ((nmpc_version()[0] != '\0') && (nmpc_self_test(&self) == 0)) ? 0 : 3;
 }
