@@ -38,6 +38,8 @@ FAULTS = {
     ),
 }
 
+QUICK = ("a clamp removed", "NaN passes")
+
 
 @pytest.fixture(autouse=True)
 def _compilers() -> None:
@@ -63,7 +65,9 @@ def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
     assert result.figures["corpus"] > 50
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    "fault", [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in FAULTS]
+)
 def test_a_broken_promise_is_found_and_can_be_repeated(fault: str, tmp_path: Path) -> None:
     """The evidence says which promise, and its command repeats the finding."""
     result = fuzzing.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]), runs=FEW_RUNS)
@@ -75,6 +79,7 @@ def test_a_broken_promise_is_found_and_can_be_repeated(fault: str, tmp_path: Pat
     assert again.returncode != 0
 
 
+@pytest.mark.long
 def test_what_the_harness_cannot_know_is_found_by_the_reference(tmp_path: Path) -> None:
     """A wrong number keeps every promise of the header, and not the reference's bits."""
     fault = (
