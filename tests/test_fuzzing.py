@@ -69,7 +69,7 @@ def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
     "fault", [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in FAULTS]
 )
 def test_a_broken_promise_is_found_and_can_be_repeated(fault: str, tmp_path: Path) -> None:
-    """The evidence says which promise, and its command repeats the finding."""
+    """The evidence says which promise, its command repeats the finding, and no seed was needed for it."""
     result = fuzzing.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]), runs=FEW_RUNS)
     assert result.outcome is Outcome.FAILED
     assert "broken promise" in result.evidence or "runtime error" in result.evidence
@@ -77,6 +77,9 @@ def test_a_broken_promise_is_found_and_can_be_repeated(fault: str, tmp_path: Pat
     assert command, result.evidence
     again = subprocess.run([command[1], command[2]], capture_output=True, check=False)
     assert again.returncode != 0
+    options = ["-seed=1", f"-runs={fuzzing.RUNS}", "-max_len=588", "-len_control=0"]
+    from_nothing = subprocess.run([command[1], *options], cwd=tmp_path, capture_output=True, check=False)
+    assert from_nothing.returncode != 0
 
 
 @pytest.mark.long
