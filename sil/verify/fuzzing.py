@@ -93,6 +93,7 @@ def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
             f"-max_len={longest}",
             "-len_control=0",
             "-reload=0",
+            "-use_cmp=0",  # it remembers what was compared, addresses among it: another run, another corpus
             "-timeout=20",
             "-print_final_stats=1",
             "-artifact_prefix=./",
