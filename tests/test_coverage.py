@@ -1,5 +1,6 @@
 """Every line and branch of the generated C is run by the cases, or the reason why not is listed."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,7 @@ def test_every_line_is_run_and_every_branch_taken(tmp_path: Path) -> None:
     result = coverage.check(subject(presets.load("mambo"), tmp_path))
     assert result.outcome is Outcome.PASSED, result.evidence
     assert result.figures["branches"] > 100
+    assert json.loads(json.dumps(result.figures)) == result.figures
     assert all("self_test" in row["gap"] for row in result.figures["explained"])
 
 

@@ -1,5 +1,6 @@
 """The fuzzer finds what breaks a promise of nmpc.h, repeatably, and names the file that repeats it."""
 
+import json
 import re
 import subprocess
 from pathlib import Path
@@ -63,6 +64,7 @@ def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
     result = fuzzing.check(subject(settings.model_copy(update={"code": code}), tmp_path), runs=FEW_RUNS)
     assert result.outcome is Outcome.PASSED, result.evidence
     assert result.figures["corpus"] > 50
+    assert json.loads(json.dumps(result.figures)) == result.figures
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Mutants are made of every line, judged by bits, and none that survives goes unexplained."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -117,6 +118,7 @@ def test_a_survivor_without_a_reason_fails_the_check(tmp_path: Path) -> None:
     result = summary(made, [Judged(killed, Fate.KILLED), Judged(survivor, Fate.SURVIVED)], {})
     assert result.outcome is Outcome.FAILED
     assert "src/nmpc.c:1: #define A 2" in result.evidence
+    assert json.loads(json.dumps(result.figures)) == result.figures
     listed = (made.folder / "survivors.txt").read_text()
     assert "- #define A 1\n+ #define A 2\n" in listed
     assert "Reason(\n        'src/nmpc.c',\n        '#define A 1',\n        '1 -> 2',\n" in listed

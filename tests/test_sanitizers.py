@@ -1,5 +1,6 @@
 """The generated C under sanitizers, called with inputs of every kind: nothing undefined, ever."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,7 @@ def test_nothing_undefined_happens(tmp_path: Path) -> None:
     result = sanitizers.check(subject(presets.load("mambo"), tmp_path))
     assert result.outcome is Outcome.PASSED, result.evidence
     assert result.figures["calls"] > 15_000
+    assert json.loads(json.dumps(result.figures)) == result.figures
     assert len(result.figures["builds"]) == len(sanitizers.WATCHES)
 
 
