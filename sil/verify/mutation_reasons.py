@@ -24,10 +24,18 @@ def _is_float32(settings: Settings) -> bool:
     return settings.code.scalar == "float32"
 
 
+def _is_float64(settings: Settings) -> bool:
+    return settings.code.scalar == "float64"
+
+
 _STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
 _EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
 _ZERO: Final = "minus zero is compared, and nothing else is done with it"
 _SIGN: Final = "of a slope and of a direction only the sign is read"
+_THIRD: Final = (
+    "not the same, and out of sight: the third part, 3.5e-27, changes a sine that is nearly zero, and every "
+    "outcome adds a multiple of the cosine to that"
+)
 _TERMS: Final = "the table grows by a zero, and a polynomial by a term of zero, which changes no bit"
 
 REASONS: Final[tuple[Reason, ...]] = (
@@ -63,6 +71,14 @@ REASONS: Final[tuple[Reason, ...]] = (
         "const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));",
         "< -> <=",
         "no turn at all, less or more a half, is quadrant 0 either way",
+    ),
+    *(
+        Reason("src/nmpc_math.c", line, what, _THIRD, _is_float64)
+        for line, what in (
+            ("<real>, <real>, <real>", "negative #2"),
+            ("<real>, <real>, <real>", "a thousandth more #2"),
+            ("- (count * quarter_turn_rad[2]);", "- -> +"),
+        )
     ),
     Reason(
         "src/nmpc_math.c",

@@ -49,10 +49,8 @@ static int nmpc_replay_init(nmpc_t *self)
         for (i = 0; i < sizeof(nmpc_t); i++) {
             if (one.bytes[i] != other.bytes[i]) {
                 untouched++;
-            } else if (one.bytes[i] != 0U) {
-                wrong = 1;
             } else {
-                /* As promised. */
+                wrong = wrong || (one.bytes[i] != 0U) || (untouched > 0U); /* padding is at the end alone */
             }
         }
         wrong = wrong || (untouched >= sizeof(nmpc_real_t));
