@@ -40,6 +40,7 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
         *_nulls(settings, rng),
         *_seams(settings, rng),
         *_at_rest(settings),
+        *_meeting(settings),
     )
     return tapes, tuple(answers(settings, tapes))
 
@@ -168,6 +169,18 @@ def _at_rest(settings: Settings) -> list[Tape]:
         found += tapes(moving)
         moving = np.nextafter(moving, scalar(0))
     return found
+
+
+def _meeting(settings: Settings) -> Iterator[Tape]:
+    """Meet the target exactly at the first predicted step, from either side along either axis, and pass it."""
+    scalar = SCALARS[settings.code.scalar]
+    advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
+    for axis in range(2):
+        for way in (-1, 1):
+            steps = np.zeros((1, 12))
+            steps[0, axis], steps[0, 2 + axis] = -way * advance_m, way
+            steps[0, 11] = hover_thrust(settings)
+            yield calls(settings, Function.STEP, steps)
 
 
 def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
