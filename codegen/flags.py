@@ -18,3 +18,42 @@ WARNING_FLAGS: Final = (
     "-Wstrict-prototypes",
     "-Wmissing-prototypes",
 )
+
+PROOF_PREPROCESSING: Final = ("-msse2", "-mfpmath=sse")
+"""Frama-C takes the sizes of a 32-bit machine; these keep the preprocessor from naming its x87."""
+
+PROOFS: Final = {
+    # NaN is an alarm wherever an operation gives it.
+    "take_numbers": (
+        "-warn-special-float nan",
+        "-main take_numbers",
+        "-eva",
+        "-eva-precision 2",
+        "-eva-split-return auto",  # a range check that says yes and one that says no are told apart
+    ),
+    # NaN is a value. No relations between variables: Frama-C 25 takes !(x < y) for x >= y when it draws
+    # conclusions from a stored comparison, which NaN breaks.
+    "refuse_nan": (
+        "-warn-special-float none",
+        "-main refuse_nan",
+        "-eva",
+        "-eva-precision 0",
+    ),
+}
+"""What each of the two proofs asks of Frama-C."""
+
+PROOF_FLAGS: Final = (
+    "-machdep x86_32",
+    "-kernel-warn-key annot:missing-spec=abort",  # no function without a body or a contract
+    "-eva-no-print",
+    "-eva-auto-loop-unroll 128",  # every loop of a controller is shorter
+)
+"""What both ask."""
+
+RULE_FLAGS: Final = (
+    "--std=c99",
+    "--addon=misra",
+    "--platform=unix32",
+    "--enable=warning,style,performance,portability",
+    "--quiet",
+)

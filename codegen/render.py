@@ -8,7 +8,14 @@ import jinja2
 
 import codegen
 from codegen import boards, literals
-from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from codegen.flags import (
+    COMPILE_FLAGS,
+    PROOF_FLAGS,
+    PROOF_PREPROCESSING,
+    PROOFS,
+    RULE_FLAGS,
+    WARNING_FLAGS,
+)
 from codegen.frozen import HELD, HOVER_M_S2, TICKS, episodes, frozen_digest, spread
 from codegen.horizon import horizon_tables
 from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
@@ -26,7 +33,10 @@ PROJECT: Final = {
     "CMakeLists.txt": "CMakeLists.txt",
     "main.c": "example/main.c",
     "nmpc_fuzz.c": "fuzz/nmpc_fuzz.c",
+    "nmpc_proof.c": "proof/nmpc_proof.c",
 }
+DEVIATIONS: Final = "deviations.txt"
+"""Names files of a bundle in folders, which an amalgamated one has not."""
 
 _OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
 _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
@@ -43,7 +53,8 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     headers = {name: environment.get_template(f"include/{name}.j2") for name in PUBLIC_HEADERS}
     privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in SUB_BLOCKS}
     sources = {name: environment.get_template(f"src/{name}.j2") for name in SOURCES}
-    project = {path: environment.get_template(f"project/{name}.j2") for name, path in PROJECT.items()}
+    others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
+    project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
 
     context = _context(settings) | {
         "amalgamated": amalgamate,
@@ -133,6 +144,9 @@ def _context(settings: Settings) -> dict[str, object]:
         "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
         "compile_flags": " ".join(COMPILE_FLAGS),
         "warning_flags": " ".join(WARNING_FLAGS),
+        "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
+        "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in PROOFS.items()},
+        "rule_flags": " ".join(RULE_FLAGS),
     }
 
 

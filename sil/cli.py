@@ -20,7 +20,7 @@ from codegen.footprint.build import builder
 from codegen.literals import SCALARS
 from codegen.reference import ReferenceController, Status
 from codegen.settings import Settings
-from sil import cli_boards, cli_faults, report
+from sil import cli_boards, cli_faults, cli_verify, report
 from sil.baseline import PdController
 from sil.compiled import CompiledController
 from sil.emulated import EmulatedController, build_guest
@@ -59,6 +59,7 @@ def main() -> None:
     register(app)
     cli_boards.register(app)
     cli_faults.register(app)
+    cli_verify.register(app)
     app()
 
 

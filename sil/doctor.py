@@ -1,5 +1,6 @@
 """What there is of the tools that the project uses on this machine, and what each missing one would bring."""
 
+import platform
 import re
 import shlex
 import shutil
@@ -8,12 +9,16 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
+from pathlib import Path
 from typing import Final, Literal
 
 from codegen import boards
 from codegen.boards import Board
 from codegen.errors import BuildError, echo
 from codegen.toolchain import host_toolchain
+
+LIBFUZZER: Final = "libFuzzer"
+"""A library of clang's, and no command: what links a fuzzer."""
 
 PATIENCE_S: Final = 5.0
 """Time that a tool gets to tell its version, in seconds."""
@@ -86,7 +91,7 @@ def _needs() -> tuple[_Need, ...]:
     on_others = [board.name for board in known if board.emulated_core.value != "avr"]
     return (
         _Need("compiler", _host_compilers(), "flies the C here: fly, table2", "Debian", ("gcc",)),
-        _Need("compiler", ("clang",), "builds for all but the AVR: same-bits", "Debian", ("clang",)),
+        _Need("compiler", ("clang",), "builds for all but the AVR: same-bits, verify", "Debian", ("clang",)),
         *_cross_compilers(known),
         _Need("emulator", ("unicorn",), f"runs the C of {', '.join(on_others)}", "PyPI", ("unicorn",)),
         _Need(
@@ -99,6 +104,17 @@ def _needs() -> tuple[_Need, ...]:
         _Need("analyser", ("pyelftools",), "measures flash and RAM of a build", "PyPI", ("pyelftools",)),
         _Need("analyser", ("capstone",), "bounds the stack of a build", "PyPI", ("capstone",)),
         _Need("analyser", ("nm",), "lets make test check the symbols of a build", "Debian", ("binutils",)),
+        _Need(
+            "analyser",
+            ("frama-c",),
+            "verify: proves the absence of run-time errors",
+            "Debian",
+            ("frama-c-base",),
+        ),
+        _Need("analyser", ("cppcheck",), "verify: checks MISRA C:2012", "Debian", ("cppcheck",)),
+        _Need("analyser", ("g++",), "verify: warnings of C++", "Debian", ("g++",)),
+        _Need("analyser", (LIBFUZZER,), "verify: fuzzing", "Debian", ("clang", "libclang-rt-14-dev")),
+        _Need("analyser", ("gcov",), "verify: counts what the tests reach", "Debian", ("gcc",)),
         _Need("builder", ("cmake",), "lets make test build a bundle with CMake", "Debian", ("cmake",)),
     )
 
@@ -141,6 +157,8 @@ def _package_version(package: str) -> str | None:
 
 def command_version(candidate: str) -> str | None:
     """Return the version that the command tells, "" if it tells none in time, None if it is missing."""
+    if candidate == LIBFUZZER:
+        return _libfuzzer_version()
     command = shlex.split(candidate)
     if shutil.which(command[0]) is None:
         return None
@@ -159,3 +177,24 @@ def command_version(candidate: str) -> str | None:
     first_line = done.stdout.partition("\n")[0]
     number = re.search(r"\d+(\.\d+)+", re.sub(r"\([^)]*\)", "", first_line))
     return number[0] if number else ""
+
+
+def _libfuzzer_version() -> str | None:
+    """Return the version of the clang that has the library, None if none has."""
+    clang = shutil.which("clang")
+    if clang is None:
+        return None
+    name = f"libclang_rt.fuzzer-{platform.machine()}.a"
+    try:
+        done = subprocess.run(
+            [clang, f"-print-file-name={name}"],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=PATIENCE_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return command_version("clang") if Path(done.stdout.strip()).is_file() else None

@@ -1,5 +1,7 @@
 """Result folders: made for one run, replaced as a whole, and never on top of somebody's work.
 
+A result is a plain file or, if its name ends in a slash, a folder, whose files the summary lists in "files".
+
 A run writes into a hidden folder inside its result folder. When it is complete its files are moved into
 place, the summary last; until then earlier results stay as they were. A run that is killed, or stopped while
 it moves, leaves the hidden folder, which the next run clears.
@@ -48,6 +50,8 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
                 raise
             (folder / SUMMARY).unlink(missing_ok=True)
             for name in (*names, SUMMARY):
+                if name.endswith("/") and (folder / name).exists():
+                    shutil.rmtree(folder / name)
                 (fresh / name).replace(folder / name)
             shutil.rmtree(fresh)
     except OSError as error:
@@ -124,10 +128,26 @@ def _refuse_other_work(folder: Path, command: str, names: Collection[str]) -> No
             f"{command}; name another folder with -o",
             (),
         )
-    for path in (folder / each for each in names):
-        if path.is_symlink() or (path.exists() and not path.is_file()):
+    for each in names:
+        path = folder / each
+        if each.endswith("/"):
+            _refuse_unlisted_files(path, folder, ours.get("files"))
+        elif path.is_symlink() or (path.exists() and not path.is_file()):
             raise ForeignFilesError(
                 f"{echo(str(path))}: is not a plain file, and a result belongs there; "
+                "move it away, or name another folder with -o",
+                (str(path),),
+            )
+
+
+def _refuse_unlisted_files(place: Path, folder: Path, listed: object) -> None:
+    """Raise ForeignFilesError if `place` is no folder, or holds a file that no run of ours left there."""
+    known = listed if isinstance(listed, dict) else {}
+    found = [place] if place.is_symlink() or place.is_file() else sorted(place.rglob("*"))
+    for path in found:
+        if path.is_symlink() or (not path.is_dir() and path.relative_to(folder).as_posix() not in known):
+            raise ForeignFilesError(
+                f"{echo(str(path))}: is not a result of ours, and would be lost; "
                 "move it away, or name another folder with -o",
                 (str(path),),
             )

@@ -16,30 +16,12 @@ from codegen.frozen import frozen_digest
 from codegen.render import render
 from codegen.settings import Settings
 from codegen.settings.controller_toml import with_option
+from sil.verify.dialects import DIALECTS
 from tests.support.cases import settings_case
 from tests.support.tools import require
 
 STRICT = [*WARNING_FLAGS, "-Werror"]
 GCC_STRICT = [*STRICT, "-Wunsuffixed-float-constants"]
-CXX_STRICT = [
-    "-pedantic",
-    "-Wall",
-    "-Wextra",
-    "-Wconversion",
-    "-Wsign-conversion",
-    "-Wshadow",
-    "-Wundef",
-    "-Werror",
-]
-DIALECTS = {
-    "gnu89 of the Mambo's compiler": ("gcc", ["-std=gnu89", "-Wall", "-Werror", "-fPIC"]),
-    "c99": ("gcc", ["-std=c99", *GCC_STRICT]),
-    "c11": ("gcc", ["-std=c11", *GCC_STRICT]),
-    "c99 clang": ("clang", ["-std=c99", *STRICT]),
-    "c++11": ("g++", ["-xc++", "-std=c++11", *CXX_STRICT]),
-    "c++20 clang": ("clang++", ["-xc++", "-std=c++20", *CXX_STRICT]),
-}
-PACKAGES = {"gcc": "gcc", "g++": "g++", "clang": "clang", "clang++": "clang"}
 SETTINGS = {name: presets.load(name) for name in presets.names()} | {
     f"case {index}": settings_case(index, "float32") for index in (0, 3, 9)
 }
@@ -79,12 +61,12 @@ def shell(*command: str | Path, folder: Path) -> str:
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
-    """All warnings on and fatal, library, self-test and example."""
-    compiler, flags = DIALECTS[dialect]
-    require(compiler, PACKAGES[compiler])
+    """All warnings on and fatal, library, self-test, example and proof."""
+    chosen = DIALECTS[dialect]
+    require(chosen.compiler, chosen.package)
     placed(SETTINGS[name], tmp_path)
-    sources = sorted(str(path) for path in [*tmp_path.glob("src/*.c"), tmp_path / "example/main.c"])
-    shell(compiler, *flags, "-O2", "-ffp-contract=off", "-Iinclude", "-c", *sources, folder=tmp_path)
+    sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
+    shell(*chosen.command(SETTINGS[name]), "-Iinclude", "-c", *sources, folder=tmp_path)
 
 
 @pytest.mark.parametrize("amalgamate", [False, True])

@@ -10,7 +10,7 @@ import pytest
 
 from codegen import boards
 from sil import doctor
-from sil.doctor import Finding, doctor_text, examine
+from sil.doctor import LIBFUZZER, Finding, doctor_text, examine
 
 ENDLESS = "while :; do :; done"
 
@@ -49,6 +49,8 @@ def test_what_is_here_is_found_with_its_version() -> None:
         if finding.registry == "PyPI":
             installed = {distribution.name for distribution in metadata.distributions()}
             assert finding.here == (finding.tool in installed)
+        elif finding.tool == LIBFUZZER:
+            assert not finding.here or shutil.which("clang") is not None
         else:
             commands = finding.tool.split(" or ")
             assert finding.here == any(shutil.which(command) is not None for command in commands)
@@ -115,6 +117,16 @@ def test_the_first_candidate_that_is_here_counts(bare: Path) -> None:
     assert finding_of("arm-linux-gnueabi-gcc").tool == "arm-linux-gnueabi-gcc"
     put(bare, "arm-none-linux-gnueabi-gcc", "#!/bin/sh\necho 4.6.3\n")
     assert finding_of("arm-none-linux-gnueabi-gcc").version == "4.6.3"
+
+
+def test_a_clang_without_its_library_cannot_fuzz(bare: Path) -> None:
+    """The library has a package of its own: it is here if clang finds its file."""
+    put(bare, "clang", "#!/bin/sh\necho 14.0.6\n")
+    assert (finding_of("clang").here, finding_of(LIBFUZZER).here) == (True, False)
+    (bare / "fuzzer.a").touch()
+    answer = f'case "$1" in -print*) echo {bare}/fuzzer.a;; *) echo 14.0.6;; esac'
+    put(bare, "clang", f"#!/bin/sh\n{answer}\n")
+    assert (finding_of(LIBFUZZER).here, finding_of(LIBFUZZER).version) == (True, "14.0.6")
 
 
 def test_the_compiler_that_cc_names_is_examined(bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:

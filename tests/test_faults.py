@@ -44,7 +44,7 @@ from sil.table2 import CASES
 from sil.traces import Trace
 from sil.trajectories import Hover
 from sil.verify.check import Outcome, Subject
-from sil.verify.faults import faults, judge
+from sil.verify.faults import check, judge
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -296,7 +296,7 @@ def subject(folder: Path, **wrong: str) -> Subject:
 def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> None:
     """Faults, statuses and ends are those of the documentation."""
     chosen = subject(tmp_path)
-    found = faults(chosen)
+    found = check(chosen)
     assert found.outcome is Outcome.PASSED, found.evidence
     assert words((chosen.folder / "faults.md").read_text("utf-8")) == words(DOCS.read_text("utf-8"))
 
@@ -315,7 +315,7 @@ def test_the_check_fails_a_controller_that_does_not_refuse(tmp_path: Path) -> No
     """Without the test of the attitude's range a NaN reaches the plan."""
     right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
     chosen = subject(tmp_path, right=right, becomes="if (!((state != 0)")
-    assert faults(chosen).outcome is Outcome.FAILED
+    assert check(chosen).outcome is Outcome.FAILED
 
 
 def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:

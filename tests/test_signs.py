@@ -26,7 +26,7 @@ from sil.sign_decisions import (
 )
 from sil.verify.check import Outcome, Subject
 from sil.verify.inputs import random_inputs
-from sil.verify.signs import judge, signs, text
+from sil.verify.signs import check, judge, text
 
 MAMBO = presets.load("mambo")
 SETTINGS = [MAMBO, in_scalar(MAMBO, MANY), presets.load("table1")]
@@ -186,6 +186,6 @@ def test_the_check_flies_the_c_of_the_bundle(
     files["src/nmpc_cost.c"] = files["src/nmpc_cost.c"].replace(right, wrong, 1 if right else 0)
     bundle.write(files, tmp_path / "bundle")
     (tmp_path / "evidence").mkdir()
-    found = signs(Subject(MAMBO, tmp_path / "bundle", tmp_path / "evidence"))
+    found = check(Subject(MAMBO, tmp_path / "bundle", tmp_path / "evidence"))
     assert found.outcome is outcome, found.evidence
     assert "in flight" in (tmp_path / "evidence" / "signs.md").read_text("utf-8")

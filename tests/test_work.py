@@ -11,10 +11,11 @@ from codegen import bundle, presets
 from codegen.render import render
 from codegen.settings import Settings
 from codegen.toolchain import Toolchain
+from sil.verify import work
 from sil.verify.check import Outcome, Result, Subject
 from sil.verify.loops import Reading, read_loops, read_unit
 from sil.verify.passes import runs
-from sil.verify.work import Counted, judge, work
+from sil.verify.work import Counted, judge
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -163,10 +164,10 @@ def subject(settings: Settings, folder: Path, path: str = "", right: str = "", w
     return Subject(settings, folder / "bundle", folder / "evidence")
 
 
-def check(chosen: Subject) -> Result:
+def checked(chosen: Subject) -> Result:
     """Check, and write the figures as JSON on the way."""
     require("cc", "gcc")
-    found = work(chosen)
+    found = work.check(chosen)
     json.dumps(found.figures, allow_nan=False)
     return found
 
@@ -202,7 +203,7 @@ def other(**sections: dict[str, Any]) -> Settings:
 )
 def test_the_generated_c_works_the_same_in_every_step(settings: Settings, tmp_path: Path) -> None:
     """Also with another prefix, at the corners of the horizon, and where the cost comes to rest at once."""
-    found = check(subject(settings, tmp_path))
+    found = checked(subject(settings, tmp_path))
     assert found.outcome is Outcome.PASSED, found.evidence
     assert f"{settings.optimizer.iterations} evaluations in each of" in found.evidence
     assert found.figures["accepted"] > 15_000
@@ -263,7 +264,7 @@ COUNTED_ONLY = {"no search where the plan is at rest", "a search for nothing"}
 def test_a_seeded_violation_fails_the_check(name: str, tmp_path: Path) -> None:
     """On the whole library, by what the source says or by what is counted."""
     path, right, wrong, word = VIOLATIONS[name]
-    found = check(subject(MAMBO, tmp_path, path, right, wrong))
+    found = checked(subject(MAMBO, tmp_path, path, right, wrong))
     assert found.outcome is Outcome.FAILED
     assert word in found.evidence
 

@@ -5,6 +5,7 @@ compiler calls of one, memset and memcpy, stands in freestanding.c. Clang compil
 the board's own compiler links, for its helpers.
 """
 
+import re
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,7 +84,7 @@ class Builder:
         for path, text in sources.items():
             (place / path).parent.mkdir(parents=True, exist_ok=True)
             (place / path).write_text(text, "utf-8")
-        chosen = sorted(path for path in sources if path.endswith(".c") and not path.startswith("example/"))
+        chosen = sorted(path for path in sources if re.fullmatch(r"(src/)?[^/]*\.c", path))
         self.toolchain.run(
             [
                 *COMPILE_FLAGS,

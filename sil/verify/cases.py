@@ -172,7 +172,7 @@ def _at_rest(settings: Settings) -> list[Tape]:
 
 
 def _meeting(settings: Settings) -> Iterator[Tape]:
-    """Meet the target exactly at the first predicted step, from either side along either axis, and pass it."""
+    """Meet the target exactly at the first predicted step, from either side of either axis."""
     scalar = SCALARS[settings.code.scalar]
     advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
     for axis in range(2):

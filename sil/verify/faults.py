@@ -14,7 +14,7 @@ from sil.verify.bundle import controller
 from sil.verify.check import Outcome, Result, Subject
 
 
-def faults(subject: Subject) -> Result:
+def check(subject: Subject) -> Result:
     """Fly every fault; raises BuildError, CacheError and FlightError."""
     settings = subject.settings
     verdicts = fly_faults(settings, partial(controller, subject))

@@ -36,9 +36,33 @@ _THIRD: Final = (
     "not the same, and out of sight: the third part, 3.5e-27, changes a sine that is nearly zero, and every "
     "outcome adds a multiple of the cosine to that"
 )
+_PROVEN: Final = (
+    "never read before it is written again; written all the same, so that a proof need not know why"
+)
 _TERMS: Final = "the table grows by a zero, and a polynomial by a term of zero, which changes no bit"
 
 REASONS: Final[tuple[Reason, ...]] = (
+    *(
+        Reason("src/nmpc_predictor.c", f"{{ {row} }},", what, "no run ends before the first step")
+        for row, responses in (("<real>, <real>, <real>, <real>", 4), ("<real>, <real>", 2))
+        for what in ("zero -> one", *(f"zero -> one #{k}" for k in range(1, responses)))
+    ),
+    *(
+        Reason(
+            "src/nmpc_predictor.c",
+            f"walk->{axis}_to_come_m = (nmpc_real_t)0;",
+            "left out",
+            "nmpc_init() has written the same, and nothing else is ever written there",
+        )
+        for axis in ("roll", "pitch")
+    ),
+    Reason(
+        "src/nmpc_cost.c",
+        "errors->sign = nmpc_bits(error_m);",
+        "left out",
+        "undefined, as MemorySanitizer says, and without effect: an empty run may end or not",
+    ),
+    Reason("src/nmpc_optimizer.c", "rprop[k].before_rad = self->plan_rad[k];", "left out", _PROVEN),
     Reason(
         "include/nmpc_config.h",
         "#define NMPC_STEP_MAX_RAD <real>",

@@ -30,7 +30,7 @@ ALIKE: Final = 0.05
 """Largest relative difference of the IAE that still counts as flying alike."""
 
 
-def signs(subject: Subject) -> Result:
+def check(subject: Subject) -> Result:
     """Compare both scalar types on random, adversarial and flown steps, and in flight.
 
     Raises BuildError, CacheError and FlightError.

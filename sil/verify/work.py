@@ -22,7 +22,7 @@ from sil.verify.passes import Count, runs
 STEPS: Final = 20_000
 
 
-def work(subject: Subject) -> Result:
+def check(subject: Subject) -> Result:
     """Read every loop of the bundle's C, and count passes over random and corner inputs.
 
     Raises BuildError and CacheError.

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * Self-test: does this build, on this board, compute the bits that the reference computed?
+ * MISRA C:2012: departs from rule 2.5, for the reason in deviations.txt.
  */
 #ifndef NMPC_SELF_TEST_H
 #define NMPC_SELF_TEST_H

@@ -2,6 +2,7 @@
  *
  * Sine and cosine: reduction by quarter turns (Cody and Waite), then Taylor series. The C libraries of
  * different boards disagree on the last bit; these do not.
+ * MISRA C:2012: departs from rule 8.9, for the reason in deviations.txt.
  */
 #include "nmpc_math.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * Settings of this controller; every number that the algorithm reads stands here or in a constant table.
+ * MISRA C:2012: departs from rule 2.5, for the reason in deviations.txt.
  *
  *   horizon.prediction                         10
  *   horizon.control                            2

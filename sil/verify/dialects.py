@@ -1,0 +1,76 @@
+"""Check: no compiler at hand has a word to say about the C, in any dialect that firmware is built in."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from codegen.flags import WARNING_FLAGS
+from codegen.settings import Settings
+from sil.doctor import command_version
+from sil.verify.check import Outcome, Result, Subject
+from sil.verify.tools import missing, run
+
+_UNSUFFIXED: Final = "-Wunsuffixed-float-constants"
+_CXX: Final = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wundef")
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """A way to compile: every warning on, each an error."""
+
+    compiler: str
+    package: str
+    flags: tuple[str, ...]
+
+    def command(self, settings: Settings) -> list[str]:
+        """Return compiler and flags; C has no suffix for a double, so gcc must not ask for one."""
+        suffixes = settings.code.scalar == "float32"
+        flags = [flag for flag in self.flags if suffixes or flag != _UNSUFFIXED]
+        return [self.compiler, *flags, "-Werror", "-O2", "-ffp-contract=off"]
+
+
+DIALECTS: Final = {
+    "gnu89 of the Mambo's compiler": Dialect("gcc", "gcc", ("-std=gnu89", "-Wall", "-fPIC")),
+    "c99": Dialect("gcc", "gcc", ("-std=c99", *WARNING_FLAGS, _UNSUFFIXED)),
+    "c11": Dialect("gcc", "gcc", ("-std=c11", *WARNING_FLAGS, _UNSUFFIXED)),
+    "c99 clang": Dialect("clang", "clang", ("-std=c99", *WARNING_FLAGS)),
+    "c++11": Dialect("g++", "g++", ("-xc++", "-std=c++11", *_CXX)),
+    "c++20 clang": Dialect("clang++", "clang", ("-xc++", "-std=c++20", *_CXX)),
+}
+
+
+def check(subject: Subject) -> Result:
+    """Compile library, self-test, example and proof in every dialect; a warning is a failure."""
+    bundle = subject.bundle.resolve()
+    sources = sorted(path for part in ("src", "example", "proof") for path in bundle.glob(f"{part}/*.c"))
+    gaps, silent, faults = [], [], []
+    log = []
+    for name, dialect in DIALECTS.items():
+        gap = missing(dialect.compiler, dialect.package)
+        if gap:
+            gaps.append(gap)
+            continue
+        command = dialect.command(subject.settings)
+        with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as objects:
+            done = run(
+                [*command, f"-I{bundle / 'include'}", "-c", *map(str, sources)],
+                Path(objects),
+            )
+        said = (done.stdout + done.stderr).replace(f"{bundle}/", "")
+        log.append(f"{name}: {' '.join(command)}\n{said}exit code {done.returncode}\n")
+        if done.returncode == 0 and not said:
+            silent.append(name)
+        else:
+            first = next((line for line in said.splitlines() if "error" in line or "warning" in line), said)
+            faults.append(f"{name}: {first or f'exit code {done.returncode}'}")
+    (subject.folder / "compilers.txt").write_text("\n".join(log), "utf-8")
+    outcome = Outcome.FAILED if faults else Outcome.INCOMPLETE if gaps else Outcome.PASSED
+    counted = f"{len(sources)} files, {len(silent)} of {len(DIALECTS)} dialects without a word"
+    compilers = sorted({dialect.compiler for dialect in DIALECTS.values()})
+    return Result(
+        outcome,
+        "; ".join([*faults, *dict.fromkeys(gaps), counted]),
+        figures={"files": len(sources), "silent": silent, "faults": faults},
+        tools={tool: version for tool in compilers if (version := command_version(tool)) is not None},
+    )

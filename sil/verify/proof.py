@@ -1,0 +1,137 @@
+"""Check: Frama-C's plug-in Eva proves what `proof/nmpc_proof.c` of the bundle promises, for every input."""
+
+import csv
+import re
+import shlex
+import subprocess
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+from codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, PROOFS
+from sil.doctor import command_version
+from sil.verify.check import Outcome, Result, Subject
+from sil.verify.tools import PATIENCE_S, missing, run
+
+_SHOWN: Final = 5
+"""Alarms that the evidence names; all are in the reports."""
+_PROMISE: Final = "user assertion"
+
+
+@dataclass(frozen=True)
+class Property:
+    """What Eva found out about one assertion, its own or the driver's."""
+
+    place: str
+    function: str
+    kind: str
+    status: str
+    text: str
+
+
+def check(subject: Subject) -> Result:
+    """Prove the absence of run-time errors and the promises of the driver; every alarm is a failure."""
+    gap = missing("frama-c", "frama-c-base")
+    if gap:
+        return Result(Outcome.INCOMPLETE, gap)
+    tools = {"frama-c": command_version("frama-c") or ""}
+    properties: list[Property] = []
+    statements = 0
+    for name in PROOFS:
+        report = subject.folder.resolve() / f"{name}.csv"
+        try:
+            done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
+        except subprocess.TimeoutExpired:
+            return Result(Outcome.INCOMPLETE, f"frama-c did not end within {PATIENCE_S:g} s", tools=tools)
+        log = done.stdout + done.stderr
+        (subject.folder / f"{name}.txt").write_text(log, "utf-8")
+        if done.returncode != 0 or not report.is_file():
+            return Result(Outcome.FAILED, f"frama-c refused the code: {_complaint(log)}", tools=tools)
+        properties += read_properties(report)
+        statements += _number(log, r"(\d+) statements reached")
+
+    alarms = unproven(properties)
+    proven = len({one.place for one in properties if one.kind == _PROMISE and one.status == "Valid"})
+    promised = _driver(subject).read_text("utf-8").count("/*@ assert ")
+    figures = {
+        "alarms": [asdict(alarm) for alarm in alarms],
+        "promises": promised,
+        "promises_proven": proven,
+        "statements": statements,
+    }
+    if alarms:
+        return Result(Outcome.FAILED, _alarm_text(alarms), figures, tools)
+    if proven < promised:
+        return Result(
+            Outcome.FAILED, f"{promised - proven} of {promised} promises were never reached", figures, tools
+        )
+    return Result(
+        Outcome.PASSED,
+        f"no alarm in {statements} statements, whatever the inputs and the order of calls: no run-time "
+        "error, no NaN or infinity stored, no command beyond the tilt limit",
+        figures,
+        tools,
+    )
+
+
+def command(subject: Subject, name: str) -> list[str]:
+    """Return the command that `make proof` runs in the bundle for the proof `name`, without its report."""
+    sources = sorted(
+        path for path in subject.bundle.glob("src/*.c") if not path.name.endswith("_self_test.c")
+    )
+    return [
+        "frama-c",
+        f"-cpp-extra-args={shlex.join(('-Iinclude', *PROOF_PREPROCESSING))}",
+        *shlex.split(" ".join((*PROOF_FLAGS, *PROOFS[name]))),
+        *(path.relative_to(subject.bundle).as_posix() for path in (_driver(subject), *sources)),
+    ]
+
+
+def unproven(properties: Sequence[Property]) -> list[Property]:
+    """Return what does not hold in every execution; a promise is dead in one proof, not in both."""
+    proven = {one.place for one in properties if one.status == "Valid"}
+    return [
+        one
+        for one in properties
+        if one.status not in ("Valid", "Considered valid")
+        and not (one.kind == _PROMISE and one.status == "Dead" and one.place in proven)
+    ]
+
+
+def read_properties(report: Path) -> list[Property]:
+    """Read Frama-C's table of properties; those of its own library are left out."""
+    with report.open(encoding="utf-8", newline="") as file:
+        return [
+            Property(
+                place=f"{row['directory']}/{row['file']}:{row['line']}",
+                function=row["function"],
+                kind=row["property kind"],
+                status=row["status"],
+                text=row["property"],
+            )
+            for row in csv.DictReader(file, delimiter="\t", quoting=csv.QUOTE_NONE)
+            if not row["directory"].startswith("FRAMAC_SHARE")
+        ]
+
+
+def _driver(subject: Subject) -> Path:
+    return subject.bundle / "proof" / f"{subject.settings.code.prefix}_proof.c"
+
+
+def _alarm_text(alarms: Sequence[Property]) -> str:
+    shown = [
+        f"{alarm.place}: {alarm.kind} not proven ({alarm.status}): {alarm.text}" for alarm in alarms[:_SHOWN]
+    ]
+    rest = [f"{len(alarms) - _SHOWN} more in the tables"] if len(alarms) > _SHOWN else []
+    return "; ".join([f"{len(alarms)} alarms", *shown, *rest])
+
+
+def _complaint(log: str) -> str:
+    lines = [line.strip() for line in log.splitlines() if "error" in line.lower()]
+    return lines[0] if lines else "it ended without a report"
+
+
+def _number(log: str, pattern: str) -> int:
+    found = re.search(pattern, log)
+    return int(found[1]) if found else 0

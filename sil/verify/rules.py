@@ -1,0 +1,82 @@
+"""Check: cppcheck finds nothing in the C, by MISRA C:2012 or otherwise, but the listed deviations."""
+
+import re
+import subprocess
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final
+
+from codegen.flags import RULE_FLAGS
+from codegen.render import DEVIATIONS
+from sil.doctor import command_version
+from sil.verify.check import Outcome, Result, Subject
+from sil.verify.tools import PATIENCE_S, missing, run
+
+_TEMPLATE: Final = "{file}\t{line}\t{id}\t{message}"
+_MISRA: Final = "misra-c2012-"
+_SHOWN: Final = 5
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line that breaks a rule: MISRA's by number, cppcheck's own by name."""
+
+    file: str
+    line: int
+    rule: str
+    message: str
+
+    def __str__(self) -> str:
+        """Spell it; the text of MISRA's rules is not free, so their number says it all."""
+        number = self.rule.removeprefix(_MISRA)
+        what = self.message if number == self.rule else f"MISRA C:2012 rule {number}"
+        return f"{self.file}:{self.line}: {what}"
+
+
+def check(subject: Subject) -> Result:
+    """Hold the C against MISRA C:2012; a finding that is no listed deviation is a failure."""
+    gap = missing("cppcheck", "cppcheck")
+    if gap:
+        return Result(Outcome.INCOMPLETE, gap)
+    tools = {"cppcheck": command_version("cppcheck") or ""}
+    try:
+        done = run(["cppcheck", *RULE_FLAGS, f"--template={_TEMPLATE}", "-Iinclude", "src"], subject.bundle)
+    except subprocess.TimeoutExpired:
+        return Result(Outcome.INCOMPLETE, f"cppcheck did not end within {PATIENCE_S:g} s", tools=tools)
+    (subject.folder / "cppcheck.txt").write_text(done.stdout + done.stderr, "utf-8")
+    found = findings(done.stderr)
+    if done.returncode != 0 or not any(one.rule.startswith(_MISRA) for one in found):
+        return Result(
+            Outcome.INCOMPLETE,
+            "cppcheck ran without its addon misra.py; Debian's package cppcheck brings it",
+            tools=tools,
+        )
+    listed = deviations(subject.bundle / DEVIATIONS)
+    unlisted = [one for one in found if (one.rule, one.file) not in listed]
+    counts = Counter(one.rule.removeprefix(_MISRA) for one in found if (one.rule, one.file) in listed)
+    departed = dict(sorted(counts.items()))
+    figures = {"findings": [asdict(one) for one in unlisted], "deviations": departed}
+    if unlisted:
+        rest = [f"{len(unlisted) - _SHOWN} more in cppcheck.txt"] if len(unlisted) > _SHOWN else []
+        return Result(
+            Outcome.FAILED, "; ".join([*map(str, unlisted[:_SHOWN]), *rest]), figures=figures, tools=tools
+        )
+    spelled = ", ".join(f"{rule} ({count})" for rule, count in departed.items())
+    return Result(
+        Outcome.PASSED,
+        f"nothing but the deviations listed in {DEVIATIONS}: {spelled}",
+        figures=figures,
+        tools=tools,
+    )
+
+
+def findings(said: str) -> list[Finding]:
+    """Read what cppcheck said, a finding a line."""
+    lines = (line.split("\t", 3) for line in said.splitlines())
+    return [Finding(words[0], int(words[1]), words[2], words[3]) for words in lines if len(words) == 4]
+
+
+def deviations(file: Path) -> set[tuple[str, str]]:
+    """Read {(rule, file)} from the list that a bundle ships."""
+    return set(re.findall(r"^([\w.-]+):(\S+)$", file.read_text("utf-8"), re.MULTILINE))
