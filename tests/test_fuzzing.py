@@ -24,8 +24,8 @@ FAULTS = {
     ),
     "NaN passes": (
         "src/nmpc_math.h",
-        "(value >= -limit) && (value <= limit)",
-        "!((value < -limit) || (value > limit))",
+        "(value >= least);\n    const int is_no_more = (value <= most);",
+        "!(value < least);\n    const int is_no_more = !(value > most);",
     ),
     "a bad weight half taken": (
         "src/nmpc.c",

@@ -72,6 +72,7 @@ def test_every_deviation_is_in_the_manual() -> None:
     assert documented == listed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("harm", [None, "15.1 goto"])
 def test_make_rules_comes_to_the_same_verdict(harm: str | None, tmp_path: Path) -> None:
     """The list of deviations is one that cppcheck reads by itself."""

@@ -22,7 +22,7 @@ _TYPES = """
 _ATOMIC = "bool char char16 char32 flag llong long schar short uchar uint ullong ulong ushort wchar"
 _THREADS = "cnd mtx once thrd thrd_start tss tss_dtor"
 _POSIX = """
-    active_reg blkcnt blksize caddr cc char16 char32 clockid cpu_set daddr dev f fexcept fpregset
+    active_reg blkcnt blksize caddr cc char16 char32 clockid cpu_set daddr dev f fds fexcept fpregset
     fsblkcnt fsfilcnt fsid gid glob greg gregset iconv id idtype in_addr in_port ino key loff mcontext
     mm mode mqd msglen msgqnum nfds nlink pid posix_spawn_file_actions posix_spawnattr quad r re_dfa
     reg_errcode reg_syntax regex regmatch regoff rlim s_reg sa_family sem shmatt sig sigevent siginfo

@@ -1,5 +1,6 @@
 """Build a bundle with every warning fatal, and load it without Python's headers: quickly, for hundreds."""
 
+import re
 import subprocess
 from importlib import resources
 from pathlib import Path
@@ -52,7 +53,7 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
         (folder / path).write_text(text, "utf-8")
     suffixes = ["-Wunsuffixed-float-constants"] if (compiler, scalar) == ("gcc", "float32") else []
     flags = [*COMPILE_FLAGS, *WARNING_FLAGS, *suffixes, "-Werror", "-fPIC", "-shared"]
-    sources = sorted(path for path in files if path.endswith(".c"))
+    sources = sorted(path for path in files if re.fullmatch(r"(src/)?[^/]*\.c", path))
     done = subprocess.run(
         [require(compiler, compiler), *flags, "-Iinclude", "-I.", *sources, "-o", "bundle.so"],
         cwd=folder,
