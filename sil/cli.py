@@ -33,7 +33,7 @@ from sil.progress import progress_bar
 from sil.results import SUMMARY, new_results, summary_text
 from sil.table2 import CASES, PD, fly_table2
 from sil.traces import Trace, write_csv, write_npz
-from sil.trajectories import Bernoulli, Circle, Gerono, Hover, Lissajous, Step, Trajectory, Waypoints
+from sil.trajectories import CURVES, Trajectory, Waypoints
 
 
 class ControllerKind(Enum):
@@ -43,8 +43,6 @@ class ControllerKind(Enum):
     PD = "pd"
     REFERENCE = "reference"
 
-
-CURVES = ("bernoulli", "gerono", "lissajous", "circle", "hover", "step")
 
 LONGEST_FLIGHT_S = 3600.0
 FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
@@ -244,19 +242,11 @@ def _on_board(kind: ControllerKind, settings: Settings, board: str) -> EmulatedC
 def _trajectory(name: str, size_m: float, rate_rad_s: float) -> Trajectory:
     _within("--size-m", size_m, -1000.0, 1000.0)
     _within("--rate-rad-s", rate_rad_s, -100.0, 100.0)
-    curves: dict[str, Trajectory] = {
-        "bernoulli": Bernoulli(size_m, rate_rad_s),
-        "gerono": Gerono(size_m, rate_rad_s),
-        "lissajous": Lissajous(size_m, rate_rad_s),
-        "circle": Circle(size_m, rate_rad_s),
-        "hover": Hover(),
-        "step": Step(size_m, 0.0),
-    }
-    if name in curves:
-        return curves[name]
+    if name in CURVES:
+        return CURVES[name](size_m, rate_rad_s)
     if not name.lower().endswith(".csv"):
         raise TrajectoryError(
-            f"--trajectory {echo(name)} must be {', '.join(curves)} or a file ending in .csv"
+            f"--trajectory {echo(name)} must be {', '.join(CURVES)} or a file ending in .csv"
         )
     return Waypoints.read(Path(name))
 

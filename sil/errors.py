@@ -7,6 +7,10 @@ class TrajectoryError(MamboNmpcError):
     """A trajectory that cannot be flown; the message names file, line and rule."""
 
 
+class ScenarioError(MamboNmpcError):
+    """A file that holds no record of a flight; the message names file, key and rule."""
+
+
 class FlightError(MamboNmpcError):
     """A flight that cannot be simulated as described."""
 

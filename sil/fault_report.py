@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from codegen.reference import Status
 from sil.fault_flights import COURSES, ORDER, Verdict
-from sil.faults import NOT_CALLED
+from sil.link import NOT_CALLED
 
 _NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
 

@@ -7,7 +7,6 @@ from typing import Final
 from codegen.reference import Status
 from codegen.settings import Settings
 from sil.faults import (
-    NOT_CALLED,
     Alter,
     Drop,
     always,
@@ -22,6 +21,7 @@ from sil.faults import (
     yaw_shifted,
     yaw_wrapped,
 )
+from sil.link import NOT_CALLED
 
 TO_THE_END: Final = math.inf
 

@@ -7,16 +7,14 @@ controllers, one for each flight, and have themselves the interface of a positio
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sil.arrays import FloatArray, IntArray
+from sil.link import NOT_CALLED
 from sil.loop import Outcome, PositionController
-
-NOT_CALLED: Final = -1
-"""What stands for a status where the controller was not called."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """The closed loop: trajectory, position controller and vehicle, for n flights at once.
 
-    target ------------------> position controller --roll, pitch--> stock loops -> rotors -> rigid body
-                               every update period                  every 5 ms                    |
-                                       ^-------------------------- state -------------------------'
+    target -> position controller --roll, pitch--> link -> stock loops -> rotors -> rigid body <- world
+              every update period                          every 5 ms                    |
+                      ^------------------------------------------^---- sensors, if any --'
 
 The simulation is pure: the same flight with the same controller gives the same trace, and a flight
 among many is the same, bit for bit, as the flight alone.
@@ -18,12 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sil.arrays import FloatArray, IntArray, PerFlight
+from sil.disturbances import Disturbances, World
 from sil.errors import FlightError
+from sil.link import NOT_CALLED, Drops, Link, Wire
 from sil.plant import loops
 from sil.plant.airframe import MAMBO
-from sil.plant.rigid_body import EULER, POSITION, world_velocity
-from sil.plant.vehicle import STEP_S, Vehicle, VehicleState, thrust_demand
-from sil.traces import Trace
+from sil.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
+from sil.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
+from sil.sensors.instruments import Sensors
+from sil.sensors.suite import Suite
+from sil.traces import SensedTrace, Trace
 from sil.trajectories import Trajectory
 
 HEIGHT_REFERENCE_M = -1.1
@@ -71,6 +75,21 @@ class Start(Enum):
     """On the ground, `TAKE_OFF_PHASE_S` before t = 0."""
 
 
+Three = tuple[PerFlight, PerFlight, PerFlight]
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """How a start differs from the one described by `Start`."""
+
+    position_m: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    velocity_m_s: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    tilt_rad: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    """Roll and pitch."""
+
+
 @dataclass(frozen=True, eq=False)
 class Flight:
     """One simulation of n flights; what differs between them comes as an array (n,)."""
@@ -86,6 +105,13 @@ class Flight:
     vehicle: Vehicle = field(default_factory=Vehicle)
     update_period_s: float = 0.01
     """Period of the position controller: a whole number of ticks of 5 ms."""
+    seeds: tuple[int, ...] | None = None
+    """One for each flight, of all that is random in it; None is 0 for all."""
+    offset: Offset | None = None
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    link: Link = field(default_factory=Link)
+    sensors: Sensors | None = None
+    """What controllers and stock loops see the state through; None shows them the truth."""
 
     def __post_init__(self) -> None:
         if not self.update_period_s <= self.duration_s < math.inf:
@@ -97,6 +123,8 @@ class Flight:
             raise FlightError(
                 f"update_period_s = {self.update_period_s:g} must be a whole multiple of {STEP_S:g}"
             )
+        if self.seeds is not None and len(self.seeds) != self.flights:
+            raise FlightError(f"seeds: there are {len(self.seeds)} for {self.flights} flights")
 
     @property
     def ticks_per_update(self) -> int:
@@ -126,19 +154,29 @@ def fly(
 
     Raises `FlightError`.
     """
-    ticks_per_update = flight.ticks_per_update
     times_s, targets = flight.times_s(), flight.targets()
-    trace = _blank(times_s, targets)
+    trace = _blank(times_s, targets, sensed=flight.sensors is not None)
     open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start is Start.TAKE_OFF else 0.0)
+    seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, _start(flight, targets[0])
+    world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
+    suite = None if flight.sensors is None else Suite(flight.sensors, seeds, truth(state))
+    wire, drops = Wire(flight.link, flight.flights), Drops(flight.link, seeds)
+    command_rad = np.zeros((2, flight.flights))
     for update, time_s in enumerate(times_s):
         state = _without_lost(state)
         lifting = time_s < open_loop_until_s - STEP_S / 2.0
-        command_rad = _record(trace, update, state, _thrust_n(state, lifting), controller)
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(time_s, 0.0)
-        for _ in range(ticks_per_update):
+        for tick in range(flight.ticks_per_update):
             with np.errstate(all="ignore"):
-                state = vehicle.step(state, command_rad, _thrust_n(state, lifting), heading_rad)
+                state, moment = world.tick(state, time_s + STEP_S * tick)
+                true = truth(state)
+                seen = true if suite is None else suite.look(true)
+                thrust_n = _thrust_n(seen, lifting)
+            if tick == 0:
+                command_rad = _update(trace, update, (true, seen), thrust_n, controller, command_rad, drops)
+            with np.errstate(all="ignore"):
+                state = vehicle.step(state, wire.carry(command_rad), thrust_n, heading_rad, seen, moment)
         if progress is not None:
             progress((update + 1) / len(times_s))
     return trace
@@ -148,17 +186,27 @@ def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
     """Return the state in which n flights begin above or at their first targets (n, 4)."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
-    if flight.start is Start.TAKE_OFF:
-        return flight.vehicle.at_rest(position_m, flight.yaw_rad, MAMBO.command_min)
-    position_m[2] = HEIGHT_REFERENCE_M
-    return flight.vehicle.at_rest(position_m, flight.yaw_rad, MAMBO.hover_command)
+    command = MAMBO.command_min
+    if flight.start is Start.HOVER:
+        position_m[2] = HEIGHT_REFERENCE_M
+        command = MAMBO.hover_command
+    state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
+    if flight.offset is None:
+        return state
+    offset, body = flight.offset, state.body
+    for row in range(3):
+        body[POSITION][row] += offset.position_m[row]
+    body[EULER][:2] = [np.broadcast_to(angle, flight.flights) for angle in offset.tilt_rad]
+    velocity_m_s = np.stack([np.broadcast_to(part, flight.flights) for part in offset.velocity_m_s])
+    body[VELOCITY] = to_body(body[EULER], velocity_m_s)
+    return state
 
 
-def _thrust_n(state: VehicleState, lifting: bool) -> FloatArray:
+def _thrust_n(seen: Seen, lifting: bool) -> FloatArray:
     """Return the total thrust (n,) asked for: open loop while lifting off, then the altitude loop."""
     if lifting:
-        return np.full(state.body.shape[1], loops.take_off_thrust())
-    return thrust_demand(state, HEIGHT_REFERENCE_M)
+        return np.full(seen.position_m.shape[1], loops.take_off_thrust())
+    return loops.altitude_thrust(HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
 
 
 def _without_lost(state: VehicleState) -> VehicleState:
@@ -171,38 +219,64 @@ def _without_lost(state: VehicleState) -> VehicleState:
     )
 
 
-def _blank(times_s: FloatArray, targets: FloatArray) -> Trace:
+def _blank(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
     """Return a trace to be filled in."""
     shape = targets.shape[:2]
-    return Trace(
-        time_s=times_s,
-        position_m=np.empty((*shape, 3)),
-        velocity_m_s=np.empty((*shape, 3)),
-        euler_rad=np.empty((*shape, 3)),
-        target=targets,
-        command_rad=np.empty((*shape, 2)),
-        thrust_acceleration_m_s2=np.empty(shape),
-        status=np.empty(shape, dtype=np.int64),
+    arrays: dict[str, Any] = {
+        "time_s": times_s,
+        "position_m": np.empty((*shape, 3)),
+        "velocity_m_s": np.empty((*shape, 3)),
+        "euler_rad": np.empty((*shape, 3)),
+        "target": targets,
+        "command_rad": np.empty((*shape, 2)),
+        "thrust_acceleration_m_s2": np.empty(shape),
+        "status": np.empty(shape, dtype=np.int64),
+    }
+    if not sensed:
+        return Trace(**arrays)
+    return SensedTrace(
+        **arrays,
+        seen_position_m=np.empty((*shape, 3)),
+        seen_velocity_m_s=np.empty((*shape, 3)),
+        seen_euler_rad=np.empty((*shape, 3)),
     )
 
 
-def _record(
-    trace: Trace, update: int, state: VehicleState, thrust_n: FloatArray, controller: PositionController
+def _update(
+    trace: Trace,
+    update: int,
+    views: tuple[Seen, Seen],
+    thrust_n: FloatArray,
+    controller: PositionController,
+    held_rad: FloatArray,
+    drops: Drops,
 ) -> FloatArray:
     """Let the controller take one step, enter it in the trace, and return the command (2, n).
 
-    The state is the true one: sensors would stand here.
+    `views` are the truth and what the controller sees. Where the update is dropped the controller is handed
+    a state that is not a number, which it refuses, and the command `held_rad` (2, n) stays.
     """
-    position_m, euler_rad = state.body[POSITION], state.body[EULER]
-    velocity_m_s = world_velocity(state.body)
-    measured = np.ascontiguousarray(np.concatenate([position_m[:2], velocity_m_s[:2], euler_rad]).T)
+    true, seen = views
+    measured = np.ascontiguousarray(
+        np.concatenate([seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]).T
+    )
+    dropped = drops.next()
+    if dropped is not None:
+        measured[dropped] = np.nan
     thrust_acceleration_m_s2 = thrust_n / MAMBO.mass_kg
     outcome = controller.step(measured, np.ascontiguousarray(trace.target[update]), thrust_acceleration_m_s2)
-    trace.position_m[update] = position_m.T
-    trace.velocity_m_s[update] = velocity_m_s.T
-    trace.euler_rad[update] = euler_rad.T
+    trace.position_m[update] = true.position_m.T
+    trace.velocity_m_s[update] = true.velocity_m_s.T
+    trace.euler_rad[update] = true.euler_rad.T
+    if isinstance(trace, SensedTrace):
+        trace.seen_position_m[update] = seen.position_m.T
+        trace.seen_velocity_m_s[update] = seen.velocity_m_s.T
+        trace.seen_euler_rad[update] = seen.euler_rad.T
     trace.command_rad[update] = outcome.command_rad
     trace.thrust_acceleration_m_s2[update] = thrust_acceleration_m_s2
     trace.status[update] = outcome.status
+    if dropped is not None:
+        trace.command_rad[update, dropped] = held_rad.T[dropped]
+        trace.status[update, dropped] = NOT_CALLED
     command_rad: FloatArray = trace.command_rad[update].T
     return command_rad

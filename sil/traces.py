@@ -1,8 +1,9 @@
 """What a closed-loop run leaves behind, and how it is written down."""
 
 import csv
+import hashlib
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,11 @@ CSV_COLUMNS = (
     *("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s"),
     *("roll_command_rad", "pitch_command_rad", "thrust_acceleration_m_s2", "status"),
 )
+SEEN_COLUMNS = (
+    *("seen_x_m", "seen_y_m", "seen_z_m", "seen_vx_m_s", "seen_vy_m_s", "seen_vz_m_s"),
+    *("seen_roll_rad", "seen_pitch_rad", "seen_yaw_rad"),
+)
+"""After the others, where there are sensors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +50,17 @@ class Trace:
 
     def same_bits(self, other: "Trace") -> bool:
         """Tell whether every array equals that of another trace, bit for bit."""
-        return all(getattr(self, f.name).tobytes() == getattr(other, f.name).tobytes() for f in fields(self))
+        return type(self) is type(other) and all(
+            getattr(self, f.name).tobytes() == getattr(other, f.name).tobytes() for f in fields(self)
+        )
+
+    def digest(self, flight: int = 0) -> str:
+        """Return the SHA-256 of every number of one flight."""
+        hasher = hashlib.sha256(self.time_s.tobytes())
+        for column in fields(self):
+            if column.name != "time_s":
+                hasher.update(getattr(self, column.name)[:, flight].tobytes())
+        return hasher.hexdigest()
 
     @property
     def flights(self) -> int:
@@ -57,8 +73,37 @@ class Trace:
         return np.asarray(np.isnan(self.position_m[-1]).any(axis=-1))
 
 
+@dataclass(frozen=True, eq=False)
+class SensedTrace(Trace):
+    """A trace with sensors: the fields of `Trace` are the truth, these what the controllers saw instead."""
+
+    seen_position_m: FloatArray
+    """Estimated position in the world frame (k, n, 3)."""
+    seen_velocity_m_s: FloatArray
+    """Estimated velocity in the world frame (k, n, 3)."""
+    seen_euler_rad: FloatArray
+    """Estimated roll, pitch, yaw (k, n, 3)."""
+
+    def as_seen(self) -> Trace:
+        """Return the flight as the controllers saw it, to be measured like the truth."""
+        return replace(
+            self,
+            position_m=self.seen_position_m,
+            velocity_m_s=self.seen_velocity_m_s,
+            euler_rad=self.seen_euler_rad,
+        )
+
+
 def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
-    """Write one flight of a trace with the columns `CSV_COLUMNS`; numbers read back to the same bits."""
+    """Write one flight of a trace with the columns `CSV_COLUMNS` (and `SEEN_COLUMNS`).
+
+    Numbers read back to the same bits.
+    """
+    seen = (
+        [trace.seen_position_m, trace.seen_velocity_m_s, trace.seen_euler_rad]
+        if isinstance(trace, SensedTrace)
+        else []
+    )
     numbers = np.column_stack(
         [
             trace.time_s,
@@ -72,23 +117,27 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
     )
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(CSV_COLUMNS)
+        writer.writerow((*CSV_COLUMNS, *(SEEN_COLUMNS if seen else ())))
+        estimates = np.column_stack([trace.time_s, *(values[:, flight] for values in seen)])[:, 1:]
         writer.writerows(
-            [*row, status]
-            for row, status in zip(numbers.tolist(), trace.status[:, flight].tolist(), strict=True)
+            [*row, status, *estimate]
+            for row, status, estimate in zip(
+                numbers.tolist(), trace.status[:, flight].tolist(), estimates.tolist(), strict=True
+            )
         )
 
 
 def write_npz(trace: Trace, path: Path) -> None:
     """Write all flights of a trace, one array for each field."""
     with path.open("wb") as file:
-        np.savez_compressed(file, **{field.name: getattr(trace, field.name) for field in fields(Trace)})
+        np.savez_compressed(file, **{field.name: getattr(trace, field.name) for field in fields(trace)})
 
 
 def read_npz(path: Path) -> Trace:
     """Read what `write_npz` wrote; raises `TraceError`."""
     try:
         with path.open("rb") as file, np.load(file) as arrays:
-            return Trace(**{field.name: arrays[field.name] for field in fields(Trace)})
+            kind = SensedTrace if "seen_position_m" in arrays else Trace
+            return kind(**{field.name: arrays[field.name] for field in fields(kind)})
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise TraceError(f"{path}: is no trace: {error}") from error

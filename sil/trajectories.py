@@ -6,10 +6,10 @@ there at rest. Half-width and radius are in metres, angular rate in rad/s.
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, Self
+from typing import Final, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -271,3 +271,14 @@ class Trajectories:
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., n, 4)."""
         return np.stack([trajectory.target(time_s) for trajectory in self.each], axis=-2)
+
+
+CURVES: Final[dict[str, Callable[[float, float], Trajectory]]] = {
+    "bernoulli": Bernoulli,
+    "gerono": Gerono,
+    "lissajous": Lissajous,
+    "circle": Circle,
+    "hover": lambda size_m, rate_rad_s: Hover(),  # noqa: ARG005 - has neither size nor rate
+    "step": lambda size_m, rate_rad_s: Step(size_m, 0.0),  # noqa: ARG005 - has no rate
+}
+"""Curves by name, made of a half-width, radius or step in m and an angular rate in rad/s."""

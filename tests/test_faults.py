@@ -21,7 +21,6 @@ from sil.fault_flights import End, Verdict, fly_faults
 from sil.fault_report import table
 from sil.fault_scenarios import Scenario, scenarios
 from sil.faults import (
-    NOT_CALLED,
     Applied,
     Fault,
     FaultyController,
@@ -39,6 +38,7 @@ from sil.faults import (
     yaw_shifted,
     yaw_wrapped,
 )
+from sil.link import NOT_CALLED
 from sil.loop import Flight, PositionController, fly
 from sil.table2 import CASES
 from sil.traces import Trace

@@ -38,6 +38,8 @@ class RigidBody:
     inertia_kg_m2: tuple[PerFlight, PerFlight, PerFlight]
     drag_1_s: PerFlight
     wind_m_s2: tuple[PerFlight, PerFlight]
+    air_m_s: tuple[PerFlight, PerFlight] | None = None
+    """Velocity of the air along x and y of the world; None is still air."""
 
     def derivative(self, state: FloatArray, wrench: FloatArray) -> FloatArray:
         """Return the time derivative (12, n) of a state (12, n) under a wrench (4, n)."""
@@ -52,7 +54,7 @@ class RigidBody:
         rate = np.empty_like(state)
 
         # Equation 2.
-        rate[POSITION] = _to_world(sines, cosines, state[VELOCITY])
+        rate[POSITION] = to_world(sines, cosines, state[VELOCITY])
 
         # Equation 7 with the wind beside gravity: R transposed takes both to the body frame.
         along = cos_yaw * wind_x + sin_yaw * wind_y
@@ -65,6 +67,12 @@ class RigidBody:
         # Equation 6, solved for the derivative of v_A.
         rate[3] = field_x - self.drag_1_s * u - (q * w - r * v)
         rate[4] = field_y - self.drag_1_s * v - (r * u - p * w)
+        if self.air_m_s is not None:  # the rotors drag on the air, which moves
+            air_x, air_y = self.air_m_s
+            ahead = cos_yaw * air_x + sin_yaw * air_y
+            aside = cos_yaw * air_y - sin_yaw * air_x
+            rate[3] += self.drag_1_s * (cos_pitch * ahead)
+            rate[4] += self.drag_1_s * (cos_roll * aside + sin_roll * (sin_pitch * ahead))
         rate[5] = field_z - thrust / self.mass_kg - (p * v - q * u)
 
         # Equations 4 and 5.
@@ -83,10 +91,10 @@ class RigidBody:
 
 def world_velocity(state: FloatArray) -> FloatArray:
     """Return the velocity (3, n) in the world frame (equation 2) of a state (12, n)."""
-    return _to_world(np.sin(state[EULER]), np.cos(state[EULER]), state[VELOCITY])
+    return to_world(np.sin(state[EULER]), np.cos(state[EULER]), state[VELOCITY])
 
 
-def _to_world(sines: FloatArray, cosines: FloatArray, vector: FloatArray) -> FloatArray:
+def to_world(sines: FloatArray, cosines: FloatArray, vector: FloatArray) -> FloatArray:
     """Return R times a body vector (3, n): the three rotations of equation 3, one after the other."""
     sin_roll, sin_pitch, sin_yaw = sines
     cos_roll, cos_pitch, cos_yaw = cosines
@@ -99,3 +107,18 @@ def _to_world(sines: FloatArray, cosines: FloatArray, vector: FloatArray) -> Flo
     world[1] = sin_yaw * forward + cos_yaw * lateral
     world[2] = cos_pitch * vertical - sin_pitch * x
     return world
+
+
+def to_body(euler_rad: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return R transposed times a world vector (3, n)."""
+    sin_roll, sin_pitch, sin_yaw = np.sin(euler_rad)
+    cos_roll, cos_pitch, cos_yaw = np.cos(euler_rad)
+    x, y, z = vector
+    along = cos_yaw * x + sin_yaw * y
+    across = cos_yaw * y - sin_yaw * x
+    below = cos_pitch * z + sin_pitch * along
+    body = np.empty_like(vector)
+    body[0] = cos_pitch * along - sin_pitch * z
+    body[1] = cos_roll * across + sin_roll * below
+    body[2] = cos_roll * below - sin_roll * across
+    return body

@@ -1,6 +1,6 @@
 """The whole vehicle: stock loops, mixer, rotors and rigid body, one tick of 5 ms at a time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,16 @@ from sil.arrays import FloatArray, PerFlight
 from sil.plant import loops
 from sil.plant.airframe import MAMBO, Airframe
 from sil.plant.integrator import NODES, bogacki_shampine
-from sil.plant.rigid_body import EULER, POSITION, RATES, STATE_ROWS, RigidBody, world_velocity
+from sil.plant.rigid_body import (
+    EULER,
+    POSITION,
+    RATES,
+    STATE_ROWS,
+    VELOCITY,
+    RigidBody,
+    to_body,
+    world_velocity,
+)
 from sil.plant.rotors import Rotors, mix
 
 STEP_S = loops.PERIOD_S
@@ -26,6 +35,33 @@ class VehicleState:
     """(4, n)."""
     attitude_integral_rad_s: FloatArray
     """Integrators of the attitude loop (2, n), roll then pitch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The state as the controllers see it: (3, n) each, position and velocity in the world frame."""
+
+    position_m: FloatArray
+    velocity_m_s: FloatArray
+    euler_rad: FloatArray
+    rates_rad_s: FloatArray
+
+
+def truth(state: VehicleState) -> Seen:
+    """Return what a controller sees that knows the true state."""
+    body = state.body
+    return Seen(body[POSITION], world_velocity(body), body[EULER], body[RATES])
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What is special about the vehicle and the air for one tick; the default is nothing."""
+
+    thrust_share: PerFlight = 1.0
+    """Thrust and torque of the rotors over those of a fresh battery."""
+    payload_kg: PerFlight = 0.0
+    air_m_s: tuple[PerFlight, PerFlight] | None = None
+    """Velocity of the air along x and y of the world; None is still air."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +90,7 @@ class Vehicle:
         return self.rotors.decay(STEP_S * np.append(NODES, 1.0))
 
     def at_rest(self, position_m: FloatArray, yaw_rad: PerFlight, motor_command: PerFlight) -> VehicleState:
-        """Return n vehicles level and at rest at positions (3, n), rotors steady at one motor command."""
+        """Return n vehicles level and at rest at positions (3, n), rotors steady at a motor command."""
         flights = position_m.shape[1]
         body = np.zeros((STATE_ROWS, flights))
         body[POSITION] = position_m
@@ -62,14 +98,28 @@ class Vehicle:
         commands = np.broadcast_to(motor_command, (4, flights))
         return VehicleState(body, self.rotors.commanded_speed_rad_s(commands), np.zeros((2, flights)))
 
+    def pushed(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
+        """Return the state right after a push (3, n) in the world frame."""
+        body = state.body.copy()
+        body[VELOCITY] += to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
+        return replace(state, body=body)
+
     def step(
-        self, state: VehicleState, command_rad: FloatArray, thrust_n: FloatArray, yaw_reference_rad: PerFlight
+        self,
+        state: VehicleState,
+        command_rad: FloatArray,
+        thrust_n: FloatArray,
+        yaw_reference_rad: PerFlight,
+        seen: Seen | None = None,
+        moment: Moment | None = None,
     ) -> VehicleState:
         """Return the state one tick later.
 
-        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the total thrust asked for.
+        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the total thrust asked for, `seen` what the
+        stock loops see: the truth if None.
         """
-        angles_rad, rates_rad_s = state.body[EULER], state.body[RATES]
+        angles_rad = state.body[EULER] if seen is None else seen.euler_rad
+        rates_rad_s = state.body[RATES] if seen is None else seen.rates_rad_s
         wrench = np.empty((4, state.body.shape[1]))
         wrench[0] = thrust_n
         wrench[1:3] = loops.attitude_torque(
@@ -77,17 +127,24 @@ class Vehicle:
         )
         wrench[3] = loops.yaw_torque(yaw_reference_rad, angles_rad[2], rates_rad_s[2])
         return VehicleState(
-            *self.coast(state, mix(MAMBO, wrench)),
+            *self.coast(state, mix(MAMBO, wrench), moment),
             loops.attitude_integral(command_rad, angles_rad[:2], state.attitude_integral_rad_s),
         )
 
-    def coast(self, state: VehicleState, motor_command: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def coast(
+        self, state: VehicleState, motor_command: FloatArray, moment: Moment | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Return rigid body (12, n) and rotor speeds (4, n) after a tick of held motor commands (4, n)."""
         goal = self.rotors.commanded_speed_rad_s(motor_command)
         speeds = goal + (state.rotor_speed_rad_s - goal) * self._rotor_decay
         wrenches = self.rotors.wrench(speeds[:3])
+        body = self.rigid_body
+        if moment is not None:
+            wrenches = moment.thrust_share * wrenches
+            mass_kg = self.airframe.mass_kg + moment.payload_kg
+            body = replace(body, mass_kg=mass_kg, air_m_s=moment.air_m_s)
         inputs = (wrenches[:, 0], wrenches[:, 1], wrenches[:, 2])
-        return bogacki_shampine(self.rigid_body.derivative, state.body, inputs, STEP_S), speeds[3]
+        return bogacki_shampine(body.derivative, state.body, inputs, STEP_S), speeds[3]
 
 
 def thrust_demand(state: VehicleState, reference_m: float) -> FloatArray:
