@@ -1,4 +1,4 @@
-"""What the world does to a flight beside gravity: moving air with gusts, a tiring battery, a payload, a push."""
+"""What the world does to a flight beside gravity: moving air with gusts, a tiring battery, payload, push."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sil.arrays import PerFlight
+from sil.arrays import FloatArray, PerFlight
 from sil.gusts import Gusts
 from sil.plant.vehicle import STEP_S, Moment, Vehicle, VehicleState
 
@@ -74,7 +74,9 @@ class World:
             return state, None
         flown_s, now = STEP_S * self._ticks, round(time_s / STEP_S)
         self._ticks += 1
-        payload_kg = chosen.payload_kg * (np.rint(np.asarray(chosen.payload_time_s) / STEP_S) <= now)
+        payload_kg: FloatArray = chosen.payload_kg * np.asarray(
+            np.rint(np.asarray(chosen.payload_time_s) / STEP_S) <= now
+        )
         pushed = np.rint(np.asarray(chosen.push_time_s) / STEP_S) == now
         if chosen.pushing and pushed.any():
             flights = state.body.shape[1]

@@ -7,9 +7,9 @@ Below 1000 ft, with the height h in ft and the mean wind W20 at 20 ft:
     H_u(s) = sigma_u sqrt(2 L_u / (pi V)) / (1 + L_u s / V)
     H_v(s) = sigma_v sqrt(L_v / (pi V)) (1 + sqrt(3) L_v s / V) / (1 + L_v s / V)^2
 
-u blows along the mean wind, v across. The mean wind at a height is W20 ln(h / z0) / ln(20 / z0), z0 = 0.15 ft
-(3.7.3.3, category C). Both filters are driven by white noise and are sampled exactly: a row of the process has
-the variance and the correlation of the continuous one at every tick.
+u blows along the mean wind, v across. The mean wind is W20 ln(h / z0) / ln(20 / z0), z0 = 0.15 ft (category C
+flight phases). White noise drives both filters, which are sampled exactly: at the ticks the gusts have the
+variance and the correlation of the continuous ones.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What lies between position controller and stock loops: updates that are left out, commands that come late."""
+"""What lies between position controller and stock loops: updates left out, commands late."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -155,18 +155,19 @@ def fly(
     Raises `FlightError`.
     """
     times_s, targets = flight.times_s(), flight.targets()
-    trace = _blank(times_s, targets, sensed=flight.sensors is not None)
     open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start is Start.TAKE_OFF else 0.0)
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, _start(flight, targets[0])
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
     suite = None if flight.sensors is None else Suite(flight.sensors, seeds, truth(state))
-    wire, drops = Wire(flight.link, flight.flights), Drops(flight.link, seeds)
-    command_rad = np.zeros((2, flight.flights))
+    wire = Wire(flight.link, flight.flights)
+    caller = _Caller(
+        controller, Drops(flight.link, seeds), _blank(times_s, targets, sensed=suite is not None)
+    )
     for update, time_s in enumerate(times_s):
         state = _without_lost(state)
         lifting = time_s < open_loop_until_s - STEP_S / 2.0
-        heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(time_s, 0.0)
+        heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
         for tick in range(flight.ticks_per_update):
             with np.errstate(all="ignore"):
                 state, moment = world.tick(state, time_s + STEP_S * tick)
@@ -174,19 +175,20 @@ def fly(
                 seen = true if suite is None else suite.look(true)
                 thrust_n = _thrust_n(seen, lifting)
             if tick == 0:
-                command_rad = _update(trace, update, (true, seen), thrust_n, controller, command_rad, drops)
+                caller.call(update, true, seen, thrust_n)
+            command_rad = wire.carry(caller.command_rad)
             with np.errstate(all="ignore"):
-                state = vehicle.step(state, wire.carry(command_rad), thrust_n, heading_rad, seen, moment)
+                state = vehicle.step(state, command_rad, thrust_n, heading_rad, seen=seen, moment=moment)
         if progress is not None:
             progress((update + 1) / len(times_s))
-    return trace
+    return caller.trace
 
 
 def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
     """Return the state in which n flights begin above or at their first targets (n, 4)."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
-    command = MAMBO.command_min
+    command: PerFlight = MAMBO.command_min
     if flight.start is Start.HOVER:
         position_m[2] = HEIGHT_REFERENCE_M
         command = MAMBO.hover_command
@@ -242,41 +244,42 @@ def _blank(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
     )
 
 
-def _update(
-    trace: Trace,
-    update: int,
-    views: tuple[Seen, Seen],
-    thrust_n: FloatArray,
-    controller: PositionController,
-    held_rad: FloatArray,
-    drops: Drops,
-) -> FloatArray:
-    """Let the controller take one step, enter it in the trace, and return the command (2, n).
+class _Caller:
+    """Calls the position controller of n flights, fills in the trace, and holds the command (2, n)."""
 
-    `views` are the truth and what the controller sees. Where the update is dropped the controller is handed
-    a state that is not a number, which it refuses, and the command `held_rad` (2, n) stays.
-    """
-    true, seen = views
-    measured = np.ascontiguousarray(
-        np.concatenate([seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]).T
-    )
-    dropped = drops.next()
-    if dropped is not None:
-        measured[dropped] = np.nan
-    thrust_acceleration_m_s2 = thrust_n / MAMBO.mass_kg
-    outcome = controller.step(measured, np.ascontiguousarray(trace.target[update]), thrust_acceleration_m_s2)
-    trace.position_m[update] = true.position_m.T
-    trace.velocity_m_s[update] = true.velocity_m_s.T
-    trace.euler_rad[update] = true.euler_rad.T
-    if isinstance(trace, SensedTrace):
-        trace.seen_position_m[update] = seen.position_m.T
-        trace.seen_velocity_m_s[update] = seen.velocity_m_s.T
-        trace.seen_euler_rad[update] = seen.euler_rad.T
-    trace.command_rad[update] = outcome.command_rad
-    trace.thrust_acceleration_m_s2[update] = thrust_acceleration_m_s2
-    trace.status[update] = outcome.status
-    if dropped is not None:
-        trace.command_rad[update, dropped] = held_rad.T[dropped]
-        trace.status[update, dropped] = NOT_CALLED
-    command_rad: FloatArray = trace.command_rad[update].T
-    return command_rad
+    def __init__(self, controller: PositionController, drops: Drops, trace: Trace) -> None:
+        self._controller, self._drops = controller, drops
+        self.trace = trace
+        self.command_rad: FloatArray = np.zeros((2, trace.flights))
+
+    def call(self, update: int, true: Seen, seen: Seen, thrust_n: FloatArray) -> None:
+        """Let the controller take one step on what it sees.
+
+        Where the update is dropped it is handed a state that is not a number: it refuses that, and
+        remembers nothing of it.
+        """
+        trace = self.trace
+        measured = np.ascontiguousarray(
+            np.concatenate([seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]).T
+        )
+        dropped = self._drops.next()
+        if dropped is not None:
+            measured[dropped] = np.nan
+        thrust_acceleration_m_s2 = thrust_n / MAMBO.mass_kg
+        outcome = self._controller.step(
+            measured, np.ascontiguousarray(trace.target[update]), thrust_acceleration_m_s2
+        )
+        trace.position_m[update] = true.position_m.T
+        trace.velocity_m_s[update] = true.velocity_m_s.T
+        trace.euler_rad[update] = true.euler_rad.T
+        if isinstance(trace, SensedTrace):
+            trace.seen_position_m[update] = seen.position_m.T
+            trace.seen_velocity_m_s[update] = seen.velocity_m_s.T
+            trace.seen_euler_rad[update] = seen.euler_rad.T
+        trace.command_rad[update] = outcome.command_rad
+        trace.thrust_acceleration_m_s2[update] = thrust_acceleration_m_s2
+        trace.status[update] = outcome.status
+        if dropped is not None:
+            trace.command_rad[update, dropped] = self.command_rad.T[dropped]
+            trace.status[update, dropped] = NOT_CALLED
+        self.command_rad = trace.command_rad[update].T

@@ -18,7 +18,8 @@ from codegen.settings import Settings
 from sil.arrays import FloatArray
 from sil.disturbances import Disturbances
 from sil.errors import FlightError, ScenarioError
-from sil.loop import Flight, Link, Offset, Start
+from sil.link import Link
+from sil.loop import Flight, Offset, Start
 from sil.plant.airframe import MAMBO
 from sil.plant.vehicle import Vehicle
 from sil.sensors.instruments import Sensors
@@ -30,6 +31,12 @@ LARGEST_FILE_BYTES: Final = 1_000_000
 Two = tuple[float, float]
 Three = tuple[float, float, float]
 
+INERTIA_KG_M2: Final[Three] = (
+    float(MAMBO.inertia_kg_m2[0]),
+    float(MAMBO.inertia_kg_m2[1]),
+    float(MAMBO.inertia_kg_m2[2]),
+)
+
 
 class _Record(BaseModel):
     """Frozen, no unknown keys, finite numbers only."""
@@ -38,7 +45,7 @@ class _Record(BaseModel):
 
 
 class Scenario(_Record):
-    """One flight; the defaults are the Table II case of a nominal Mambo, undisturbed, which sees the truth."""
+    """One flight; by default the Table II case of a nominal Mambo, undisturbed, that sees the truth."""
 
     seed: int = Field(0, ge=0, lt=2**63)
     """Of all that is random in this flight."""
@@ -58,12 +65,12 @@ class Scenario(_Record):
     yaw_rad: float = Field(0.0, ge=-1000.0, le=1000.0)
     yaw_rate_rad_s: float = 0.0
 
-    mass_kg: float = Field(MAMBO.mass_kg, gt=0.0)
-    inertia_kg_m2: Three = MAMBO.inertia_kg_m2
-    thrust_factor_n_s2: float = Field(MAMBO.thrust_factor_n_s2, gt=0.0)
-    torque_factor_n_m_s2: float = Field(MAMBO.torque_factor_n_m_s2, gt=0.0)
+    mass_kg: float = Field(float(MAMBO.mass_kg), gt=0.0)
+    inertia_kg_m2: Three = INERTIA_KG_M2
+    thrust_factor_n_s2: float = Field(float(MAMBO.thrust_factor_n_s2), gt=0.0)
+    torque_factor_n_m_s2: float = Field(float(MAMBO.torque_factor_n_m_s2), gt=0.0)
     motor_lag_s: float = Field(0.0, ge=0.0, le=1.0)
-    drag_1_s: float = Field(Vehicle.drag_1_s, ge=0.0)
+    drag_1_s: float = Field(float(Vehicle.drag_1_s), ge=0.0)
 
     wind_m_s2: Two = (0.0, 0.0)
     """Steady push of the wind along x and y of the world."""
@@ -82,7 +89,8 @@ class Scenario(_Record):
     dropped_share: float = Field(0.0, ge=0.0, le=1.0)
     """Probability that an update of the position controller is left out, its command held."""
 
-    sensors: Literal["none", "mambo"] = "none"
+    sensors: Literal["none", "mambo", "mambo-derotated"] = "none"
+    """`mambo-derotated` takes the turning of the camera out of the optical flow."""
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
     """Factor on the standard deviation of every sensor's noise."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
@@ -157,7 +165,12 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         ),
         sensors=None
         if first.sensors == "none"
-        else Sensors(each("noise_scale"), parts("accelerometer_bias_m_s2"), parts("gyro_bias_rad_s")),
+        else Sensors(
+            each("noise_scale"),
+            parts("accelerometer_bias_m_s2"),
+            parts("gyro_bias_rad_s"),
+            derotated=first.sensors == "mambo-derotated",
+        ),
     )
 
 

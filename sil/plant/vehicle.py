@@ -101,7 +101,8 @@ class Vehicle:
     def pushed(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
         """Return the state right after a push (3, n) in the world frame."""
         body = state.body.copy()
-        body[VELOCITY] += to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
+        kick = to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
+        body[VELOCITY] = np.where(impulse_n_s.any(axis=0), body[VELOCITY] + kick, body[VELOCITY])
         return replace(state, body=body)
 
     def step(
@@ -110,6 +111,7 @@ class Vehicle:
         command_rad: FloatArray,
         thrust_n: FloatArray,
         yaw_reference_rad: PerFlight,
+        *,
         seen: Seen | None = None,
         moment: Moment | None = None,
     ) -> VehicleState:

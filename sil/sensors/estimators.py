@@ -1,6 +1,8 @@
 """The stock estimators: attitude, altitude, velocity and position out of readings, at 200 Hz for n flights.
 
-Source: `estimatorVars` and the state estimator of the MathWorks asbQuadcopter example, R2018b to R2020a.
+Source: `estimatorVars` and the state estimator of the MathWorks asbQuadcopter example, R2018b to R2020a. There
+the turning of the camera stays in the optical flow; later releases take it out by the gyro, which is what
+`derotated` does.
 """
 
 import math
@@ -18,7 +20,7 @@ ACCELEROMETER_TAPS: Final = (0.02640772, 0.14053, 0.33306, 0.33306, 0.14053, 0.0
 """Low-pass filter before the attitude estimator (order 5, cut-off 0.1 of 100 Hz)."""
 TILT_WEIGHT: Final = 0.001
 TILT_GATE: Final = 0.002
-"""Largest deviation of the specific force from g, over g, at which the accelerometer has a say on the tilt."""
+"""Largest deviation of the specific force from g, over g, at which the accelerometer has a say."""
 
 ALTITUDE_NOISE: Final = (0.0005, 0.1)
 """Variances Q, of what enters the velocity at each tick, and R, of the sonar."""
@@ -55,7 +57,7 @@ def velocity_gain() -> float:
 
 
 class Attitude:
-    """Complementary filter: integrated rates, pulled towards the accelerometer's tilt where that is trusted."""
+    """Complementary filter: integrated rates, and the accelerometer's tilt where that is trusted."""
 
     def __init__(self, euler_rad: FloatArray) -> None:
         self.euler_rad = euler_rad.copy()
@@ -147,7 +149,8 @@ class Altitude:
 class Velocity:
     """Kalman filter of the velocity along body x and y, driven by a share of the acceleration."""
 
-    def __init__(self, velocity_m_s: FloatArray) -> None:
+    def __init__(self, velocity_m_s: FloatArray, *, derotated: bool) -> None:
+        self._derotated = derotated
         self.velocity_m_s = velocity_m_s.copy()
         self._predicted = self.velocity_m_s
         self._gain = velocity_gain()
@@ -163,7 +166,11 @@ class Velocity:
             & (jump <= FLOW_JUMP_M_S)
             & (z_m <= -FLOW_LEAST_M)
         )
-        surprise = np.where(counts, readings.flow_m_s - self._predicted, 0.0)
+        flow_m_s = readings.flow_m_s
+        if self._derotated:
+            p, q = readings.imu[3:5]
+            flow_m_s = flow_m_s + z_m * np.stack([q, -p])
+        surprise = np.where(counts, flow_m_s - self._predicted, 0.0)
         self.velocity_m_s = self._predicted + self._gain * surprise
         self._predicted = self.velocity_m_s + STEP_S * ACCELERATION_GAIN * acceleration_m_s2
 
@@ -171,10 +178,10 @@ class Velocity:
 class Estimators:
     """All of them, one after the other; they start from the truth."""
 
-    def __init__(self, start: Seen) -> None:
+    def __init__(self, start: Seen, *, derotated: bool) -> None:
         self._attitude = Attitude(start.euler_rad)
         self._altitude = Altitude(start.position_m[2], start.velocity_m_s[2])
-        self._velocity = Velocity(to_body(start.euler_rad, start.velocity_m_s)[:2])
+        self._velocity = Velocity(to_body(start.euler_rad, start.velocity_m_s)[:2], derotated=derotated)
         self._position_m = start.position_m[:2].copy()
 
     def update(self, readings: Readings) -> Seen:

@@ -52,6 +52,8 @@ class Sensors:
     """Factor on the standard deviation of every reading's noise; 0 is noise-free."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
     gyro_bias_rad_s: Three = (0.0, 0.0, 0.0)
+    derotated: bool = False
+    """Whether the estimator takes the rotation out of the optical flow; the same for all flights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +116,7 @@ class Instruments:
         return self._late.pop(0) if len(self._late) > DELAY_TICKS else self._late[0]
 
     def _feel(self, true: Seen) -> FloatArray:
-        """Return the mean specific force since the last tick, over the body axes of now, and the rates (6, n)."""
+        """Return the mean specific force since the last tick, in the body axes of now, and the rates."""
         force = (true.velocity_m_s - self._velocity_m_s) / STEP_S
         force[2] -= GRAVITY_M_S2
         return np.concatenate([to_body(true.euler_rad, force), true.rates_rad_s])
@@ -128,7 +130,8 @@ def _flow(true: Seen) -> FloatArray:
     body_m_s = to_body(true.euler_rad, true.velocity_m_s)[:2]
     p, q, _ = true.rates_rad_s
     z = true.position_m[2]
-    return body_m_s + FLOW_COUPLING * z * np.stack([-q, p])
+    turning = np.stack([-q, p])
+    return np.asarray(body_m_s + FLOW_COUPLING * z * turning)
 
 
 def _second_order(

@@ -12,7 +12,7 @@ class Suite:
 
     def __init__(self, sensors: Sensors, seeds: Sequence[int], start: Seen) -> None:
         self._instruments = Instruments(sensors, seeds, start)
-        self._estimators = Estimators(start)
+        self._estimators = Estimators(start, derotated=sensors.derotated)
 
     def look(self, true: Seen) -> Seen:
         """Return the estimates at this tick."""
