@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -18,22 +18,37 @@ from codegen import cli as generating
 from codegen.errors import echo
 from codegen.footprint.build import builder
 from codegen.literals import SCALARS
-from codegen.reference import ReferenceController, Status
+from codegen.reference import ReferenceController
 from codegen.settings import Settings
 from sil import cli_boards, cli_faults, cli_verify, report
 from sil.baseline import PdController
+from sil.cli_replay import fly_again
 from sil.compiled import CompiledController
+from sil.disturbances import Disturbances
 from sil.emulated import EmulatedController, build_guest
 from sil.errors import FlightError, TrajectoryError
+from sil.gusts import LIGHT_M_S
 from sil.loop import Flight, PositionController, Start
 from sil.loop import fly as simulate
-from sil.metrics import TRANSIENT_S, measure
 from sil.plant.vehicle import Vehicle
 from sil.progress import progress_bar
 from sil.results import SUMMARY, new_results, summary_text
+from sil.sensors.instruments import Sensors
 from sil.table2 import CASES, PD, fly_table2
 from sil.traces import Trace, write_csv, write_npz
 from sil.trajectories import CURVES, Trajectory, Waypoints
+
+
+class SensorsKind(Enum):
+    """What the controllers see the state through."""
+
+    NONE = "none"
+    MAMBO = "mambo"
+    DEROTATED = "mambo-derotated"
+
+    def of_one_flight(self) -> Sensors | None:
+        """Return the sensors; None for the truth."""
+        return None if self is SensorsKind.NONE else Sensors(derotated=self is SensorsKind.DEROTATED)
 
 
 class ControllerKind(Enum):
@@ -44,7 +59,9 @@ class ControllerKind(Enum):
     REFERENCE = "reference"
 
 
+GUSTS = "gusts"
 LONGEST_FLIGHT_S = 3600.0
+LARGEST_SEED = 2**63 - 1
 FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
 TABLE2_PICTURES = ("figure3.png", "figure3.svg")
 
@@ -70,12 +87,17 @@ def register(app: typer.Typer) -> None:
             "mambo-nmpc fly --controller pd --wind 0.5,0 -o pd-in-wind",
             "mambo-nmpc fly --on crazyflie -o on-crazyflie",
             "mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30",
+            "mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo",
+            "mambo-nmpc fly --replay worst.json -o again",
         )
     )(fly)
-    app.command(epilog=generating.examples("mambo-nmpc table2 -o table2"))(table2)
+    app.command(
+        epilog=generating.examples("mambo-nmpc table2 -o table2", "mambo-nmpc table2 --sensors mambo -o seen")
+    )(table2)
 
 
 def fly(
+    context: typer.Context,
     source: Annotated[str, typer.Argument(help="A preset or a controller.toml.")] = "mambo",
     *,
     output: Annotated[
@@ -94,8 +116,21 @@ def fly(
     rate_rad_s: Annotated[float, typer.Option(help="Angular rate of the curve, in rad/s.")] = 0.5,
     yaw_rad: Annotated[float, typer.Option(help="Heading, in rad, held throughout.")] = 0.0,
     wind: Annotated[
-        str, typer.Option(help="Push of the wind along x (north), y (east), in m/s^2.", metavar="X,Y")
+        str,
+        typer.Option(
+            help="Steady push of the wind along x (north), y (east), in m/s^2; or `gusts`: moving air, "
+            "light turbulence towards north.",
+            metavar="X,Y|gusts",
+        ),
     ] = "0,0",
+    sensors: Annotated[
+        SensorsKind,
+        typer.Option(
+            help="What controller and stock loops see the state through: the truth, or the Mambo's sensors "
+            "and estimators, without or with the rotation taken out of the optical flow."
+        ),
+    ] = SensorsKind.NONE,
+    seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.")] = 0,
     motor_lag_s: Annotated[float, typer.Option(help="Time constant of the motors, in s.")] = 0.0,
     start: Annotated[Start, typer.Option(help="In the air, or 5 s earlier on the ground.")] = Start.HOVER,
     duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0,
@@ -105,16 +140,27 @@ def fly(
             help="Board on whose emulated core the C runs; the same flight on this machine follows."
         ),
     ] = None,
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            help="Record of a flight to fly again, with the optimizer's inner steps.", metavar="FILE"
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.", metavar="")] = False,
 ) -> None:
     """Fly once on the model of the Mambo: trace, metrics and pictures."""
+    if replay is not None:
+        fly_again(context, replay, output, as_json=as_json)
+        return
     settings = presets.load(source)
     name, period_s = echo(source), settings.horizon.update_period_s
     curve = _trajectory(trajectory, size_m, rate_rad_s)
-    wind_m_s2 = _wind(wind)
+    wind_m_s2 = (0.0, 0.0) if wind == GUSTS else _wind(wind)
+    wind_speed_m_s = LIGHT_M_S if wind == GUSTS else 0.0
     _within("--yaw-rad", yaw_rad, -1000.0, 1000.0)
     _within("--motor-lag-s", motor_lag_s, 0.0, 1.0)
     _within("--duration-s", duration_s, period_s, LONGEST_FLIGHT_S)
+    _within("--seed", seed, 0, LARGEST_SEED)
     try:
         flight = Flight(
             curve,
@@ -123,6 +169,9 @@ def fly(
             yaw_rad=yaw_rad,
             vehicle=Vehicle(motor_lag_s=motor_lag_s, wind_m_s2=wind_m_s2),
             update_period_s=period_s,
+            seeds=(seed,),
+            disturbances=Disturbances(wind_speed_m_s=wind_speed_m_s),
+            sensors=sensors.of_one_flight(),
         )
     except FlightError as error:
         raise FlightError(
@@ -153,10 +202,13 @@ def fly(
             "rate_rad_s": rate_rad_s,
             "yaw_rad": yaw_rad,
             "wind_m_s2": wind_m_s2,
+            "wind_speed_m_s": wind_speed_m_s,
+            "sensors": sensors.value,
+            "seed": seed,
             "motor_lag_s": motor_lag_s,
             "start": start.value,
             "duration_s": duration_s,
-            **_found(trace, settings),
+            **report.found(trace, settings),
         }
         text = summary_text("fly", summary)
         (folder / SUMMARY).write_text(text, "utf-8")
@@ -195,21 +247,6 @@ def table2(
 
     typer.echo(text if as_json else report.table2_text(result), nl=not as_json)
     typer.echo(f"{echo(str(output))}: {', '.join(TABLE2_PICTURES)} and the traces", err=True)
-
-
-def _found(trace: Trace, settings: Settings) -> dict[str, Any]:
-    """Return what a flight is judged by; "mostly_refused" is about the time on the trajectory."""
-    statuses = np.bincount(trace.status[:, 0], minlength=len(Status))
-    found: dict[str, Any] = {
-        "lost": bool(trace.diverged[0]),
-        "mostly_refused": bool(np.mean(trace.status[trace.time_s >= 0.0, 0] != Status.OK) > 0.5),
-        "statuses": {status.name: int(statuses[status]) for status in Status if statuses[status]},
-        "refusals": report.refusals(trace, settings),
-        "metrics": report.numbers(measure(trace)),
-    }
-    if trace.time_s[-2] >= TRANSIENT_S:
-        found["metrics_without_transient"] = report.numbers(measure(trace, TRANSIENT_S))
-    return found
 
 
 def _draw(flights: Mapping[str, Trace], stem: Path) -> None:
@@ -270,7 +307,7 @@ def _wind(text: str) -> tuple[float, float]:
     try:
         x, y = (float(word) for word in text.split(","))
     except ValueError:
-        raise FlightError(f"--wind {echo(text)} must be two numbers, as in 0.5,0") from None
+        raise FlightError(f"--wind {echo(text)} must be two numbers, as in 0.5,0, or {GUSTS}") from None
     _within("--wind", x, -100.0, 100.0)
     _within("--wind", y, -100.0, 100.0)
     return x, y

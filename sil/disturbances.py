@@ -74,9 +74,8 @@ class World:
             return state, None
         flown_s, now = STEP_S * self._ticks, round(time_s / STEP_S)
         self._ticks += 1
-        payload_kg: FloatArray = chosen.payload_kg * np.asarray(
-            np.rint(np.asarray(chosen.payload_time_s) / STEP_S) <= now
-        )
+        carried = np.rint(np.asarray(chosen.payload_time_s) / STEP_S) <= now
+        payload_kg: FloatArray = np.asarray(chosen.payload_kg, np.float64) * carried
         pushed = np.rint(np.asarray(chosen.push_time_s) / STEP_S) == now
         if chosen.pushing and pushed.any():
             flights = state.body.shape[1]

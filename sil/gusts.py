@@ -27,6 +27,9 @@ LOWEST_FT: Final = 10.0
 """Least height for which the model states scales: what flies lower is given those of 10 ft."""
 ROUGHNESS_FT: Final = 0.15
 REFERENCE_FT: Final = 20.0
+KNOT_M_S: Final = 1852.0 / 3600.0
+LIGHT_M_S: Final = 15.0 * KNOT_M_S
+"""Mean wind at 20 ft that the specifications take for light turbulence."""
 SLOWEST_M_S: Final = 0.1
 """Least speed at which gusts are carried past the vehicle: in still air they would never change."""
 

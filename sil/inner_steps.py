@@ -1,6 +1,7 @@
 """The optimizer's inner steps, watched: what each iteration evaluated, and which way it decided to go."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,46 @@ class InnerSteps:
         at_rest[1:] = np.logical_or.accumulate(np.abs(np.diff(self.cost, axis=0)) < tolerance)
         return np.where(at_rest[:, :, None, None], 0, sign(self.gradient)).astype(np.int8)
 
+    def step_sizes_rad(self, settings: Settings) -> Real:
+        """Return RPROP's step size (i, n, control, 2) after it has heard the sign of each iteration."""
+        optimizer, scalar = settings.optimizer, self.cost.dtype.type
+        size = np.full_like(self.plan_rad[0], optimizer.initial_step_rad)
+        before = np.zeros_like(size)
+        sizes = []
+        for slope in self.decisions(settings).astype(size.dtype):
+            agreement = slope * before
+            longer = np.minimum(size * scalar(optimizer.increase), scalar(optimizer.step_max_rad))
+            shorter = np.maximum(size * scalar(optimizer.decrease), scalar(optimizer.step_min_rad))
+            size = np.where(agreement > 0, longer, np.where(agreement < 0, shorter, size))
+            before = np.where(agreement < 0, scalar(0), slope)
+            sizes.append(size)
+        return np.stack(sizes)
+
+
+class WatchedController:
+    """n reference controllers that keep the inner steps of every control step."""
+
+    def __init__(self, settings: Settings, n: int = 1) -> None:
+        self.settings = settings
+        self.controller = ReferenceController(settings, n, self._watch)
+        self.steps: list[InnerSteps] = []
+        self._evaluated: list[tuple[Any, Any, Any]] = []
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands, as `ReferenceController.step`."""
+        self._evaluated = []
+        step = self.controller.step(state, target, thrust_acceleration_m_s2)
+        self.steps.append(InnerSteps(*(np.stack(values) for values in zip(*self._evaluated, strict=True))))
+        return step
+
+    def _watch(self, chosen: Settings, evaluate: Evaluate, start: Real) -> Search:
+        def watch(moves_rad: Real) -> tuple[Real, Real]:
+            cost, gradient = evaluate(moves_rad)
+            self._evaluated.append((moves_rad.copy(), cost.copy(), gradient.copy()))
+            return cost, gradient
+
+        return minimize(chosen, watch, start)
+
 
 def watched_step(
     settings: Settings,
@@ -41,18 +82,22 @@ def watched_step(
     thrust_acceleration_m_s2: ArrayLike,
 ) -> tuple[Step, InnerSteps]:
     """Let n reference controllers that remember `memory` step once, and return what they did inside."""
-    evaluated: list[tuple[Any, Any, Any]] = []
+    watched = WatchedController(settings, len(memory.command_rad))
+    watched.controller.memory = memory
+    step = watched.step(state, target, thrust_acceleration_m_s2)
+    return step, watched.steps[-1]
 
-    def watching(chosen: Settings, evaluate: Evaluate, start: Real) -> Search:
-        def watch(moves_rad: Real) -> tuple[Real, Real]:
-            cost, gradient = evaluate(moves_rad)
-            evaluated.append((moves_rad.copy(), cost.copy(), gradient.copy()))
-            return cost, gradient
 
-        return minimize(chosen, watch, start)
+def write_inner_steps(watched: WatchedController, path: Path) -> None:
+    """Write all inner steps of a flight as NPZ: arrays (k, i, n, ...) named as in `InnerSteps`.
 
-    controller = ReferenceController(settings, len(memory.command_rad), watching)
-    controller.memory = memory
-    step = controller.step(state, target, thrust_acceleration_m_s2)
-    plan_rad, cost, gradient = (np.stack(values) for values in zip(*evaluated, strict=True))
-    return step, InnerSteps(plan_rad, cost, gradient)
+    `step_size_rad` is beside them.
+    """
+    with path.open("wb") as file:
+        np.savez_compressed(
+            file,
+            plan_rad=np.stack([inner.plan_rad for inner in watched.steps]),
+            cost=np.stack([inner.cost for inner in watched.steps]),
+            gradient=np.stack([inner.gradient for inner in watched.steps]),
+            step_size_rad=np.stack([inner.step_sizes_rad(watched.settings) for inner in watched.steps]),
+        )

@@ -7,9 +7,10 @@ import numpy as np
 
 from codegen.reference import Status
 from codegen.settings import Settings
-from sil.metrics import Metrics
+from sil.link import NOT_CALLED
+from sil.metrics import TRANSIENT_S, Metrics, measure
 from sil.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD, Four, Row, Table2
-from sil.traces import Trace
+from sil.traces import SensedTrace, Trace
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
 _UNITS |= {"_rad": "rad", "_m": "m"}
@@ -22,6 +23,8 @@ def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
 
 def refusals(trace: Trace, settings: Settings) -> list[str]:
     """Say how often the controller of the first flight refused its input, and which range was exceeded."""
+    if isinstance(trace, SensedTrace):
+        trace = trace.as_seen()
     status, ranges = trace.status[:, 0], settings.ranges
     sentences = []
     refused = (status == Status.BAD_STATE) & np.isfinite(trace.position_m[:, 0]).all(axis=-1)
@@ -48,18 +51,46 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
     return [f"{sentence}; the last command was kept" for sentence in sentences]
 
 
+def found(trace: Trace, settings: Settings) -> dict[str, Any]:
+    """Return what a flight is judged by; "mostly_refused" is about the time on the trajectory."""
+    status = trace.status[:, 0]
+    names = {NOT_CALLED: "NOT_CALLED", **{int(each): each.name for each in Status}}
+    counts = {name: int((status == value).sum()) for value, name in names.items()}
+    refused = ~np.isin(status[trace.time_s >= 0.0], (Status.OK, NOT_CALLED))
+    summary: dict[str, Any] = {
+        "lost": bool(trace.diverged[0]),
+        "mostly_refused": bool(np.mean(refused) > 0.5),
+        "statuses": {name: count for name, count in counts.items() if count},
+        "refusals": refusals(trace, settings),
+        "metrics": numbers(measure(trace)),
+    }
+    if trace.time_s[-2] >= TRANSIENT_S:
+        summary["metrics_without_transient"] = numbers(measure(trace, TRANSIENT_S))
+    if isinstance(trace, SensedTrace):
+        summary["metrics_as_seen"] = numbers(measure(trace.as_seen()))
+    return summary
+
+
 def flight_text(summary: dict[str, Any]) -> str:
-    """Spell the summary of a flight: a metric a line, with and without the start transient."""
-    whole, settled = summary["metrics"], summary.get("metrics_without_transient")
-    lines = [f"{'':22}{'whole flight':>14}" + (f"{'after 10 s':>14}" if settled else "")]
-    for key, value in whole.items():
+    """Spell the summary of a flight: a metric a line, with and without the start transient, and as seen."""
+    columns = {"whole flight": summary["metrics"]}
+    for heading, key in (("after 10 s", "metrics_without_transient"), ("as seen", "metrics_as_seen")):
+        if key in summary:
+            columns[heading] = summary[key]
+    lines = [f"{'':22}" + "".join(f"{heading:>14}" for heading in columns)]
+    for key in summary["metrics"]:
         name, unit = _named(key)
-        line = f"{name:22}{value:14.5g}" + (f"{settled[key]:14.5g}" if settled else "")
-        lines.append(f"{line}  {unit}")
-    refused = {name: count for name, count in summary["statuses"].items() if name != "OK"}
+        lines.append(
+            f"{name:22}" + "".join(f"{values[key]:14.5g}" for values in columns.values()) + f"  {unit}"
+        )
+    quiet = ("OK", "NOT_CALLED")
+    refused = {name: count for name, count in summary["statuses"].items() if name not in quiet}
     if refused:
         lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
         lines += [f"  {sentence}" for sentence in summary["refusals"]]
+    if summary.get("same_bits_as_recorded") is not None:
+        same = "equals" if summary["same_bits_as_recorded"] else "DIFFERS FROM"
+        lines.append(f"flown again: the trace {same} the recorded one, bit for bit")
     if summary["same_bits_as_host"] is not None:
         same = "equals" if summary["same_bits_as_host"] else "DIFFERS FROM"
         lines.append(

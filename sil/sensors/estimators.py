@@ -1,7 +1,7 @@
 """The stock estimators: attitude, altitude, velocity and position out of readings, at 200 Hz for n flights.
 
-Source: `estimatorVars` and the state estimator of the MathWorks asbQuadcopter example, R2018b to R2020a. There
-the turning of the camera stays in the optical flow; later releases take it out by the gyro, which is what
+Source: `estimatorVars` and the state estimator of the MathWorks asbQuadcopter example, R2018b to R2020a.
+There the turning of the camera stays in the optical flow; later releases take it out by the gyro, as
 `derotated` does.
 """
 
