@@ -9,7 +9,17 @@ from codegen.reference import Status
 from codegen.settings import Settings
 from sil.link import NOT_CALLED
 from sil.metrics import TRANSIENT_S, Metrics, measure
-from sil.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD, Four, Row, Table2
+from sil.table2 import (
+    CASES,
+    INDICES,
+    PRINTED_IMPROVEMENT,
+    PRINTED_NMPC,
+    PRINTED_PD,
+    Four,
+    Row,
+    Table2,
+    digits,
+)
 from sil.traces import SensedTrace, Trace
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
@@ -133,10 +143,5 @@ def _row(row: Row) -> str:
 
 
 def _line(name: str, values: Four, improvement: Four | None) -> str:
-    ratios = "" if improvement is None else "".join(f"{_digits(ratio):>9}" for ratio in improvement)
-    return f"  {name:26}" + "".join(f"{_digits(value):>10}" for value in values) + ratios
-
-
-def _digits(value: float) -> str:
-    """Spell a value with four digits, and a large one in full."""
-    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+    ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
+    return f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values) + ratios

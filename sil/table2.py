@@ -146,3 +146,8 @@ def spelled(values: tuple[float, ...]) -> str:
     return " / ".join(
         f"{value:#.3g}".rstrip(".") if abs(value) < 1000 else f"{value:.0f}" for value in values
     )
+
+
+def digits(value: float) -> str:
+    """Spell a value with four digits, and a large one in full."""
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
