@@ -261,12 +261,12 @@ def table2(
 
 
 def _table2_sensed(output: Path, *, as_json: bool) -> None:
-    with new_results(output, "table2", (SENSED_TABLE,)) as folder:
+    with new_results(output, "table2 --sensors", (SENSED_TABLE,)) as folder:
         with progress_bar("flying Table II with sensors") as progress:
             rows = fly_sensed(progress)
         table = table2_sensed.text(rows)
         (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
-        text = summary_text("table2", {"rows": [asdict(row) for row in rows]})
+        text = summary_text("table2 --sensors", {"rows": [asdict(row) for row in rows]})
         (folder / SUMMARY).write_text(text, "utf-8")
     typer.echo(text if as_json else table, nl=not as_json)
     typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)

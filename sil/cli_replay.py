@@ -15,6 +15,7 @@ from sil.results import SUMMARY, new_results, summary_text
 from sil.scenario import flight_of, read_record
 from sil.traces import write_csv, write_npz
 
+COMMAND = "fly --replay"
 REPLAY_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
 INNER_STEPS = "inner-steps.npz"
 BESIDE = frozenset({"replay", "output", "as_json"})
@@ -35,7 +36,7 @@ def fly_again(context: typer.Context, file: Path, output: Path, *, as_json: bool
     watched = WatchedController(record.settings) if record.controller != "pd" else None
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
     files = REPLAY_FILES if watched is None else (*REPLAY_FILES, INNER_STEPS)
-    with new_results(output, "fly", files) as folder:
+    with new_results(output, COMMAND, files) as folder:
         with progress_bar("flying again") as progress:
             trace = simulate(flight, PdController() if watched is None else watched, progress)
         write_csv(trace, folder / "trace.csv")
@@ -54,7 +55,7 @@ def fly_again(context: typer.Context, file: Path, output: Path, *, as_json: bool
             "settings": record.settings.digest,
             **report.found(trace, record.settings),
         }
-        text = summary_text("fly", summary)
+        text = summary_text(COMMAND, summary)
         (folder / SUMMARY).write_text(text, "utf-8")
     typer.echo(text if as_json else report.flight_text(summary), nl=not as_json)
     typer.echo(f"{echo(str(output))}: {', '.join(files)}", err=True)

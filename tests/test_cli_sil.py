@@ -13,7 +13,7 @@ from codegen.errors import INTERRUPTED
 from sil.loop import Flight
 from sil.report import table2_text
 from sil.table2 import Claim, Row, Table2
-from sil.traces import CSV_COLUMNS, read_npz
+from sil.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 
 
 def command(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -80,6 +80,23 @@ def test_every_curve_flies(trajectory: str, tmp_path: Path) -> None:
     assert json.loads(done.stdout)["lost"] is False
 
 
+def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
+    """The same seed gives the same flight, another another; true and seen metrics are told apart."""
+    options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "1", "--json"]
+    flights = [
+        command("fly", *options, "--seed", seed, "-o", f"{number}", folder=tmp_path)
+        for number, seed in enumerate(("7", "7", "8"))
+    ]
+    assert flights[0].returncode == 0, flights[0].stderr
+    assert flights[0].stdout == flights[1].stdout
+    first, _, third = (json.loads(flight.stdout) for flight in flights)
+    assert first["metrics"] != first["metrics_as_seen"]
+    assert first["metrics"] != third["metrics"]
+    assert (first["seed"], first["sensors"], first["wind_m_s2"]) == (7, "mambo", [0, 0])
+    header = (tmp_path / "0" / "trace.csv").read_text().splitlines()[0]
+    assert header == ",".join((*CSV_COLUMNS, *SEEN_COLUMNS))
+
+
 def test_waypoints_fly(tmp_path: Path) -> None:
     """A CSV file is a trajectory."""
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,0,0\n1,0.2,0.1\n")
@@ -93,7 +110,9 @@ def test_waypoints_fly(tmp_path: Path) -> None:
         (["mamba"], "did you mean mambo"),
         (["--trajectory", "triangle"], "--trajectory triangle must be bernoulli"),
         (["--trajectory", "none.CSV"], "none.CSV: cannot be read: No such file or directory\n"),
-        (["--wind", "strong"], "--wind strong must be two numbers, as in 0.5,0"),
+        (["--wind", "strong"], "--wind strong must be two numbers, as in 0.5,0, or gusts"),
+        (["--seed", "-1"], "--seed = -1 must lie in 0.."),
+        (["--replay", "none.json"], "none.json: cannot be read: No such file or directory"),
         (["--wind", "nan,0"], "--wind = nan must be a finite number"),
         (["--yaw-rad", "inf"], "--yaw-rad = inf must be a finite number"),
         (["--motor-lag-s", "nan"], "--motor-lag-s = nan must be a finite number; it must lie in 0..1"),
