@@ -65,12 +65,21 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
         itae_m_s2=_integral(weight_s * error_m, time_s),
         rms_error_m=np.sqrt(ise_m2_s / span_s),
         max_error_m=error_m.max(axis=0),
-        effort_rad_s=(np.diff(time_s)[:, np.newaxis] * effort_rad).sum(axis=0),
-        command_variation_rad=np.abs(np.diff(command_rad, axis=0)).sum(axis=-1).mean(axis=0),
+        effort_rad_s=_total(np.diff(time_s)[:, np.newaxis] * effort_rad),
+        command_variation_rad=_total(np.abs(np.diff(command_rad, axis=0)).sum(axis=-1)) / (len(time_s) - 1),
     )
 
 
 def _integral(values: FloatArray, time_s: FloatArray) -> FloatArray:
     """Return the trapezoidal integrals (n,) of values (k, n)."""
     steps_s = np.diff(time_s)[:, np.newaxis]
-    return np.asarray((steps_s * (values[1:] + values[:-1]) / 2.0).sum(axis=0))
+    return _total(steps_s * (values[1:] + values[:-1]) / 2.0)
+
+
+def _total(values: FloatArray) -> FloatArray:
+    """Return the sums (n,) of values (k, n) over time.
+
+    NumPy adds along the innermost axis in another order than across it: laid out flight by flight, a flight
+    among many has the same bits as alone.
+    """
+    return np.asarray(np.ascontiguousarray(values.T).sum(axis=-1))

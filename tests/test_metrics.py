@@ -120,3 +120,16 @@ def test_flight_shorter_than_the_transient_is_refused() -> None:
     """There is nothing to measure after the end."""
     with pytest.raises(ValueError, match="start_s = 10 must lie before the end 8"):
         measure(steady(np.linspace(0.0, 8.0, 801)), TRANSIENT_S)
+
+
+def test_a_flight_among_many_has_the_metrics_of_the_flight_alone() -> None:
+    """Bit for bit: sums over time run in the same order whatever else is measured."""
+    rng = np.random.default_rng(1)
+    error_m, command_rad = rng.normal(size=(1001, 3, 2)), rng.normal(size=(1001, 3, 2))
+    time_s = 0.01 * np.arange(1001)
+    together = measure(trace_of(time_s, error_m, command_rad))
+    for flight in range(3):
+        one = slice(flight, flight + 1)
+        alone = measure(trace_of(time_s, error_m[:, one], command_rad[:, one]))
+        for name, values in vars(together).items():
+            np.testing.assert_array_equal(getattr(alone, name), values[one], err_msg=name)
