@@ -20,7 +20,7 @@ from codegen.footprint.build import builder
 from codegen.literals import SCALARS
 from codegen.reference import ReferenceController
 from codegen.settings import Settings
-from sil import cli_boards, cli_faults, cli_verify, report, table2_sensed
+from sil import cli_boards, cli_campaign, cli_faults, cli_verify, report, table2_sensed
 from sil.baseline import PdController
 from sil.cli_replay import fly_again
 from sil.compiled import CompiledController
@@ -77,6 +77,7 @@ def main() -> None:
     cli_boards.register(app)
     cli_faults.register(app)
     cli_verify.register(app)
+    cli_campaign.register(app)
     app()
 
 

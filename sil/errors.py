@@ -33,3 +33,7 @@ class EmulatorError(MamboNmpcError):
 
 class EmulationError(MamboNmpcError):
     """The program on the emulated core died, or did not return in time."""
+
+
+class WorkerError(MamboNmpcError):
+    """Work given to other processes or machines did not come back."""

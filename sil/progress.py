@@ -5,7 +5,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
 
 
 @contextmanager
@@ -20,3 +30,34 @@ def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
             progress.update(task, completed=share)
 
         yield advance
+
+
+class _RateColumn(ProgressColumn):
+    """Things finished in a second."""
+
+    def render(self, task: Task) -> Text:
+        """Return the rate, once there is one."""
+        return Text("" if task.speed is None else f"{task.speed:.3g}/s")
+
+
+@contextmanager
+def counting_bar(text: str, things: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Show `text`, a bar, a count of `things`, their rate and the time left; the function takes the count."""
+    columns = (
+        *(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(things)),
+        *(_RateColumn(), TimeRemainingColumn()),
+    )
+    shown = sys.stderr.isatty()
+    console = Console(stderr=True)
+    with Progress(
+        *columns, console=console, transient=True, disable=not shown, speed_estimate_period=600.0
+    ) as progress:
+        task = None
+
+        def count(finished: int) -> None:
+            nonlocal task
+            if task is None:  # what an earlier run has finished is no part of the rate
+                task = progress.add_task(text, total=total, completed=finished)
+            progress.update(task, completed=finished)
+
+        yield count

@@ -26,7 +26,7 @@ SUMMARY: Final = "summary.json"
 """The file that marks a folder as ours: removed first, written last."""
 
 _NEW: Final = ".mambo-nmpc-new-"
-_GENERATOR: Final = "mambo-nmpc "
+GENERATOR: Final = "mambo-nmpc "
 
 
 @contextlib.contextmanager
@@ -38,7 +38,7 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
     UnwritableError for what the file system refuses: as far as can be told, before the run.
     """
     try:
-        with _made(folder), _locked(folder):
+        with _made(folder), locked(folder):
             _refuse_other_work(folder, command, (*names, SUMMARY))
             for left_over in folder.glob(f"{_NEW}*"):
                 shutil.rmtree(left_over)
@@ -60,7 +60,7 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
 
 def summary_text(command: str, summary: dict[str, Any]) -> str:
     """Return what a run of `command` found as JSON, after the version that found it; no number is NaN."""
-    whole = {"generator": f"{_GENERATOR}{codegen.__version__}", "command": command, **summary}
+    whole = {"generator": f"{GENERATOR}{codegen.__version__}", "command": command, **summary}
     return json.dumps(finite(whole), indent=2, allow_nan=False) + "\n"
 
 
@@ -92,7 +92,7 @@ def _made(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
     """Lock `folder` against other runs; a file system without locks goes without."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -161,5 +161,5 @@ def _summary(path: Path) -> dict[str, Any] | None:
         summary = json.loads(path.read_text("utf-8"))
     except (ValueError, RecursionError):
         return None
-    ours = isinstance(summary, dict) and str(summary.get("generator")).startswith(_GENERATOR)
+    ours = isinstance(summary, dict) and str(summary.get("generator")).startswith(GENERATOR)
     return summary if ours else None

@@ -1,0 +1,113 @@
+"""The distributions that a campaign draws from, each as its quantile function.
+
+A quantile function turns one uniform number into one draw: every parameter takes exactly one number of its
+flight's stream, so that another distribution for one parameter leaves the draws of all others alone.
+"""
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any, Final, Literal
+
+Kind = Literal["constant", "uniform", "log_uniform", "normal", "choice"]
+
+_SHAPES: Final = (
+    "a number, { uniform = [low, high] }, { log_uniform = [low, high] }, { normal = [mean, deviation] } "
+    "or { choice = [value, ...] }"
+)
+_MOST_CHOICES: Final = 1000
+
+
+@dataclass(frozen=True)
+class Domain:
+    """What values a parameter may have: `low` to `high`, only whole ones if `whole`."""
+
+    low: float
+    high: float
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """One distribution within a domain.
+
+    `numbers` are the value of a constant, the limits of a uniform or log-uniform one, mean and standard
+    deviation of a normal one, or the values of a choice. A normal one is cut off at the domain's limits.
+    """
+
+    kind: Kind
+    numbers: tuple[float, ...]
+    domain: Domain
+
+    def quantile(self, share: float) -> float:
+        """Return the value below which `share` of all draws lie; `share` is in [0, 1)."""
+        numbers = self.numbers
+        match self.kind:
+            case "constant":
+                return numbers[0]
+            case "uniform":
+                return numbers[0] + share * (numbers[1] - numbers[0])
+            case "log_uniform":
+                return numbers[0] * math.exp(share * math.log(numbers[1] / numbers[0]))
+            case "normal":
+                return self._normal_quantile(share)
+            case "choice":
+                return numbers[int(share * len(numbers))]
+
+    def _normal_quantile(self, share: float) -> float:
+        mean, deviation = self.numbers
+        if deviation == 0.0:
+            return mean
+        normal, domain = NormalDist(mean, deviation), self.domain
+        below, above = normal.cdf(domain.low), normal.cdf(domain.high)
+        inner = min(max(below + share * (above - below), 1e-16), 1.0 - 1e-16)
+        return min(max(normal.inv_cdf(inner), domain.low), domain.high)
+
+    def document(self) -> float | dict[str, list[float]]:
+        """Return the distribution as campaign.toml spells it."""
+        return self.numbers[0] if self.kind == "constant" else {self.kind: list(self.numbers)}
+
+
+def parse(value: Any, domain: Domain) -> Distribution:
+    """Return the distribution that campaign.toml spells as `value`; raises ValueError, "must ..."."""
+    match value:
+        case dict() if len(value) == 1:
+            ((kind, numbers),) = value.items()
+        case bool() | dict() | list() | str():
+            raise ValueError(f"must be {_SHAPES}")
+        case _:
+            kind, numbers = "constant", [value]
+    wrong = not isinstance(numbers, list) or not all(
+        isinstance(number, int | float) and not isinstance(number, bool) for number in numbers
+    )
+    if wrong or kind not in ("constant", "uniform", "log_uniform", "normal", "choice"):
+        raise ValueError(f"must be {_SHAPES}")
+    _demand_count(kind, numbers)
+    within = numbers[:1] if kind == "normal" else numbers
+    for number in within:
+        if not domain.low <= number <= domain.high:
+            raise ValueError(f"must lie in {domain.low:g}..{domain.high:g}")
+        if domain.whole and number != int(number):
+            raise ValueError("must be whole numbers")
+    _demand_order(kind, numbers, whole=domain.whole)
+    return Distribution(kind, tuple(float(number) for number in numbers), domain)
+
+
+def _demand_count(kind: str, numbers: list[float]) -> None:
+    """Raise ValueError unless there are as many numbers as a distribution of this kind has."""
+    if kind == "choice" and not 1 <= len(numbers) <= _MOST_CHOICES:
+        raise ValueError(f"must have 1 to {_MOST_CHOICES} values to choose from")
+    if kind in ("uniform", "log_uniform", "normal") and len(numbers) != 2:
+        raise ValueError(f"must have two numbers: {_SHAPES}")
+
+
+def _demand_order(kind: str, numbers: list[float], *, whole: bool) -> None:
+    """Raise ValueError unless the numbers, which lie in the domain, make a distribution of this kind."""
+    if whole and kind not in ("constant", "choice"):
+        raise ValueError("must be a whole number or { choice = [value, ...] } of them")
+    if kind in ("uniform", "log_uniform") and numbers[0] > numbers[1]:
+        raise ValueError("must have the lower limit first")
+    if kind == "log_uniform" and numbers[0] <= 0.0:
+        raise ValueError("must have limits above 0; a logarithm needs them")
+    if kind == "normal" and not 0.0 <= numbers[1] < math.inf:
+        raise ValueError("must have a standard deviation of 0 or more")

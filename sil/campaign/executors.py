@@ -1,0 +1,143 @@
+"""Where batches are flown: processes of this machine, or the workers of a running Dask cluster.
+
+Both are executors as the standard library defines them, and everything else treats them alike.
+"""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import active_children, get_context, parent_process
+from typing import Any, Final
+
+import codegen
+from codegen.errors import MamboNmpcError, echo
+from sil.errors import WorkerError
+
+PATIENCE_S: Final = 5.0
+"""Time within which a scheduler must answer."""
+
+
+@dataclass(frozen=True)
+class Pool:
+    """An executor, how many tasks it runs at once, and what the end of a worker says about it."""
+
+    executor: Executor
+    workers: int
+    trouble: Callable[[BaseException], str | None]
+
+    def run(
+        self, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]
+    ) -> Iterator[tuple[int, Any]]:
+        """Yield number and result of each task as it is finished, in any order; raises WorkerError.
+
+        Errors of ours that a task raises are raised here.
+        """
+        with _interrupts_blocked():  # worker processes inherit that, so Ctrl-C is for this one alone
+            asked: dict[Future[Any], int] = {
+                self.executor.submit(function, *task): number for number, task in enumerate(tasks)
+            }
+        for future in as_completed(asked):
+            try:
+                result = future.result()
+            except MamboNmpcError:
+                raise
+            except (CancelledError, Exception) as error:
+                reason = self.trouble(error)
+                if reason is None:
+                    raise
+                raise WorkerError(
+                    f"{reason}; the flights finished so far are kept, and the same command goes on"
+                ) from error
+            yield asked[future], result
+
+
+@contextlib.contextmanager
+def processes(count: int) -> Iterator[Pool]:
+    """Hold `count` worker processes of this machine; they end with this one, however it ends."""
+
+    def trouble(error: BaseException) -> str | None:
+        return "a worker process has died" if isinstance(error, BrokenProcessPool) else None
+
+    with ProcessPoolExecutor(count, get_context("spawn"), initializer=_follow_parent) as executor:
+        try:
+            yield Pool(executor, count, trouble)
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            for child in active_children():
+                child.terminate()
+            raise
+
+
+def _follow_parent() -> None:
+    """End this process when its parent has ended, even by a kill."""
+    parent = parent_process()
+    assert parent is not None  # a worker has one
+
+    def follow() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Let Ctrl-C wait, here and in processes that are started meanwhile for good."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def cluster(address: str) -> Iterator[Pool]:
+    """Hold a connection to the Dask scheduler at `address`; raises WorkerError if there is none."""
+    try:
+        from distributed import Client  # noqa: PLC0415 - an optional extra
+    except ImportError:
+        raise WorkerError("--scheduler wants Dask; install mambo-nmpc with its extra dask") from None
+    option = f"--scheduler {echo(address)}"
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters comes as an exception
+    try:
+        asyncio.run(asyncio.wait_for(_knock(address), PATIENCE_S))
+        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        reason = str(error) or f"no answer within {PATIENCE_S:g} s"
+        raise WorkerError(
+            f"{option}: is no Dask scheduler that can be reached ({echo(reason)}); "
+            "start one with `dask scheduler`, and give its address as in tcp://host:8786"
+        ) from None
+
+    def trouble(error: BaseException) -> str:
+        if isinstance(error, CancelledError):
+            return f"{option}: the scheduler is gone"
+        return (
+            f"{option}: a worker has failed, {type(error).__name__}: {echo(str(error))}; mambo-nmpc "
+            f"{codegen.__version__} and a C compiler must be installed where the workers run"
+        )
+
+    with client:
+        workers = sum(client.nthreads().values())
+        if workers == 0:
+            raise WorkerError(f"{option}: has no workers; start some with `dask worker {echo(address)}`")
+        executor = client.get_executor(pure=False)
+        try:
+            yield Pool(executor, workers, trouble)
+        finally:
+            executor.shutdown(wait=False)
+
+
+async def _knock(address: str) -> None:
+    """Connect to a scheduler and take leave: what Client itself does not give up when nobody answers."""
+    from distributed.core import connect  # noqa: PLC0415 - an optional extra
+
+    connection = await connect(address, timeout=PATIENCE_S)
+    await connection.close()

@@ -1,0 +1,238 @@
+"""Read campaign.toml: what is drawn, what is flown, and by whom.
+
+Messages name file, key, value, rule and fix, all faults of a file at once.
+"""
+
+import difflib
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+    create_model,
+    field_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from codegen import presets
+from codegen.errors import InvalidSettingsError, MamboNmpcError, echo
+from codegen.settings import Settings
+from codegen.toml_file import parse_document, read_text
+from sil.campaign.distributions import Distribution, parse
+from sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values
+from sil.errors import FlightError
+from sil.scenario import Scenario, flight_of
+
+PD: Final = "pd"
+
+_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_LONGEST_LIST: Final = 10
+
+
+class _Section(BaseModel):
+    """Frozen, no unknown keys, no silent conversion, finite numbers only."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+class FlightSection(_Section):
+    """What all flights have in common."""
+
+    trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
+    size_m: float = Field(2.0, ge=-1000, le=1000)
+    rate_rad_s: float = Field(0.5, ge=-100, le=100)
+    duration_s: float = Field(100.0, ge=1, le=3600)
+    start: Literal["hover", "take-off"] = "hover"
+    sensors: Literal["none", "mambo"] = "mambo"
+
+
+def _drawn(parameter: Parameter) -> Any:
+    """Return type and default of the key of a parameter."""
+
+    def validated(value: Any, parameter: Parameter) -> Distribution:
+        try:
+            return parse(value, parameter.domain)
+        except ValueError as error:
+            raise PydanticCustomError("draw", "{rule}", {"rule": str(error)}) from None
+
+    validator = PlainValidator(partial(validated, parameter=parameter))
+    written = PlainSerializer(lambda distribution: distribution.document())
+    return Annotated[Distribution, validator, written], parameter.default
+
+
+_Draws: Any = create_model(
+    "_Draws",
+    __base__=_Section,
+    **{name: _drawn(parameter) for name, parameter in PARAMETERS.items()},
+)
+
+
+class CampaignFile(_Section):
+    """The keys of campaign.toml; a missing key is that of the default campaign."""
+
+    seed: int = Field(0, ge=0, lt=2**63)
+    controllers: tuple[str, ...] = Field((PD, "mambo"), strict=False)
+    flight: FlightSection = FlightSection()
+    draws: _Draws = _Draws()
+
+    @field_validator("controllers")
+    @classmethod
+    def _some(cls, controllers: tuple[str, ...]) -> tuple[str, ...]:
+        if not 1 <= len(controllers) <= _LONGEST_LIST:
+            raise PydanticCustomError(
+                "controllers", f'must name 1 to {_LONGEST_LIST} controllers, as in ["pd", "mambo"]'
+            )
+        return controllers
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """One controller of a campaign: the stock PD, or generated C."""
+
+    name: str
+    kind: Literal["pd", "nmpc"]
+    settings: Settings
+    """The PD has but the update period of them."""
+
+    def document(self) -> dict[str, Any]:
+        """Return plain values, which travel to other processes and into files."""
+        return {"name": self.name, "kind": self.kind, "settings": self.settings.model_dump()}
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> "Entrant":
+        """Return what `document` describes."""
+        return cls(document["name"], document["kind"], Settings.model_validate(document["settings"]))
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign; the first of the entrants is the one that the others are compared with."""
+
+    file: CampaignFile
+    entrants: tuple[Entrant, ...]
+
+    def draw(self, flight: int) -> Draw:
+        """Return what flight number `flight` is."""
+        return draw(self.file.seed, flight, {name: getattr(self.file.draws, name) for name in PARAMETERS})
+
+    def document(self) -> dict[str, Any]:
+        """Return everything that decides the result, as plain values."""
+        document: dict[str, Any] = self.file.model_dump(mode="json")
+        return document | {"controllers": [entrant.document() for entrant in self.entrants]}
+
+
+def scenario(flight: dict[str, Any], drawn: Draw) -> Scenario:
+    """Return one flight, from the section [flight] as plain values and from what was drawn."""
+    return Scenario.model_validate(flight | scenario_values(drawn))
+
+
+def default() -> Campaign:
+    """Return the default campaign."""
+    return _campaign(CampaignFile(), Path(), "the default campaign")
+
+
+def read(path: Path) -> Campaign:
+    """Read a campaign.toml; controllers named by a path are looked for beside it.
+
+    Raises UnreadableFileError for what is not TOML, InvalidSettingsError with every broken rule, and the
+    errors of the controllers' files.
+    """
+    source = echo(str(path))
+    document = parse_document(read_text(path), source)
+    try:
+        file = CampaignFile.model_validate(document)
+    except ValidationError as error:
+        details = error.errors(include_url=False, include_context=False)
+        raise InvalidSettingsError(tuple(f"{source}: {_fault(one)}" for one in details)) from None
+    return _campaign(file, path.parent, source)
+
+
+def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
+    """Look the controllers up, and try whether they can fly."""
+    entrants = tuple(_entrant(name, folder, source) for name in file.controllers)
+    names = [entrant.name for entrant in entrants]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidSettingsError(
+                (f"{source}: controllers: two are called {name}; give their files different names",)
+            )
+    campaign = Campaign(file, entrants)
+    flight = file.flight.model_dump()
+    for entrant, named in zip(entrants, file.controllers, strict=True):
+        try:
+            flight_of([scenario(flight, campaign.draw(0))], entrant.settings.horizon.update_period_s)
+        except FlightError as error:
+            raise InvalidSettingsError(
+                (f"{source}: controllers: {echo(named)}: horizon.{error}; stock loops run at 200 Hz",)
+            ) from None
+    return campaign
+
+
+def _entrant(named: str, folder: Path, source: str) -> Entrant:
+    """Return the controller called `named` in the file `source`, which is in `folder`."""
+    if named == PD:
+        return Entrant(PD, "pd", Settings())
+    path = folder / named
+    try:
+        settings = presets.load(named if named in presets.names() or not path.exists() else str(path))
+    except MamboNmpcError as error:
+        raise InvalidSettingsError(
+            tuple(f"{source}: controllers: {line}" for line in str(error).splitlines())
+        ) from None
+    name = named if named in presets.names() else path.stem
+    if not _NAME.fullmatch(name) or name == PD:
+        raise InvalidSettingsError(
+            (
+                f"{source}: controllers: {echo(named)} must have a name of at most 40 letters, digits, - and "
+                f"_, other than {PD}: columns of the table begin with it",
+            )
+        )
+    return Entrant(name, "nmpc", settings)
+
+
+def _fault(details: ErrorDetails) -> str:
+    """Say which key is wrong, with its value, and what to write instead."""
+    names = [str(part) for part in details["loc"]]
+    dotted = echo(".".join(names))
+    value = _spelled(details["input"])
+    match details["type"]:
+        case "extra_forbidden":
+            return _unknown(names, dotted)
+        case "model_type":
+            return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
+        case "draw" | "controllers":
+            return f"{dotted} = {value} {details['msg']}"
+        case _:
+            return f"{dotted} = {value} {details['msg'].replace('Input should', 'must')}"
+
+
+def _unknown(names: Sequence[str], dotted: str) -> str:
+    """Say that a key does not exist, with the nearest one that does."""
+    section: Any = CampaignFile
+    for name in names[:-1]:
+        section = section.model_fields[name].annotation
+    keys = list(section.model_fields)
+    near = difflib.get_close_matches(names[-1], keys, n=1)
+    what = "parameter" if names[0] == "draws" and len(names) == 2 else "key of a campaign"
+    choice = f"did you mean {near[0]}?" if near else f"there are {', '.join(keys)}"
+    return f"{dotted} is not a {what}; {choice}"
+
+
+def _spelled(value: object) -> str:
+    """Return a value nearly as TOML spells it, shortened."""
+    try:
+        return echo(json.dumps(value, ensure_ascii=False, default=str))
+    except ValueError:
+        return "a number too long to repeat"
+    except RecursionError:
+        return "a value too deep to repeat"

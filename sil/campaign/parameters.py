@@ -1,0 +1,117 @@
+"""What varies from flight to flight: every parameter, its domain, and how the default campaign draws it.
+
+Sources of the default ranges are in docs/campaign.md.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from sil.campaign.distributions import Distribution, Domain, parse
+from sil.plant.airframe import MAMBO
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One key of [draws]: its domain and its distribution in the default campaign."""
+
+    name: str
+    domain: Domain
+    default: Distribution
+
+
+def _parameter(name: str, low: float, high: float, default: Any, *, whole: bool = False) -> Parameter:
+    """Return a parameter with its default distribution, as campaign.toml would spell it."""
+    domain = Domain(low, high, whole)
+    return Parameter(name, domain, parse(default, domain))
+
+
+def _axes(stem: str, unit: str, axes: str, domain: tuple[float, float], default: Any) -> list[Parameter]:
+    """Return a parameter for each axis."""
+    return [_parameter(f"{stem}_{axis}{unit}", *domain, default) for axis in axes]
+
+
+def _uniform(low: float, high: float) -> dict[str, list[float]]:
+    return {"uniform": [low, high]}
+
+
+PARAMETERS: Final[dict[str, Parameter]] = {
+    parameter.name: parameter
+    for parameter in (
+        _parameter("mass_kg", 0.01, 1.0, _uniform(0.063, 0.08)),
+        *_axes("inertia_scale", "", "xyz", (0.1, 10.0), _uniform(0.8, 1.2)),
+        _parameter("thrust_scale", 0.1, 10.0, _uniform(0.9, 1.1)),
+        _parameter("motor_lag_s", 0.0, 1.0, _uniform(0.0, 0.05)),
+        _parameter("drag_1_s", 0.0, 10.0, _uniform(0.0335, 0.1005)),
+        _parameter("battery_sag_1_s", 0.0, 1.0, _uniform(0.0, 0.001)),
+        _parameter("command_delay_ticks", 0, 200, {"choice": [0, 1, 2]}, whole=True),
+        _parameter("dropped_share", 0.0, 1.0, _uniform(0.0, 0.05)),
+        _parameter("noise_scale", 0.0, 1000.0, {"log_uniform": [0.5, 2.0]}),
+        *_axes("accelerometer_bias", "_m_s2", "xyz", (-10.0, 10.0), {"normal": [0.0, 0.02]}),
+        *_axes("gyro_bias", "_rad_s", "xyz", (-10.0, 10.0), {"normal": [0.0, 0.0005]}),
+        *_axes("wind", "_m_s2", "xy", (-100.0, 100.0), 0.0),
+        _parameter("wind_speed_m_s", 0.0, 50.0, _uniform(0.0, 2.0)),
+        _parameter("wind_direction_rad", -10.0, 10.0, _uniform(-math.pi, math.pi)),
+        _parameter("yaw_rad", -1000.0, 1000.0, _uniform(-math.pi, math.pi)),
+        _parameter("yaw_rate_rad_s", -10.0, 10.0, 0.0),
+        *_axes("start_offset", "_m", "xy", (-100.0, 100.0), _uniform(-0.5, 0.5)),
+        _parameter("start_offset_z_m", -100.0, 100.0, _uniform(-0.2, 0.2)),
+        *_axes("start_velocity", "_m_s", "xyz", (-10.0, 10.0), _uniform(-0.2, 0.2)),
+        _parameter("start_roll_rad", -1.0, 1.0, _uniform(-0.1, 0.1)),
+        _parameter("start_pitch_rad", -1.0, 1.0, _uniform(-0.1, 0.1)),
+        _parameter("payload_kg", 0.0, 1.0, 0.0),
+        _parameter("payload_time_s", 0.0, 3600.0, 0.0),
+        *_axes("push", "_n_s", "xyz", (-1.0, 1.0), 0.0),
+        _parameter("push_time_s", 0.0, 3600.0, 0.0),
+    )
+}
+"""In the order in which a flight's stream is used: a new one comes last."""
+
+Draw = dict[str, float]
+"""One flight: its parameters by name, and the `seed` of what is random within it."""
+
+
+def draw(seed: int, flight: int, distributions: Mapping[str, Distribution]) -> Draw:
+    """Return what flight number `flight` is, from the campaign's seed and that number alone."""
+    numbers, noise = np.random.SeedSequence(seed, spawn_key=(flight,)).spawn(2)
+    shares = np.random.Generator(np.random.Philox(numbers)).random(len(PARAMETERS))
+    drawn: Draw = {"seed": int(noise.generate_state(1, np.uint64)[0] >> np.uint64(1))}
+    for name, share in zip(PARAMETERS, shares.tolist(), strict=True):
+        value = distributions[name].quantile(share)
+        drawn[name] = int(value) if PARAMETERS[name].domain.whole else value
+    return drawn
+
+
+def scenario_values(drawn: Draw) -> dict[str, Any]:
+    """Return the draws as keys of `sil.scenario.Scenario`; thrust and torque of the rotors scale alike."""
+
+    def parts(stem: str, unit: str, axes: str = "xyz") -> tuple[float, ...]:
+        return tuple(drawn[f"{stem}_{axis}{unit}"] for axis in axes)
+
+    scale = drawn["thrust_scale"]
+    real = replace(
+        MAMBO,
+        thrust_factor_n_s2=scale * MAMBO.thrust_factor_n_s2,
+        torque_factor_n_m_s2=scale * MAMBO.torque_factor_n_m_s2,
+    )
+    factors = parts("inertia_scale", "")
+    same = (
+        *("seed", "mass_kg", "motor_lag_s", "drag_1_s", "battery_sag_1_s", "command_delay_ticks"),
+        *("dropped_share", "noise_scale", "wind_speed_m_s", "wind_direction_rad", "yaw_rad"),
+        *("yaw_rate_rad_s", "payload_kg", "payload_time_s", "push_time_s"),
+    )
+    return {name: drawn[name] for name in same} | {
+        "inertia_kg_m2": tuple(f * j for f, j in zip(factors, MAMBO.inertia_kg_m2, strict=True)),
+        "thrust_factor_n_s2": real.thrust_factor_n_s2,
+        "torque_factor_n_m_s2": real.torque_factor_n_m_s2,
+        "accelerometer_bias_m_s2": parts("accelerometer_bias", "_m_s2"),
+        "gyro_bias_rad_s": parts("gyro_bias", "_rad_s"),
+        "wind_m_s2": parts("wind", "_m_s2", "xy"),
+        "start_offset_m": parts("start_offset", "_m"),
+        "start_velocity_m_s": parts("start_velocity", "_m_s"),
+        "start_tilt_rad": (drawn["start_roll_rad"], drawn["start_pitch_rad"]),
+        "push_n_s": parts("push", "_n_s"),
+    }

@@ -1,0 +1,144 @@
+"""What a campaign says: distributions of the indices, crashes, and the improvement over the first controller.
+
+A crashed flight counts as infinitely bad in every index: leaving it out would flatter whoever crashes in hard
+flights. Intervals hold 95 %.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sil.arrays import FloatArray
+from sil.campaign.flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
+
+QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+COMPARED: Final = ("iae_m_s", "ise_m2_s", "itse_m2_s2", "itae_m_s2")
+"""The indices of Table II."""
+
+CONFIDENCE: Final = 0.95
+RESAMPLES: Final = 9999
+WORST: Final = 5
+_SEED: Final = 0
+"""Of the resampling: the same table gives the same intervals."""
+
+Table = Mapping[str, FloatArray]
+"""Columns (n,) by name, in the order of the flights."""
+
+
+@dataclass(frozen=True)
+class Proportion:
+    """A share of flights with its interval after Clopper and Pearson."""
+
+    count: int
+    flights: int
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """One index of the first controller over that of another, flight by flight.
+
+    `median` is the median of the ratios with its bootstrap interval, `better` the share of flights with a
+    ratio above 1. Flights in which both crash have no ratio; `flights` counts the others.
+    """
+
+    controller: str
+    index: str
+    flights: int
+    median: float
+    low: float
+    high: float
+    better: Proportion
+
+
+def proportion(count: int, flights: int) -> Proportion:
+    """Return a share with its Clopper-Pearson interval."""
+    from scipy.stats import binomtest  # noqa: PLC0415 - takes a second
+
+    interval = binomtest(count, flights).proportion_ci(CONFIDENCE, method="exact")
+    return Proportion(count, flights, count / flights, float(interval.low), float(interval.high))
+
+
+def judged(table: Table, name: str, index: str) -> FloatArray:
+    """Return an index of a controller (n,), infinite where it crashed."""
+    return np.where(table[f"{name}_{CRASHED}"] > 0.0, math.inf, table[f"{name}_{index}"])
+
+
+def quantiles(values: FloatArray) -> dict[str, float]:
+    """Return the `QUANTILES` of values (n,): each is one of the values, so that infinite ones do no harm."""
+    found = np.quantile(values, QUANTILES, method="inverted_cdf")
+    return {f"{share:g}": float(value) for share, value in zip(QUANTILES, found, strict=True)}
+
+
+def improvement(table: Table, first: str, name: str, index: str) -> Improvement | None:
+    """Compare a controller with the first one on the same flights; None if both crash in all."""
+    ours, theirs = judged(table, name, index), judged(table, first, index)
+    both = np.isfinite(ours) | np.isfinite(theirs)
+    if not both.any():
+        return None
+    with np.errstate(divide="ignore"):
+        ratios = theirs[both] / ours[both]
+    low, high = _median_interval(ratios)
+    return Improvement(
+        controller=name,
+        index=index,
+        flights=len(ratios),
+        median=float(np.median(ratios)),
+        low=low,
+        high=high,
+        better=proportion(int((ratios > 1.0).sum()), len(ratios)),
+    )
+
+
+def _median_interval(values: FloatArray) -> tuple[float, float]:
+    """Return the percentile bootstrap interval of the median of values (n,); NaN for a single one."""
+    if len(values) < 2:
+        return math.nan, math.nan
+    from scipy.stats import bootstrap  # noqa: PLC0415 - takes a second
+
+    with np.errstate(invalid="ignore"):  # the standard error, which is not used, of infinite medians
+        result = bootstrap(
+            (values,),
+            np.median,
+            n_resamples=RESAMPLES,
+            batch=max(1, 10_000_000 // len(values)),
+            confidence_level=CONFIDENCE,
+            method="percentile",
+            rng=np.random.default_rng(_SEED),
+        )
+    return float(result.confidence_interval.low), float(result.confidence_interval.high)
+
+
+def worst(table: Table, name: str) -> list[int]:
+    """Return the positions of the worst flights of a controller: crashes first, then by IAE."""
+    order = np.lexsort((-np.nan_to_num(table[f"{name}_iae_m_s"], nan=math.inf), -table[f"{name}_{CRASHED}"]))
+    return [int(position) for position in order[:WORST]]
+
+
+def summarise(table: Table, names: Sequence[str], *, sensed: bool) -> dict[str, Any]:
+    """Return all statistics as plain values; `names` are the controllers, the first to compare with."""
+    indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES if sensed)]
+    compared = [*COMPARED, *(SEEN + index for index in COMPARED if sensed)]
+    flights = len(table[f"{names[0]}_{CRASHED}"])
+    improvements = [improvement(table, names[0], name, index) for name in names[1:] for index in compared]
+    return {
+        "controllers": {
+            name: {
+                "crashed": asdict(_share(table[f"{name}_{CRASHED}"], flights)),
+                "refused_an_input": asdict(_share(table[f"{name}_{REFUSED}"], flights)),
+                "quantiles": {index: quantiles(judged(table, name, index)) for index in indices},
+            }
+            for name in names
+        },
+        "improvements": [asdict(one) for one in improvements if one is not None],
+    }
+
+
+def _share(values: NDArray[Any], flights: int) -> Proportion:
+    return proportion(int((values > 0).sum()), flights)

@@ -1,0 +1,180 @@
+"""The folder of a campaign: which campaign it is, and every flight that is finished, safe from a kill.
+
+`campaign.json` says what is flown, and marks the folder. `flights.csv` has a line for each finished flight,
+appended when its batch comes back and brought to the disk before the next; a line that a kill or a full disk
+cuts short is dropped by the next run. Once all flights are there the lines are put in order.
+"""
+
+import contextlib
+import csv
+import io
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+import codegen
+from codegen.errors import ForeignFilesError, UnwritableError, echo
+from codegen.exchange import put
+from sil.results import GENERATOR, locked
+
+IDENTITY: Final = "campaign.json"
+TABLE: Final = "flights.csv"
+FLIGHT: Final = "flight"
+
+Value = float | str
+
+
+class Store:
+    """An open folder; `lines` has the finished flights by number, as they stand in the table."""
+
+    def __init__(self, folder: Path, columns: Sequence[str]) -> None:
+        self.folder = folder
+        self._columns = (FLIGHT, *columns)
+        self._table = folder / TABLE
+        self.lines = self._read()
+        self._file = self._table.open("ab", buffering=0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
+        """Append finished flights and bring them to the disk; raises UnwritableError."""
+        lines = {flight: self._line(flight, row) for flight, row in rows.items()}
+        with refusals(self.folder, "; the flights finished so far are kept, and the same command goes on"):
+            self._write("".join(lines.values()).encode())
+        self.lines |= lines
+
+    def put_in_order(self) -> None:
+        """Replace the table by one in the order of the flights, whole or not at all."""
+        ordered = [self._header(), *(self.lines[flight] for flight in sorted(self.lines))]
+        with refusals(self.folder):
+            put(self._table, "".join(ordered).encode())
+
+    def values(self) -> dict[str, list[str]]:
+        """Return the columns of the table by name, in the order of the flights."""
+        rows = csv.reader(self.lines[flight] for flight in sorted(self.lines))
+        return {
+            name: list(column) for name, column in zip(self._columns, zip(*rows, strict=True), strict=True)
+        }
+
+    def _header(self) -> str:
+        return _csv_line(self._columns)
+
+    def _line(self, flight: int, row: Mapping[str, Value]) -> str:
+        return _csv_line([flight, *(row[column] for column in self._columns[1:])])
+
+    def _write(self, content: bytes) -> None:
+        left = memoryview(content)
+        while left:
+            left = left[self._file.write(left) :]
+        os.fsync(self._file.fileno())
+
+    def _read(self) -> dict[int, str]:
+        """Return the lines of an earlier run by flight, and cut off what is not a whole line.
+
+        Raises ForeignFilesError for a table that is not ours.
+        """
+        name = echo(str(self._table))
+        with refusals(self.folder):
+            if self._table.is_symlink() or (self._table.exists() and not self._table.is_file()):
+                raise ForeignFilesError(f"{name}: is not a plain file; move it away", (str(self._table),))
+            content = self._table.read_bytes() if self._table.exists() else b""
+            whole = content[: content.rfind(b"\n") + 1]
+            if not whole:
+                put(self._table, self._header().encode())
+                return {}
+            if len(whole) < len(content):
+                os.truncate(self._table, len(whole))
+        header, *lines = whole.decode("utf-8", "replace").splitlines(keepends=True)
+        found: dict[int, str] = {}
+        for number, line in enumerate([header, *lines], start=1):
+            cells = next(csv.reader([line]), [])
+            flight = cells[0] if len(cells) == len(self._columns) else ""
+            if number == 1 and line == self._header():
+                continue
+            if number == 1 or not (flight.isascii() and flight.isdigit()) or int(flight) in found:
+                raise ForeignFilesError(
+                    f"{name}: line {number} is not of this campaign, somebody has edited the table; "
+                    "restore it, or name another folder with -o",
+                    (str(self._table),),
+                )
+            found[int(flight)] = line
+        return found
+
+
+@contextlib.contextmanager
+def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[Store]:
+    """Hold `folder` for a run of `campaign`, and yield what is in it.
+
+    Raises ForeignFilesError for a folder with other work or another campaign, BusyError if another run holds
+    it, UnwritableError for what the file system refuses.
+    """
+    with refusals(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        _claim(folder, {"generator": f"{GENERATOR}{codegen.__version__}", "command": "campaign", **campaign})
+        with Store(folder, columns) as store:
+            yield store
+
+
+@contextlib.contextmanager
+def refusals(folder: Path, advice: str = "") -> Iterator[None]:
+    """Turn what the file system refuses into an UnwritableError."""
+    try:
+        yield
+    except OSError as error:
+        name = echo(str(error.filename or folder))
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}{advice}") from error
+
+
+def _claim(folder: Path, identity: dict[str, Any]) -> None:
+    """Mark an empty folder with `identity`; refuse one that holds anything but this campaign."""
+    name, path = echo(str(folder)), folder / IDENTITY
+    try:
+        held = json.loads(path.read_text("utf-8")) if path.is_file() and not path.is_symlink() else None
+    except (ValueError, RecursionError):
+        held = None
+    if not isinstance(held, dict) or not str(held.get("generator")).startswith(GENERATOR):
+        if any(not one.name.startswith(f".{IDENTITY}") for one in folder.iterdir()):
+            raise ForeignFilesError(
+                f"{name}: holds files that are not a campaign of ours; name another folder with -o", ()
+            )
+        with refusals(folder):
+            put(path, (json.dumps(identity, indent=2) + "\n").encode())
+        return
+    difference = _difference("", held, json.loads(json.dumps(identity)))
+    if difference:
+        raise ForeignFilesError(
+            f"{name}: holds another campaign, {difference}; name another folder with -o", ()
+        )
+
+
+def _difference(where: str, held: Any, asked: Any) -> str | None:
+    """Say where two documents differ first, or return None."""
+    if isinstance(held, dict) and isinstance(asked, dict):
+        for key in dict.fromkeys((*held, *asked)):
+            found = _difference(f"{where}.{key}" if where else key, held.get(key), asked.get(key))
+            if found:
+                return found
+        return None
+    if isinstance(held, list) and isinstance(asked, list) and len(held) == len(asked):
+        pairs = enumerate(zip(held, asked, strict=True))
+        differences = (_difference(f"{where}[{i}]", one, other) for i, (one, other) in pairs)
+        return next((found for found in differences if found), None)
+    if held == asked:
+        return None
+    return f"with {echo(where)} = {echo(json.dumps(held))} where {echo(json.dumps(asked))} is asked for"
+
+
+def _csv_line(cells: Sequence[Value | int]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue()
