@@ -29,6 +29,7 @@ _STYLE: Final[dict[Any, Any]] = {
     "lines.linewidth": 1.1,
     "legend.frameon": False,
     "svg.fonttype": "none",
+    "svg.hashsalt": "mambo-nmpc",
 }
 _COLUMN_INCHES: Final = 4.2
 _HEIGHT_INCHES: Final = 8.2

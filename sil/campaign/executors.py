@@ -105,7 +105,8 @@ def cluster(address: str) -> Iterator[Pool]:
     except ImportError:
         raise WorkerError("--scheduler wants Dask; install mambo-nmpc with its extra dask") from None
     option = f"--scheduler {echo(address)}"
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters comes as an exception
+    for name in ("distributed", "distributed.client"):  # what matters comes as an exception
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         asyncio.run(asyncio.wait_for(_knock(address), PATIENCE_S))
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
@@ -121,7 +122,7 @@ def cluster(address: str) -> Iterator[Pool]:
             return f"{option}: the scheduler is gone"
         return (
             f"{option}: a worker has failed, {type(error).__name__}: {echo(str(error))}; mambo-nmpc "
-            f"{codegen.__version__} and a C compiler must be installed where the workers run"
+            f"{codegen.__version__} must be installed where scheduler and workers run"
         )
 
     with client:

@@ -13,7 +13,7 @@ from sil.campaign.parameters import PARAMETERS
 from sil.campaign.store import Store, open_store
 from sil.errors import FlightError
 
-MOST_IN_A_BATCH: Final = 50
+MOST_IN_A_BATCH: Final = 100
 """Flights for NumPy at once: a trace of 100 s takes 2 MB, and more gain little."""
 
 
