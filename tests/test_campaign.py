@@ -129,7 +129,7 @@ def test_an_empty_file_is_the_default_campaign(tmp_path: Path) -> None:
     assert read == file.default()
     assert [(entrant.name, entrant.kind) for entrant in read.entrants] == [("pd", "pd"), ("mambo", "nmpc")]
     assert read.file.flight.duration_s == 100.0
-    assert read.file.flight.sensors == "mambo"
+    assert read.file.flight.sensors == "mambo-derotated"
 
 
 def test_a_controller_may_be_a_file_beside_the_campaign(tmp_path: Path) -> None:

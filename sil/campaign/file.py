@@ -53,7 +53,7 @@ class FlightSection(_Section):
     rate_rad_s: float = Field(0.5, ge=-100, le=100)
     duration_s: float = Field(100.0, ge=1, le=3600)
     start: Literal["hover", "take-off"] = "hover"
-    sensors: Literal["none", "mambo"] = "mambo"
+    sensors: Literal["none", "mambo", "mambo-derotated"] = "mambo-derotated"
 
 
 def _drawn(parameter: Parameter) -> Any:
