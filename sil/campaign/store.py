@@ -48,7 +48,7 @@ class Store:
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
         """Append finished flights and bring them to the disk; raises UnwritableError."""
         lines = {flight: self._line(flight, row) for flight, row in rows.items()}
-        with refusals(self.folder, "; the flights finished so far are kept, and the same command goes on"):
+        with refusals(self._table, "; the flights finished so far are kept, and the same command goes on"):
             self._write("".join(lines.values()).encode())
         self.lines |= lines
 
@@ -126,12 +126,12 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
 
 
 @contextlib.contextmanager
-def refusals(folder: Path, advice: str = "") -> Iterator[None]:
-    """Turn what the file system refuses into an UnwritableError."""
+def refusals(place: Path, advice: str = "") -> Iterator[None]:
+    """Turn what the file system refuses at or below `place` into an UnwritableError."""
     try:
         yield
     except OSError as error:
-        name = echo(str(error.filename or folder))
+        name = echo(str(error.filename or place))
         raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}{advice}") from error
 
 

@@ -1,8 +1,10 @@
 """Tools that may be missing: a skip that names them, and a failure where they are demanded."""
 
+import importlib.util
 import os
 import shutil
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -15,11 +17,20 @@ def require(tool: str, package: str) -> str:
     """Return the path of `tool`; without it skip the test, or fail it where CI is true."""
     path = shutil.which(tool)
     if path is None:
-        message = f"{tool} is missing; Debian's package {package} brings it"
-        if os.environ.get("CI") == "true":
-            pytest.fail(message)
-        pytest.skip(message)
+        _miss(f"{tool} is missing; Debian's package {package} brings it")
     return path
+
+
+def require_module(name: str) -> None:
+    """Skip the test, or fail it where CI is true, without the Python package `name`."""
+    if importlib.util.find_spec(name) is None:
+        _miss(f"{name} is missing; pip install {name} brings it")
+
+
+def _miss(message: str) -> NoReturn:
+    if os.environ.get("CI") == "true":
+        pytest.fail(message)
+    pytest.skip(message)
 
 
 def board_builder(name: str) -> Builder:
