@@ -85,7 +85,7 @@ def _fly(chosen: Campaign, store: Store, flights: int, pool: AbstractContextMana
         with contextlib.suppress(OSError):
             typer.echo(
                 f"{echo(str(store.folder))}: stopped with {len(store.lines)} of {flights} flights finished; "
-                "the same command goes on",
+                "the same command goes on from there",
                 err=True,
             )
         raise

@@ -173,7 +173,9 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(source: Path, whole: Path, tmp_path
     done = run_script(STOPPED, *arguments)
     assert done.returncode == INTERRUPTED
     assert done.stdout == ""
-    assert done.stderr.endswith(f"stopped with 3 of {FLIGHTS} flights finished; the same command goes on\n")
+    assert done.stderr.endswith(
+        f"stopped with 3 of {FLIGHTS} flights finished; the same command goes on from there\n"
+    )
     assert done.stderr.count("\n") == 1
     assert command(*arguments).returncode == 0
     assert contents(tmp_path) == contents(whole)

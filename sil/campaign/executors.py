@@ -53,7 +53,7 @@ class Pool:
                 if reason is None:
                     raise
                 raise WorkerError(
-                    f"{reason}; the flights finished so far are kept, and the same command goes on"
+                    f"{reason}; the flights finished so far are kept, and the same command goes on from there"
                 ) from error
             yield asked[future], result
 

@@ -80,7 +80,7 @@ _Draws: Any = create_model(
 class CampaignFile(_Section):
     """The keys of campaign.toml; a missing key is that of the default campaign."""
 
-    seed: int = Field(0, ge=0, lt=2**63)
+    seed: int = Field(0, ge=0, le=2**63 - 1)
     controllers: tuple[str, ...] = Field((PD, "mambo"), strict=False)
     flight: FlightSection = FlightSection()
     draws: _Draws = _Draws()
@@ -210,26 +210,37 @@ def _fault(details: ErrorDetails) -> str:
             return _unknown(names, dotted)
         case "model_type":
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
-        case "draw" | "controllers":
-            return f"{dotted} = {value} {details['msg']}"
+        case "greater_than_equal" | "less_than_equal":
+            limits = _section(names).model_fields[names[-1]].metadata
+            low, high = (next(getattr(m, k) for m in limits if hasattr(m, k)) for k in ("ge", "le"))
+            return f"{dotted} = {value} must lie in {low}..{high}"
         case _:
             return f"{dotted} = {value} {details['msg'].replace('Input should', 'must')}"
 
 
-def _unknown(names: Sequence[str], dotted: str) -> str:
-    """Say that a key does not exist, with the nearest one that does."""
+def _section(names: Sequence[str]) -> Any:
+    """Return the model that has, or should have, the key at the path `names`."""
     section: Any = CampaignFile
     for name in names[:-1]:
         section = section.model_fields[name].annotation
-    keys = list(section.model_fields)
-    near = difflib.get_close_matches(names[-1], keys, n=1)
+    return section
+
+
+def _unknown(names: Sequence[str], dotted: str) -> str:
+    """Say that a key does not exist, with the nearest one that does."""
+    keys = list(_section(names).model_fields)
+    near = [key for key in keys if key.startswith(f"{names[-1]}_")]
+    near = near or difflib.get_close_matches(names[-1], keys, n=1)
     what = "parameter" if names[0] == "draws" and len(names) == 2 else "key of a campaign"
-    choice = f"did you mean {near[0]}?" if near else f"there are {', '.join(keys)}"
+    choice = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(keys)}"
     return f"{dotted} is not a {what}; {choice}"
 
 
 def _spelled(value: object) -> str:
     """Return a value nearly as TOML spells it, shortened."""
+    if isinstance(value, dict) and len(value) == 1:
+        ((key, inner),) = value.items()
+        return f"{{ {echo(str(key))} = {_spelled(inner)} }}"
     try:
         return echo(json.dumps(value, ensure_ascii=False, default=str))
     except ValueError:

@@ -48,7 +48,9 @@ class Store:
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
         """Append finished flights and bring them to the disk; raises UnwritableError."""
         lines = {flight: self._line(flight, row) for flight, row in rows.items()}
-        with refusals(self._table, "; the flights finished so far are kept, and the same command goes on"):
+        with refusals(
+            self._table, "; the flights finished so far are kept, and the same command goes on from there"
+        ):
             self._write("".join(lines.values()).encode())
         self.lines |= lines
 
