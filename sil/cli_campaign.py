@@ -22,7 +22,7 @@ from sil.progress import counting_bar
 from sil.results import SUMMARY, summary_text
 
 PICTURE = "campaign"
-_MOST_FLIGHTS = 1_000_000
+_MOST_FLIGHTS = 100_000
 _MOST_WORKERS = 1024
 
 
@@ -62,9 +62,9 @@ def campaign(
     if workers is not None and scheduler is not None:
         raise typer.BadParameter("it names the workers: leave out --workers", param_hint="--scheduler")
     chosen = file.default() if source is None else file.read(source)
-    with opened(chosen, output) as store:
+    with _pool(workers, scheduler) as pool, opened(chosen, output) as store:
         if missing(store, flights):
-            _fly(chosen, store, flights, _pool(workers, scheduler))
+            _fly(chosen, store, flights, pool)
         summary = _finish(chosen, store)
     text = summary_text("campaign", summary)
     typer.echo(text if as_json else campaign_text(summary, str(output)), nl=not as_json)
@@ -77,10 +77,11 @@ def _pool(workers: int | None, scheduler: str | None) -> AbstractContextManager[
     return processes(workers or os.cpu_count() or 1)
 
 
-def _fly(chosen: Campaign, store: Store, flights: int, pool: AbstractContextManager[Pool]) -> None:
+def _fly(chosen: Campaign, store: Store, flights: int, pool: Pool) -> None:
+    """Fly what is missing; say on Ctrl-C what is kept."""
     try:
-        with pool as held, counting_bar("flying", "flights", flights) as progress:
-            fly_missing(chosen, store, flights, held, progress)
+        with counting_bar("flying", "flights", flights) as progress:
+            fly_missing(chosen, store, flights, pool, progress)
     except KeyboardInterrupt:
         with contextlib.suppress(OSError):
             typer.echo(
