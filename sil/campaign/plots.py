@@ -22,6 +22,7 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
     Flights that crash are missing from the top of a curve.
     """
     rows = 1 if len(names) == 1 else 2
+    other = names[1] if len(names) == 2 else "another"
     with style():
         figure = Figure(figsize=(11.0, 0.6 + 2.7 * rows), layout="constrained")
         panels = figure.subplots(rows, len(COMPARED), squeeze=False, sharey=True)
@@ -36,7 +37,7 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
                 with np.errstate(invalid="ignore", divide="ignore"):
                     _draw_shares(axes, theirs / ours, f"C{colour}", name)
             axes.axvline(1.0, color="#444444", linewidth=0.8)
-            axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: {names[0]} over another")
+            axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: {names[0]} over {other}")
         for axes in panels[:, 0]:
             axes.set_ylabel("share of flights")
         return save(figure, stem)
