@@ -36,6 +36,10 @@ EXIT_CODES = (
     "130 interrupted; 141 nobody reads the output."
 )
 
+Scalar = Annotated[
+    str | None, typer.Option(help="Type of the numbers (code.scalar).", metavar="float32|float64|fixed")
+]
+
 
 class RootGroup(TyperGroup):
     """The root of the command: errors become a message and an exit code, without a traceback."""
@@ -181,6 +185,16 @@ def schema() -> None:
     typer.echo(json.dumps(Settings.json_schema(), indent=2))
 
 
+def load(source: str, scalar: str | None) -> Settings:
+    """Load a preset or a controller.toml, with another scalar type if one is named."""
+    settings = presets.load(source)
+    return (
+        settings
+        if scalar is None
+        else controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
+    )
+
+
 def generate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the bundle.")],
     source: Annotated[str, typer.Argument(help="A preset or a controller.toml.")] = "mambo",
@@ -190,9 +204,7 @@ def generate(
         typer.Option("--check", help="Write nothing; exit 1 with a diff if the folder is not up to date."),
     ] = False,
     prefix: Annotated[str | None, typer.Option(help="Begin public names with this (code.prefix).")] = None,
-    scalar: Annotated[
-        str | None, typer.Option(help="Type of the numbers (code.scalar).", metavar="float32|float64")
-    ] = None,
+    scalar: Scalar = None,
     amalgamate: Annotated[bool, typer.Option("--amalgamate", help="One header and one source.")] = False,
     force: Annotated[
         bool,
@@ -206,11 +218,9 @@ def generate(
     """Generate the C of a controller into a folder."""
     if check and (force or dry_run):
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")
-    settings = presets.load(source)
+    settings = load(source, scalar)
     if prefix is not None:
         settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")
-    if scalar is not None:
-        settings = controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
     files = render(settings, amalgamate=amalgamate)
     if check:
         _report_drifts(bundle.check(files, output), output, as_json=as_json)

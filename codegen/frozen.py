@@ -13,12 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.literals import SCALARS, Scalar
+from codegen.fixed_point import LARGEST
 from codegen.reference import ReferenceController, Step
-from codegen.reference.controller import ATTITUDE_LIMIT_RAD
-from codegen.reference.math import Real
+from codegen.reference.math import Real, rounded
+from codegen.representation import STATE, TARGET, Limits, Representation
 from codegen.settings import Settings
-from codegen.trigonometry import YAW_LIMIT_RAD
 
 TICKS: Final = 100
 """Steps of an episode."""
@@ -33,7 +32,8 @@ _LEAST_WORK: Final = 20
 """What an iteration of few predicted steps and moves takes the reference all the same."""
 _TOGETHER: Final = 250
 """Episodes side by side: few enough for the caches, many enough for NumPy."""
-_UNIT: Final = 1 << 23
+_UNIT_BITS: Final = 23
+_UNIT: Final = 1 << _UNIT_BITS
 """A draw is a whole number in -_UNIT.._UNIT - 1, which every scalar type holds exactly."""
 _MULTIPLIER: Final = 2654435761
 """The prime next to 2**32 over the golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
@@ -44,7 +44,10 @@ Inputs = tuple[Real, Real, Real]
 
 @dataclass(frozen=True)
 class Spread:
-    """How far the frozen inputs lie apart, for each unit of a draw; errors come in four sizes."""
+    """How far the frozen inputs lie apart, for each unit of a draw; errors come in four sizes.
+
+    In fixed point, which has no format for that, for each _UNIT of a draw.
+    """
 
     target_position_m: float
     target_velocity_m_s: float
@@ -53,6 +56,7 @@ class Spread:
     attitude_rad: float
     yaw_rad: float
     thrust_acceleration_m_s2: float
+    hover_m_s2: float
 
 
 def spread(settings: Settings) -> Spread:
@@ -60,18 +64,23 @@ def spread(settings: Settings) -> Spread:
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
     near = 0.25, 0.025, 0.0025
+    fixed, most_m_s2 = settings.code.scalar == "fixed", settings.ranges.thrust_acceleration_max_m_s2
+    hover_m_s2 = min(HOVER_M_S2, most_m_s2) if fixed else HOVER_M_S2
+    thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
+    unit = 1 if fixed else _UNIT
     return Spread(
-        target_position_m=position_m / _UNIT,
-        target_velocity_m_s=velocity_m_s / _UNIT,
+        target_position_m=position_m / unit,
+        target_velocity_m_s=velocity_m_s / unit,
         error_position_m=tuple(
-            error / _UNIT for error in (min(20.0, half_m), *(size * position_m for size in near))
+            error / unit for error in (min(20.0, half_m), *(size * position_m for size in near))
         ),
         error_velocity_m_s=tuple(
-            error / _UNIT for error in (min(10.0, half_m_s), *(size * velocity_m_s for size in near))
+            error / unit for error in (min(10.0, half_m_s), *(size * velocity_m_s for size in near))
         ),
-        attitude_rad=0.5 / _UNIT,
-        yaw_rad=100.0 / _UNIT,
-        thrust_acceleration_m_s2=3.0 / _UNIT,
+        attitude_rad=0.5 / unit,
+        yaw_rad=100.0 / unit,
+        thrust_acceleration_m_s2=thrust_m_s2 / unit,
+        hover_m_s2=hover_m_s2,
     )
 
 
@@ -116,55 +125,77 @@ class _Source:
         self._state = number
         return number
 
-    def draw(self, scalar: Scalar, scale: float | Real) -> Real:
+    def draw(self, numbers: Representation, scale: Real) -> Real:
         """Return the upper 24 bits of the next number, signed, times `scale`: the one rounding of a draw."""
-        whole = (self.next() >> 8).astype(np.int32) - _UNIT
-        drawn: Real = whole.astype(scalar) * np.asarray(scale, scalar)
+        whole = ((self.next() >> 8).astype(np.int32) - _UNIT).astype(numbers.computed)
+        drawn: Real = whole * scale if numbers.formats is None else rounded(whole * scale, _UNIT_BITS)
         return drawn
 
 
 def _next_inputs(settings: Settings, source: _Source) -> Inputs:
     """Draw states, targets and thrusts; five in 64 will be refused."""
-    scalar, scales, ranges = SCALARS[settings.code.scalar], spread(settings), settings.ranges
+    numbers, scales = Representation(settings), spread(settings)
+    limits = numbers.limits(settings)
     choice = source.next()
     size = choice & 3
-    target = [source.draw(scalar, scales.target_position_m) for _ in range(2)]
-    target += [source.draw(scalar, scales.target_velocity_m_s) for _ in range(2)]
-    position, velocity = (
-        np.array(sizes, scalar)[size] for sizes in (scales.error_position_m, scales.error_velocity_m_s)
-    )
-    state: list[Real] = [target[axis] + source.draw(scalar, position) for axis in (0, 1)]
-    state += [target[axis] + source.draw(scalar, velocity) for axis in (2, 3)]
-    state += [source.draw(scalar, scales.attitude_rad) for _ in range(2)]
-    state += [source.draw(scalar, scales.yaw_rad)]
-    thrust = scalar(HOVER_M_S2) + source.draw(scalar, scales.thrust_acceleration_m_s2)
-    thrust = np.maximum(thrust, scalar(ranges.thrust_acceleration_min_m_s2))
-    thrust = np.minimum(thrust, scalar(ranges.thrust_acceleration_max_m_s2))
+
+    def draw(scale: float, quantity: str) -> Real:
+        return source.draw(numbers, numbers.constant(scale, quantity))
+
+    def error(sizes: tuple[float, ...], quantity: str) -> Real:
+        return source.draw(numbers, np.array([numbers.constant(one, quantity) for one in sizes])[size])
+
+    target = [draw(scales.target_position_m, "position") for _ in range(2)]
+    target += [draw(scales.target_velocity_m_s, "velocity") for _ in range(2)]
+    state: list[Real] = [target[axis] + error(scales.error_position_m, "position") for axis in (0, 1)]
+    state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
+    state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
+    state += [draw(scales.yaw_rad, "yaw")]
+    thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_acceleration_m_s2, "thrust")
+    thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
 
     refusal = (choice >> 8) & 63
-    state[0] = np.where(refusal == 0, scalar(np.nan), state[0])
-    state[5] = np.where(refusal == 1, scalar(2) * scalar(ATTITUDE_LIMIT_RAD), state[5])
-    state[6] = np.where(refusal == 2, scalar(2) * scalar(YAW_LIMIT_RAD), state[6])
-    target[3] = np.where(refusal == 3, scalar(-2) * scalar(ranges.velocity_m_s), target[3])
-    thrust = np.where(refusal == 4, scalar(0), thrust)
-    return np.stack(state, axis=1), np.stack(target, axis=1), thrust
+    no_number, roll, yaw, velocity = _refused(numbers, limits)
+    state[0] = np.where(refusal == 0, no_number, state[0])
+    state[5] = np.where(refusal == 1, roll, state[5])
+    state[6] = np.where(refusal == 2, yaw, state[6])
+    target[3] = np.where(refusal == 3, velocity, target[3])
+    thrust = np.where(refusal == 4, numbers.computed(0), thrust)
+    return (
+        np.stack(
+            [numbers.told(value, quantity) for value, quantity in zip(state, STATE, strict=True)], axis=1
+        ),
+        np.stack(
+            [numbers.told(value, quantity) for value, quantity in zip(target, TARGET, strict=True)], axis=1
+        ),
+        numbers.told(thrust, "thrust"),
+    )
+
+
+def _refused(numbers: Representation, limits: Limits) -> tuple[Any, Any, Any, Any]:
+    """Return no number, an attitude, a yaw and a velocity out of range."""
+    if numbers.formats is not None:
+        return LARGEST, LARGEST, LARGEST, -LARGEST
+    two = numbers.scalar(2)
+    return numbers.scalar(np.nan), two * limits.attitude, two * limits.yaw, -two * limits.velocity
 
 
 def _episodes(settings: Settings, episode: Words) -> Words:
     """Return the digests (n,) of n episodes, each by itself."""
-    controller = ReferenceController(settings, len(episode))
+    controller, numbers = ReferenceController(settings, len(episode)), Representation(settings)
     seen = np.zeros_like(episode)
     for inputs in frozen_inputs(settings, episode):
-        for word in _words(controller.step(*inputs)):
+        for word in _words(numbers, controller.step(*inputs)):
             seen = _fold(seen, word)
     return seen
 
 
-def _words(step: Step) -> Iterator[Words]:
+def _words(numbers: Representation, step: Step) -> Iterator[Words]:
     """Yield the outcome of a step in words (n,), the upper one first where a number has two."""
     for whole in (step.status, step.iterations, step.converged):
         yield whole.astype(np.uint32)
-    for real in (step.command_rad, step.cost, step.gradient, step.plan_rad):
+    for name in ("command_rad", "cost", "gradient", "plan_rad"):
+        real = numbers.behind(getattr(step, name), name)
         rows = np.ascontiguousarray(real.reshape(len(real), -1))
         yield from rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T
 

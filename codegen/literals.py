@@ -1,16 +1,46 @@
 """Spell Python values as C tokens: the one place that knows C's lexical rules."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
+from codegen.fixed_point import LARGEST, raw
+
 Scalar = type[np.floating[Any]]
-"""The scalar type of a controller, `numpy.float32` or `numpy.float64`."""
+"""The scalar type of a floating point controller, `numpy.float32` or `numpy.float64`."""
 
 SCALARS: Final[dict[str, Scalar]] = {"float32": np.float32, "float64": np.float64}
-C_TYPES: Final[dict[str, str]] = {"float32": "float", "float64": "double"}
+C_TYPES: Final[dict[str, str]] = {"float32": "float", "float64": "double", "fixed": "int"}
+SUM_TYPES: Final[dict[str, str]] = C_TYPES | {"fixed": "long long"}
+_INDENT: Final = 4
+_WIDTH: Final = 110
 _SUFFIXES: Final[dict[str, str]] = {"float32": "f", "float64": ""}
+
+
+class Spelling:
+    """How one controller's constants are spelled, by the quantity that each is of.
+
+    Floating point has one format for all. In fixed point `bits` names those of each quantity.
+    """
+
+    def __init__(self, scalar: str, bits: Mapping[str, int] | None = None) -> None:
+        self._scalar = scalar
+        self._bits = bits
+
+    def real(self, value: float, quantity: str = "") -> str:
+        """Spell one number; of no quantity, one for the user's own arithmetic, always floating point."""
+        if self._bits is None:
+            return real(value, self._scalar)
+        return fixed(value, self._bits[quantity]) if quantity else real(value, "float32")
+
+    def rows(self, values: Iterable[Sequence[float]], quantity: str = "") -> str:
+        """Spell a two-dimensional table, a brace-enclosed row for each sequence."""
+        return ",\n".join(_row([self.real(value, quantity) for value in row]) for row in values)
+
+    def row(self, values: Sequence[float], quantity: str = "", indent: int = _INDENT) -> str:
+        """Spell a one-dimensional table without its braces."""
+        return _wrapped([self.real(value, quantity) for value in values], " " * indent)
 
 
 def real(value: float, scalar: str) -> str:
@@ -24,25 +54,21 @@ def real(value: float, scalar: str) -> str:
     return f"{rounded!s}{_SUFFIXES[scalar]}"
 
 
-def rows(values: Iterable[Sequence[float]], scalar: str, indent: int = 4, width: int = 110) -> str:
-    """Spell a two-dimensional table, a brace-enclosed row for each sequence, wrapped at `width` columns."""
-    return ",\n".join(_row([real(value, scalar) for value in row], indent, width) for row in values)
+def fixed(value: float, bits: int) -> str:
+    """Spell the number of format `bits` nearest to `value`, of 64 bits if it does not fit in 32."""
+    number = raw(value, bits)
+    return f"{number}LL" if abs(number) > LARGEST else str(number)
 
 
-def row(values: Sequence[float], scalar: str, indent: int = 4, width: int = 110) -> str:
-    """Spell a one-dimensional table without its braces, wrapped at `width` columns."""
-    return _wrapped([real(value, scalar) for value in values], " " * indent, width)
+def _row(words: list[str]) -> str:
+    margin = " " * _INDENT
+    return f"{margin}{{ {_wrapped(words, margin + '  ').lstrip()} }}"
 
 
-def _row(words: list[str], indent: int, width: int) -> str:
-    margin = " " * indent
-    return f"{margin}{{ {_wrapped(words, margin + '  ', width).lstrip()} }}"
-
-
-def _wrapped(words: list[str], margin: str, width: int) -> str:
+def _wrapped(words: list[str], margin: str) -> str:
     lines = [margin]
     for word in (*(f"{word}," for word in words[:-1]), words[-1]):
-        if lines[-1] != margin and len(lines[-1]) + len(word) + 1 > width:
+        if lines[-1] != margin and len(lines[-1]) + len(word) + 1 > _WIDTH:
             lines.append(margin)
         lines[-1] += word if lines[-1] == margin else f" {word}"
     return "\n".join(lines)

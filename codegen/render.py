@@ -1,13 +1,15 @@
 """Render the templates: settings in, {path: text} of a bundle out; a pure function, no clock and no path."""
 
+import math
 import re
-from functools import partial
+from collections.abc import Sequence
 from typing import Final
 
 import jinja2
 
 import codegen
 from codegen import boards, literals
+from codegen.fixed_point import SINE_BITS
 from codegen.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
@@ -16,13 +18,14 @@ from codegen.flags import (
     RULE_FLAGS,
     WARNING_FLAGS,
 )
-from codegen.frozen import HELD, HOVER_M_S2, TICKS, episodes, frozen_digest, spread
+from codegen.frozen import HELD, TICKS, episodes, frozen_digest, spread
 from codegen.horizon import horizon_tables
-from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
+from codegen.representation import STATE, THRUST, WEIGHTS, Representation
 from codegen.self_test import hover_thrust, self_test
 from codegen.settings import Settings
 from codegen.settings.controller_toml import to_toml
-from codegen.trigonometry import SINE_ERRORS, YAW_LIMIT_RAD, trigonometry
+from codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from codegen.trigonometry import SINE_ERRORS, fixed_trigonometry, trigonometry
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
 SUB_BLOCKS: Final = ("nmpc_math", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
@@ -40,7 +43,8 @@ DEVIATIONS: Final = "deviations.txt"
 
 _OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
 _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
-_REAL_BYTES: Final = {"float32": 4, "float64": 8}
+_BYTES: Final = {"float32": (4, 4), "float64": (8, 8), "fixed": (4, 8)}
+"""Size of a number and of a sum."""
 
 
 def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = True) -> dict[str, str]:
@@ -49,28 +53,35 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     With `amalgamate` the library is one header and one source in the bundle's folder. Only `with_digest` does
     the header state the digest of the frozen steps: what is compiled to run at once need not wait for it.
     """
-    environment = _environment(settings.code.scalar)
-    headers = {name: environment.get_template(f"include/{name}.j2") for name in PUBLIC_HEADERS}
+    numbers = Representation(settings)
+    environment = _environment(literals.Spelling(settings.code.scalar, numbers.bits))
+    public: tuple[str, ...] = PUBLIC_HEADERS
+    code: tuple[str, ...] = SOURCES
+    if numbers.formats is not None:
+        public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
+    headers = {name: environment.get_template(f"include/{name}.j2") for name in public}
     privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in SUB_BLOCKS}
-    sources = {name: environment.get_template(f"src/{name}.j2") for name in SOURCES}
+    sources = {name: environment.get_template(f"src/{name}.j2") for name in code}
     others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
 
-    context = _context(settings) | {
+    context = _context(settings, numbers) | {
         "amalgamated": amalgamate,
         "frozen_digest": frozen_digest(settings, episodes(settings)) if with_digest else None,
     }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "sources": ["nmpc.c"]}
-        library = _amalgamated(text)
+        library = _amalgamated(text, public, code)
     else:
         layout = {
             "header_folder": "include/",
             "source_folder": "src/",
-            "sources": [f"src/{name}" for name in SOURCES],
+            "sources": [f"src/{name}" for name in code],
         }
-        library = {_home(name): content for name, content in text.items()}
+        library = {
+            f"include/{name}" if name in public else f"src/{name}": content for name, content in text.items()
+        }
     files = library | {path: template.render(context | layout) for path, template in project.items()}
     prefix = settings.code.prefix
     named = {with_prefix(path, prefix): with_prefix(text, prefix) for path, text in files.items()}
@@ -82,7 +93,7 @@ def with_prefix(text: str, prefix: str) -> str:
     return _OWN_NAME.sub(lambda name: prefix if name[1] == "nmpc" else prefix.upper(), text)
 
 
-def _environment(scalar: str) -> jinja2.Environment:
+def _environment(spelling: literals.Spelling) -> jinja2.Environment:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("templates", ""),
         undefined=jinja2.StrictUndefined,
@@ -91,14 +102,11 @@ def _environment(scalar: str) -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.filters |= {
-        spell.__name__: partial(spell, scalar=scalar)
-        for spell in (literals.real, literals.row, literals.rows)
-    }
+    environment.filters |= {"real": spelling.real, "row": spelling.row, "rows": spelling.rows}
     return environment
 
 
-def _context(settings: Settings) -> dict[str, object]:
+def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
     """Decide everything that the templates only arrange."""
     tables = horizon_tables(settings)
     scalar = settings.code.scalar
@@ -112,22 +120,29 @@ def _context(settings: Settings) -> dict[str, object]:
         ],
         "version": codegen.__version__,
         "digest": settings.digest[:16],
+        "fixed": numbers.formats is not None,
+        "formats": numbers.formats,
+        "sine_bits": SINE_BITS,
+        "scales": _powers(numbers, 1),
+        "units": _powers(numbers, -1),
         "c_type": literals.C_TYPES[scalar],
-        "scalar_bytes": _REAL_BYTES[scalar],
+        "shell": "nmpc_float_" if numbers.formats else "nmpc_",
+        "sum_type": literals.SUM_TYPES[scalar],
+        "scalar_bytes": _BYTES[scalar][0],
         "instance_bytes": _instance_bytes(settings, has_lag=tables.has_lag),
         "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
         "tables": tables,
-        "trigonometry": trigonometry(scalar),
+        "trigonometry": fixed_trigonometry(numbers.formats) if numbers.formats else trigonometry(scalar),
         "sine_error": SINE_ERRORS[scalar],
-        "weight_limit": WEIGHT_LIMIT,
+        "tracking_limit": numbers.tracking_limit,
+        "effort_limit": numbers.effort_limit,
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
         "vectors": self_test(settings),
         "episodes": episodes(settings),
         "ticks": TICKS,
         "held": HELD,
-        "hover_m_s2": HOVER_M_S2,
         "frozen_steps": TICKS * episodes(settings),
         "spread": spread(settings),
         "boards": [
@@ -150,25 +165,31 @@ def _context(settings: Settings) -> dict[str, object]:
     }
 
 
+def _powers(numbers: Representation, sign: int) -> dict[str, str]:
+    """Spell by quantity the numbers per unit, or with sign -1 the units per number, for floats."""
+    bits = numbers.bits or {}
+    return {
+        name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
+        for name in (*STATE, *THRUST, *WEIGHTS, "cost")
+        if bits
+    }
+
+
 def _instance_bytes(settings: Settings, *, has_lag: bool) -> int:
-    """Count the members of nmpc_t: scalars, then single bytes, padded to a whole scalar."""
+    """Count the members of nmpc_t: numbers, sums, single bytes, each padded to what follows."""
     moves = 2 * settings.horizon.control
-    weights, gains, tilt, walks, command, cost = 2, 4, 2, 2 * (5 if has_lag else 3), 2, 1
+    weights, gains, tilt, walks, command = 2, 4, 2, 2 * (5 if has_lag else 3), 2
     flags = 2
-    scalars = weights + gains + tilt + walks + command + cost + (2 * moves)
-    scalar_bytes = _REAL_BYTES[settings.code.scalar]
-    return (scalars + -(-flags // scalar_bytes)) * scalar_bytes
+    numbers, sums = weights + gains + tilt + walks + command + moves, moves + 1
+    number_bytes, sum_bytes = _BYTES[settings.code.scalar]
+    before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
+    return -(-(before_flags + flags) // sum_bytes) * sum_bytes
 
 
-def _home(name: str) -> str:
-    return f"include/{name}" if name in PUBLIC_HEADERS else f"src/{name}"
-
-
-def _amalgamated(text: dict[str, str]) -> dict[str, str]:
+def _amalgamated(text: dict[str, str], public: Sequence[str], code: Sequence[str]) -> dict[str, str]:
     """Join the library into one header and one source: each file once, in order, without our own includes."""
-    header = [text[name] for name in PUBLIC_HEADERS]
-    source = [text[f"{block}{ending}"] for ending in (".h", ".c") for block in SUB_BLOCKS]
-    source += [text["nmpc.c"], text["nmpc_self_test.c"]]
+    header = [text[name] for name in public]
+    source = [text[f"{block}.h"] for block in SUB_BLOCKS] + [text[name] for name in code]
     return {
         "nmpc.h": _OWN_INCLUDE.sub("", "\n".join(header)),
         "nmpc.c": '#include "nmpc.h"\n\n' + _OWN_INCLUDE.sub("", "\n".join(source)),

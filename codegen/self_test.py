@@ -38,7 +38,8 @@ def self_test(settings: Settings) -> list[SelfTestStep]:
     ranges = settings.ranges
     position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
     spread = _spread()
-    tiny = float(np.finfo(SCALARS[settings.code.scalar]).smallest_normal) / 100
+    scalar = settings.code.scalar
+    tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
     steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, hover_thrust(settings))]
     for index in range(1, STEPS):
         target = [_next(spread, scale) for scale in (position_m, position_m, speed_m_s, speed_m_s)]

@@ -13,16 +13,15 @@ from typing import Final
 
 import numpy as np
 
+from codegen.fixed_point import SINE_BITS, WORD_BITS, Formats
 from codegen.literals import SCALARS
 
-YAW_LIMIT_RAD: Final = 1024.0
-"""Largest heading, either way, for which the reduction is exact: 652 quarter turns fit in ten bits."""
-
-SINE_ERRORS: Final = {"float32": 1.2e-7, "float64": 2.3e-16}
-"""Largest absolute error of sine and cosine within YAW_LIMIT_RAD: about one ulp of 1."""
+SINE_ERRORS: Final = {"float32": 1.2e-7, "float64": 2.3e-16, "fixed": 2e-9}
+"""Largest absolute error of sine and cosine within YAW_LIMIT_RAD: about one ulp of 1; two in fixed point."""
 
 _QUARTER_TURN: Final = Fraction(Decimal("3.14159265358979323846264338327950288419716939937510582")) / 2
 _TURN_BITS: Final = 10
+_FINE_BITS: Final = 40
 
 
 @dataclass(frozen=True)
@@ -37,6 +36,46 @@ class Trigonometry:
     quarter_turn_rad: tuple[float, float, float]
     sine: tuple[float, ...]
     cosine: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FixedTrigonometry:
+    """The same in whole numbers: coefficients and rest in the format SINE_BITS.
+
+    quarter_turns_per_rad: 2/pi; an angle times that has `quarter_turns_bits` behind the point.
+    quarter_turn:          pi/2 in the format `fine_bits`, which an angle times 2^`finer_bits` has too.
+    """
+
+    quarter_turns_per_rad: int
+    quarter_turns_bits: int
+    quarter_turn: int
+    fine_bits: int
+    finer_bits: int
+    sine: tuple[int, ...]
+    cosine: tuple[int, ...]
+
+
+def fixed_trigonometry(formats: Formats) -> FixedTrigonometry:
+    """Derive the constants for yaws of the format of `formats`."""
+    return FixedTrigonometry(
+        quarter_turns_per_rad=round(2**WORD_BITS / _QUARTER_TURN),
+        quarter_turns_bits=WORD_BITS + formats.yaw,
+        quarter_turn=round(2**_FINE_BITS * _QUARTER_TURN),
+        fine_bits=_FINE_BITS,
+        finer_bits=_FINE_BITS - formats.yaw,
+        sine=_fixed_taylor(3),
+        cosine=_fixed_taylor(2),
+    )
+
+
+def _fixed_taylor(first_power: int) -> tuple[int, ...]:
+    """Collect coefficients until a term at pi/4 is below a quarter of the resolution."""
+    coefficients: list[int] = []
+    power, sign = first_power, -1
+    while (_QUARTER_TURN / 2) ** power / factorial(power) > Fraction(1, 2 ** (SINE_BITS + 2)):
+        coefficients.append(round(Fraction(sign * 2**SINE_BITS, factorial(power))))
+        power, sign = power + 2, -sign
+    return tuple(coefficients)
 
 
 def trigonometry(scalar: str) -> Trigonometry:

@@ -8,8 +8,8 @@
 typedef struct {
     int *status;
     nmpc_command_t *command;
-    nmpc_real_t *cost;
-    nmpc_real_t *gradient;
+    nmpc_sum_t *cost;
+    nmpc_sum_t *gradient;
     nmpc_real_t *plan_rad;
     int *iterations;
     int *converged;

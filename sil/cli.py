@@ -17,8 +17,8 @@ from codegen import boards, presets
 from codegen import cli as generating
 from codegen.errors import echo
 from codegen.footprint.build import builder
-from codegen.literals import SCALARS
 from codegen.reference import ReferenceController
+from codegen.representation import TARGET, Representation
 from codegen.settings import Settings
 from sil import cli_boards, cli_campaign, cli_faults, cli_verify, report, table2_sensed
 from sil.baseline import PdController
@@ -137,6 +137,7 @@ def fly(
     motor_lag_s: Annotated[float, typer.Option(help="Time constant of the motors, in s.")] = 0.0,
     start: Annotated[Start, typer.Option(help="In the air, or 5 s earlier on the ground.")] = Start.HOVER,
     duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0,
+    scalar: generating.Scalar = None,
     on: Annotated[
         str | None,
         typer.Option(
@@ -155,7 +156,7 @@ def fly(
     if replay is not None:
         fly_again(context, replay, output, as_json=as_json)
         return
-    settings = presets.load(source)
+    settings = generating.load(source, scalar)
     name, period_s = echo(source), settings.horizon.update_period_s
     curve = _trajectory(trajectory, size_m, rate_rad_s)
     wind_m_s2 = (0.0, 0.0) if wind == GUSTS else _wind(wind)
@@ -314,13 +315,22 @@ def _trajectory(name: str, size_m: float, rate_rad_s: float) -> Trajectory:
 
 def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
     """Raise FlightError if the controller would refuse a target, compared in its own scalar type."""
-    scalar, ranges = SCALARS[settings.code.scalar], settings.ranges
-    x, y, vx, vy = np.abs(flight.targets()[:, 0]).max(axis=0).astype(scalar)
-    for what, largest, unit, key, limit in (
-        ("position", max(x, y), "m", "position_m", ranges.position_m),
-        ("speed", max(vx, vy), "m/s", "velocity_m_s", ranges.velocity_m_s),
+    numbers, ranges = Representation(settings), settings.ranges
+    limits = numbers.limits(settings)
+    given = np.abs(flight.targets()[:, :1]).max(axis=0)
+    x, y, vx, vy = numbers.taken(given, TARGET)[0]
+    for what, refused, largest, unit, key, limit in (
+        ("position", max(x, y) > limits.position, given[0, :2].max(), "m", "position_m", ranges.position_m),
+        (
+            "speed",
+            max(vx, vy) > limits.velocity,
+            given[0, 2:].max(),
+            "m/s",
+            "velocity_m_s",
+            ranges.velocity_m_s,
+        ),
     ):
-        if largest > scalar(limit):
+        if refused:
             raise FlightError(
                 f"--trajectory {echo(trajectory)}: the target's {what} along an axis, up to {largest:g} "
                 f"{unit}, exceeds ranges.{key} = {limit:g}; the controller would refuse it"

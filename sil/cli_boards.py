@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from codegen import boards, presets
+from codegen import boards
 from codegen import cli as generating
 from codegen.boards import Board
 from codegen.errors import BuildError, InvalidSettingsError, echo
@@ -59,6 +59,7 @@ def register(app: typer.Typer) -> None:
 def footprint(
     source: Source = "mambo",
     *,
+    scalar: generating.Scalar = None,
     board: Annotated[
         str, typer.Option(help=f"{', '.join(boards.names())}, all, or a board's TOML file.")
     ] = "all",
@@ -67,7 +68,7 @@ def footprint(
     as_json: AsJson = False,
 ) -> None:
     """Measure flash, RAM, stack and instructions on a board, and hold them against its budget."""
-    settings = presets.load(source)
+    settings = generating.load(source, scalar)
     chosen = _boards(board)
     with contextlib.ExitStack() as stack:
         folder = output and stack.enter_context(new_results(output, "footprint", FOOTPRINT_FILES))
@@ -91,6 +92,7 @@ def footprint(
 def same_bits_command(
     source: Source = "mambo",
     *,
+    scalar: generating.Scalar = None,
     board: Annotated[
         str, typer.Option("--boards", help="Boards, separated by commas, or all.", metavar="NAME,NAME")
     ] = "all",
@@ -104,7 +106,7 @@ def same_bits_command(
     as_json: AsJson = False,
 ) -> None:
     """Run the same frozen steps in every build at hand; exit 1 unless all digests are one."""
-    settings = presets.load(source)
+    settings = generating.load(source, scalar)
     chosen = [one for name in board.split(",") for one in _boards(name)]
     count = episodes(settings) if steps is None else steps // TICKS
     found: list[BuildDigest] = []
@@ -134,6 +136,7 @@ def same_bits_command(
 def sweep_command(
     source: Source = "mambo",
     *,
+    scalar: generating.Scalar = None,
     board: Annotated[str, typer.Option(help="Board, or its TOML file.")] = "crazyflie",
     prediction: Annotated[
         str, typer.Option(help="Prediction horizons.", metavar="FIRST:LAST[:STEP]")
@@ -151,7 +154,7 @@ def sweep_command(
     as_json: AsJson = False,
 ) -> None:
     """Measure footprint and tracking over a grid of horizons and iterations."""
-    settings = presets.load(source)
+    settings = generating.load(source, scalar)
     chosen = boards.load(board)
     grid = Grid(
         _numbers("--prediction", prediction, 50),

@@ -1,14 +1,15 @@
 """The compiled controller: the generated C behind the interface of the reference."""
 
+from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.literals import SCALARS, Scalar
 from codegen.reference import Step
 from codegen.render import render
+from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
 from codegen.settings import Settings
 from codegen.toolchain import Toolchain, host_toolchain
 from sil.extension import load_extension
@@ -33,12 +34,28 @@ def compiled_digest(extension: ModuleType, episodes: int) -> int:
     return digest
 
 
-def as_array(values: ArrayLike, scalar: Scalar, shape: tuple[int, ...]) -> NDArray[Any]:
-    """Return `values` as a contiguous array of `scalar`; raises ValueError if the shape is another."""
-    array = np.ascontiguousarray(values, scalar)
-    if array.shape != shape:
-        raise ValueError(f"expected an array of shape {shape}, got {array.shape}")
-    return array
+def as_arrays(
+    numbers: Representation, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
+) -> list[NDArray[Any]]:
+    """Return inputs of n controllers as they read them; raises ValueError if a shape is another."""
+    return [
+        as_array(numbers, values, quantities, shape)
+        for values, quantities, shape in (
+            (state, STATE, (n, 7)),
+            (target, TARGET, (n, 4)),
+            (thrust, THRUST, (n,)),
+        )
+    ]
+
+
+def as_array(
+    numbers: Representation, values: ArrayLike, quantities: Sequence[str], shape: tuple[int, ...]
+) -> NDArray[Any]:
+    """Return `values` as the C reads them, contiguous; raises ValueError if the shape is another."""
+    given = np.asarray(values)
+    if given.shape != shape:
+        raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
+    return np.ascontiguousarray(numbers.taken(given.reshape(-1, len(quantities)), quantities).reshape(shape))
 
 
 DIRT = b"\xa5"
@@ -50,7 +67,8 @@ class CompiledController:
 
     def __init__(self, settings: Settings, n: int = 1, extension: ModuleType | None = None) -> None:
         self.settings = settings
-        self.scalar = SCALARS[settings.code.scalar]
+        self._numbers = Representation(settings)
+        self.scalar = self._numbers.scalar
         self._n = n
         self._moves = (settings.horizon.control, 2)
         extension = extension or compiled(settings, host_toolchain())
@@ -61,28 +79,26 @@ class CompiledController:
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Start all controllers over from `command_rad` (n, 2), clamped; returns a status (n,)."""
-        return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad)
+        return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad, COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
         """Replace tracking and effort weight by `weights` (n, 2); returns a status (n,)."""
-        return self._set_each(self._lib.nmpc_set_weights, "nmpc_weights_t", weights)
+        return self._set_each(self._lib.nmpc_set_weights, "nmpc_weights_t", weights, WEIGHTS)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
         n = self._n
         status, iterations, converged = (np.empty(n, np.intc) for _ in range(3))
-        command, cost = np.empty((n, 2), self.scalar), np.empty(n, self.scalar)
-        gradient, plan = (np.empty((n, *self._moves), self.scalar) for _ in range(2))
-        inputs = [
-            as_array(values, self.scalar, shape)
-            for values, shape in ((state, (n, 7)), (target, (n, 4)), (thrust_acceleration_m_s2, (n,)))
-        ]
+        scalar, wide, told = self.scalar, self._numbers.wide, self._numbers.told
+        command, plan = np.empty((n, 2), scalar), np.empty((n, *self._moves), scalar)
+        cost, gradient = np.empty(n, wide), np.empty((n, *self._moves), wide)
+        inputs = as_arrays(self._numbers, n, state, target, thrust_acceleration_m_s2)
         outcome = self._ffi.new("nmpc_outcome_t *")
         for name, kind, values in (
             ("status", "int", status),
             ("command", "nmpc_command_t", command),
-            ("cost", "nmpc_real_t", cost),
-            ("gradient", "nmpc_real_t", gradient),
+            ("cost", "nmpc_sum_t", cost),
+            ("gradient", "nmpc_sum_t", gradient),
             ("plan_rad", "nmpc_real_t", plan),
             ("iterations", "int", iterations),
             ("converged", "int", converged),
@@ -98,10 +114,10 @@ class CompiledController:
         )
         return Step(
             status=status.astype(np.int64),
-            command_rad=command,
-            cost=cost,
-            gradient=gradient,
-            plan_rad=plan,
+            command_rad=told(command, "angle"),
+            cost=told(cost, "cost"),
+            gradient=told(gradient, "gradient"),
+            plan_rad=told(plan, "angle"),
             iterations=iterations.astype(np.int64),
             converged=converged.astype(np.bool_),
         )
@@ -109,8 +125,10 @@ class CompiledController:
     def _pointer(self, kind: str, array: NDArray[Any]) -> Any:
         return self._ffi.cast(f"{kind} *", self._ffi.from_buffer(array))
 
-    def _set_each(self, function: Any, kind: str, values: ArrayLike) -> NDArray[np.int64]:
-        array = as_array(values, self.scalar, (self._n, 2))
+    def _set_each(
+        self, function: Any, kind: str, values: ArrayLike, quantities: Sequence[str]
+    ) -> NDArray[np.int64]:
+        array = as_array(self._numbers, values, quantities, (self._n, 2))
         pointer = self._pointer(kind, array)
         return np.array(
             [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)],

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from codegen.footprint.build import Builder
 from codegen.frozen import TICKS
-from codegen.literals import SCALARS
 from codegen.reference import Step
 from codegen.render import render
+from codegen.representation import OUTCOME, Representation
 from codegen.settings import Settings
-from sil.compiled import DIRT, as_array, plainly_named
+from sil.compiled import DIRT, as_arrays, plainly_named
 from sil.errors import EmulatorError
 from sil.machine import TIME_LIMIT_S, start
 from sil.machine_avr import Long
@@ -49,7 +49,9 @@ class EmulatedController:
         self, settings: Settings, elf: Path, core: str, n: int = 1, *, counting: bool = False
     ) -> None:
         self.settings = settings
-        self.scalar = SCALARS[settings.code.scalar]
+        self._numbers = Representation(settings)
+        self.scalar = self._numbers.scalar
+        real, wide = np.dtype(self.scalar), np.dtype(self._numbers.wide)
         self._n = n
         horizon = settings.horizon
         work = _work(settings)
@@ -58,16 +60,15 @@ class EmulatedController:
         integer = np.dtype(f"<i{self.machine.word_bytes}")
         self._shapes = {
             "status": (integer, ()),
-            "command_rad": (np.dtype(self.scalar), (2,)),
-            "cost": (np.dtype(self.scalar), ()),
-            "gradient": (np.dtype(self.scalar), (horizon.control, 2)),
-            "plan_rad": (np.dtype(self.scalar), (horizon.control, 2)),
+            "command_rad": (real, (2,)),
+            "cost": (wide, ()),
+            "gradient": (wide, (horizon.control, 2)),
+            "plan_rad": (real, (horizon.control, 2)),
             "iterations": (integer, ()),
             "converged": (integer, ()),
         }
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
-        real = np.dtype(self.scalar).itemsize
-        sizes = [self._instance_bytes, 7 * real, 4 * real, real]
+        sizes = [self._instance_bytes, *(width * real.itemsize for width in (7, 4, 1))]
         sizes += [kind.itemsize * math.prod(shape) for kind, shape in self._shapes.values()]
         self._together = min(n, max(1, _WORK_A_CALL // work), self._room(sizes) // sum(sizes))
         if self._together < 1:
@@ -86,8 +87,7 @@ class EmulatedController:
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
-        given = (state, (self._n, 7)), (target, (self._n, 4)), (thrust_acceleration_m_s2, (self._n,))
-        inputs = [as_array(values, self.scalar, shape) for values, shape in given]
+        inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
         outcome = {name: np.empty((self._n, *shape), kind) for name, (kind, shape) in self._shapes.items()}
         for few in self._visits():
             for address, values in zip(self._inputs, inputs, strict=True):
@@ -96,6 +96,8 @@ class EmulatedController:
             for name, values in outcome.items():
                 content = self.machine.read(self._outputs[name], values[few].nbytes)
                 values[few] = np.frombuffer(content, values.dtype).reshape(values[few].shape)
+        for name, quantity in OUTCOME.items():
+            outcome[name] = self._numbers.told(outcome[name], quantity)
         return Step(
             **outcome
             | {

@@ -20,13 +20,14 @@ import cffi
 
 from codegen.errors import BuildError
 from codegen.flags import COMPILE_FLAGS
-from codegen.literals import C_TYPES
+from codegen.literals import C_TYPES, SUM_TYPES
 from codegen.toolchain import Toolchain
 from sil.cache import cached
 from sil.errors import CacheError
 
 _DECLARATIONS: Final = """
 typedef REAL nmpc_real_t;
+typedef SUM nmpc_sum_t;
 typedef int... nmpc_status_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
@@ -38,7 +39,8 @@ typedef struct { ...; } nmpc_t;
 typedef struct {
     int *status;
     nmpc_command_t *command;
-    nmpc_real_t *cost, *gradient, *plan_rad;
+    nmpc_sum_t *cost, *gradient;
+    nmpc_real_t *plan_rad;
     int *iterations, *converged;
 } nmpc_outcome_t;
 
@@ -54,8 +56,8 @@ void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
 void nmpc_predictor_turn(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_walk_t *, nmpc_walk_t *);
 void nmpc_predictor_walk(nmpc_walk_t *);
-nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *, const nmpc_weights_t *, const nmpc_real_t *,
-                               const nmpc_real_t *, nmpc_real_t *);
+nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *, const nmpc_weights_t *, const nmpc_real_t *,
+                              const nmpc_real_t *, nmpc_sum_t *);
 
 void nmpc_batch_init(nmpc_t *, int);
 void nmpc_batch_step(nmpc_t *, int, const nmpc_state_t *, const nmpc_target_t *, const nmpc_real_t *,
@@ -105,7 +107,7 @@ def _place(files: dict[str, str], folder: Path) -> None:
 
 def _emit_glue(name: str, glue: str, scalar: str, folder: Path) -> None:
     ffi = cffi.FFI()
-    ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]))
+    ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar]))
     ffi.set_source(name, glue, compiler_verbose=0)
     ffi.emit_c_code(str(folder / "extension.c"))
 

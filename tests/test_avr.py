@@ -15,6 +15,7 @@ from codegen.footprint.elf import FootprintError, load
 from codegen.footprint.stack import StackReport, worst_case
 from codegen.frozen import frozen_digest
 from codegen.render import render
+from codegen.settings.controller_toml import with_option
 from sil.emulated import GUEST, EmulatedController, build_guest, emulated_digest
 from sil.errors import EmulationError, EmulatorError
 from sil.machine import Machine, start
@@ -30,7 +31,10 @@ static nmpc_t scratch;
 long run(void);
 long run(void) { return nmpc_self_test(&scratch); }
 """
-EFFORT = "return (weights->tracking * distance_m) + (weights->effort * variation_rad);"
+EFFORT = (
+    "return nmpc_tracking_cost(weights->tracking, distance_m)"
+    " + nmpc_effort_cost(weights->effort, variation_rad);"
+)
 HARMED = (
     "return (weights->effort * variation_rad) + (weights->tracking * (distance_m + (nmpc_real_t)0.001f));"
 )
@@ -57,10 +61,12 @@ def mega() -> Builder:
     return board_builder("mega")
 
 
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
 @pytest.mark.parametrize("preset", ["mambo", "table1"])
-def test_the_self_test_passes_on_eight_bits(preset: str, tmp_path: Path) -> None:
+def test_the_self_test_passes_on_eight_bits(preset: str, scalar: str, tmp_path: Path) -> None:
     """Every step of it has the bits of the reference: zero, no first difference."""
-    assert self_test(render(presets.load(preset), with_digest=False), tmp_path).call("run") == 0
+    settings = with_option(presets.load(preset), "code.scalar", scalar, "test")
+    assert self_test(render(settings, with_digest=False), tmp_path).call("run") == 0
 
 
 def test_the_self_test_sees_a_harmed_controller_on_eight_bits(tmp_path: Path) -> None:
@@ -71,10 +77,14 @@ def test_the_self_test_sees_a_harmed_controller_on_eight_bits(tmp_path: Path) ->
     assert self_test(harmed, tmp_path).call("run") == 1
 
 
-@pytest.mark.parametrize("preset", ["mambo", "table1"])
-def test_frozen_steps_have_their_digest_on_eight_bits(preset: str, mega: Builder, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("preset", "scalar"), [("mambo", "float32"), ("table1", "float32"), ("mambo", "fixed")]
+)
+def test_frozen_steps_have_their_digest_on_eight_bits(
+    preset: str, scalar: str, mega: Builder, tmp_path: Path
+) -> None:
     """Two episodes of it, as the reference has them."""
-    settings = presets.load(preset)
+    settings = with_option(presets.load(preset), "code.scalar", scalar, "test")
     elf = build_guest(settings, mega, tmp_path)
     assert emulated_digest(settings, elf, "avr", 2) == frozen_digest(settings, 2)
 

@@ -25,6 +25,9 @@ GCC_STRICT = [*STRICT, "-Wunsuffixed-float-constants"]
 SETTINGS = {name: presets.load(name) for name in presets.names()} | {
     f"case {index}": settings_case(index, "float32") for index in (0, 3, 9)
 }
+SETTINGS |= {f"fixed case {index}": settings_case(index, "fixed") for index in (0, 3, 9)} | {
+    "fixed mambo": with_option(SETTINGS["mambo"], "code.scalar", "fixed", "test")
+}
 SYSTEM_HEADERS = """
     assert complex ctype dirent dlfcn errno fcntl fenv float fmtmsg glob iconv inttypes limits locale
     math mqueue netinet/in poll pthread regex sched semaphore setjmp signal spawn stdarg stdatomic

@@ -14,7 +14,7 @@ from sil.emulated import GUEST, EmulatedController, build_guest
 from sil.errors import EmulationError
 from sil.machine import CORES as KNOWN_CORES
 from sil.machine import Machine, start
-from tests.support.cases import settings_case
+from tests.support.cases import SCALARS, settings_case
 from tests.support.parity import Run, differences, inputs_of_steps
 from tests.support.tools import board_builder
 
@@ -26,8 +26,13 @@ CORES = {
     "rv32": "rv32",
     "mega": "avr",
 }
-SCALARS = ("float32", "float64")
-QUICK_CASES = {"mambo": (0, 5), "rp2040": (1, 9), "crazyflie": (3, 8), "teensy41": (4, 5), "rv32": (2, 6)}
+QUICK_CASES = {
+    "mambo": (0, 5, 4),
+    "rp2040": (1, 9, 6),
+    "crazyflie": (3, 8, 2),
+    "teensy41": (4, 5, 0),
+    "rv32": (2, 6, 8),
+}
 """Settings of each board in a quick run, one for each scalar type: corners of the horizon, random ones."""
 LONG_CASES = range(12)
 AVR_CASES = {case: case in {0, 6} for case in range(12) if case != 4}
@@ -73,7 +78,11 @@ def cases() -> list[object]:
         for column, scalar in enumerate(SCALARS)
         for index in LONG_CASES
     ]
-    chosen += [("mega", "float32", index, quick) for index, quick in AVR_CASES.items()]
+    chosen += [
+        ("mega", scalar, index, quick)
+        for scalar in ("float32", "fixed")
+        for index, quick in AVR_CASES.items()
+    ]
     return [
         pytest.param(*case, marks=[] if quick else pytest.mark.long, id=" ".join(map(str, case)))
         for *case, quick in chosen

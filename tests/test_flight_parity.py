@@ -16,6 +16,7 @@ from sil.plant.vehicle import Vehicle
 from sil.table2 import PRINTED_IMPROVEMENT
 from sil.traces import Trace
 from sil.trajectories import Bernoulli
+from tests.support.cases import SCALARS
 from tests.support.tools import toolchain
 
 CASE = Bernoulli(2.0, 0.5)
@@ -38,7 +39,7 @@ def assert_same_bits(a: Trace, b: Trace) -> None:
         assert getattr(a, field.name).tobytes() == getattr(b, field.name).tobytes(), field.name
 
 
-@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("preset", ["mambo", "table1"])
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str, scalar: str) -> None:
@@ -94,11 +95,12 @@ def test_mambo_keeps_tracking_turned_in_wind_and_with_slow_motors() -> None:
     assert np.all(metrics.iae_m_s < 5)
 
 
-def test_float64_flies_like_float32() -> None:
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_other_scalars_fly_like_float64(scalar: str) -> None:
     """Other bits, same flight: the indices agree within a tenth."""
     flight = Flight(CASE, duration_s=30.0)
     ours, theirs = (
-        indices(measure(fly(flight, CompiledController(with_scalar(presets.load("mambo"), scalar)))))
-        for scalar in ("float32", "float64")
+        indices(measure(fly(flight, CompiledController(with_scalar(presets.load("mambo"), kind)))))
+        for kind in (scalar, "float64")
     )
     assert np.allclose(ours, theirs, rtol=0.1)

@@ -13,6 +13,7 @@ from codegen.footprint.elf import load
 from codegen.footprint.gate import Forbidden, forbidden
 from codegen.render import render
 from codegen.settings import Settings
+from codegen.settings.controller_toml import with_option
 from sil import footprint_report
 from sil.footprint import Footprint, measure_footprint
 from tests.support.tools import board_builder, only
@@ -25,8 +26,9 @@ TINY = {
     "period_share = 0.1": "period_share = 0.002",
 }
 """A budget for the Crazyflie that preset mambo exceeds everywhere."""
-COST = "return (weights->tracking * distance_m) + (weights->effort * variation_rad);"
-WIDENED = "return 1.0000001 * ((weights->tracking * distance_m) + (weights->effort * variation_rad));"
+COST = "return nmpc_tracking_cost(weights->tracking, distance_m)"
+WIDENED = "return 1.0000001 * nmpc_tracking_cost(weights->tracking, distance_m)"
+DIVIDED = "return nmpc_tracking_cost(weights->tracking, distance_m) / weights->effort"
 
 
 @lru_cache
@@ -165,6 +167,42 @@ def test_a_sneaked_in_double_is_reported_with_its_caller(name: str, tmp_path: Pa
     assert all(one.kind == "double precision" for one in found)
     assert any("nmpc_cost_evaluate" in one.callers for one in found)
     assert forbidden(image, "float64") == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "kind"),
+    [
+        ("mambo", WIDENED, "floating point"),
+        ("rp2040", WIDENED, "floating point"),
+        ("rp2040", DIVIDED, "division"),
+        ("rv32", DIVIDED, "division"),
+    ],
+)
+def test_fixed_point_links_neither_floats_nor_divisions(
+    name: str, wrong: str, kind: str, tmp_path: Path
+) -> None:
+    """Nothing of either as generated; one float or one division is reported."""
+    files = render(with_option(MAMBO, "code.scalar", "fixed", "test"), with_digest=False)
+    source = files["src/nmpc_cost.c"]
+    assert source.count(COST) == 1
+    harmed = files | {"src/nmpc_cost.c": source.replace(COST, wrong)}
+    build = board_builder(name)
+    assert forbidden(load(build.firmware(files, tmp_path / "good")), "fixed") == ()
+    found = forbidden(load(build.firmware(harmed, tmp_path / "harmed")), "fixed")
+    assert kind in {one.kind for one in found}
+
+
+@pytest.mark.parametrize(("board", "preset", "most"), [("mambo", "mambo", 6000), ("mambo", "table1", 4400)])
+def test_fixed_point_keeps_its_promises(board: str, preset: str, most: int) -> None:
+    """A step on the Mambo's processor: a tenth of what it takes in float32, within 400 B of stack."""
+    settings = with_option(presets.load(preset), "code.scalar", "fixed", "test")
+    board_builder(board)
+    footprint = measure_footprint(settings, boards.load(board), counted_steps=150)
+    assert footprint.counts is not None
+    assert footprint.counts.most <= most
+    assert footprint.stack is not None
+    assert footprint.stack.bytes <= 400
+    assert footprint.forbidden == ()
 
 
 def test_what_must_not_be_linked_is_over_whatever_the_sizes() -> None:

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 
 from codegen.horizon import horizon_tables
 from codegen.reference import ReferenceController, cost
+from codegen.reference.arithmetic import arithmetic
 from codegen.reference.predictor import Predictor
 from codegen.settings import Settings
 from tests.support.cases import settings_case
@@ -28,7 +29,7 @@ class Situation:
         self.thrust = rng.uniform(5, 15)
         self.moves = rng.uniform(-0.3, 0.3, (settings.horizon.control, 2))
         self.weights = np.array([settings.cost.tracking_weight, settings.cost.effort_weight])
-        self._predictor = Predictor(settings, horizon_tables(settings), np.float64)
+        self._predictor = Predictor(settings, horizon_tables(settings), arithmetic(settings))
         self._prediction = self._predictor.prepare(
             self.state[None], self.target[None], np.array([self.thrust])
         )
@@ -36,7 +37,11 @@ class Situation:
     def reference(self, moves: Array) -> tuple[float, Array]:
         """Return the reference's cost and gradient (control, 2) at `moves`."""
         costs, gradients = cost.evaluate(
-            self._predictor, self._prediction, self.weights[None], moves[None], self.last[None]
+            self._predictor,
+            self._prediction,
+            self.weights[None],
+            moves[None],
+            self.last[None],
         )
         return float(costs[0]), gradients[0]
 

@@ -54,7 +54,7 @@ def test_all_cases_have_the_bits_of_the_reference(settings: Settings, tmp_path: 
             "self->command_rad[1] = self->plan_rad[0];",
             "command_rad",
         ),
-        ("    self->cost = (nmpc_real_t)0;\n", "", "cost"),
+        ("    self->cost = (nmpc_sum_t)0;\n", "", "cost"),
         ("        command->roll_rad = (nmpc_real_t)0;\n", "", "command_rad"),
         ("        return NMPC_BAD_WEIGHT;", "        return NMPC_BAD_COMMAND;", "status"),
     ],

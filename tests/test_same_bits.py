@@ -34,7 +34,7 @@ HARM = {
         "walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m))",
         "(walk->advance_m + walk->bend_m) + (walk->roll_to_come_m + walk->pitch_to_come_m)",
     ),
-    "another sign": ("src/nmpc_cost.c", "effort = -weights->effort;", "effort = weights->effort;"),
+    "another sign": ("src/nmpc_cost.c", "effort = -nmpc_effort_slope", "effort = nmpc_effort_slope"),
 }
 """Faults by name: file, the line, what it becomes."""
 

@@ -174,7 +174,7 @@ def test_the_tables_hold_every_count() -> None:
     ("right", "wrong", "outcome"),
     [
         ("", "", Outcome.PASSED),
-        ("effort = weights->effort;", "effort = 900 * weights->effort;", Outcome.FAILED),
+        ("effort = nmpc_effort_slope(", "effort = 900 * nmpc_effort_slope(", Outcome.FAILED),
     ],
     ids=["as generated", "a weight"],
 )

@@ -29,9 +29,16 @@ _DOUBLE: Final = (
 )
 """RTABI 2020Q2, tables 2 to 8; GCC internals, routines for floating-point emulation."""
 _QUADRUPLE: Final = r"__\w*tf([23]|[dsh]f2|si|di|ti)?"
+_FLOATING: Final = (
+    rf"{_DOUBLE}|{_QUADRUPLE}"
+    r"|__aeabi_(f(add|sub|rsub|mul|div|neg|cmp\w+|2\w+)|cfr?cmp\w+|\w+2f)"
+    r"|__\w*sf([23]|df2|hf2|si|di|ti)?"
+)
+_DIVISION: Final = r"__aeabi_u?(i|l)div(mod)?|__u?(div|mod|divmod)[qhsd]i[34]|__u?divmod[qhsd]i4"
 _WIDER: Final = {
     "float32": {"double precision": _DOUBLE, "quadruple precision": _QUADRUPLE},
     "float64": {"quadruple precision": _QUADRUPLE},
+    "fixed": {"floating point": _FLOATING, "division": _DIVISION},
 }
 
 

@@ -1,25 +1,20 @@
 """Controller: checked inputs in, one command out, and what is remembered between two steps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.horizon import horizon_tables
-from codegen.literals import SCALARS
 from codegen.reference import cost, optimizer
+from codegen.reference.arithmetic import arithmetic
 from codegen.reference.math import Real
 from codegen.reference.predictor import Predictor
+from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from codegen.settings import Settings
-from codegen.trigonometry import YAW_LIMIT_RAD
-
-ATTITUDE_LIMIT_RAD: Final = 3.25
-"""Largest measured roll or pitch: a little more than half a turn, so that degrees are refused."""
-
-WEIGHT_LIMIT: Final = 1e6
-"""Largest run-time weight, the bound of `cost.tracking_weight` and `cost.effort_weight`."""
 
 
 class Status(IntEnum):
@@ -62,6 +57,8 @@ class Step:
     plan_rad:    (n, control, 2) moves found, the first of which is the command.
     iterations:  (n,) updates made.
     converged:   (n,) whether the cost came to rest.
+
+    With fixed point the numbers are those of the C, told exactly in float64.
     """
 
     status: NDArray[np.int64]
@@ -84,17 +81,19 @@ class ReferenceController:
     ) -> None:
         self.settings = settings
         self._minimize = minimize
-        self.scalar = SCALARS[settings.code.scalar]
-        self._predictor = Predictor(settings, horizon_tables(settings), self.scalar)
-        control = settings.horizon.control
+        self._arithmetic = arithmetic(settings)
+        self._numbers = self._arithmetic.numbers
+        self.scalar = self._numbers.scalar
+        self._predictor = Predictor(settings, horizon_tables(settings), self._arithmetic)
+        self._limits = self._numbers.limits(settings)
+        control, computed = settings.horizon.control, self._numbers.computed
+        weights = [settings.cost.tracking_weight, settings.cost.effort_weight]
         self.memory = Memory(
-            command_rad=np.zeros((n, 2), self.scalar),
-            plan_rad=np.zeros((n, control, 2), self.scalar),
-            weights=np.tile(
-                np.array([settings.cost.tracking_weight, settings.cost.effort_weight], self.scalar), (n, 1)
-            ),
-            cost=np.zeros(n, self.scalar),
-            gradient=np.zeros((n, control, 2), self.scalar),
+            command_rad=np.zeros((n, 2), computed),
+            plan_rad=np.zeros((n, control, 2), computed),
+            weights=np.tile(self._taken([weights], WEIGHTS), (n, 1)),
+            cost=np.zeros(n, computed),
+            gradient=np.zeros((n, control, 2), computed),
             iterations=np.zeros(n, np.int64),
             converged=np.zeros(n, np.bool_),
         )
@@ -102,11 +101,11 @@ class ReferenceController:
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Start all controllers over from `command_rad` (n, 2), clamped to the tilt limit.
 
-        Returns a status (n,); a command that is not finite, or beyond ATTITUDE_LIMIT_RAD, changes nothing.
+        Returns a status (n,); one that is not finite, or beyond the limit of attitudes, changes nothing.
         """
-        given = np.asarray(command_rad, self.scalar)
-        good = _within(given, ATTITUDE_LIMIT_RAD)
-        limit = self.scalar(self.settings.limits.tilt_rad)
+        given = self._taken(command_rad, COMMAND)
+        good = _within(given, self._limits.attitude)
+        limit = self._limits.tilt
         command = np.where(
             good[:, None], np.minimum(np.maximum(given, -limit), limit), self.memory.command_rad
         )
@@ -119,12 +118,12 @@ class ReferenceController:
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Replace tracking and effort weight by `weights` (n, 2), each in 0..WEIGHT_LIMIT.
+        """Replace tracking and effort weight by `weights` (n, 2), each from 0 to its limit.
 
         Returns a status (n,); bad weights change nothing.
         """
-        given = np.asarray(weights, self.scalar)
-        good = np.all((given >= 0) & (given <= self.scalar(WEIGHT_LIMIT)), axis=1)
+        given = self._taken(weights, WEIGHTS)
+        good = np.all((given >= 0) & (given <= self._limits.weights), axis=1)
         self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
         return np.where(good, Status.OK, Status.BAD_WEIGHT)
 
@@ -134,15 +133,14 @@ class ReferenceController:
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
         target (n, 4): x, y (m), vx, vy (m/s). thrust_acceleration_m_s2 (n,): thrust over mass, up.
         """
-        states = np.asarray(state, self.scalar)
-        targets = np.asarray(target, self.scalar)
-        thrusts = np.asarray(thrust_acceleration_m_s2, self.scalar)
+        states, targets = self._taken(state, STATE), self._taken(target, TARGET)
+        thrusts = self._taken(np.asarray(thrust_acceleration_m_s2)[:, None], THRUST)[:, 0]
         status = self._check(states, targets, thrusts)
         good = status == Status.OK
         searched = self._search(
-            np.where(good[:, None], states, self.scalar(0)),
-            np.where(good[:, None], targets, self.scalar(0)),
-            np.where(good, thrusts, self.scalar(self.settings.ranges.thrust_acceleration_min_m_s2)),
+            np.where(good[:, None], states, self._numbers.computed(0)),
+            np.where(good[:, None], targets, self._numbers.computed(0)),
+            np.where(good, thrusts, self._limits.thrust_least),
         )
         old = self.memory
         self.memory = replace(
@@ -155,9 +153,19 @@ class ReferenceController:
             converged=np.where(good, searched.converged, old.converged),
         )
         new = self.memory
+        told = self._numbers.told
         return Step(
-            status, new.command_rad, new.cost, new.gradient, new.plan_rad, new.iterations, new.converged
+            status=status,
+            command_rad=told(new.command_rad, "angle"),
+            cost=told(new.cost, "cost"),
+            gradient=told(new.gradient, "gradient"),
+            plan_rad=told(new.plan_rad, "angle"),
+            iterations=new.iterations,
+            converged=new.converged,
         )
+
+    def _taken(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
+        return self._numbers.taken(values, quantities).astype(self._numbers.computed)
 
     def _search(self, state: Real, target: Real, thrust: Real) -> optimizer.Search:
         memory = self.memory
@@ -172,19 +180,15 @@ class ReferenceController:
         return self._minimize(self.settings, evaluate, start)
 
     def _check(self, state: Real, target: Real, thrust: Real) -> NDArray[np.int64]:
-        ranges = self.settings.ranges
+        limits = self._limits
         good_state = (
-            _within(state[:, 0:2], self.scalar(ranges.position_m))
-            & _within(state[:, 2:4], self.scalar(ranges.velocity_m_s))
-            & _within(state[:, 4:6], ATTITUDE_LIMIT_RAD)
-            & _within(state[:, 6:7], YAW_LIMIT_RAD)
+            _within(state[:, 0:2], limits.position)
+            & _within(state[:, 2:4], limits.velocity)
+            & _within(state[:, 4:6], limits.attitude)
+            & _within(state[:, 6:7], limits.yaw)
         )
-        good_target = _within(target[:, 0:2], self.scalar(ranges.position_m)) & _within(
-            target[:, 2:4], self.scalar(ranges.velocity_m_s)
-        )
-        good_thrust = (thrust >= self.scalar(ranges.thrust_acceleration_min_m_s2)) & (
-            thrust <= self.scalar(ranges.thrust_acceleration_max_m_s2)
-        )
+        good_target = _within(target[:, 0:2], limits.position) & _within(target[:, 2:4], limits.velocity)
+        good_thrust = (thrust >= limits.thrust_least) & (thrust <= limits.thrust_most)
         return np.select(
             [~good_state, ~good_target, ~good_thrust],
             [Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST],
@@ -192,7 +196,7 @@ class ReferenceController:
         )
 
 
-def _within(values: Real, limit: float | np.floating[Any]) -> NDArray[np.bool_]:
+def _within(values: Real, limit: Any) -> NDArray[np.bool_]:
     """Tell for each row of (n, k) whether all values lie in -limit..limit; NaN does not."""
     inside: NDArray[np.bool_] = np.all((values >= -limit) & (values <= limit), axis=1)
     return inside

@@ -7,23 +7,29 @@ from codegen.reference.predictor import Prediction, Predictor
 
 
 def evaluate(
-    predictor: Predictor, prediction: Prediction, weights: Real, moves_rad: Real, last_command_rad: Real
+    predictor: Predictor,
+    prediction: Prediction,
+    weights: Real,
+    moves_rad: Real,
+    last_command_rad: Real,
 ) -> tuple[Real, Real]:
     """Return the cost (n,) and its subgradient (n, control, 2) at `moves_rad` (n, control, 2).
 
     weights is (n, 2): lambda1 in 1/m, lambda2 in 1/rad; last_command_rad (n, 2) precedes the first move.
     """
+    arithmetic = predictor.arithmetic
     distance, slopes = _distance(predictor, predictor.errors(prediction, moves_rad))
     by_move = np.repeat(slopes, predictor.axes_alike, axis=2).reshape(*slopes.shape[:2], -1, 2)
-    weighed = prediction.gain_m[:, :, None] * by_move
-    tracking = weighed[:, 0] + weighed[:, 1]
+    tracking = arithmetic.distance_slope(prediction.gain_m[:, :, None], by_move)
 
     change = moves_rad - np.concatenate([last_command_rad[:, None], moves_rad[:, :-1]], axis=1)
     variation = ordered_sum(np.abs(change).reshape(len(change), -1), axis=1)
-    effort = weights[:, 1, None, None] * sign(change)
+    effort = arithmetic.effort_slope(weights[:, 1, None, None]) * sign(change)
 
-    cost = (weights[:, 0] * distance) + (weights[:, 1] * variation)
-    gradient = (weights[:, 0, None, None] * tracking) + effort
+    cost = arithmetic.tracking_cost(weights[:, 0], distance) + arithmetic.effort_cost(
+        weights[:, 1], variation
+    )
+    gradient = arithmetic.tracking_slope(weights[:, 0, None, None], tracking) + effort
     gradient[:, :-1] = gradient[:, :-1] - effort[:, 1:]
     return cost, gradient
 

@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.trigonometry import Trigonometry
+from codegen.fixed_point import SINE_BITS
+from codegen.trigonometry import FixedTrigonometry, Trigonometry
 
-Real = NDArray[np.floating[Any]]
-"""An array of the controller's scalar type."""
+Real = NDArray[Any]
+"""An array of the controller's scalar type, or with fixed point of int64."""
 
 
 def sine_cosine(angle_rad: Real, constants: Trigonometry) -> tuple[Real, Real]:
@@ -21,7 +22,11 @@ def sine_cosine(angle_rad: Real, constants: Trigonometry) -> tuple[Real, Real]:
     square = rest * rest
     sine = rest + (rest * (square * _polynomial(square, constants.sine)))
     cosine = scalar(1) + (square * _polynomial(square, constants.cosine))
-    turned = [quadrant.astype(np.int64) % 4 == count for count in (1, 2, 3)]
+    return _turned(quadrant.astype(np.int64), sine, cosine)
+
+
+def _turned(quadrant: NDArray[np.int64], sine: Real, cosine: Real) -> tuple[Real, Real]:
+    turned = [quadrant % 4 == count for count in (1, 2, 3)]
     return (
         np.select(turned, [cosine, -sine, -cosine], sine),
         np.select(turned, [-sine, -cosine, sine], cosine),
@@ -36,10 +41,37 @@ def _polynomial(square: Real, coefficients: tuple[float, ...]) -> Real:
     return value
 
 
+def fixed_sine_cosine(angle_rad: Real, constants: FixedTrigonometry) -> tuple[Real, Real]:
+    """Return sine and cosine of `angle_rad`, numbers of the format of yaws, in the format SINE_BITS."""
+    quadrant = rounded(angle_rad * constants.quarter_turns_per_rad, constants.quarter_turns_bits)
+    fine = (angle_rad * 2**constants.finer_bits) - (quadrant * constants.quarter_turn)
+    rest = rounded(fine, constants.fine_bits - SINE_BITS)
+    square = rounded(rest * rest, SINE_BITS)
+    sine = rest + rounded(
+        rest * rounded(square * _fixed_polynomial(square, constants.sine), SINE_BITS), SINE_BITS
+    )
+    cosine = 2**SINE_BITS + rounded(square * _fixed_polynomial(square, constants.cosine), SINE_BITS)
+    return _turned(quadrant, sine, cosine)
+
+
+def _fixed_polynomial(square: Real, coefficients: tuple[int, ...]) -> Real:
+    value: Real = np.full_like(square, coefficients[-1])
+    for coefficient in reversed(coefficients[:-1]):
+        value = coefficient + rounded(square * value, SINE_BITS)
+    return value
+
+
+def rounded(product: Real, bits: int) -> Real:
+    """Shift `bits` to the right, to the nearest whole number, ties up."""
+    nearest: Real = (product + 2 ** (bits - 1)) >> bits
+    return nearest
+
+
 def sign(value: Real) -> Real:
     """Return -1, 0 or 1 in the type of `value`; the sign of zero, of either sign, is 0 (decision 14)."""
     scalar = value.dtype.type
-    return np.where(value > 0, scalar(1), np.where(value < 0, scalar(-1), scalar(0)))
+    signs: Real = np.where(value > 0, scalar(1), np.where(value < 0, scalar(-1), scalar(0)))
+    return signs
 
 
 def ordered_sum(terms: Real, axis: int) -> Real:

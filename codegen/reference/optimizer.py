@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen.reference.arithmetic import arithmetic
 from codegen.reference.math import Real, sign
 from codegen.settings import Settings
 
@@ -40,9 +41,17 @@ def minimize(settings: Settings, evaluate: Evaluate, moves_rad: Real) -> Search:
 
     Once the cost changes by less than the tolerance the plan is frozen; the evaluations go on.
     """
-    scalar = moves_rad.dtype.type
-    optimizer = settings.optimizer
-    step = np.full_like(moves_rad, optimizer.initial_step_rad)
+    scalar, products = moves_rad.dtype.type, arithmetic(settings)
+    optimizer, numbers = settings.optimizer, products.numbers
+    step_max, step_min = (
+        numbers.constant(step, "angle") for step in (optimizer.step_max_rad, optimizer.step_min_rad)
+    )
+    increase, decrease = (
+        numbers.constant(factor, "factor") for factor in (optimizer.increase, optimizer.decrease)
+    )
+    tolerance = numbers.constant(optimizer.tolerance, "cost")
+    limit = numbers.constant(settings.limits.tilt_rad, "angle")
+    step = np.full_like(moves_rad, numbers.constant(optimizer.initial_step_rad, "angle"))
     direction = np.zeros_like(moves_rad)
     before = moves_rad
     cost = np.zeros(len(moves_rad), dtype=scalar)
@@ -54,7 +63,7 @@ def minimize(settings: Settings, evaluate: Evaluate, moves_rad: Real) -> Search:
         previous_cost = cost
         cost, gradient = evaluate(moves_rad)
         if iteration > 0:
-            converged = converged | (np.abs(cost - previous_cost) < scalar(optimizer.tolerance))
+            converged = converged | (np.abs(cost - previous_cost) < tolerance)
         iterations = iterations + ~converged
 
         slope = sign(gradient)
@@ -63,17 +72,12 @@ def minimize(settings: Settings, evaluate: Evaluate, moves_rad: Real) -> Search:
         across = active & ((slope * direction) < 0)
         ahead = active & ~across
 
-        longer = np.minimum(step * scalar(optimizer.increase), scalar(optimizer.step_max_rad))
-        shorter = np.maximum(step * scalar(optimizer.decrease), scalar(optimizer.step_min_rad))
+        longer = np.minimum(products.scaled(step, increase), step_max)
+        shorter = np.maximum(products.scaled(step, decrease), step_min)
         step = np.where(onward, longer, np.where(across, shorter, step))
-        moved = _clamped(moves_rad - (slope * step), settings, scalar)
+        moved = np.minimum(np.maximum(moves_rad - (slope * step), -limit), limit)
         stepped_back = before if optimizer.variant == "rprop+" else moves_rad
         before = np.where(ahead, moves_rad, before)
         moves_rad = np.where(ahead, moved, np.where(across, stepped_back, moves_rad))
         direction = np.where(ahead, slope, np.where(across, scalar(0), direction))
     return Search(moves_rad, cost, gradient, iterations, converged)
-
-
-def _clamped(moves_rad: Real, settings: Settings, scalar: type[np.floating]) -> Real:
-    limit = scalar(settings.limits.tilt_rad)
-    return np.minimum(np.maximum(moves_rad, -limit), limit)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from codegen.horizon import HorizonTables
-from codegen.reference.math import Real, sine_cosine
+from codegen.reference.arithmetic import Arithmetic
+from codegen.reference.math import Real
 from codegen.settings import Settings
-from codegen.trigonometry import trigonometry
 
 
 @dataclass(frozen=True)
@@ -31,61 +31,68 @@ class Prediction:
 class Predictor:
     """The prediction constants of one set of settings, in its scalar type."""
 
-    def __init__(self, settings: Settings, tables: HorizonTables, scalar: type[np.floating]) -> None:
+    def __init__(self, settings: Settings, tables: HorizonTables, arithmetic: Arithmetic) -> None:
         self._steps = settings.horizon.prediction
         self._moves = settings.horizon.control
         self._printed_yaw = settings.model.yaw_convention == "printed"
-        self._trigonometry = trigonometry(settings.code.scalar)
-        self._step_s = scalar(settings.horizon.prediction_step_s)
-        self._step_squared_s2 = scalar(tables.step_squared_s2)
-        self._held = scalar(tables.held)
+        self.arithmetic, numbers = arithmetic, arithmetic.numbers
+        self._held = numbers.constant(tables.held, "share")
         self._has_lag = tables.has_lag
-        self._axes = np.array([(axis.at_once, axis.delayed, axis.decay) for axis in tables.axes], scalar).T
+        self._axes = np.array(
+            [
+                [numbers.constant(share, "share") for share in (axis.at_once, axis.delayed, axis.decay)]
+                for axis in tables.axes
+            ]
+        ).T
         self.axes_alike = tables.axes_alike
-        self.response_sum = tables.response_sum.astype(scalar)
+        self.response_sum = np.array(
+            [[numbers.constant(value, "response") for value in row] for row in tables.response_sum]
+        )
 
     def prepare(self, state: Real, target: Real, thrust_acceleration_m_s2: Real) -> Prediction:
         """Evaluate eq 8 at the present heading and thrust, and find where the walks start without moves.
 
         state is (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
         """
-        push = thrust_acceleration_m_s2 * self._step_squared_s2
-        sine, cosine = sine_cosine(state[:, 6], self._trigonometry)
-        across, along = push * sine, push * cosine
+        arithmetic = self.arithmetic
+        push = arithmetic.push(thrust_acceleration_m_s2)
+        sine, cosine = arithmetic.sine_cosine(state[:, 6])
+        across, along = arithmetic.component(push, sine), arithmetic.component(push, cosine)
         turned = across if self._printed_yaw else -across
         gain = np.stack([np.stack([turned, -along], 1), np.stack([along, turned], 1)], 1)
-        advance = self._step_s * (state[:, 2:4] - target[:, 2:4])
+        advance = arithmetic.travel(state[:, 2:4] - target[:, 2:4])
         tilt, bend = np.zeros_like(advance), np.zeros_like(advance)
         if self._has_lag:
             tilt = state[:, 4:6]
-            shares = gain * tilt[:, None]
+            shares = arithmetic.bend(gain, tilt[:, None])
             bend = shares[:, :, 0] + shares[:, :, 1]
-            advance = advance + (self._held * bend)
-        return Prediction(gain, tilt, state[:, 0:2] - target[:, 0:2], advance, bend)
+            advance = advance + arithmetic.part(self._held, bend)
+        error = arithmetic.first_error(state[:, 0:2] - target[:, 0:2])
+        return Prediction(gain, tilt, error, advance, bend)
 
     def errors(self, prediction: Prediction, moves_rad: Real) -> Real:
         """Predict position less target for `moves_rad` (n, control, 2): (prediction, n, 2), in m."""
         error, advance, bend = prediction.error_m, prediction.advance_m, prediction.bend_m
-        at_once, delayed, decay = self._axes
+        (at_once, delayed, decay), arithmetic = self._axes, self.arithmetic
         to_come = np.zeros_like(prediction.gain_m)
         errors = np.empty((self._steps, *error.shape), error.dtype)
         before = prediction.tilt_rad
         for i in range(self._steps):
             if i < self._moves:
-                shares = prediction.gain_m * (moves_rad[:, i] - before)[:, None]
+                shares = arithmetic.bend(prediction.gain_m, (moves_rad[:, i] - before)[:, None])
                 before = moves_rad[:, i]
                 both = shares[:, :, 0] + shares[:, :, 1]
                 if self._has_lag:
-                    sooner = at_once * shares
+                    sooner = arithmetic.part(at_once, shares)
                     advance = advance + (sooner[:, :, 0] + sooner[:, :, 1])
-                    to_come = to_come - (delayed * shares)
+                    to_come = to_come - arithmetic.part(delayed, shares)
                 else:
-                    advance = advance + (at_once[0] * both)
+                    advance = advance + arithmetic.part(at_once[0], both)
                 bend = bend + both
-            error = error + advance
+            error = error + arithmetic.step_of(advance)
             if self._has_lag:
                 advance = advance + (bend + (to_come[:, :, 0] + to_come[:, :, 1]))
-                to_come = to_come * decay
+                to_come = arithmetic.part(decay, to_come)
             else:
                 advance = advance + bend
             errors[i] = error

@@ -8,10 +8,19 @@ The descriptions below are the text of the commented controller.toml, the JSON s
 import hashlib
 import json
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from codegen.settings import reserved
 
@@ -278,8 +287,10 @@ class Ranges(_Section):
 class Code(_Section):
     """How the C is spelled."""
 
-    scalar: Literal["float32", "float64"] = Field(
-        "float32", description="Type of every number in the C: float32 is C's float, float64 its double."
+    scalar: Literal["float32", "float64", "fixed"] = Field(
+        "float32",
+        description="Type of every number in the C: float32 is C's float, float64 its double, fixed whole "
+        "numbers of 32 bits, for processors without an FPU.",
     )
     prefix: str = Field(
         "nmpc",
@@ -323,6 +334,27 @@ class Settings(_Section):
         Ranges(), description="What the controller accepts; anything outside is refused with a status."
     )
     code: Code = Field(Code(), description="How the C is spelled.")
+
+    @model_validator(mode="after")
+    def _representable(self) -> Self:
+        if self.code.scalar != "fixed":
+            return self
+        from codegen.fixed_point import refusals  # noqa: PLC0415 - it takes settings
+
+        refused = refusals(self)
+        if refused:
+            raise ValidationError.from_exception_data(
+                "Settings",
+                [
+                    InitErrorDetails(
+                        type=PydanticCustomError("fixed", "{rule}", {"rule": refusal.rule}),
+                        loc=(refusal.section, refusal.name),
+                        input=getattr(getattr(self, refusal.section), refusal.name),
+                    )
+                    for refusal in refused
+                ],
+            )
+        return self
 
     @property
     def digest(self) -> str:

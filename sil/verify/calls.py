@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.literals import SCALARS
 from codegen.reference import Memory, ReferenceController, Status
+from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
 from codegen.settings import Settings
 
 Tape = NDArray[Any]
@@ -48,23 +48,31 @@ _POINTERS: Final = {
 }
 
 
+_QUANTITIES: Final = {
+    Function.STEP: (*STATE, *TARGET, *THRUST),
+    Function.RESET: COMMAND,
+    Function.SET_WEIGHTS: WEIGHTS,
+    Function.INIT: COMMAND,
+}
+
+
 def call_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of a call: function in bits 0 and 1 of the byte, null pointers in bits 2 to 5."""
-    return np.dtype([("call", np.uint8), ("values", SCALARS[settings.code.scalar], 12)])
+    return np.dtype([("call", np.uint8), ("values", Representation(settings).scalar, 12)])
 
 
 def outcome_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of an outcome, as `replay.c` writes it."""
-    scalar, moves = SCALARS[settings.code.scalar], 2 * settings.horizon.control
+    numbers, moves = Representation(settings), 2 * settings.horizon.control
     return np.dtype(
         [
             ("status", np.int32),
             ("iterations", np.int32),
             ("converged", np.int32),
-            ("command_rad", scalar, 2),
-            ("cost", scalar),
-            ("gradient", scalar, moves),
-            ("plan_rad", scalar, moves),
+            ("command_rad", numbers.scalar, 2),
+            ("cost", numbers.wide),
+            ("gradient", numbers.wide, moves),
+            ("plan_rad", numbers.scalar, moves),
         ]
     )
 
@@ -73,7 +81,8 @@ def calls(settings: Settings, function: Function, values: NDArray[Any], nulls: i
     """Return a call of `function` for each row of values (n, 1..12), with `nulls` among its pointers."""
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
-    made["values"][:, : values.shape[1]] = values
+    quantities = _QUANTITIES[function][: values.shape[1]]
+    made["values"][:, : values.shape[1]] = Representation(settings).taken(values, quantities)
     return made
 
 
@@ -103,6 +112,7 @@ class _Runs:
 
     def __init__(self, settings: Settings, n: int) -> None:
         self._settings = settings
+        self._numbers = Representation(settings)
         self._controller = ReferenceController(settings, n)
         self._fresh = self._controller.memory
 
@@ -114,12 +124,14 @@ class _Runs:
         values = now["values"]
 
         def given(wanted: Function) -> NDArray[Any]:
-            return np.where(((function == wanted) & ~null)[:, None], values, np.nan).astype(values.dtype)
+            quantities = _QUANTITIES[wanted]
+            told = self._numbers.told(values[:, : len(quantities)], *quantities)
+            return np.where(((function == wanted) & ~null)[:, None], told, np.nan).astype(told.dtype)
 
         outcome = np.zeros(len(now), outcome_type(self._settings))
         with np.errstate(all="ignore"):
-            resets = self._controller.reset(given(Function.RESET)[:, 0:2])
-            weights = self._controller.set_weights(given(Function.SET_WEIGHTS)[:, 0:2])
+            resets = self._controller.reset(given(Function.RESET))
+            weights = self._controller.set_weights(given(Function.SET_WEIGHTS))
             step = given(Function.STEP)
             steps = self._controller.step(step[:, 0:7], step[:, 7:11], step[:, 11]).status
         self._initialise((function == Function.INIT) & ~null)

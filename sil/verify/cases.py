@@ -7,11 +7,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.literals import SCALARS
-from codegen.reference.controller import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT
+from codegen.literals import SCALARS, Scalar
 from codegen.self_test import hover_thrust
 from codegen.settings import Settings
-from codegen.trigonometry import YAW_LIMIT_RAD
+from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from sil.verify.calls import (
     NULL_COMMAND,
     NULL_FIRST,
@@ -124,7 +123,7 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
 def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
     """Head for eighths of a turn, near and far, and their neighbours: there sine and cosine change hands."""
-    scalar = SCALARS[settings.code.scalar]
+    scalar = _floating(settings)
     eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 4)])
     yaws = [(eighths * (np.pi / 4)).astype(scalar)]
     for _ in range(3):
@@ -148,7 +147,7 @@ def _at_rest(settings: Settings) -> list[Tape]:
     constant. The largest weight with which that counts as rest is found by bisection; it and its neighbours
     are the cases.
     """
-    n, scalar = 16, SCALARS[settings.code.scalar]
+    n, scalar = 16, _floating(settings)
     steps = np.zeros((n, 12))
     steps[:, 0:2] = 1e-7 * np.linspace(1, 2, n)[:, None]
     steps[:, 6] = np.linspace(-3, 3, n)
@@ -173,7 +172,7 @@ def _at_rest(settings: Settings) -> list[Tape]:
 
 def _meeting(settings: Settings) -> Iterator[Tape]:
     """Meet the target exactly at the first predicted step, from either side of either axis."""
-    scalar = SCALARS[settings.code.scalar]
+    scalar = _floating(settings)
     advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
     for axis in range(2):
         for way in (-1, 1):
@@ -203,13 +202,18 @@ def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
 
 def _around(settings: Settings, low: float, high: float) -> Array:
     """Return both ends of a range, their neighbours in the scalar type, and what is no number or no size."""
-    scalar = SCALARS[settings.code.scalar]
+    scalar = _floating(settings)
     ends = np.array([low, high], scalar)
     beyond = np.array([-np.inf, np.inf], scalar)
     neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
     tiny = np.finfo(scalar).smallest_subnormal
     odd = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, tiny, -tiny], scalar)
     return np.concatenate([ends, *neighbours, odd]).astype(np.float64)
+
+
+def _floating(settings: Settings) -> Scalar:
+    """Return the type to look for neighbours in: with fixed point that of the world outside."""
+    return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]
 
 
 def _rows(inputs: Inputs) -> Array:

@@ -13,8 +13,8 @@ from pycparser import c_ast, c_generator
 
 from codegen.errors import BuildError
 from codegen.flags import COMPILE_FLAGS
-from codegen.literals import SCALARS
 from codegen.render import with_prefix
+from codegen.representation import STATE, TARGET, THRUST, Representation
 from codegen.settings import Settings
 from codegen.toolchain import Toolchain
 from sil.verify.loops import Unit, place, walk
@@ -81,17 +81,18 @@ def count(
 
     Step k is one of controller k modulo TOGETHER. Raises BuildError if the program dies.
     """
-    scalar = SCALARS[settings.code.scalar]
+    numbers = Representation(settings)
     layout = np.dtype(
-        [("status", np.int32), ("command", scalar, 2), ("counts", np.uint32, places_counted)], align=False
+        [("status", np.int32), ("command", numbers.scalar, 2), ("counts", np.uint32, places_counted)],
+        align=False,
     )
     done = subprocess.run(
         [str(program.absolute())],
-        input=np.ascontiguousarray(inputs, scalar).tobytes(),
+        input=numbers.taken(inputs, (*STATE, *TARGET, *THRUST)).tobytes(),
         capture_output=True,
         check=False,
     )
     if done.returncode != 0 or len(done.stdout) != layout.itemsize * len(inputs):
         raise BuildError(f"{program.name}: the counting build ended with code {done.returncode}")
     found = np.frombuffer(done.stdout, layout)
-    return found["status"], found["command"], found["counts"]
+    return found["status"], numbers.told(found["command"], "angle"), found["counts"]

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from functools import partial
 
-from codegen.literals import SCALARS
+import numpy as np
+
+from codegen.representation import Representation
 from codegen.settings import Settings
 from codegen.toolchain import host_toolchain
 from sil.fault_flights import STRAY_M, End, Verdict, fly_faults
@@ -28,7 +30,8 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 
     A controller that strays without a fault cannot show that it comes back: INCOMPLETE, unless it failed.
     """
-    limit = float(SCALARS[settings.code.scalar](settings.limits.tilt_rad))
+    numbers = Representation(settings)
+    limit = float(numbers.told(np.array([numbers.limits(settings).tilt]), "angle")[0])
     ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
     strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
     wrong = []

@@ -74,11 +74,11 @@ REASONS: Final[tuple[Reason, ...]] = (
         Reason("include/nmpc_config.h", "#define NMPC_STEP_MIN_RAD <real>", what, _STEPS, _steps_stay_long)
         for what in ("next number", "negative")
     ),
-    Reason("src/nmpc_math.h", "return (value < (nmpc_real_t)0) ? -value : value;", "< -> <=", _ZERO),
+    Reason("src/nmpc_math.h", "return (value < (nmpc_sum_t)0) ? -value : value;", "< -> <=", _ZERO),
     *(
         Reason(
             "src/nmpc_math.h",
-            "return (value > (nmpc_real_t)0) ? 1 : ((value < (nmpc_real_t)0) ? -1 : 0);",
+            "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);",
             what,
             _SIGN,
         )

@@ -53,7 +53,7 @@ static int nmpc_replay_init(nmpc_t *self)
                 wrong = wrong || (one.bytes[i] != 0U) || (untouched > 0U); /* padding is at the end alone */
             }
         }
-        wrong = wrong || (untouched >= sizeof(nmpc_real_t));
+        wrong = wrong || (untouched >= sizeof(nmpc_sum_t));
     }
 #endif
     return wrong;
@@ -71,7 +71,7 @@ static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
     const nmpc_fuzz_call_t call = nmpc_fuzz_decode(bytes);
     nmpc_command_t command = { NMPC_REPLAY_UNWRITTEN, NMPC_REPLAY_UNWRITTEN };
     int32_t numbers[3];
-    nmpc_real_t cost;
+    nmpc_sum_t cost;
 
     if ((call.function == NMPC_FUZZ_INIT) && ((call.nulls & NMPC_FUZZ_NULL_SELF) == 0U)) {
         numbers[0] = (int32_t)nmpc_replay_init(self);

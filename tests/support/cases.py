@@ -3,16 +3,31 @@
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from codegen.settings import Settings
+
+SCALARS = ("float32", "float64", "fixed")
 
 CORNER_HORIZONS = ((1, 1, 5), (2, 2, 5), (10, 10, 5), (50, 1, 5), (50, 50, 2))
 """Np, Nc and iterations of the first settings that `settings_case` makes."""
 
 
 def settings_case(index: int, scalar: str) -> Settings:
-    """Make the valid settings number `index`: the corners of the horizon first, then random ones."""
+    """Make the valid settings number `index`: the corners of the horizon first, then random ones.
+
+    Weights too far apart for fixed point are drawn again.
+    """
     rng = np.random.default_rng(index)
+    while True:
+        try:
+            return _drawn_settings(index, scalar, rng)
+        except ValidationError:
+            if scalar != "fixed":
+                raise
+
+
+def _drawn_settings(index: int, scalar: str, rng: np.random.Generator) -> Settings:
     if index < len(CORNER_HORIZONS):
         return _random_settings(rng, scalar, *CORNER_HORIZONS[index])
     prediction = int(rng.choice([1, 2, 3, 5, 10, 10, 15, 20, 30, 50]))

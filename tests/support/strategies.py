@@ -33,7 +33,10 @@ def numbers(path: str, low: float | None = None, high: float | None = None) -> s
 
 @st.composite
 def valid_values(draw: st.DrawFn) -> Values:
-    """Draw valid settings, every key free within the rules, by their dotted paths."""
+    """Draw valid settings, every key free within the rules, by their dotted paths.
+
+    All are of floating point, for fixed point refuses ranges and weights too far apart.
+    """
     prediction = draw(st.integers(1, 50))
     update = draw(st.sampled_from(["exact", "printed"]))
     no_lag = st.just(0.0)
@@ -55,6 +58,7 @@ def valid_values(draw: st.DrawFn) -> Values:
         "ranges.thrust_acceleration_max_m_s2": draw(
             numbers("ranges.thrust_acceleration_max_m_s2", low=math.nextafter(thrust_min, math.inf))
         ),
+        "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(prefixes()),
     }
     choices = {

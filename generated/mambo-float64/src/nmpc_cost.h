@@ -12,9 +12,9 @@ extern "C" {
 #endif
 
 /* Return the cost of `moves_rad`, of which the first follows `last_rad`; fill `gradient`, per rad. */
-nmpc_real_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_weights_t *weights,
-                               const nmpc_real_t last_rad[NMPC_AXES], const nmpc_real_t moves_rad[NMPC_MOVES],
-                               nmpc_real_t gradient[NMPC_MOVES]);
+nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_weights_t *weights,
+                              const nmpc_real_t last_rad[NMPC_AXES], const nmpc_real_t moves_rad[NMPC_MOVES],
+                              nmpc_sum_t gradient[NMPC_MOVES]);
 
 #ifdef __cplusplus
 }

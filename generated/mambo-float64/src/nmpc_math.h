@@ -31,15 +31,15 @@ extern "C" {
 #define NMPC_UNROLL
 #endif
 
-static inline nmpc_real_t nmpc_absolute(nmpc_real_t value)
+static inline nmpc_sum_t nmpc_absolute(nmpc_sum_t value)
 {
-    return (value < (nmpc_real_t)0) ? -value : value;
+    return (value < (nmpc_sum_t)0) ? -value : value;
 }
 
 /* The sign of zero, of either sign, is 0. */
-static inline int nmpc_sign(nmpc_real_t value)
+static inline int nmpc_sign(nmpc_sum_t value)
 {
-    return (value > (nmpc_real_t)0) ? 1 : ((value < (nmpc_real_t)0) ? -1 : 0);
+    return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);
 }
 
 /* The bits of a value; the highest is its sign. Where there is no FPU, reading that is much cheaper than a
@@ -88,6 +88,73 @@ static inline int nmpc_between(nmpc_real_t value, nmpc_real_t least, nmpc_real_t
 static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
 {
     return nmpc_between(value, -limit, limit);
+}
+
+/* Products, by what they mean. */
+static inline nmpc_real_t nmpc_push(nmpc_real_t thrust_acceleration_m_s2)
+{
+    return thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
+}
+
+static inline nmpc_real_t nmpc_component(nmpc_real_t push_m, nmpc_real_t sine)
+{
+    return push_m * sine;
+}
+
+static inline nmpc_real_t nmpc_travel(nmpc_real_t velocity_m_s)
+{
+    return NMPC_PREDICTION_STEP_S * velocity_m_s;
+}
+
+static inline nmpc_real_t nmpc_bend(nmpc_real_t gain_m, nmpc_real_t turn_rad)
+{
+    return gain_m * turn_rad;
+}
+
+static inline nmpc_real_t nmpc_part(nmpc_real_t share, nmpc_real_t bend_m)
+{
+    return share * bend_m;
+}
+
+static inline nmpc_real_t nmpc_first_error(nmpc_real_t difference_m)
+{
+    return difference_m;
+}
+
+static inline nmpc_real_t nmpc_step_of(nmpc_real_t advance_m)
+{
+    return advance_m;
+}
+
+static inline nmpc_real_t nmpc_distance_slope(nmpc_real_t gain_x_m, nmpc_real_t slope_x, nmpc_real_t gain_y_m,
+                                              nmpc_real_t slope_y)
+{
+    return (gain_x_m * slope_x) + (gain_y_m * slope_y);
+}
+
+static inline nmpc_sum_t nmpc_tracking_cost(nmpc_real_t weight, nmpc_sum_t distance_m)
+{
+    return weight * distance_m;
+}
+
+static inline nmpc_sum_t nmpc_effort_cost(nmpc_real_t weight, nmpc_sum_t variation_rad)
+{
+    return weight * variation_rad;
+}
+
+static inline nmpc_sum_t nmpc_tracking_slope(nmpc_real_t weight, nmpc_real_t slope_m)
+{
+    return weight * slope_m;
+}
+
+static inline nmpc_sum_t nmpc_effort_slope(nmpc_real_t weight)
+{
+    return weight;
+}
+
+static inline nmpc_real_t nmpc_scaled(nmpc_real_t step_rad, nmpc_real_t factor)
+{
+    return step_rad * factor;
 }
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, each within 2.3e-16 of the true value. */

@@ -25,11 +25,11 @@ static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int slope)
     if (agreement < 0) {
         /* The last update crossed a minimum: take it back, and go on with a shorter step. */
         next_rad = rprop->before_rad;
-        rprop->step_rad = nmpc_larger(rprop->step_rad * NMPC_DECREASE, NMPC_STEP_MIN_RAD);
+        rprop->step_rad = nmpc_larger(nmpc_scaled(rprop->step_rad, NMPC_DECREASE), NMPC_STEP_MIN_RAD);
         rprop->direction = 0;
     } else {
         if (agreement > 0) {
-            rprop->step_rad = nmpc_smaller(rprop->step_rad * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
+            rprop->step_rad = nmpc_smaller(nmpc_scaled(rprop->step_rad, NMPC_INCREASE), NMPC_STEP_MAX_RAD);
         }
         if (slope > 0) {
             next_rad = nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD);
@@ -59,7 +59,7 @@ void nmpc_optimizer_minimize(nmpc_t *self)
     self->converged = 0U;
 
     for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
-        const nmpc_real_t previous_cost = self->cost;
+        const nmpc_sum_t previous_cost = self->cost;
 
         self->cost = nmpc_cost_evaluate(&self->prediction, &self->weights, self->command_rad, self->plan_rad,
                                         self->gradient);

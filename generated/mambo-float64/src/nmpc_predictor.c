@@ -24,9 +24,9 @@ const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_
 static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t velocity_m_s,
                        const nmpc_real_t gain_m[NMPC_AXES], const nmpc_real_t tilt_rad[NMPC_AXES])
 {
-    walk->error_m = error_m;
-    walk->bend_m = (gain_m[NMPC_ROLL] * tilt_rad[NMPC_ROLL]) + (gain_m[NMPC_PITCH] * tilt_rad[NMPC_PITCH]);
-    walk->advance_m = (NMPC_PREDICTION_STEP_S * velocity_m_s) + (0.5 * walk->bend_m);
+    walk->error_m = nmpc_first_error(error_m);
+    walk->bend_m = nmpc_bend(gain_m[NMPC_ROLL], tilt_rad[NMPC_ROLL]) + nmpc_bend(gain_m[NMPC_PITCH], tilt_rad[NMPC_PITCH]);
+    walk->advance_m = nmpc_travel(velocity_m_s) + nmpc_part(0.5, walk->bend_m);
     walk->roll_to_come_m = (nmpc_real_t)0;
     walk->pitch_to_come_m = (nmpc_real_t)0;
 }
@@ -34,7 +34,7 @@ static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t veloc
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
-    const nmpc_real_t push_m = thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
+    const nmpc_real_t push_m = nmpc_push(thrust_acceleration_m_s2);
     nmpc_real_t sine;
     nmpc_real_t cosine;
     nmpc_real_t across_m;
@@ -42,8 +42,8 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
 
     /* Eq 8 with the signs of eq 3, over one step. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
-    across_m = push_m * sine;
-    along_m = push_m * cosine;
+    across_m = nmpc_component(push_m, sine);
+    along_m = nmpc_component(push_m, cosine);
     prediction->gain_x_m[NMPC_ROLL] = -across_m;
     prediction->gain_x_m[NMPC_PITCH] = -along_m;
     prediction->gain_y_m[NMPC_ROLL] = along_m;

@@ -42,13 +42,13 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
 static inline void nmpc_predictor_bend(nmpc_walk_t *walk, const nmpc_real_t gain_m[NMPC_AXES],
                                        nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
 {
-    const nmpc_real_t roll_m = gain_m[NMPC_ROLL] * roll_rad;
-    const nmpc_real_t pitch_m = gain_m[NMPC_PITCH] * pitch_rad;
+    const nmpc_real_t roll_m = nmpc_bend(gain_m[NMPC_ROLL], roll_rad);
+    const nmpc_real_t pitch_m = nmpc_bend(gain_m[NMPC_PITCH], pitch_rad);
 
-    walk->advance_m = walk->advance_m + ((NMPC_ROLL_AT_ONCE * roll_m) + (NMPC_PITCH_AT_ONCE * pitch_m));
+    walk->advance_m = walk->advance_m + (nmpc_part(NMPC_ROLL_AT_ONCE, roll_m) + nmpc_part(NMPC_PITCH_AT_ONCE, pitch_m));
     walk->bend_m = walk->bend_m + (roll_m + pitch_m);
-    walk->roll_to_come_m = walk->roll_to_come_m - (NMPC_ROLL_DELAYED * roll_m);
-    walk->pitch_to_come_m = walk->pitch_to_come_m - (NMPC_PITCH_DELAYED * pitch_m);
+    walk->roll_to_come_m = walk->roll_to_come_m - nmpc_part(NMPC_ROLL_DELAYED, roll_m);
+    walk->pitch_to_come_m = walk->pitch_to_come_m - nmpc_part(NMPC_PITCH_DELAYED, pitch_m);
 }
 
 /* Make move `i` of the control horizon, a turn from the move before. */
@@ -68,10 +68,10 @@ static inline void nmpc_predictor_turn(const nmpc_prediction_t *prediction,
 /* Go to the next predicted step. */
 static inline void nmpc_predictor_walk(nmpc_walk_t *walk)
 {
-    walk->error_m = walk->error_m + walk->advance_m;
+    walk->error_m = walk->error_m + nmpc_step_of(walk->advance_m);
     walk->advance_m = walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m));
-    walk->roll_to_come_m = walk->roll_to_come_m * NMPC_ROLL_DECAY;
-    walk->pitch_to_come_m = walk->pitch_to_come_m * NMPC_PITCH_DECAY;
+    walk->roll_to_come_m = nmpc_part(NMPC_ROLL_DECAY, walk->roll_to_come_m);
+    walk->pitch_to_come_m = nmpc_part(NMPC_PITCH_DECAY, walk->pitch_to_come_m);
 }
 
 #ifdef __cplusplus

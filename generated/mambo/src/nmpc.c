@@ -89,9 +89,9 @@ void nmpc_init(nmpc_t *self)
     }
     for (k = 0; k < NMPC_MOVES; k++) {
         self->plan_rad[k] = (nmpc_real_t)0;
-        self->gradient[k] = (nmpc_real_t)0;
+        self->gradient[k] = (nmpc_sum_t)0;
     }
-    self->cost = (nmpc_real_t)0;
+    self->cost = (nmpc_sum_t)0;
     self->iterations = 0U;
     self->converged = 0U;
 }
@@ -117,8 +117,8 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights)
     if ((self == NULL) || (weights == NULL)) {
         return NMPC_NULL_POINTER;
     }
-    if (!(nmpc_between(weights->tracking, (nmpc_real_t)0, NMPC_WEIGHT_LIMIT)
-          && nmpc_between(weights->effort, (nmpc_real_t)0, NMPC_WEIGHT_LIMIT))) {
+    if (!(nmpc_between(weights->tracking, (nmpc_real_t)0, NMPC_TRACKING_WEIGHT_LIMIT)
+          && nmpc_between(weights->effort, (nmpc_real_t)0, NMPC_EFFORT_WEIGHT_LIMIT))) {
         return NMPC_BAD_WEIGHT;
     }
 
@@ -154,7 +154,7 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
     return status;
 }
 
-nmpc_real_t nmpc_last_cost(const nmpc_t *self)
+nmpc_sum_t nmpc_last_cost(const nmpc_t *self)
 {
     return self->cost;
 }

@@ -32,19 +32,20 @@ void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cos
     const nmpc_real_t count = (nmpc_real_t)quadrant;
     const nmpc_real_t rest = ((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))
                              - (count * quarter_turn_rad[2]);
-    const nmpc_real_t square = rest * rest;
+    const nmpc_real_t one = (nmpc_real_t)1;
+    const nmpc_real_t square = nmpc_component(rest, rest);
     nmpc_real_t sine_rest = sine_terms[NMPC_SINE_TERMS - 1];
     nmpc_real_t cosine_rest = cosine_terms[NMPC_COSINE_TERMS - 1];
     int k;
 
     for (k = NMPC_SINE_TERMS - 2; k >= 0; k--) {
-        sine_rest = sine_terms[k] + (square * sine_rest);
+        sine_rest = sine_terms[k] + nmpc_component(square, sine_rest);
     }
     for (k = NMPC_COSINE_TERMS - 2; k >= 0; k--) {
-        cosine_rest = cosine_terms[k] + (square * cosine_rest);
+        cosine_rest = cosine_terms[k] + nmpc_component(square, cosine_rest);
     }
-    sine_rest = rest + (rest * (square * sine_rest));
-    cosine_rest = (nmpc_real_t)1 + (square * cosine_rest);
+    sine_rest = rest + nmpc_component(rest, nmpc_component(square, sine_rest));
+    cosine_rest = one + nmpc_component(square, cosine_rest);
 
     switch ((unsigned int)quadrant % 4U) {
     case 0U:

@@ -16,8 +16,8 @@ typedef struct {
     nmpc_real_t thrust_acceleration_m_s2;
     nmpc_status_t status;
     nmpc_command_t command;
-    nmpc_real_t cost;
-    nmpc_real_t gradient[NMPC_AXES];
+    nmpc_sum_t cost;
+    nmpc_sum_t gradient[NMPC_AXES];
 } nmpc_self_test_step_t;
 
 static const nmpc_self_test_step_t self_test_steps[NMPC_SELF_TEST_STEPS] = {

@@ -79,8 +79,8 @@ typedef struct {
     nmpc_prediction_t prediction;
     nmpc_real_t command_rad[NMPC_AXES]; /* the last command given out */
     nmpc_real_t plan_rad[NMPC_MOVES];   /* the moves of the last step */
-    nmpc_real_t gradient[NMPC_MOVES];   /* cost per radian, as the last iteration saw it */
-    nmpc_real_t cost;                   /* eq 12, as the last iteration saw it */
+    nmpc_sum_t gradient[NMPC_MOVES];    /* cost per radian, as the last iteration saw it */
+    nmpc_sum_t cost;                    /* eq 12, as the last iteration saw it */
     unsigned char iterations;
     unsigned char converged;
 } nmpc_t;
@@ -93,7 +93,7 @@ void nmpc_init(nmpc_t *self);
  * nothing, if an angle is beyond NMPC_ATTITUDE_RANGE_RAD or NaN. */
 nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command);
 
-/* Replace the weights, each within 0 .. NMPC_WEIGHT_LIMIT.
+/* Replace the weights, each from 0 to its limit, NMPC_TRACKING_WEIGHT_LIMIT and NMPC_EFFORT_WEIGHT_LIMIT.
  * Returns NMPC_BAD_WEIGHT, and changes nothing, otherwise. */
 nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights);
 
@@ -109,7 +109,7 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
 
 /* Of the last good step: the cost that the last iteration saw, the updates made, and whether the cost came
  * to rest within the tolerance. `self` must not be null. */
-nmpc_real_t nmpc_last_cost(const nmpc_t *self);
+nmpc_sum_t nmpc_last_cost(const nmpc_t *self);
 int nmpc_last_iterations(const nmpc_t *self);
 int nmpc_has_converged(const nmpc_t *self);
 

@@ -34,7 +34,9 @@
 #ifndef NMPC_CONFIG_H
 #define NMPC_CONFIG_H
 
+/* Numbers of the interface. */
 typedef float nmpc_real_t;
+typedef float nmpc_sum_t;
 
 #define NMPC_VERSION "mambo-nmpc 0.1.0"
 #define NMPC_SETTINGS_DIGEST "1b8bfce44e6fc1aa"
@@ -54,7 +56,8 @@ typedef float nmpc_real_t;
 /* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest to replace them. */
 #define NMPC_TRACKING_WEIGHT 2250.0f
 #define NMPC_EFFORT_WEIGHT 1.0f
-#define NMPC_WEIGHT_LIMIT 1e+06f
+#define NMPC_TRACKING_WEIGHT_LIMIT 1e+06f
+#define NMPC_EFFORT_WEIGHT_LIMIT 1e+06f
 
 /* Optimizer: Ustep, eta+, eta-, Delta_max, Delta_min and epsilon of Table I. */
 #define NMPC_INITIAL_STEP_RAD 0.01f

@@ -23,15 +23,15 @@ const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_
 /* Start a walk: robot and target keep their velocity. */
 static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t velocity_m_s)
 {
-    walk->error_m = error_m;
-    walk->advance_m = NMPC_PREDICTION_STEP_S * velocity_m_s;
+    walk->error_m = nmpc_first_error(error_m);
+    walk->advance_m = nmpc_travel(velocity_m_s);
     walk->bend_m = (nmpc_real_t)0;
 }
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
-    const nmpc_real_t push_m = thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
+    const nmpc_real_t push_m = nmpc_push(thrust_acceleration_m_s2);
     nmpc_real_t sine;
     nmpc_real_t cosine;
     nmpc_real_t across_m;
@@ -39,8 +39,8 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
 
     /* Eq 8 with the signs of eq 3, over one step. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
-    across_m = push_m * sine;
-    along_m = push_m * cosine;
+    across_m = nmpc_component(push_m, sine);
+    along_m = nmpc_component(push_m, cosine);
     prediction->gain_x_m[NMPC_ROLL] = -across_m;
     prediction->gain_x_m[NMPC_PITCH] = -along_m;
     prediction->gain_y_m[NMPC_ROLL] = along_m;

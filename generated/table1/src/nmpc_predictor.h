@@ -36,11 +36,11 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
 static inline void nmpc_predictor_bend(nmpc_walk_t *walk, const nmpc_real_t gain_m[NMPC_AXES],
                                        nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
 {
-    const nmpc_real_t roll_m = gain_m[NMPC_ROLL] * roll_rad;
-    const nmpc_real_t pitch_m = gain_m[NMPC_PITCH] * pitch_rad;
+    const nmpc_real_t roll_m = nmpc_bend(gain_m[NMPC_ROLL], roll_rad);
+    const nmpc_real_t pitch_m = nmpc_bend(gain_m[NMPC_PITCH], pitch_rad);
     const nmpc_real_t both_m = roll_m + pitch_m;
 
-    walk->advance_m = walk->advance_m + (NMPC_AT_ONCE * both_m);
+    walk->advance_m = walk->advance_m + nmpc_part(NMPC_AT_ONCE, both_m);
     walk->bend_m = walk->bend_m + both_m;
 }
 
@@ -61,7 +61,7 @@ static inline void nmpc_predictor_turn(const nmpc_prediction_t *prediction,
 /* Go to the next predicted step. */
 static inline void nmpc_predictor_walk(nmpc_walk_t *walk)
 {
-    walk->error_m = walk->error_m + walk->advance_m;
+    walk->error_m = walk->error_m + nmpc_step_of(walk->advance_m);
     walk->advance_m = walk->advance_m + walk->bend_m;
 }
 

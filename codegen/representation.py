@@ -1,0 +1,120 @@
+"""How a controller's C represents numbers, and what the world outside gives to it and reads from it.
+
+Outside, numbers are floating point in SI units. A float32 or float64 controller takes them as they are,
+rounded to its type; a fixed point controller takes whole numbers, in a format for each quantity.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from codegen.fixed_point import LARGEST, SINE_BITS, Formats, formats, raw
+from codegen.literals import SCALARS
+from codegen.settings import Settings
+from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+
+STATE: Final = (*["position"] * 2, *["velocity"] * 2, *["angle"] * 2, "yaw")
+TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
+THRUST: Final = ("thrust",)
+COMMAND: Final = ("angle", "angle")
+WEIGHTS: Final = ("tracking", "effort")
+"""What the columns of inputs are."""
+
+OUTCOME: Final = {"command_rad": "angle", "cost": "cost", "gradient": "gradient", "plan_rad": "angle"}
+"""What the numbers of an outcome are."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The ends of the ranges of inputs and commands, constants of one controller."""
+
+    position: Any
+    velocity: Any
+    attitude: Any
+    yaw: Any
+    thrust_least: Any
+    thrust_most: Any
+    tilt: Any
+    weights: NDArray[Any]
+
+
+class Representation:
+    """The numbers of one controller.
+
+    scalar:   type of nmpc_real_t, the numbers of the interface.
+    wide:     type of nmpc_sum_t, cost and gradient.
+    computed: type that the reference computes with.
+    formats:  those of fixed point, None with floating point; `bits` has them by name.
+    tracking_limit, effort_limit: largest weights.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        fixed = settings.code.scalar == "fixed"
+        self.formats: Formats | None = formats(settings) if fixed else None
+        self.scalar: Any = np.int32 if fixed else SCALARS[settings.code.scalar]
+        self.wide: Any = np.int64 if fixed else self.scalar
+        self.computed: Any = self.wide
+        found = self.formats
+        self.bits: Mapping[str, int] | None = (
+            asdict(found) | {"sine": SINE_BITS, "whole": 0} if found else None
+        )
+        self.tracking_limit = math.ldexp(found.tracking_limit, -found.tracking) if found else WEIGHT_LIMIT
+        self.effort_limit = math.ldexp(found.effort_limit, -found.effort) if found else WEIGHT_LIMIT
+
+    def constant(self, value: float, quantity: str) -> Any:
+        """Return a constant of the settings, rounded once, in the type that the reference computes with."""
+        return self.scalar(value) if self.bits is None else np.int64(raw(value, self.bits[quantity]))
+
+    def limits(self, settings: Settings) -> Limits:
+        """Return the limits of all inputs."""
+        ranges = settings.ranges
+        return Limits(
+            position=self.constant(ranges.position_m, "position"),
+            velocity=self.constant(ranges.velocity_m_s, "velocity"),
+            attitude=self.constant(ATTITUDE_LIMIT_RAD, "angle"),
+            yaw=self.constant(YAW_LIMIT_RAD, "yaw"),
+            thrust_least=self.constant(ranges.thrust_acceleration_min_m_s2, "thrust"),
+            thrust_most=self.constant(ranges.thrust_acceleration_max_m_s2, "thrust"),
+            tilt=self.constant(settings.limits.tilt_rad, "angle"),
+            weights=np.array(
+                [self.constant(self.tracking_limit, "tracking"), self.constant(self.effort_limit, "effort")]
+            ),
+        )
+
+    def taken(self, values: ArrayLike, quantities: Sequence[str]) -> NDArray[Any]:
+        """Return what the C gets for `values`, whose last axis holds `quantities`.
+
+        In fixed point that is the nearest number, ties away from zero; NaN and what no format holds become
+        the largest number, which is out of every range.
+        """
+        if self.bits is None:
+            return np.ascontiguousarray(values, self.scalar)
+        with np.errstate(all="ignore"):
+            scaled = np.ldexp(np.asarray(values, np.float64), [self.bits[name] for name in quantities])
+            fits = np.abs(scaled) < LARGEST
+            whole = np.trunc(np.where(fits, scaled, 0))
+            rest = np.where(fits, scaled, 0) - whole
+        rounded = whole + np.trunc(2 * rest)
+        return np.where(fits, rounded, LARGEST).astype(self.scalar)
+
+    def told(self, numbers: NDArray[Any], *quantities: str) -> NDArray[Any]:
+        """Return what `numbers` of the C mean: as they are, or exactly in float64.
+
+        They are of one quantity, or the last axis holds `quantities`.
+        """
+        if self.bits is None:
+            return numbers
+        told: NDArray[Any] = np.ldexp(numbers.astype(np.float64), [-self.bits[name] for name in quantities])
+        return told
+
+    def behind(self, values: NDArray[Any], name: str) -> NDArray[Any]:
+        """Return the numbers of the C that an outcome, by its name, was told from."""
+        if self.bits is None:
+            return values
+        kind = self.wide if name in ("cost", "gradient") else self.scalar
+        behind: NDArray[Any] = np.ldexp(values, self.bits[OUTCOME[name]]).astype(kind)
+        return behind

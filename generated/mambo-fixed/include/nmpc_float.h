@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Floats in and out of a fixed point controller, for code around it that computes in floating point. Link
+ * nmpc_float.c only to use it; the controller itself calls nothing of it.
+ */
+#ifndef NMPC_FLOAT_H
+#define NMPC_FLOAT_H
+
+#include "nmpc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The structures of nmpc.h, in SI units. */
+typedef struct {
+    float position_m[2];
+    float velocity_m_s[2];
+    float roll_rad;
+    float pitch_rad;
+    float yaw_rad;
+} nmpc_float_state_t;
+
+typedef struct {
+    float position_m[2];
+    float velocity_m_s[2];
+} nmpc_float_target_t;
+
+typedef struct {
+    float roll_rad;
+    float pitch_rad;
+} nmpc_float_command_t;
+
+typedef struct {
+    float tracking; /* 1/m */
+    float effort;   /* 1/rad */
+} nmpc_float_weights_t;
+
+/* The same as nmpc_step(), nmpc_reset(), nmpc_set_weights() and nmpc_last_cost(), of the nearest numbers, ties
+ * away from zero. NaN, infinity and what no format holds become the largest number, which is out of every range:
+ * the status says so, as in nmpc.h. */
+nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
+                              float thrust_acceleration_m_s2, nmpc_float_command_t *command);
+nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command);
+nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *weights);
+float nmpc_float_last_cost(const nmpc_t *self);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

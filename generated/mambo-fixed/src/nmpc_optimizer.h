@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Optimizer: RPROP with a fixed number of iterations.
+ */
+#ifndef NMPC_OPTIMIZER_H
+#define NMPC_OPTIMIZER_H
+
+#include "nmpc.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Improve the plan of `self`, from where it stands, against its prediction and weights. */
+void nmpc_optimizer_minimize(nmpc_t *self);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
