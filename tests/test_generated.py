@@ -12,6 +12,7 @@ GENERATED = Path(__file__).parent.parent / "generated"
 BUNDLES = {
     "mambo": ("mambo", "float32"),
     "mambo-float64": ("mambo", "float64"),
+    "mambo-fixed": ("mambo", "fixed"),
     "table1": ("table1", "float32"),
 }
 
