@@ -106,7 +106,7 @@ def _improvement(one: Mapping[str, Any]) -> str:
 def _proportion(one: Mapping[str, Any]) -> str:
     return (
         f"{one['count']} of {one['flights']} flights, "
-        f"{100 * one['share']:.3g} % ({100 * one['low']:.2g} .. {100 * one['high']:.3g} %)"
+        f"{100 * one['share']:.3g} % ({100 * one['low']:.3g} .. {100 * one['high']:.3g} %)"
     )
 
 
