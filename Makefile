@@ -17,10 +17,10 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check -
 # What the tests want beside a C compiler; named as Debian names it.
 TOOLS = gcc g++ clang make cmake binutils \
     gcc-arm-linux-gnueabi libc6-dev-armel-cross gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc qemu-system-misc \
-    frama-c-base cppcheck libclang-rt-14-dev
+    frama-c-base cppcheck libclang-rt-14-dev chromium
 TOOL_COMMANDS = gcc g++ clang make cmake nm \
     arm-linux-gnueabi-gcc arm-none-eabi-gcc riscv64-unknown-elf-gcc avr-gcc qemu-system-avr \
-    frama-c cppcheck
+    frama-c cppcheck chromium
 
 ifeq ($(CI),true)
 MARKED = -m "long or not long"

@@ -3,14 +3,33 @@
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
+from typing import Final
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter, MaxNLocator
 
 from codegen.boards import Board
 from sil.footprint import Footprint
 from sil.plots import COMMAND, FLOWN, style
-from sil.sweep import Point
+from sil.sweep import Point, budgets
+
+SWEPT: Final = {
+    "flash_bytes": "flash, B",
+    "ram_bytes": "RAM, B",
+    "time_ms": "time of a step, ms (upper estimate)",
+    "iae_m_s": "IAE, m s",
+}
+"""What a sweep measures and its picture shows, with labels."""
+
+
+class PlainLogFormatter(LogFormatter):
+    """Labels the same ticks of a logarithmic axis, but writes 0.02 for 2e-02."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of the tick at `x`, empty for one that has none."""
+        return f"{x:g}" if super().__call__(x, pos) else ""
 
 
 def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, Path]:
@@ -56,30 +75,33 @@ def draw_sweep(
     A colour for each control horizon, a line style for each number of iterations; filled dots fit the budget,
     which is the dashed line.
     """
-    budget = board.budget
-    panels = (
-        ("flash, B", "flash_bytes", budget.flash_bytes),
-        ("RAM, B", "ram_bytes", budget.ram_bytes),
-        ("time of a step, ms (upper estimate)", "time_ms", 1000 * update_period_s * budget.period_share),
-        ("IAE, m s", "iae_m_s", None),
-    )
-    controls = sorted({point.control for point in points})
-    iterations = sorted({point.iterations for point in points})
     with style():
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")
-        for axes, (label, name, limit) in zip(figure.subplots(2, 2).flat, panels, strict=True):
-            for (row, control), (column, count) in product(enumerate(controls), enumerate(iterations)):
-                line = [p for p in points if (p.control, p.iterations) == (control, count)]
-                x, y = [p.prediction for p in line], [getattr(p, name) for p in line]
-                colour, dashes = f"C{row}", ("-", "--", "-.", ":")[column % 4]
-                axes.plot(x, y, color=colour, linestyle=dashes, label=f"{control} moves, {count} iterations")
-                fits = [(p.prediction, getattr(p, name)) for p in line if p.fits]
-                axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour, markersize=3.5)
-            if limit is not None and limit < 3 * max(getattr(p, name) for p in points):
-                axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
-            axes.set(xlabel="prediction horizon", ylabel=label)
-            axes.set_yscale("log" if name in ("iae_m_s", "time_ms") else "linear")
+        limits = budgets(board, update_period_s)
+        for axes, quantity in zip(figure.subplots(2, 2).flat, SWEPT, strict=True):
+            draw_swept(axes, points, quantity, limits.get(quantity))
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
         figure.suptitle(board.title, parse_math=False)
         return save(figure, stem)
+
+
+def draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float | None) -> None:
+    """Draw one quantity of `SWEPT` against the prediction horizon, and its limit if that is near."""
+    controls = sorted({point.control for point in points})
+    iterations = sorted({point.iterations for point in points})
+    for (row, control), (column, count) in product(enumerate(controls), enumerate(iterations)):
+        line = [p for p in points if (p.control, p.iterations) == (control, count)]
+        x, y = [p.prediction for p in line], [getattr(p, quantity) for p in line]
+        colour, dashes = f"C{row}", ("-", "--", "-.", ":")[column % 4]
+        axes.plot(x, y, color=colour, linestyle=dashes, label=f"{control} moves, {count} iterations")
+        fits = [(p.prediction, getattr(p, quantity)) for p in line if p.fits]
+        axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour, markersize=3.5)
+    if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
+        axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
+    axes.set(xlabel="prediction horizon", ylabel=SWEPT[quantity])
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if quantity in ("iae_m_s", "time_ms"):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(PlainLogFormatter())
+        axes.yaxis.set_minor_formatter(PlainLogFormatter())

@@ -21,7 +21,7 @@ from sil.footprint import Footprint, measure_footprint
 from sil.progress import progress_bar
 from sil.results import SUMMARY, new_results, summary_text
 from sil.same_bits import REFERENCE, BuildDigest, builds, same_bits
-from sil.sweep import Grid, Point, largest_fit, sweep, write_points
+from sil.sweep import Grid, Point, budgets, largest_fit, sweep, write_points
 
 FOOTPRINT_FILES = ("footprint.png", "footprint.svg", "footprint.html")
 SWEEP_FILES = ("sweep.csv", "sweep.png", "sweep.svg")
@@ -181,6 +181,7 @@ def sweep_command(
             "source": source,
             "settings": settings.digest,
             "board": chosen.name,
+            "budget": budgets(chosen, settings.horizon.update_period_s),
             "points": [asdict(point) for point in points],
             "largest_fit": None if best is None else asdict(best),
         }

@@ -19,6 +19,10 @@ class TraceError(MamboNmpcError):
     """A file that holds no trace; the message names it."""
 
 
+class ResultsError(MamboNmpcError):
+    """A folder that holds no results of ours, or broken ones; the message names it and what was expected."""
+
+
 class CacheError(MamboNmpcError):
     """The compile cache cannot be used, or others may write to it."""
 

@@ -3,11 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-import jinja2
-
 import codegen
 from codegen.settings import Settings
 from sil.footprint import Footprint, Limit
+from sil.page import render_page
 
 _HEAD = ("board", "flash B", "RAM B", "stack B", "instructions a step", "time ms", "period", "")
 
@@ -40,14 +39,7 @@ def text(footprints: Sequence[Footprint]) -> str:
 
 def page(summary_of_all: dict[str, Any]) -> str:
     """Render the summary as one HTML page that needs no other file."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("templates", "report"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        autoescape=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("footprint.html.j2").render(summary_of_all)
+    return render_page("footprint.html.j2", summary_of_all)
 
 
 def _row(footprint: Footprint) -> tuple[str, ...]:

@@ -18,6 +18,8 @@ from sil.traces import Trace
 TARGET, FLOWN, COMMAND = "#c4c4c4", "#0072B2", "#E69F00"
 """Colours that stay apart for colour-blind readers and in grey (Okabe and Ito)."""
 
+COLUMN_LABELS: Final = ("y (east), m", "error, m", "roll, rad", "pitch, rad")
+
 _STYLE: Final[dict[Any, Any]] = {
     "font.size": 9,
     "axes.titlesize": 10,
@@ -44,14 +46,8 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
         figure = Figure(figsize=(_COLUMN_INCHES * len(flights), _HEIGHT_INCHES), layout="constrained")
         rows = figure.subplots(4, len(flights), squeeze=False, sharey="row", height_ratios=(1.9, 1, 1, 1))
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
-            _draw_path(column[0], trace, title)
-            _draw_error(column[1], trace)
-            _draw_angle(column[2], trace, axis=0)
-            _draw_angle(column[3], trace, axis=1)
-            column[3].set_xlabel("time, s")
-        for axes, label in zip(
-            rows[:, 0], ("y (east), m", "error, m", "roll, rad", "pitch, rad"), strict=True
-        ):
+            draw_column(column, trace, title)
+        for axes, label in zip(rows[:, 0], COLUMN_LABELS, strict=True):
             axes.set_ylabel(label)
         _share_horizontal_scale(rows[0])
         rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
@@ -71,6 +67,15 @@ def style() -> Iterator[None]:
         mpl.rcParams.update(_STYLE)
         warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)
         yield
+
+
+def draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
+    """Draw the first flight of a trace in four axes (4,): path, error, roll, pitch."""
+    _draw_path(column[0], trace, title)
+    _draw_error(column[1], trace)
+    _draw_angle(column[2], trace, axis=0)
+    _draw_angle(column[3], trace, axis=1)
+    column[3].set_xlabel("time, s")
 
 
 def _draw_path(axes: Axes, trace: Trace, title: str) -> None:

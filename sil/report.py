@@ -89,7 +89,7 @@ def flight_text(summary: dict[str, Any]) -> str:
             columns[heading] = summary[key]
     lines = [f"{'':22}" + "".join(f"{heading:>14}" for heading in columns)]
     for key in summary["metrics"]:
-        name, unit = _named(key)
+        name, unit = named(key)
         lines.append(
             f"{name:22}" + "".join(f"{values[key]:14.5g}" for values in columns.values()) + f"  {unit}"
         )
@@ -113,10 +113,12 @@ def flight_text(summary: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _named(key: str) -> tuple[str, str]:
-    suffix = next(suffix for suffix in _UNITS if key.endswith(suffix))
+def named(key: str) -> tuple[str, str]:
+    """Return the words and the unit of a metric's key, as rms_error_m."""
+    suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
     name = key.removesuffix(suffix).replace("_", " ")
-    return (name.upper() if name in ("iae", "ise", "itse", "itae") else name), _UNITS[suffix]
+    words = [word.upper() if word in ("iae", "ise", "itse", "itae") else word for word in name.split()]
+    return " ".join(words), _UNITS.get(suffix, "")
 
 
 def table2_text(result: Table2) -> str:

@@ -62,6 +62,16 @@ def sweep(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
         yield from pool.map(_measured, jobs)
 
 
+def budgets(board: Board, update_period_s: float) -> dict[str, float]:
+    """Return what a controller may take of the board, by the names of `Point`."""
+    budget = board.budget
+    return {
+        "flash_bytes": budget.flash_bytes,
+        "ram_bytes": budget.ram_bytes,
+        "time_ms": 1000.0 * update_period_s * budget.period_share,
+    }
+
+
 def largest_fit(points: Sequence[Point]) -> Point | None:
     """Return the largest horizon that fits and flies: longest prediction, most moves, then best tracking."""
     fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]

@@ -5,6 +5,7 @@ import hashlib
 import zipfile
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,17 @@ SEEN_COLUMNS = (
     *("seen_roll_rad", "seen_pitch_rad", "seen_yaw_rad"),
 )
 """After the others, where there are sensors."""
+
+
+_AXES: Final[dict[str, tuple[int, ...]]] = {
+    "position_m": (3,),
+    "velocity_m_s": (3,),
+    "euler_rad": (3,),
+    "target": (4,),
+    "command_rad": (2,),
+    "thrust_acceleration_m_s2": (),
+}
+"""Axes of the arrays behind instant and flight; each seen one has those of the true one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +150,18 @@ def read_npz(path: Path) -> Trace:
     try:
         with path.open("rb") as file, np.load(file) as arrays:
             kind = SensedTrace if "seen_position_m" in arrays else Trace
-            return kind(**{field.name: arrays[field.name] for field in fields(kind)})
+            trace = kind(**{field.name: arrays[field.name] for field in fields(kind)})
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise TraceError(f"{path}: is no trace: {error}") from error
+    steps = trace.status.shape
+    if len(steps) != 2 or 0 in steps or trace.time_s.shape != steps[:1]:
+        raise TraceError(f"{path}: is no trace: time_s {trace.time_s.shape} and status {steps} disagree")
+    for name in (field.name for field in fields(trace) if field.name not in ("time_s", "status")):
+        array, axes = getattr(trace, name), _AXES[name.removeprefix("seen_")]
+        if array.shape != (*steps, *axes) or array.dtype.kind not in "fi":
+            raise TraceError(f"{path}: is no trace: {name} has the shape {array.shape}")
+    if not (np.isfinite(trace.target).all() and np.isfinite(trace.time_s).all()):
+        raise TraceError(f"{path}: is no trace: time and target must be finite")
+    if not (np.diff(trace.time_s) > 0.0).all():
+        raise TraceError(f"{path}: is no trace: time must rise")
+    return trace

@@ -5,11 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import jinja2
-
 import codegen
 from codegen.settings import Settings
 from codegen.settings.controller_toml import to_toml
+from sil.page import render_page
 from sil.verify.check import Outcome, Result
 from sil.verify.checks import CHECKS, Entry
 
@@ -77,14 +76,7 @@ def summary(found: Sequence[Verified], source: str, settings: Settings) -> dict[
 
 def page(summary_of_all: Mapping[str, Any]) -> str:
     """Render the summary as one HTML page that needs no other file."""
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("templates", "report"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        autoescape=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("verify.html.j2").render(summary_of_all)
+    return render_page("verify.html.j2", summary_of_all)
 
 
 def digests(folder: Path) -> dict[str, str]:

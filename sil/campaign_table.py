@@ -1,0 +1,37 @@
+"""The table of a campaign read back: a flight a line, what was drawn, and what became of each controller."""
+
+import csv
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from codegen.errors import echo
+from sil.campaign.statistics import Table
+from sil.errors import ResultsError
+
+COMPARED: Final = {
+    "iae_m_s": "IAE, m s",
+    "max_error_m": "largest error, m",
+    "rms_error_m": "rms error, m",
+    "command_variation_rad": "command variation, rad",
+}
+"""Indices that a page compares controllers by, with labels."""
+
+
+def read_table(path: Path) -> Table:
+    """Return the table at `path` without a last line that is cut short; raises ResultsError."""
+    name = echo(str(path))
+    try:
+        text = path.read_text("utf-8")
+        header, *rows = csv.reader(text[: text.rfind("\n") + 1].splitlines())
+        columns = zip(header, zip(*rows, strict=True), strict=True) if rows else ()
+        return {
+            title: np.array([float(cell) for cell in cells])
+            for title, cells in columns
+            if not title.endswith("_sha256")
+        }
+    except (OSError, ValueError, csv.Error) as error:
+        raise ResultsError(
+            f"{name}: is no table of a campaign: {echo(str(error))}; run campaign again"
+        ) from error

@@ -1,0 +1,107 @@
+"""A real browser without a window and without a network, driven through its own debugging protocol."""
+
+import contextlib
+import fcntl
+import json
+import os
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from tests.support.tools import require
+
+_FIRST_HIGH_DESCRIPTOR = 10
+
+
+class Browser:
+    """One tab; `complaints` collects what the page writes to the console, throws or is refused."""
+
+    def __init__(self, commands: BinaryIO, answers: BinaryIO) -> None:
+        self.complaints: list[str] = []
+        self._commands, self._answers = commands, answers
+        self._sent = 0
+        self._session: str | None = None
+        target = self.do("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.do("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log"):
+            self.do(f"{domain}.enable")
+
+    def do(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Carry out a command of the protocol and return its result."""
+        self._sent += 1
+        message: dict[str, Any] = {"id": self._sent, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        self._commands.write(json.dumps(message).encode() + b"\0")
+        while (answer := self._next()).get("id") != self._sent:
+            pass
+        assert "error" not in answer, (method, answer)
+        return dict(answer["result"])
+
+    def open(self, page: Path, width_px: int, **media: str) -> None:
+        """Show a page in a window of this width, with these media features, such as a dark scheme."""
+        self.complaints.clear()
+        features = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items()]
+        self.do("Emulation.setEmulatedMedia", features=features)
+        size = {"width": width_px, "height": 800, "deviceScaleFactor": 1, "mobile": width_px < 600}
+        self.do("Emulation.setDeviceMetricsOverride", **size)
+        self.do("Page.navigate", url=page.as_uri())
+        while self._next().get("method") != "Page.loadEventFired":
+            pass
+
+    def find(self, expression: str) -> Any:
+        """Return the value of a JavaScript expression in the page, awaited."""
+        found = self.do("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in found, found
+        return found["result"].get("value")
+
+    def press(self, key: str, code: int, text: str = "") -> None:
+        """Press a key of the keyboard and let it go."""
+        names = {"key": key, "code": key, "windowsVirtualKeyCode": code}
+        self.do("Input.dispatchKeyEvent", type="keyDown", text=text, **names)
+        self.do("Input.dispatchKeyEvent", type="keyUp", **names)
+
+    def _next(self) -> dict[str, Any]:
+        """Return the next answer or event, and note complaints."""
+        text = bytearray()
+        while (byte := self._answers.read(1)) != b"\0":
+            assert byte, "the browser is gone"
+            text += byte
+        message: dict[str, Any] = json.loads(text)
+        if message.get("method") in ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded"):
+            self.complaints.append(json.dumps(message["params"]))
+        return message
+
+
+@contextlib.contextmanager
+def browser(folder: Path) -> Iterator[Browser]:
+    """Start a browser that keeps its files in `folder`, and end it."""
+    chromium, bash = require("chromium", "chromium"), require("bash", "bash")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run"]
+    options += [f"--user-data-dir={folder}", "--host-resolver-rules=MAP * ~NOTFOUND"]
+    options += ["--remote-debugging-pipe"]
+    (its_commands, commands), (answers, its_answers) = _pipe(), _pipe()
+    with os.fdopen(commands, "wb", buffering=0) as to_it, os.fdopen(answers, "rb") as from_it:
+        process = subprocess.Popen(
+            [bash, "-c", f'exec "$0" "$@" 3<&{its_commands} 4>&{its_answers}', chromium, *options],
+            pass_fds=(its_commands, its_answers),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(its_commands)
+        os.close(its_answers)
+        try:
+            yield Browser(to_it, from_it)
+        finally:
+            process.terminate()
+            process.wait(30)
+
+
+def _pipe() -> tuple[int, int]:
+    """Return a pipe, read end first, away from the numbers that the browser's own ends get."""
+    low = os.pipe()
+    high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, _FIRST_HIGH_DESCRIPTOR) for end in low]
+    for end in low:
+        os.close(end)
+    return high[0], high[1]

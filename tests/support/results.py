@@ -1,0 +1,246 @@
+"""Result folders of every command, small: written by the commands' own writers where they have one."""
+
+import copy
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from codegen import boards
+from codegen.footprint.sizes import Added, Memory, Parts
+from codegen.reference import Status
+from codegen.settings import Settings
+from sil import fault_report, footprint_report, report, verify_report
+from sil.baseline import PdController
+from sil.cli_replay import COMMAND
+from sil.fault_flights import End, Verdict
+from sil.footprint import Footprint
+from sil.loop import Flight, fly
+from sil.results import SUMMARY, summary_text
+from sil.scenario import Scenario
+from sil.sweep import Point, budgets
+from sil.table2 import CASES, PD, Claim, Row
+from sil.table2_sensed import SensedRow
+from sil.traces import Trace, write_npz
+from sil.verify.check import Outcome, Result
+from sil.verify.checks import CHECKS
+
+HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
+"""A name of a file that is markup, the end of a script, and quotes."""
+
+DURATION_S: Final = 4.0
+
+
+@lru_cache
+def _flown() -> Trace:
+    return fly(Flight(next(iter(CASES.values())), duration_s=DURATION_S), PdController())
+
+
+def trace(*, lost: bool = False) -> Trace:
+    """Return the PD on the figure of eight; if `lost`, without a second half."""
+    flown = copy.deepcopy(_flown())
+    if lost:
+        for array in (flown.position_m, flown.velocity_m_s, flown.euler_rad):
+            array[len(array) // 2 :] = np.nan
+    return flown
+
+
+def fly_folder(folder: Path, *, lost: bool = False) -> None:
+    """Write a flight of a controller with a hostile name."""
+    flown = trace(lost=lost)
+    write_npz(flown, folder / "trace.npz")
+    summary = {
+        "controller": "nmpc",
+        "board": "crazyflie",
+        "same_bits_as_host": True,
+        "source": HOSTILE,
+        "settings": Settings().digest,
+        "trajectory": HOSTILE,
+        "size_m": 2.0,
+        "rate_rad_s": 0.5,
+        "yaw_rad": 0.0,
+        "wind_m_s2": (0.0, 0.0),
+        "wind_speed_m_s": 3.0,
+        "sensors": "none",
+        "motor_lag_s": 0.0,
+        "start": "hover",
+        "duration_s": DURATION_S,
+        **report.found(flown, Settings()),
+    }
+    _write(folder, "fly", summary | {"refusals": [HOSTILE]})
+
+
+def replay_folder(folder: Path) -> None:
+    """Write a recorded flight flown again, not bit for bit."""
+    flown = trace()
+    write_npz(flown, folder / "trace.npz")
+    summary = {
+        "replay": HOSTILE,
+        "same_bits_as_recorded": False,
+        "same_bits_as_host": None,
+        "controller": "pd",
+        "scenario": Scenario().model_dump(mode="json"),
+        "settings": Settings().digest,
+        **report.found(flown, Settings()),
+    }
+    _write(folder, COMMAND, summary)
+
+
+def sensed_folder(folder: Path) -> None:
+    """Write Table II through sensors, with one row."""
+    row = SensedRow(HOSTILE, "mambo", 20, 1, (7.123, 0.5, 40.0, np.nan), (6.0, 0.4, 30.0, 900.0), 8.5, 0.77)
+    _write(folder, "table2 --sensors", {"rows": [asdict(row)]})
+
+
+def table2_folder(folder: Path) -> None:
+    """Write Table II with two controllers and made-up rows."""
+    flown = trace()
+    write_npz(flown, folder / "pd.npz")
+    write_npz(flown, folder / "mambo.npz")
+    rows = [
+        Row(case, name, (7.123, 0.5, 40.0, 1234.5), None if name == PD else (2.5, 3.0, 4.0, 5.0))
+        for case in CASES
+        for name in (PD, "mambo", HOSTILE)
+    ]
+    claims = [Claim(f"holds, says {HOSTILE}", True, "as shown"), Claim("does not", False, "as shown")]
+    _write(
+        folder, "table2", {"rows": [asdict(row) for row in rows], "claims": [asdict(one) for one in claims]}
+    )
+
+
+def footprint_folder(folder: Path) -> None:
+    """Write the footprint on two boards, one without stack and time, over its flash."""
+    measured = [
+        Footprint(
+            board=boards.load(name),
+            compiler=HOSTILE,
+            optimisation="-O2",
+            scalar="float32",
+            added=Added(Memory({}, {}), Parts(flash, 0, 0, 0), Parts(120, 0, 0, 0), {"nmpc_step": flash}, {}),
+            instance_bytes=120,
+            stack=None,
+            counts=None,
+            uncounted="there is no emulator",
+            forbidden=(),
+            update_period_s=0.01,
+        )
+        for name, flash in (("crazyflie", 3000), ("mega", 10**6))
+    ]
+    _write(folder, "footprint", footprint_report.summary(measured, HOSTILE, Settings()))
+
+
+def sweep_folder(folder: Path) -> None:
+    """Write a sweep of four points, one of which did not fly."""
+    points = [
+        Point(
+            prediction, control, 5, 3000 + prediction, 100, 200.0, 4000.0, 0.1, 3.0 / prediction, control < 2
+        )
+        for prediction in (5, 10)
+        for control in (1, 2)
+    ]
+    points.append(Point(15, 1, 5, 3015, 100, np.nan, np.nan, np.nan, np.nan, False))
+    summary = {
+        "source": HOSTILE,
+        "settings": Settings().digest,
+        "board": HOSTILE,
+        "budget": budgets(boards.load("crazyflie"), 0.01),
+        "points": [asdict(point) for point in points],
+        "largest_fit": asdict(points[2]),
+    }
+    _write(folder, "sweep", summary)
+
+
+def faults_folder(folder: Path) -> None:
+    """Write two faults on two courses, one of which crashes."""
+    answers = (int(Status.OK), int(Status.BAD_STATE))
+    verdicts = [
+        Verdict(course, fault, False, answers, True, 0.35, 0.3, error, 0.07, back, end)
+        for course in ("eight", "hover")
+        for fault, error, back, end in (
+            (HOSTILE, 0.06, 0.0, End.BACK),
+            ("state NaN to the end", 2376.5, np.nan, End.CRASHED),
+        )
+    ]
+    summary = {
+        "source": HOSTILE,
+        "settings": Settings().digest,
+        "flights": fault_report.records(verdicts),
+    }
+    _write(folder, "faults", summary)
+
+
+def verify_folder(folder: Path) -> None:
+    """Write a verification of which one check passed and one could not run."""
+    results = (
+        Result(Outcome.PASSED, f"nothing but {HOSTILE}"),
+        Result(Outcome.INCOMPLETE, "cppcheck is missing"),
+    )
+    found = [verify_report.Verified(entry, result) for entry, result in zip(CHECKS, results, strict=False)]
+    _write(folder, "verify", verify_report.summary(found, HOSTILE, Settings()))
+
+
+def campaign_folder(folder: Path, *, finished: bool = True) -> None:
+    """Write a campaign of four flights, one of which crashes with the second controller."""
+    document = {
+        "seed": 7,
+        "flight": {
+            "trajectory": "bernoulli",
+            "size_m": 2.0,
+            "rate_rad_s": 0.5,
+            "duration_s": 100.0,
+            "sensors": "mambo",
+        },
+        "controllers": [{"name": name} for name in ("pd", "mambo")],
+    }
+    identity = {"generator": "mambo-nmpc 0.1.0", "command": "campaign", **document}
+    (folder / "campaign.json").write_text(json.dumps(identity), "utf-8")
+    columns = [f"{name}_{key}" for name in ("pd", "mambo") for key in ("crashed", "iae_m_s", "trace_sha256")]
+    lines = [",".join(["flight", *columns])]
+    lines += [f"{flight},0,{60 + flight},ab,{int(flight == 3)},{4 + flight},cd" for flight in range(4)]
+    (folder / "flights.csv").write_text("\n".join(lines) + "\n4,0,6", "utf-8")
+    if not finished:
+        return
+
+    def share(count: int) -> dict[str, float]:
+        return {"count": count, "flights": 4, "share": count / 4, "low": 0.0, "high": 0.6}
+
+    quantiles = {"iae_m_s": {"0.05": 4.0, "0.5": 5.0, "0.95": 6.0, "1": np.inf}}
+    found = {"refused_an_input": share(0), "quantiles": quantiles}
+    worst = {
+        "flight": 3,
+        "crashed": True,
+        "iae_m_s": np.nan,
+        "max_error_m": 9.5,
+        "record": f"flights/{HOSTILE}",
+    }
+    improvement = {"controller": "mambo", "index": "iae_m_s", "median": 12.0, "low": 11.0, "high": 13.0}
+    summary = {
+        "campaign": document,
+        "flights": 4,
+        "controllers": {"pd": {"crashed": share(0), **found}, "mambo": {"crashed": share(1), **found}},
+        "improvements": [{**improvement, "better": share(3)}],
+        "worst": {"mambo": [worst]},
+    }
+    _write(folder, "campaign", summary)
+
+
+FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
+    "fly": fly_folder,
+    "replay": replay_folder,
+    "table2": table2_folder,
+    "sensed": sensed_folder,
+    "footprint": footprint_folder,
+    "sweep": sweep_folder,
+    "faults": faults_folder,
+    "verify": verify_folder,
+    "campaign": campaign_folder,
+}
+"""A folder of every command."""
+
+
+def _write(folder: Path, command: str, summary: dict[str, Any]) -> None:
+    (folder / SUMMARY).write_text(summary_text(command, summary), "utf-8")
