@@ -20,7 +20,16 @@ from codegen.footprint.build import builder
 from codegen.reference import ReferenceController
 from codegen.representation import TARGET, Representation
 from codegen.settings import Settings
-from sil import cli_boards, cli_campaign, cli_faults, cli_report, cli_verify, report, table2_sensed
+from sil import (
+    cli_boards,
+    cli_campaign,
+    cli_faults,
+    cli_report,
+    cli_tune,
+    cli_verify,
+    report,
+    table2_sensed,
+)
 from sil.baseline import PdController
 from sil.cli_replay import fly_again
 from sil.compiled import CompiledController
@@ -78,6 +87,7 @@ def main() -> None:
     cli_faults.register(app)
     cli_verify.register(app)
     cli_campaign.register(app)
+    cli_tune.register(app)
     cli_report.register(app)
     app()
 

@@ -41,3 +41,7 @@ class EmulationError(MamboNmpcError):
 
 class WorkerError(MamboNmpcError):
     """Work given to other processes or machines did not come back."""
+
+
+class StudyError(MamboNmpcError):
+    """A study cannot be searched or kept: Optuna is missing, or the storage refuses."""

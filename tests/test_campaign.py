@@ -151,7 +151,7 @@ def test_the_campaign_is_its_values(tmp_path: Path) -> None:
 BAD = {
     "seed = -1": "seed = -1 must lie in 0..9223372036854775807",
     'seed = "x"': 'seed = "x" must be a valid integer',
-    "sed = 1": "sed is not a key of a campaign; did you mean seed?",
+    "sed = 1": "sed is not a key of this file; did you mean seed?",
     "draws = 3": "draws = 3 must be a section; write [draws] and its keys below",
     "[draws]\nmas_kg = 1": "draws.mas_kg is not a parameter; did you mean mass_kg?",
     "[draws]\nwind = 3": "draws.wind is not a parameter; did you mean wind_x_m_s2, wind_y_m_s2",

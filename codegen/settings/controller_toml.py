@@ -30,7 +30,11 @@ def parse(text: str, source: str) -> Settings:
 
     Raises UnreadableFileError for bad syntax, InvalidSettingsError with all faults for bad settings.
     """
-    document = parse_document(text, source)
+    return validated(parse_document(text, source), source)
+
+
+def validated(document: Mapping[str, object], source: str) -> Settings:
+    """Return the settings in `document`; raises InvalidSettingsError with all faults, after `source`."""
     try:
         return Settings.model_validate(document)
     except ValidationError as error:
@@ -46,10 +50,7 @@ def with_option(settings: Settings, path: str, value: object, source: str) -> Se
     section, name = path.split(".")
     document = settings.model_dump()
     document[section][name] = value
-    try:
-        return Settings.model_validate(document)
-    except ValidationError as error:
-        raise _invalid(source, error, document) from None
+    return validated(document, source)
 
 
 def to_toml(settings: Settings, title: str = _TITLE) -> str:

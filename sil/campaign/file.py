@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -39,13 +39,16 @@ _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _LONGEST_LIST: Final = 10
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
     """Frozen, no unknown keys, no silent conversion, finite numbers only."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-class FlightSection(_Section):
+File = TypeVar("File", bound=Section)
+
+
+class FlightSection(Section):
     """What all flights have in common."""
 
     trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
@@ -70,20 +73,20 @@ def _drawn(parameter: Parameter) -> Any:
     return Annotated[Distribution, validator, written], parameter.default
 
 
-_Draws: Any = create_model(
-    "_Draws",
-    __base__=_Section,
+Draws: Any = create_model(
+    "Draws",
+    __base__=Section,
     **{name: _drawn(parameter) for name, parameter in PARAMETERS.items()},
 )
 
 
-class CampaignFile(_Section):
+class CampaignFile(Section):
     """The keys of campaign.toml; a missing key is that of the default campaign."""
 
     seed: int = Field(0, ge=0, le=2**63 - 1)
     controllers: tuple[str, ...] = Field((PD, "mambo"), strict=False)
     flight: FlightSection = FlightSection()
-    draws: _Draws = _Draws()
+    draws: Draws = Draws()
 
     @field_validator("controllers")
     @classmethod
@@ -148,13 +151,21 @@ def read(path: Path) -> Campaign:
     errors of the controllers' files.
     """
     source = echo(str(path))
+    return _campaign(read_as(CampaignFile, path), path.parent, source)
+
+
+def read_as(model: type[File], path: Path) -> File:
+    """Return the file at `path` as `model`, which has sections like a campaign's.
+
+    Raises UnreadableFileError for what is not TOML, InvalidSettingsError with every broken rule.
+    """
+    source = echo(str(path))
     document = parse_document(read_text(path), source)
     try:
-        file = CampaignFile.model_validate(document)
+        return model.model_validate(document)
     except ValidationError as error:
         details = error.errors(include_url=False, include_context=False)
-        raise InvalidSettingsError(tuple(f"{source}: {_fault(one)}" for one in details)) from None
-    return _campaign(file, path.parent, source)
+        raise InvalidSettingsError(tuple(f"{source}: {_fault(one, model)}" for one in details)) from None
 
 
 def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
@@ -200,47 +211,47 @@ def _entrant(named: str, folder: Path, source: str) -> Entrant:
     return Entrant(name, "nmpc", settings)
 
 
-def _fault(details: ErrorDetails) -> str:
+def _fault(details: ErrorDetails, model: type[Section]) -> str:
     """Say which key is wrong, with its value, and what to write instead."""
     names = [str(part) for part in details["loc"]]
     dotted = echo(".".join(names))
-    value = _spelled(details["input"])
+    value = spelled(details["input"])
     match details["type"]:
         case "extra_forbidden":
-            return _unknown(names, dotted)
+            return _unknown(names, dotted, model)
         case "model_type":
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
         case "greater_than_equal" | "less_than_equal":
-            limits = _section(names).model_fields[names[-1]].metadata
+            limits = _section(names, model).model_fields[names[-1]].metadata
             low, high = (next(getattr(m, k) for m in limits if hasattr(m, k)) for k in ("ge", "le"))
             return f"{dotted} = {value} must lie in {low}..{high}"
         case _:
             return f"{dotted} = {value} {details['msg'].replace('Input should', 'must')}"
 
 
-def _section(names: Sequence[str]) -> Any:
+def _section(names: Sequence[str], model: type[Section]) -> Any:
     """Return the model that has, or should have, the key at the path `names`."""
-    section: Any = CampaignFile
+    section: Any = model
     for name in names[:-1]:
         section = section.model_fields[name].annotation
     return section
 
 
-def _unknown(names: Sequence[str], dotted: str) -> str:
+def _unknown(names: Sequence[str], dotted: str, model: type[Section]) -> str:
     """Say that a key does not exist, with the nearest one that does."""
-    keys = list(_section(names).model_fields)
+    keys = list(_section(names, model).model_fields)
     near = [key for key in keys if key.startswith(f"{names[-1]}_")]
     near = near or difflib.get_close_matches(names[-1], keys, n=1)
-    what = "parameter" if names[0] == "draws" and len(names) == 2 else "key of a campaign"
+    what = "parameter" if names[0] == "draws" and len(names) == 2 else "key of this file"
     choice = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(keys)}"
     return f"{dotted} is not a {what}; {choice}"
 
 
-def _spelled(value: object) -> str:
+def spelled(value: object) -> str:
     """Return a value nearly as TOML spells it, shortened."""
     if isinstance(value, dict) and len(value) == 1:
         ((key, inner),) = value.items()
-        return f"{{ {echo(str(key))} = {_spelled(inner)} }}"
+        return f"{{ {echo(str(key))} = {spelled(inner)} }}"
     try:
         return echo(json.dumps(value, ensure_ascii=False, default=str))
     except ValueError:

@@ -20,7 +20,6 @@ from codegen.errors import ForeignFilesError, UnwritableError, echo
 from codegen.exchange import put
 from sil.results import GENERATOR, locked
 
-IDENTITY: Final = "campaign.json"
 TABLE: Final = "flights.csv"
 FLIGHT: Final = "flight"
 
@@ -122,7 +121,7 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
     with refusals(folder):
         folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
-        _claim(folder, {"generator": f"{GENERATOR}{codegen.__version__}", "command": "campaign", **campaign})
+        claim(folder, "campaign", {"command": "campaign", **campaign})
         with Store(folder, columns) as store:
             yield store
 
@@ -137,17 +136,18 @@ def refusals(place: Path, advice: str = "") -> Iterator[None]:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}{advice}") from error
 
 
-def _claim(folder: Path, identity: dict[str, Any]) -> None:
-    """Mark an empty folder with `identity`; refuse one that holds anything but this campaign."""
-    name, path = echo(str(folder)), folder / IDENTITY
+def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
+    """Mark an empty folder with `identity` in `<kind>.json`; refuse one that holds anything else."""
+    name, path = echo(str(folder)), folder / f"{kind}.json"
+    identity = {"generator": f"{GENERATOR}{codegen.__version__}", **identity}
     try:
         held = json.loads(path.read_text("utf-8")) if path.is_file() and not path.is_symlink() else None
     except (ValueError, RecursionError):
         held = None
     if not isinstance(held, dict) or not str(held.get("generator")).startswith(GENERATOR):
-        if any(not one.name.startswith(f".{IDENTITY}") for one in folder.iterdir()):
+        if any(not one.name.startswith(f".{path.name}") for one in folder.iterdir()):
             raise ForeignFilesError(
-                f"{name}: holds files that are not a campaign of ours; name another folder with -o", ()
+                f"{name}: holds files that are not a {kind} of ours; name another folder with -o", ()
             )
         with refusals(folder):
             put(path, (json.dumps(identity, indent=2) + "\n").encode())
@@ -155,7 +155,7 @@ def _claim(folder: Path, identity: dict[str, Any]) -> None:
     difference = _difference("", held, json.loads(json.dumps(identity)))
     if difference:
         raise ForeignFilesError(
-            f"{name}: holds another campaign, {difference}; name another folder with -o", ()
+            f"{name}: holds another {kind}, {difference}; name another folder with -o", ()
         )
 
 

@@ -1,0 +1,188 @@
+"""Read tune.toml: which settings are searched, from which controller on, and on which drawn flights."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import Field
+
+from codegen import presets
+from codegen.errors import InvalidSettingsError, MamboNmpcError, echo
+from codegen.settings import Settings, controller_toml
+from codegen.settings.keys import KEYS
+from sil.campaign.distributions import Distribution, Domain, parse
+from sil.campaign.file import Draws, FlightSection, Section, read_as, scenario, spelled
+from sil.campaign.parameters import PARAMETERS, Draw, draw
+from sil.errors import FlightError
+from sil.scenario import flight_of
+
+DEFAULT_SEARCH: Final[dict[str, dict[str, Any]]] = {
+    "horizon": {
+        "prediction": {"choice": [6, 8, 10]},
+        "control": {"choice": [1, 2]},
+        "prediction_step_s": {"uniform": [0.03, 0.12]},
+    },
+    "model": {"roll_lag_s": {"uniform": [0.05, 0.5]}, "pitch_lag_s": {"uniform": [0.05, 0.5]}},
+    "cost": {"effort_weight": {"log_uniform": [0.1, 10000.0]}},
+    "optimizer": {
+        "iterations": {"choice": [3, 4, 5]},
+        "initial_step_rad": {"log_uniform": [0.0005, 0.05]},
+    },
+}
+"""No trial takes more work than the base, which has the longest horizons and the most iterations.
+
+The tracking weight is the scale of the effort weight, and stays.
+"""
+
+_FIXED: Final = ("horizon.update_period_s", "cost.tracking_weight")
+_MOST_KEYS: Final = 10
+
+
+class TuningFlight(FlightSection):
+    """What all flights have in common: shorter ones than those of a campaign, for many are flown."""
+
+    duration_s: float = Field(20.0, ge=1, le=3600)
+
+
+class TuneFile(Section):
+    """The keys of tune.toml; a missing key is that of the default study."""
+
+    seed: int = Field(1, ge=0, le=2**63 - 1)
+    base: str = "mambo"
+    flights: int = Field(12, ge=1, le=1000)
+    flight: TuningFlight = TuningFlight()
+    draws: Draws = Draws()
+    search: dict[str, dict[str, Any]] = DEFAULT_SEARCH
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What is searched: `search` has a distribution for each dotted key, the rest stays as in `base`."""
+
+    file: TuneFile
+    base: Settings
+    search: Mapping[str, Distribution]
+
+    @property
+    def start(self) -> dict[str, float]:
+        """The values of the base for what is searched."""
+        return {path: _value(self.base, path) for path in self.search}
+
+    def settings(self, values: Mapping[str, float]) -> Settings:
+        """Return the base with other values for what is searched, in four digits, as people write them.
+
+        Raises InvalidSettingsError.
+        """
+        document = self.base.model_dump()
+        for path, value in values.items():
+            section, name = path.split(".")
+            whole = KEYS[path].kind == "whole number"
+            document[section][name] = int(value) if whole else rounded(value)
+        return controller_toml.validated(document, "the search")
+
+    def drawn(self) -> list[Draw]:
+        """Return the flights that every trial flies."""
+        distributions = {name: getattr(self.file.draws, name) for name in PARAMETERS}
+        return [draw(self.file.seed, flight, distributions) for flight in range(self.file.flights)]
+
+    def document(self) -> dict[str, Any]:
+        """Return everything that decides the trials, as plain values."""
+        document: dict[str, Any] = self.file.model_dump(mode="json")
+        search = {path: distribution.document() for path, distribution in self.search.items()}
+        return document | {"base": self.base.model_dump(), "search": search}
+
+
+def rounded(value: float) -> float:
+    """Return the number of four digits next to `value`."""
+    return float(f"{value:.4g}")
+
+
+def default() -> Tuning:
+    """Return the default study."""
+    return _tuning(TuneFile(), Path(), "the default study")
+
+
+def read(path: Path) -> Tuning:
+    """Read a tune.toml; a base named by a path is looked for beside it.
+
+    Raises UnreadableFileError for what is not TOML, InvalidSettingsError for broken rules, and the errors of
+    the base's file.
+    """
+    return _tuning(read_as(TuneFile, path), path.parent, echo(str(path)))
+
+
+def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
+    """Look the base up, and try whether all that may be searched can fly."""
+    path = folder / file.base
+    try:
+        base = presets.load(file.base if file.base in presets.names() or not path.exists() else str(path))
+    except MamboNmpcError as error:
+        raise InvalidSettingsError(
+            tuple(f"{source}: base: {line}" for line in str(error).splitlines())
+        ) from None
+    tuning = Tuning(file, base, _search(file.search, base, source))
+    try:
+        one = scenario(file.flight.model_dump(), tuning.drawn()[0])
+        flight_of([one], base.horizon.update_period_s)
+    except FlightError as error:
+        raise InvalidSettingsError((f"{source}: base: horizon.{error}; stock loops run at 200 Hz",)) from None
+    _demand_valid_corners(tuning, source)
+    return tuning
+
+
+def _search(
+    sections: Mapping[str, Mapping[str, Any]], base: Settings, source: str
+) -> dict[str, Distribution]:
+    """Return what is searched by dotted key; raises InvalidSettingsError with every broken rule."""
+    found: dict[str, Distribution] = {}
+    faults: list[str] = []
+    for path, value in (
+        (f"{section}.{name}", value) for section, values in sections.items() for name, value in values.items()
+    ):
+        try:
+            found[path] = _range(path, value, base)
+        except ValueError as error:
+            faults.append(f"{source}: search.{echo(path)} = {spelled(value)} {error}")
+    if not faults and not 1 <= len(found) <= _MOST_KEYS:
+        faults.append(
+            f"{source}: search must have 1 to {_MOST_KEYS} keys of a controller.toml in its sections"
+        )
+    if faults:
+        raise InvalidSettingsError(tuple(faults))
+    return found
+
+
+def _range(path: str, value: Any, base: Settings) -> Distribution:
+    """Return one range; raises ValueError, "must ..."."""
+    key = KEYS.get(path)
+    if key is None or key.low is None or key.high is None or path in _FIXED:
+        free = [one for one in KEYS if KEYS[one].low is not None and one not in _FIXED]
+        raise ValueError(f"must name a number of a controller.toml that may be tuned: {', '.join(free)}")
+    found = parse(value, Domain(key.low, key.high, whole=key.kind == "whole number"))
+    if found.kind in ("constant", "normal"):
+        raise ValueError("must be a range: uniform, log_uniform or choice")
+    held, numbers = _value(base, path), found.numbers
+    ranged = found.kind in ("uniform", "log_uniform")
+    if not (numbers[0] <= held <= numbers[1] if ranged else held in numbers):
+        raise ValueError(f"must include the base's {held:g}: the search begins there")
+    return found
+
+
+def _demand_valid_corners(tuning: Tuning, source: str) -> None:
+    """Raise InvalidSettingsError unless ends of ranges go with each other in every combination."""
+    ends = [(min(found.numbers), max(found.numbers)) for found in tuning.search.values()]
+    for corner in product(*ends):
+        try:
+            tuning.settings(dict(zip(tuning.search, corner, strict=True)))
+        except InvalidSettingsError as error:
+            fault = error.faults[0].partition(": ")[2]
+            raise InvalidSettingsError(
+                (f"{source}: search: ends of its ranges do not go together: {fault}",)
+            ) from None
+
+
+def _value(settings: Settings, path: str) -> float:
+    section, name = path.split(".")
+    return float(getattr(getattr(settings, section), name))

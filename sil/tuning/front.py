@@ -1,0 +1,54 @@
+"""What a study found: the Pareto front, the point of it that is chosen, and the controller.toml it makes."""
+
+import csv
+import io
+from collections.abc import Sequence
+from typing import Final
+
+from codegen.settings import controller_toml
+from sil.tuning.file import Tuning, rounded
+from sil.tuning.study import Judged, study_name
+
+IAE_ALLOWANCE: Final = 1.1
+"""The chosen point has an IAE of at most this times the least found."""
+
+RULE: Final = "the least command variation with an IAE within 10 % of the least found"
+
+
+def pareto_front(trials: Sequence[Judged]) -> list[Judged]:
+    """Return the trials that no other beats in both IAE and command variation, by IAE."""
+    front: list[Judged] = []
+    for trial in sorted(trials, key=lambda one: (one.iae_m_s, one.command_variation_rad, one.number)):
+        if not front or trial.command_variation_rad < front[-1].command_variation_rad:
+            front.append(trial)
+    return front
+
+
+def chosen(front: Sequence[Judged]) -> Judged:
+    """Return the point of a front, sorted by IAE, that `RULE` names."""
+    return [one for one in front if one.iae_m_s <= IAE_ALLOWANCE * front[0].iae_m_s][-1]
+
+
+def front_csv(front: Sequence[Judged]) -> str:
+    """Return the front as CSV, a line for each trial; `chosen` is 1 for one of them."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    keys = list(front[0].values)
+    writer.writerow(["trial", "chosen", "iae_m_s", "command_variation_rad", "crashed", *keys])
+    best = chosen(front)
+    for one in front:
+        found = (one.number, int(one is best), one.iae_m_s, one.command_variation_rad, one.crashed)
+        writer.writerow([*found, *(rounded(one.values[key]) for key in keys)])
+    return text.getvalue()
+
+
+def controller_text(tuning: Tuning, trials: Sequence[Judged]) -> str:
+    """Return the controller.toml of the chosen trial; its head says where it comes from."""
+    best, flight = chosen(pareto_front(trials)), tuning.file.flight
+    title = (
+        f"Found by mambo-nmpc tune: trial {best.number} of {len(trials)} in study {study_name(tuning)}, seed "
+        f"{tuning.file.seed}: {RULE}. Over {tuning.file.flights} drawn flights of {flight.duration_s:g} s "
+        f"on {flight.trajectory}, sensors {flight.sensors}: mean IAE {best.iae_m_s:.4g} m s, command "
+        f"variation {best.command_variation_rad:.4g} rad an update, {best.crashed} crashed."
+    )
+    return controller_toml.to_toml(tuning.settings(best.values), title)

@@ -1,0 +1,31 @@
+"""The picture of a study: every trial, the Pareto front, where the search began and what is chosen."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from sil.board_plots import save
+from sil.plots import style
+from sil.tuning.front import chosen, pareto_front
+from sil.tuning.study import Judged
+
+
+def draw_front(trials: Sequence[Judged], base: Sequence[Judged], stem: Path) -> tuple[Path, Path]:
+    """Draw IAE against command variation, both logarithmic; write stem.png and stem.svg."""
+    front = pareto_front(trials)
+    best = chosen(front)
+    with style():
+        figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+        axes = figure.subplots()
+        for points, form, label in (
+            (trials, ".", "trial"),
+            (front, "o-", "Pareto front"),
+            (base, "s", "base"),
+            ([best], "*", "chosen"),
+        ):
+            x, y = [one.command_variation_rad for one in points], [one.iae_m_s for one in points]
+            axes.plot(x, y, form, label=label, markersize=12 if form == "*" else None)
+        axes.set(xscale="log", yscale="log", xlabel="command variation, rad an update", ylabel="IAE, m s")
+        axes.legend()
+        return save(figure, stem)

@@ -1,0 +1,191 @@
+"""The study: Optuna proposes settings, drawn flights of the compiled C judge them, a storage keeps both.
+
+Trials are proposed in rounds of `ROUND`, each from a seed of its own, so that neither the number of workers
+nor a stop in between changes what is proposed.
+"""
+
+import contextlib
+import hashlib
+import json
+import socket
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+import codegen
+from codegen.errors import echo
+from sil.campaign.distributions import Distribution
+from sil.campaign.executors import Pool
+from sil.campaign.file import Entrant
+from sil.campaign.flights import CRASHED, Row, fly_batch
+from sil.errors import StudyError
+from sil.tuning.file import Tuning
+
+if TYPE_CHECKING:
+    from optuna import Study, Trial
+    from optuna.trial import FrozenTrial
+
+ROUND: Final = 8
+"""Trials that are proposed before the first of them is judged."""
+
+DRAWN_AT_RANDOM: Final = 20
+"""Trials before the search begins to learn from them."""
+
+CRASH_ERROR_M: Final = 10.0
+"""Distance from the target all along that a crashed flight counts as; none counts as more."""
+
+DATABASE: Final = "study.db"
+
+_NAME: Final = "tuned"
+_OWNER: Final = "folder"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One finished trial: what was tried, and what came of it, means over all flights."""
+
+    number: int
+    values: dict[str, float]
+    """By dotted key of controller.toml."""
+    iae_m_s: float
+    command_variation_rad: float
+    crashed: int
+
+
+@contextlib.contextmanager
+def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["Study"]:
+    """Hold the study of `tuning` in a storage: that of the URL, or a file in `folder`; raises StudyError.
+
+    The name of the study follows from what decides it, so that others may live in the same storage.
+    """
+    try:
+        import optuna  # noqa: PLC0415 - an optional extra
+        from sqlalchemy.exc import SQLAlchemyError  # noqa: PLC0415 - comes with it
+    except ImportError:
+        raise StudyError('tuning wants Optuna; pip install "mambo-nmpc[tune]" brings it') from None
+    optuna.logging.set_verbosity(optuna.logging.CRITICAL)
+    where = f"sqlite:///{(folder / DATABASE).resolve()}" if storage is None else storage
+    named = echo(str(folder / DATABASE)) if storage is None else "--storage"
+    try:
+        study = optuna.create_study(
+            storage=optuna.storages.RDBStorage(where),
+            study_name=study_name(tuning),
+            directions=["minimize", "minimize"],
+            load_if_exists=True,
+        )
+        yield study
+    except (SQLAlchemyError, ImportError, optuna.exceptions.StorageInternalError) as error:
+        reason = str(error.__cause__ or error).splitlines()[0]
+        raise StudyError(
+            f"{named}: the storage refuses ({echo(reason)}); what it has is kept. A URL is as in "
+            "sqlite:////home/me/study.db or postgresql://host/name, with that database's driver installed"
+        ) from error
+
+
+def study_name(tuning: Tuning) -> str:
+    """Return the name of a study in its storage."""
+    document = {"version": codegen.__version__, **tuning.document()}
+    return f"mambo-nmpc-{hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:16]}"
+
+
+def search(
+    tuning: Tuning, study: "Study", folder: Path, trials: int, *, pool: Pool, progress: Callable[[int], None]
+) -> None:
+    """Go on until the study has `trials` finished trials; `progress` hears how many it has.
+
+    What an earlier run from `folder` began and did not finish is flown first. Raises WorkerError.
+    """
+    drawn = tuning.drawn()
+    flight = tuning.file.flight.model_dump()
+    owner = f"{socket.gethostname()}:{folder.resolve()}"
+    if not study.get_trials(deepcopy=False):
+        study.enqueue_trial(tuning.start)
+    progress(len(judged(study)))
+    while (finished := len(judged(study))) < trials:
+        proposed = _left_over(tuning, study, owner)
+        count = min(ROUND - _begun(study) % ROUND, trials - finished - len(proposed))
+        proposed |= dict(_ask(tuning, study, owner) for _ in range(max(count, 0)))
+        tasks = [
+            (codegen.__version__, [Entrant(_NAME, "nmpc", tuning.settings(values)).document()], flight, drawn)
+            for values in proposed.values()
+        ]
+        numbers = list(proposed)
+        for task, rows in pool.run(fly_batch, tasks):
+            crashed, means = judge(rows, tuning.file.flight.duration_s, tuning.base.limits.tilt_rad)
+            study.set_user_attr(f"{CRASHED}_{numbers[task]}", crashed)
+            study.tell(numbers[task], means)
+            progress(len(judged(study)))
+
+
+def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int, tuple[float, float]]:
+    """Return how many flights crashed, and mean IAE and command variation of all.
+
+    A crashed flight counts as `CRASH_ERROR_M` away all along, with commands that jump from limit to limit.
+    """
+    worst = np.array([CRASH_ERROR_M * duration_s, 4.0 * tilt_rad])
+    found = np.array(
+        [[row[f"{_NAME}_{key}"] for key in ("iae_m_s", "command_variation_rad")] for row in rows], np.float64
+    )
+    crashed = np.array([row[f"{_NAME}_{CRASHED}"] for row in rows], np.float64) > 0.0
+    found[crashed] = worst
+    iae_m_s, variation_rad = np.minimum(found, worst).mean(axis=0).tolist()
+    return int(crashed.sum()), (iae_m_s, variation_rad)
+
+
+def judged(study: "Study") -> list[Judged]:
+    """Return the finished trials of a study, in order."""
+    from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
+
+    crashed = study.user_attrs
+    return [
+        Judged(one.number, dict(one.params), one.values[0], one.values[1], crashed[f"{CRASHED}_{one.number}"])
+        for one in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+    ]
+
+
+def _begun(study: "Study") -> int:
+    """Return how many trials have been proposed."""
+    from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
+
+    return sum(one.state != TrialState.WAITING for one in study.get_trials(deepcopy=False))
+
+
+def _ask(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, float]]:
+    """Return number and values of a new trial, which the study then waits for."""
+    from optuna.samplers import TPESampler  # noqa: PLC0415 - an optional extra
+
+    entropy = np.random.SeedSequence(tuning.file.seed, spawn_key=(_begun(study),))
+    seed = int(entropy.generate_state(1)[0])
+    study.sampler = TPESampler(
+        n_startup_trials=DRAWN_AT_RANDOM, multivariate=True, constant_liar=True, seed=seed
+    )
+    trial = study.ask()
+    trial.set_user_attr(_OWNER, owner)
+    return trial.number, {path: _suggest(trial, path, found) for path, found in tuning.search.items()}
+
+
+def _suggest(trial: "Trial", path: str, found: Distribution) -> float:
+    """Return what the sampler proposes for one key."""
+    if found.kind == "choice":
+        value: Any = trial.suggest_categorical(path, found.numbers)
+        return float(value)
+    return trial.suggest_float(path, *found.numbers, log=found.kind == "log_uniform")
+
+
+def _left_over(tuning: Tuning, study: "Study", owner: str) -> dict[int, dict[str, float]]:
+    """Return the trials that an earlier run of `owner` asked for; give up those half proposed."""
+    from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
+
+    waiting: Sequence[FrozenTrial] = [
+        one
+        for one in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,))
+        if one.user_attrs.get(_OWNER) == owner
+    ]
+    whole = {one.number: dict(one.params) for one in waiting if set(one.params) == set(tuning.search)}
+    for one in waiting:
+        if one.number not in whole:
+            study.tell(one.number, state=TrialState.FAIL)
+    return whole
