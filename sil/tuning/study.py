@@ -70,13 +70,17 @@ def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["S
     where = f"sqlite:///{(folder / DATABASE).resolve()}" if storage is None else storage
     named = echo(str(folder / DATABASE)) if storage is None else "--storage"
     try:
-        study = optuna.create_study(
-            storage=optuna.storages.RDBStorage(where),
-            study_name=study_name(tuning),
-            directions=["minimize", "minimize"],
-            load_if_exists=True,
-        )
-        yield study
+        database = optuna.storages.RDBStorage(where)
+        try:
+            yield optuna.create_study(
+                storage=database,
+                study_name=study_name(tuning),
+                directions=["minimize", "minimize"],
+                load_if_exists=True,
+            )
+        finally:
+            database.remove_session()
+            database.engine.dispose()
     except (SQLAlchemyError, ImportError, optuna.exceptions.StorageInternalError) as error:
         reason = str(error.__cause__ or error).splitlines()[0]
         raise StudyError(
