@@ -251,6 +251,14 @@ def test_no_trial_of_the_default_study_costs_more_than_its_base() -> None:
         assert max(tuning.search[path].numbers) == tuning.start[path]
 
 
+def test_the_documented_study_is_the_default_one(tmp_path: Path) -> None:
+    """What docs/tuning.md prints is what is searched without a file."""
+    text = (Path(__file__).parents[1] / "docs" / "tuning.md").read_text("utf-8")
+    path = tmp_path / "tune.toml"
+    path.write_text(text.split("```toml\n")[1].split("```")[0])
+    assert file.read(path) == file.default()
+
+
 STOPPED = """
 import os, signal
 from optuna import Study
