@@ -207,6 +207,28 @@ def test_a_finished_campaign_grows(source: Path, whole: Path, tmp_path: Path) ->
         fly_on_threads(source, tmp_path, 4)
 
 
+def test_only_what_is_missing_is_flown(source: Path, tmp_path: Path) -> None:
+    """Flight by flight: none that is finished is flown again."""
+    fly_on_threads(source, tmp_path, 2)
+    finished: list[int] = []
+    fly_on_threads(source, tmp_path, FLIGHTS, batch=1, progress=finished.append)
+    assert finished == [2, 3, 4, 5, 6]
+
+
+def test_a_campaign_may_be_killed_again_and_again(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Half a line is cut off before anything follows it, so that the next run reads both."""
+    campaign, lines = file.read(source), (whole / "flights.csv").read_bytes().splitlines(keepends=True)
+    for flight in range(3):
+        with opened(campaign, tmp_path) as store:
+            assert set(store.lines) == set(range(flight))
+        with (tmp_path / "flights.csv").open("ab") as table:
+            table.write(lines[1 + flight][:-20])
+        with opened(campaign, tmp_path) as store:
+            cells = next(csv.reader([lines[1 + flight].decode()]))
+            store.add({flight: dict(zip(table_columns(campaign), cells[1:], strict=True))})
+    assert (tmp_path / "flights.csv").read_bytes() == b"".join(lines[:4])
+
+
 def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
     """And told in what it differs; nothing is touched."""
     folder = tmp_path / "out"
