@@ -12,7 +12,10 @@ from sil.tuning.study import Judged
 
 
 def draw_front(trials: Sequence[Judged], base: Sequence[Judged], stem: Path) -> tuple[Path, Path]:
-    """Draw IAE against command variation, both logarithmic; write stem.png and stem.svg."""
+    """Draw IAE against command variation, both logarithmic; write stem.png and stem.svg.
+
+    A controller that never moves its command has no place on such an axis.
+    """
     front = pareto_front(trials)
     best = chosen(front)
     with style():
@@ -24,7 +27,8 @@ def draw_front(trials: Sequence[Judged], base: Sequence[Judged], stem: Path) -> 
             (base, "s", "base"),
             ([best], "*", "chosen"),
         ):
-            x, y = [one.command_variation_rad for one in points], [one.iae_m_s for one in points]
+            moving = [one for one in points if one.command_variation_rad > 0.0]
+            x, y = [one.command_variation_rad for one in moving], [one.iae_m_s for one in moving]
             axes.plot(x, y, form, label=label, markersize=12 if form == "*" else None)
         axes.set(xscale="log", yscale="log", xlabel="command variation, rad an update", ylabel="IAE, m s")
         axes.legend()
