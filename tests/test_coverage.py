@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from codegen import presets
+from sil.sign_decisions import in_scalar
 from sil.verify import coverage
 from sil.verify.check import Outcome
 from tests.support.cases import settings_case
@@ -45,6 +46,26 @@ def test_every_line_is_run_whatever_the_settings(name: str, tmp_path: Path) -> N
         settings = settings.model_copy(update={"code": code})
     result = coverage.check(subject(settings, tmp_path))
     assert result.outcome is Outcome.PASSED, result.evidence
+
+
+@pytest.mark.long
+def test_floats_around_whole_numbers_are_run(tmp_path: Path) -> None:
+    """In fixed point nmpc_float.c is played too; no gap of it needs a reason."""
+    result = coverage.check(subject(in_scalar(presets.load("mambo"), "fixed"), tmp_path))
+    assert result.outcome is Outcome.PASSED, result.evidence
+    assert all("self_test" in row["gap"] for row in result.figures["explained"])
+
+
+def test_floats_that_differ_from_their_numbers_fail(tmp_path: Path) -> None:
+    """A scale that is wrong shows in the replay."""
+    fault = (
+        "src/nmpc_float.c",
+        "number_of(state->yaw_rad, NMPC_YAW_SCALE)",
+        "number_of(state->yaw_rad, 1.0f)",
+    )
+    result = coverage.check(subject(in_scalar(presets.load("mambo"), "fixed"), tmp_path, fault))
+    assert result.outcome is Outcome.FAILED
+    assert "the self-test fails" in result.evidence
 
 
 def test_a_dead_line_and_its_branch_fail_by_name(tmp_path: Path) -> None:

@@ -8,15 +8,18 @@ import pytest
 
 from codegen import presets
 from codegen.render import DEVIATIONS, render
+from sil.sign_decisions import in_scalar
 from sil.verify.check import Outcome
 from sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
 from tests.support.tools import require
 from tests.support.verifying import Harm, subject
 
-SETTINGS = {name: presets.load(name) for name in presets.names()} | {
-    f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)
-}
+SETTINGS = (
+    {name: presets.load(name) for name in presets.names()}
+    | {f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)}
+    | {"fixed": in_scalar(presets.load("mambo"), "fixed")}
+)
 HARMS = {
     "15.1 goto": Harm("src/nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
     "17.7 a result thrown away": Harm(

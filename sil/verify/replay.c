@@ -9,6 +9,9 @@
 #include <sys/resource.h>
 
 #include "nmpc_self_test.h"
+#if defined(NMPC_POSITION_BITS)
+#include "nmpc_float.h"
+#endif
 
 #if defined(__has_feature)
 #if __has_feature(memory_sanitizer)
@@ -99,7 +102,74 @@ static int passes_self_test(nmpc_t *self)
     return (nmpc_self_test(self) == 0) && (digest == NMPC_SELF_TEST_DIGEST);
 }
 
-/* Returns 0, 2 if the file cannot be read or the output not written, 3 if the self-test fails. */
+#if defined(NMPC_POSITION_BITS)
+static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_float_command_t *found,
+                    const nmpc_command_t *command)
+{
+    const float unit_rad = 1.0f / (float)((nmpc_sum_t)1 << NMPC_ANGLE_BITS);
+
+    return (status == expected) && (found->roll_rad == ((float)command->roll_rad * unit_rad))
+           && (found->pitch_rad == ((float)command->pitch_rad * unit_rad));
+}
+
+/* Steps with floats and with the numbers that they are, and with floats that no format holds. */
+static int passes_floats(nmpc_t *self)
+{
+    static const float zero = 0.0f;
+    const float position_unit_m = 1.0f / (float)(1L << NMPC_POSITION_BITS);
+    const nmpc_real_t gravity_m_s2 = NMPC_THRUST_ACCELERATION(9.75);
+    const nmpc_float_state_t state = { { 0.5f, -0.25f }, { 0.125f, -0.5f }, 0.0625f, -0.03125f, 0.75f };
+    const nmpc_float_target_t target = { { 0.75f * position_unit_m, -0.75f * position_unit_m }, { 0.0f, 0.25f } };
+    const nmpc_state_t state_numbers = { { NMPC_POSITION(0.5), NMPC_POSITION(-0.25) },
+                                         { NMPC_VELOCITY(0.125), NMPC_VELOCITY(-0.5) },
+                                         NMPC_ANGLE(0.0625),
+                                         NMPC_ANGLE(-0.03125),
+                                         NMPC_YAW(0.75) };
+    const nmpc_target_t target_numbers = { { 1, -1 }, { 0, NMPC_VELOCITY(0.25) } };
+    const nmpc_float_command_t last = { 0.125f, -0.25f };
+    const nmpc_command_t last_numbers = { NMPC_ANGLE(0.125), NMPC_ANGLE(-0.25) };
+    const nmpc_float_weights_t weights = { NMPC_TRACKING_WEIGHT / (float)(1L << NMPC_TRACKING_BITS),
+                                           NMPC_EFFORT_WEIGHT / (float)(1L << NMPC_EFFORT_BITS) };
+    const float unheld[3] = { zero / zero, 1.0f / zero, -1.0f / zero };
+    nmpc_t other;
+    nmpc_command_t command;
+    nmpc_float_command_t found;
+    nmpc_status_t expected;
+    int i;
+    int is_good;
+
+    nmpc_init(self);
+    nmpc_init(&other);
+    is_good = (nmpc_float_reset(self, NULL) == NMPC_NULL_POINTER)
+              && (nmpc_float_set_weights(self, NULL) == NMPC_NULL_POINTER)
+              && (nmpc_float_step(self, &state, &target, 9.75f, NULL) == NMPC_NULL_POINTER)
+              && (nmpc_float_reset(self, &last) == nmpc_reset(&other, &last_numbers))
+              && (nmpc_float_set_weights(self, &weights) == NMPC_OK)
+              && (self->weights.effort == NMPC_EFFORT_WEIGHT);
+    expected = nmpc_step(&other, &state_numbers, &target_numbers, gravity_m_s2, &command);
+    is_good = is_good && (expected == NMPC_OK)
+              && is_alike(nmpc_float_step(self, &state, &target, 9.75f, &found), expected, &found, &command)
+              && (nmpc_last_cost(self) == nmpc_last_cost(&other))
+              && (nmpc_float_last_cost(self)
+                  == ((float)nmpc_last_cost(&other) / (float)((nmpc_sum_t)1 << NMPC_COST_BITS)))
+              && is_alike(nmpc_float_step(self, NULL, &target, 9.75f, &found), NMPC_NULL_POINTER, &found, &command)
+              && is_alike(nmpc_float_step(self, &state, NULL, 9.75f, &found), NMPC_NULL_POINTER, &found, &command);
+    for (i = 0; i < 3; i++) {
+        is_good = is_good
+                  && is_alike(nmpc_float_step(self, &state, &target, unheld[i], &found), NMPC_BAD_THRUST, &found,
+                              &command);
+    }
+    return is_good;
+}
+#else
+static int passes_floats(nmpc_t *self)
+{
+    (void)self;
+    return 1;
+}
+#endif
+
+/* Returns 0, 2 if the file cannot be read or the output not written, 3 if the self-test or the one of floats fails. */
 int main(int count, char **arguments)
 {
     static nmpc_t self;
@@ -122,5 +192,5 @@ int main(int count, char **arguments)
         nmpc_replay_call(&self, bytes);
     }
     (void)fclose(file);
-    return ((nmpc_version()[0] != '\0') && passes_self_test(&self)) ? 0 : 3;
+    return ((nmpc_version()[0] != '\0') && passes_self_test(&self) && passes_floats(&self)) ? 0 : 3;
 }
