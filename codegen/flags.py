@@ -42,13 +42,37 @@ PROOFS: Final = {
 }
 """What each of the two proofs asks of Frama-C."""
 
+_WHOLE_NUMBERS: Final = (
+    "-warn-signed-overflow",
+    "-warn-signed-downcast",
+    "-no-warn-right-shift-negative",  # nmpc_math.h asserts what it does
+)
+FIXED_PROOFS: Final = {
+    "take_numbers": (
+        *_WHOLE_NUMBERS,
+        "-main take_numbers",
+        "-eva",
+        "-eva-precision 2",
+        "-eva-split-return auto",
+        "-eva-use-spec nmpc_sine_cosine",
+    ),
+    "turn_everywhere": (
+        *_WHOLE_NUMBERS,
+        "-main turn_everywhere",
+        "-eva",
+        "-eva-precision 0",
+        "-eva-min-loop-unroll 1400",  # all quarter turns of a heading
+    ),
+}
+"""The same for fixed point: no NaN, and overflow to look for."""
+
 PROOF_FLAGS: Final = (
     "-machdep x86_32",
     "-kernel-warn-key annot:missing-spec=abort",  # no function without a body or a contract
     "-eva-no-print",
     "-eva-auto-loop-unroll 128",  # every loop of a controller is shorter
 )
-"""What both ask."""
+"""What all ask."""
 
 RULE_FLAGS: Final = (
     "--std=c99",
@@ -57,3 +81,8 @@ RULE_FLAGS: Final = (
     "--enable=warning,style,performance,portability",
     "--quiet",
 )
+
+
+def proofs(scalar: str) -> dict[str, tuple[str, ...]]:
+    """Return the proofs of a scalar type: what each asks of Frama-C, by the function it starts in."""
+    return FIXED_PROOFS if scalar == "fixed" else PROOFS

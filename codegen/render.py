@@ -14,9 +14,9 @@ from codegen.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
     PROOF_PREPROCESSING,
-    PROOFS,
     RULE_FLAGS,
     WARNING_FLAGS,
+    proofs,
 )
 from codegen.frozen import HELD, TICKS, episodes, frozen_digest, spread
 from codegen.horizon import horizon_tables
@@ -160,7 +160,7 @@ def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
         "compile_flags": " ".join(COMPILE_FLAGS),
         "warning_flags": " ".join(WARNING_FLAGS),
         "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
-        "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in PROOFS.items()},
+        "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in proofs(scalar).items()},
         "rule_flags": " ".join(RULE_FLAGS),
     }
 

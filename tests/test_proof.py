@@ -1,5 +1,6 @@
 """The proof: no alarm whatever the settings, an alarm for every fault that it is there to exclude."""
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -66,6 +67,37 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
     assert set(result.tools) == {"frama-c"}
+
+
+FIXED_SUMS = {"nmpc_predictor_walk", "nmpc_predictor_bend", "nmpc_step_of", "nmpc_distance_slope", "end_run"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", presets.names())
+def test_of_fixed_point_all_but_the_sums_of_the_prediction_is_proven(name: str, tmp_path: Path) -> None:
+    """Sine and cosine of every heading, memory, commands; sums that intervals do not bound are named."""
+    result = check(subject(of_scalar(name, "fixed"), tmp_path))
+    assert result.outcome is Outcome.INCOMPLETE, result.evidence
+    assert result.figures["promises"] == result.figures["promises_proven"] == 4
+    assert {re.sub(r"_\d+$", "", one["function"]) for one in result.figures["alarms"]} <= FIXED_SUMS
+    assert {one["kind"] for one in result.figures["alarms"]} <= {"signed_overflow", "signed_downcast"}
+
+
+FIXED_HARMS = {
+    "the heading goes unchecked": HARMS["the heading goes unchecked"],
+    "the plan leaves the tilt limit": HARMS["the plan leaves the tilt limit"],
+    "a rest that does not fit": Harm(
+        "src/nmpc_math.c", r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"
+    ),
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("harm", FIXED_HARMS)
+def test_a_fault_of_fixed_point_raises_an_alarm(harm: str, tmp_path: Path) -> None:
+    """Another alarm than those of the sums is a failure, not a gap."""
+    result = check(subject(of_scalar("mambo", "fixed"), tmp_path, FIXED_HARMS[harm]))
+    assert result.outcome is Outcome.FAILED, result.evidence
 
 
 @pytest.mark.long

@@ -189,3 +189,10 @@ def test_the_check_flies_the_c_of_the_bundle(
     found = check(Subject(MAMBO, tmp_path / "bundle", tmp_path / "evidence"))
     assert found.outcome is outcome, found.evidence
     assert "in flight" in (tmp_path / "evidence" / "signs.md").read_text("utf-8")
+
+
+def test_fixed_point_is_not_compared(tmp_path: Path) -> None:
+    """What compares two other scalar types says nothing about this one: it never passes."""
+    result = check(Subject(in_scalar(MAMBO, "fixed"), tmp_path, tmp_path))
+    assert result.outcome is Outcome.INCOMPLETE
+    assert "fixed point" in result.evidence
