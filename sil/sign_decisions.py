@@ -22,7 +22,7 @@ from sil.table2 import CASES, DURATION_S
 from sil.traces import Trace
 from sil.trajectories import Trajectories
 
-ScalarName = Literal["float32", "float64"]
+ScalarName = Literal["float32", "float64", "fixed"]
 FEW: Final[ScalarName] = "float32"
 MANY: Final[ScalarName] = "float64"
 

@@ -166,8 +166,8 @@ def _alarm_text(alarms: Sequence[Property]) -> str:
 
 def _gap_text(alarms: Sequence[Property], statements: int) -> str:
     return (
-        f"no other alarm in {statements} statements, but in sums of the prediction, which intervals do not bound "
-        f"(codegen/fixed_point.py does): {_alarm_text(alarms)}"
+        f"no other alarm in {statements} statements, but in sums of the prediction: intervals do not "
+        f"bound them, codegen/fixed_point.py does: {_alarm_text(alarms)}"
     )
 
 
