@@ -6,6 +6,7 @@
  */
 #include "nmpc_fuzz.c"
 
+#include <math.h>
 #include <sys/resource.h>
 
 #include "nmpc_self_test.h"
@@ -115,7 +116,6 @@ static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_flo
 /* Steps with floats and with the numbers that they are, and with floats that no format holds. */
 static int passes_floats(nmpc_t *self)
 {
-    static const float zero = 0.0f;
     const float position_unit_m = 1.0f / (float)(1L << NMPC_POSITION_BITS);
     const nmpc_real_t gravity_m_s2 = NMPC_THRUST_ACCELERATION(9.75);
     const nmpc_float_state_t state = { { 0.5f, -0.25f }, { 0.125f, -0.5f }, 0.0625f, -0.03125f, 0.75f };
@@ -130,7 +130,7 @@ static int passes_floats(nmpc_t *self)
     const nmpc_command_t last_numbers = { NMPC_ANGLE(0.125), NMPC_ANGLE(-0.25) };
     const nmpc_float_weights_t weights = { NMPC_TRACKING_WEIGHT / (float)(1L << NMPC_TRACKING_BITS),
                                            NMPC_EFFORT_WEIGHT / (float)(1L << NMPC_EFFORT_BITS) };
-    const float unheld[3] = { zero / zero, 1.0f / zero, -1.0f / zero };
+    const float unheld[3] = { NAN, INFINITY, -INFINITY };
     nmpc_t other;
     nmpc_command_t command;
     nmpc_float_command_t found;
