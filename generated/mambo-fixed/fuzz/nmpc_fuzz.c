@@ -109,7 +109,7 @@ static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *
 
 static int nmpc_fuzz_lies_in(nmpc_real_t value, nmpc_real_t least, nmpc_real_t most)
 {
-    return !((value != value) || (value < least) || (value > most));
+    return !((value < least) || (value > most));
 }
 
 static int nmpc_fuzz_is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * Floats in and out of a fixed point controller.
+ * MISRA C:2012: departs from rule 15.5, for the reason in deviations.txt.
  */
+#include <stddef.h>
+
 #include "nmpc_float.h"
 
 /* Numbers per unit, and units per number. */
@@ -46,15 +49,16 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
     nmpc_target_t there;
     nmpc_command_t next;
     nmpc_status_t status;
-    int axis;
 
-    if (command == 0) {
+    if (command == NULL) {
         return NMPC_NULL_POINTER;
     }
 
-    if ((state == 0) || (target == 0)) {
-        status = nmpc_step(self, 0, 0, 0, &next);
+    if ((state == NULL) || (target == NULL)) {
+        status = nmpc_step(self, NULL, NULL, 0, &next);
     } else {
+        int axis;
+
         for (axis = 0; axis < 2; axis++) {
             here.position_m[axis] = number_of(state->position_m[axis], NMPC_POSITION_SCALE);
             here.velocity_m_s[axis] = number_of(state->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
@@ -75,7 +79,7 @@ nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command
 {
     nmpc_command_t last;
 
-    if (command == 0) {
+    if (command == NULL) {
         return NMPC_NULL_POINTER;
     }
 
@@ -88,7 +92,7 @@ nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *w
 {
     nmpc_weights_t numbers;
 
-    if (weights == 0) {
+    if (weights == NULL) {
         return NMPC_NULL_POINTER;
     }
 

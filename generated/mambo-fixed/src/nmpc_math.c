@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * Sine and cosine: reduction by quarter turns, then Taylor series, in whole numbers.
- * MISRA C:2012: departs from rule 8.9, for the reason in deviations.txt.
+ * MISRA C:2012: departs from rules 8.9 and 10.1, for the reasons in deviations.txt.
  */
 #include "nmpc_math.h"
 

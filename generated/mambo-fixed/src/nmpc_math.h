@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * The few functions that the controller needs beyond + - *, the same bits everywhere.
- * MISRA C:2012: departs from rules 10.3 and 19.2, for the reasons in deviations.txt.
+ * MISRA C:2012: departs from rules 2.3, 10.1, 10.3 and 19.2, for the reasons in deviations.txt.
  */
 #ifndef NMPC_MATH_H
 #define NMPC_MATH_H
