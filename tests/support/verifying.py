@@ -21,7 +21,7 @@ def subject(
     settings: Settings, folder: Path, harm: Harm | None = None, *, amalgamate: bool = False
 ) -> Subject:
     """Write the bundle of `settings` below `folder`, with `harm` done to it; an empty folder for evidence."""
-    files = render(settings, amalgamate=amalgamate, with_digest=False)
+    files = render(settings, amalgamate=amalgamate)
     if harm is not None:
         path = "nmpc.c" if amalgamate else harm.path
         files[path], count = re.subn(harm.right, harm.wrong, files[path], count=1)
