@@ -31,7 +31,7 @@ HARMS = {
         STEP, r"nmpc_clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)", "command->pitch_rad"
     ),
     "a null pointer is followed": Harm(STEP, r"\(state != NULL\) && ", ""),
-    "the cost starts uninitialised": Harm(STEP, r"    self->cost = \(nmpc_real_t\)0;\n", ""),
+    "the cost starts uninitialised": Harm(STEP, r"    self->cost = \(nmpc_sum_t\)0;\n", ""),
     "one move too many": Harm(STEP, r"k < NMPC_MOVES", "k <= NMPC_MOVES"),
     "a table is read past its end": Harm(
         COST,

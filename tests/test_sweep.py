@@ -163,7 +163,7 @@ def test_a_bad_grid_gets_a_message_and_exit_2(options: list[str], message: str, 
 
 @pytest.mark.long
 def test_a_sweep_yields_the_points_in_order() -> None:
-    """Two by two: more of anything takes more flash, RAM and instructions."""
+    """Two by two: more of anything takes more flash and instructions, more moves more RAM too."""
     require_compiler("crazyflie")
     grid = Grid(prediction=(5, 8), control=(1, 2), iterations=(3,))
     points = list(sweep(presets.load("mambo"), boards.load("crazyflie"), grid))
@@ -171,7 +171,7 @@ def test_a_sweep_yields_the_points_in_order() -> None:
     assert all(p.fits and math.isfinite(p.iae_m_s) for p in points)
     for less, more in ((0, 1), (0, 2), (1, 3), (2, 3)):
         assert points[less].flash_bytes < points[more].flash_bytes
-        assert points[less].ram_bytes < points[more].ram_bytes
+        assert points[less].ram_bytes <= points[more].ram_bytes
         assert points[less].instructions < points[more].instructions
     assert points[2].iae_m_s < points[0].iae_m_s
 

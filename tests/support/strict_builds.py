@@ -26,13 +26,14 @@ _FUNCTIONS: Final = {
 }
 _TYPES: Final = """
 typedef REAL nmpc_real_t;
+typedef REAL nmpc_sum_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
 typedef struct { nmpc_real_t memory[SCALARS]; } nmpc_t;
 typedef struct {
-    int *status; nmpc_command_t *command; nmpc_real_t *cost, *gradient, *plan_rad;
+    int *status; nmpc_command_t *command; nmpc_sum_t *cost, *gradient; nmpc_real_t *plan_rad;
     int *iterations, *converged;
 } nmpc_outcome_t;
 """
