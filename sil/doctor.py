@@ -162,19 +162,8 @@ def command_version(candidate: str) -> str | None:
     command = shlex.split(candidate)
     if shutil.which(command[0]) is None:
         return None
-    try:
-        done = subprocess.run(
-            [*command, "--version"],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=PATIENCE_S,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    first_line = done.stdout.partition("\n")[0]
+    said = _said([*command, "--version"])
+    first_line = (said or "").partition("\n")[0]
     number = re.search(r"\d+(\.\d+)+", re.sub(r"\([^)]*\)", "", first_line))
     return number[0] if number else ""
 
@@ -185,9 +174,15 @@ def _libfuzzer_version() -> str | None:
     if clang is None:
         return None
     name = f"libclang_rt.fuzzer-{platform.machine()}.a"
+    library = _said([clang, f"-print-file-name={name}"])
+    return command_version("clang") if library and Path(library.strip()).is_file() else None
+
+
+def _said(command: Sequence[str]) -> str | None:
+    """Return what a command prints, None if it cannot be run or does not end in time."""
     try:
         done = subprocess.run(
-            [clang, f"-print-file-name={name}"],
+            command,
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
@@ -197,4 +192,4 @@ def _libfuzzer_version() -> str | None:
         )
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return command_version("clang") if Path(done.stdout.strip()).is_file() else None
+    return done.stdout

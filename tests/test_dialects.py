@@ -7,8 +7,8 @@ import pytest
 from codegen import presets
 from sil.verify.check import Outcome
 from sil.verify.dialects import DIALECTS, check
+from tests.support.subjects import Harm, subject
 from tests.support.tools import require
-from tests.support.verifying import Harm, subject
 
 HARMS = {
     "a conversion that loses digits": Harm(

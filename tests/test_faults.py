@@ -43,8 +43,9 @@ from sil.loop import Flight, PositionController, fly
 from sil.table2 import CASES
 from sil.traces import Trace
 from sil.trajectories import Hover
-from sil.verify.check import Outcome, Subject
+from sil.verify.check import Outcome
 from sil.verify.faults import check, judge
+from tests.support.subjects import subject
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -281,21 +282,10 @@ def test_a_fault_without_an_end_may_lead_away() -> None:
     assert judge([VERDICT, gone], MAMBO).outcome is Outcome.PASSED
 
 
-def subject(folder: Path, **wrong: str) -> Subject:
-    """Make a subject of preset mambo; `wrong` replaces in nmpc.c the text of `right` by `becomes`."""
-    files = render(MAMBO)
-    if wrong:
-        assert files["src/nmpc.c"].count(wrong["right"]) == 1
-        files["src/nmpc.c"] = files["src/nmpc.c"].replace(wrong["right"], wrong["becomes"])
-    bundle.write(files, folder / "bundle")
-    (folder / "evidence").mkdir()
-    return Subject(MAMBO, folder / "bundle", folder / "evidence")
-
-
 @pytest.mark.long
 def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> None:
     """Faults, statuses and ends are those of the documentation."""
-    chosen = subject(tmp_path)
+    chosen = subject(MAMBO, tmp_path)
     found = check(chosen)
     assert found.outcome is Outcome.PASSED, found.evidence
     assert words((chosen.folder / "faults.md").read_text("utf-8")) == words(DOCS.read_text("utf-8"))
@@ -314,7 +304,7 @@ def words(text: str) -> list[tuple[str, str, str]]:
 def test_the_check_fails_a_controller_that_does_not_refuse(tmp_path: Path) -> None:
     """Without the test of the attitude's range a NaN reaches the plan."""
     right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
-    chosen = subject(tmp_path, right=right, becomes="if (!((state != 0)")
+    chosen = subject(MAMBO, tmp_path, ("src/nmpc.c", right, "if (!((state != 0)"))
     assert check(chosen).outcome is Outcome.FAILED
 
 

@@ -12,8 +12,8 @@ from codegen.settings import Settings
 from sil.verify.check import Outcome
 from sil.verify.proof import check, read_properties
 from tests.support.cases import settings_case
+from tests.support.subjects import Harm, subject
 from tests.support.tools import require
-from tests.support.verifying import Harm, subject
 
 STEP, OPTIMIZER, COST, MATH = "src/nmpc.c", "src/nmpc_optimizer.c", "src/nmpc_cost.c", "src/nmpc_math.h"
 HARMS = {
@@ -144,6 +144,7 @@ def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: 
 def test_make_proof_comes_to_the_same_verdict(harm: str | None, tmp_path: Path, *, amalgamate: bool) -> None:
     """The command of the bundle, in both layouts, ends in an error unless everything is proven."""
     require("make", "make")
-    its = subject(presets.load("mambo"), tmp_path, HARMS[harm] if harm else None, amalgamate=amalgamate)
+    harms = [HARMS[harm]] if harm else []
+    its = subject(presets.load("mambo"), tmp_path, *harms, amalgamate=amalgamate)
     done = subprocess.run(["make", "proof"], cwd=its.bundle, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == (harm is None), done.stdout

@@ -13,8 +13,8 @@ from sil.sign_decisions import in_scalar
 from sil.verify.check import Outcome
 from sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
+from tests.support.subjects import Harm, subject
 from tests.support.tools import require
-from tests.support.verifying import Harm, subject
 
 SETTINGS = (
     {name: presets.load(name) for name in presets.names()}
@@ -85,7 +85,7 @@ def test_every_deviation_is_in_the_manual() -> None:
 def test_make_rules_comes_to_the_same_verdict(harm: str | None, tmp_path: Path) -> None:
     """The list of deviations is one that cppcheck reads by itself."""
     require("make", "make")
-    its = subject(presets.load("mambo"), tmp_path, HARMS[harm] if harm else None)
+    its = subject(presets.load("mambo"), tmp_path, *([HARMS[harm]] if harm else []))
     done = subprocess.run(
         ["make", "-s", "rules"], cwd=its.bundle, capture_output=True, text=True, check=False
     )

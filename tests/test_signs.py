@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen import bundle, presets
+from codegen import presets
 from codegen.reference import ReferenceController, Status
-from codegen.render import render
 from codegen.settings import Settings
 from sil.inner_steps import watched_step
 from sil.sign_decisions import (
@@ -27,6 +26,7 @@ from sil.sign_decisions import (
 from sil.verify.check import Outcome, Subject
 from sil.verify.inputs import random_inputs
 from sil.verify.signs import check, judge, text
+from tests.support.subjects import subject
 
 MAMBO = presets.load("mambo")
 SETTINGS = [MAMBO, in_scalar(MAMBO, MANY), presets.load("table1")]
@@ -182,13 +182,11 @@ def test_the_check_flies_the_c_of_the_bundle(
     tmp_path: Path, right: str, wrong: str, outcome: Outcome
 ) -> None:
     """A controller that pays 900 times for effort does not fly like the other scalar type."""
-    files = render(MAMBO)
-    files["src/nmpc_cost.c"] = files["src/nmpc_cost.c"].replace(right, wrong, 1 if right else 0)
-    bundle.write(files, tmp_path / "bundle")
-    (tmp_path / "evidence").mkdir()
-    found = check(Subject(MAMBO, tmp_path / "bundle", tmp_path / "evidence"))
+    harms = [("src/nmpc_cost.c", right, wrong)] if right else []
+    chosen = subject(MAMBO, tmp_path, *harms)
+    found = check(chosen)
     assert found.outcome is outcome, found.evidence
-    assert "in flight" in (tmp_path / "evidence" / "signs.md").read_text("utf-8")
+    assert "in flight" in (chosen.folder / "signs.md").read_text("utf-8")
 
 
 def test_fixed_point_is_not_compared(tmp_path: Path) -> None:

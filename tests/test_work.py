@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen import bundle, presets
-from codegen.render import render
+from codegen import presets
 from codegen.settings import Settings
 from codegen.toolchain import Toolchain
 from sil.verify import work
@@ -16,6 +15,7 @@ from sil.verify.check import Outcome, Result, Subject
 from sil.verify.loops import Reading, read_loops, read_unit
 from sil.verify.passes import runs
 from sil.verify.work import Counted, judge
+from tests.support.subjects import subject
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -153,17 +153,6 @@ def test_runs_are_counted_over_every_way(tmp_path: Path) -> None:
     assert [count for place, count in least.items() if "a.c" in place] == [3]
 
 
-def subject(settings: Settings, folder: Path, path: str = "", right: str = "", wrong: str = "") -> Subject:
-    """Write a bundle, with `wrong` in place of `right` in one of its files."""
-    files = render(settings)
-    if path:
-        assert files[path].count(right) == 1, files[path].count(right)
-        files[path] = files[path].replace(right, wrong)
-    bundle.write(files, folder / "bundle")
-    (folder / "evidence").mkdir()
-    return Subject(settings, folder / "bundle", folder / "evidence")
-
-
 def checked(chosen: Subject) -> Result:
     """Check, and write the figures as JSON on the way."""
     require("cc", "gcc")
@@ -264,7 +253,7 @@ COUNTED_ONLY = {"no search where the plan is at rest", "a search for nothing"}
 def test_a_seeded_violation_fails_the_check(name: str, tmp_path: Path) -> None:
     """On the whole library, by what the source says or by what is counted."""
     path, right, wrong, word = VIOLATIONS[name]
-    found = checked(subject(MAMBO, tmp_path, path, right, wrong))
+    found = checked(subject(MAMBO, tmp_path, (path, right, wrong)))
     assert found.outcome is Outcome.FAILED
     assert word in found.evidence
 

@@ -13,6 +13,7 @@ from sil.verify.cases import cases
 from sil.verify.check import Outcome, Result, Subject
 from sil.verify.coverage_reasons import REASONS
 from sil.verify.reasons import plain, reason_for, row
+from sil.verify.tools import missing as missing_tool
 
 FLAGS: Final = ("--coverage", "-O0")
 
@@ -20,7 +21,7 @@ FLAGS: Final = ("--coverage", "-O0")
 def check(subject: Subject) -> Result:
     """Play the cases on a build that counts; its bits are the reference's, so counting changed nothing."""
     tools = {tool: command_version(tool) or "" for tool in ("gcc", "gcov")}
-    missing = replay.missing("gcc", FLAGS, subject.folder) or replay.missing_command("gcov", "gcc")
+    missing = replay.missing("gcc", FLAGS, subject.folder) or missing_tool("gcov", "gcc")
     if missing:
         return Result(Outcome.INCOMPLETE, missing, tools=tools)
     tapes, expected = cases(subject.settings)

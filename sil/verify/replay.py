@@ -1,7 +1,6 @@
 """Play tapes on a bundle's C, built with any compiler and flags, and compare with the reference."""
 
 import re
-import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from codegen.settings import Settings
 from codegen.toolchain import Toolchain
 from sil.verify.calls import Function, Outcomes, Tape, calls, outcome_type
 from sil.verify.check import Subject
+from sil.verify.tools import missing as missing_tool
 
 LIMIT_S: Final = 600
 """Processor time that a program gets, in seconds."""
@@ -62,7 +62,7 @@ def sources(subject: Subject) -> list[Path]:
 
 def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
     """Say what is missing to build with gcc or clang and `flags`, and which package of Debian brings it."""
-    gap = missing_command(tool, tool)
+    gap = missing_tool(tool, tool)
     if gap:
         return gap
     (folder / "probe.c").write_text(
@@ -74,11 +74,6 @@ def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
     except BuildError:
         return f"{tool} cannot link with {' '.join(flags)}; Debian's package {PACKAGES[tool]} brings that"
     return None
-
-
-def missing_command(tool: str, package: str) -> str | None:
-    """Say that `tool` is missing, and which package of Debian brings it; None if it is here."""
-    return None if shutil.which(tool) else f"{tool} is missing; Debian's package {package} brings it"
 
 
 def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
