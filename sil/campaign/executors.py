@@ -69,10 +69,9 @@ def processes(count: int) -> Iterator[Pool]:
         try:
             yield Pool(executor, count, trouble)
         except BaseException:
-            executor.shutdown(wait=False, cancel_futures=True)
             for child in active_children():
                 child.terminate()
-            raise
+            raise  # the executor, broken now, takes leave of its tasks, and is waited for
 
 
 def _follow_parent() -> None:
