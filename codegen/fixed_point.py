@@ -1,27 +1,29 @@
 """The fixed point formats of a controller: how many bits each quantity has behind the point, and why.
 
 A number of format b is a whole number of 32 bits, its value times 2^b. Each quantity has the most bits with
-which no value that it can take overflows. Those values are bounded, not sampled: for held commands
-every intermediate of the prediction is linear in the velocity error, the measured tilt and the moves, so that
-its largest size is the sum of the sizes of its coefficients times their ranges (`_reach`).
+which no value that it can take overflows. Those values are bounded, not sampled: by the sizes of what is
+added up, as if nothing ever cancelled (`_reach`). That gives away two bits, and lets a proof by intervals
+find the same bounds in the C.
 
 A position error beyond what the horizon can change keeps its sign there whatever the moves: it is clamped to
 a little more than that reach, which changes neither a slope nor a difference of costs, and leaves the bits to
 the errors that matter.
 
-Sums over the horizon, cost and gradient have 64 bits, of which they use no more than 53: a double holds them.
+The errors of a whole horizon add up in one word. Distance, cost and gradient have 64 bits, of which they use
+no more than 53: a double holds them.
 """
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from codegen.horizon import AxisConstants, HorizonTables, horizon_tables
+import numpy as np
+
+from codegen.horizon import HorizonTables, horizon_tables
 from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
-from codegen.settings.model import Horizon, Settings
+from codegen.settings.model import Settings
 
 WORD_BITS: Final = 31
 """Bits of a number beside its sign."""
@@ -32,8 +34,8 @@ LARGEST: Final = 2**WORD_BITS - 1
 SINE_BITS: Final = 30
 """Format of sine and cosine, of which 1 is the largest."""
 
-SHARE_PRODUCT_BITS: Final = 32
-"""Where the product of a share ends: the bend is shifted up to there first."""
+UPPER_BITS: Final = 32
+"""Where the products of shares and factors end, in the upper word: bend and step are shifted up first."""
 
 SUM_BITS: Final = 53
 """Bits of cost and gradient beside the sign: those of a double, so that logs and tests lose nothing."""
@@ -106,14 +108,16 @@ class _Reach:
     """The largest sizes over the horizon.
 
     bend:     of bend, advance, what is to come, and every sum of them on the way, m.
-    tilt:     of the bend of a turn, of all turns together, and of what is to come of them, m.
+    tilt:     of what a share is taken of: bend of a turn or of the measured tilt, and what is to come, m.
     error:    of what is added to the first error, m.
-    response: of the sum of all responses to a move.
+    errors:   of the sum of that over the horizon, m.
+    response: of the sum of responses to a move with the signs of all runs.
     """
 
     bend: float
     tilt: float
     error: float
+    errors: float
     response: float
 
 
@@ -134,18 +138,20 @@ def formats(settings: Settings) -> Formats:
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
     reach = _reach(settings, tables)
 
+    factor = _fit(optimizer.increase)
     angle = _fit(
         ATTITUDE_LIMIT_RAD + (tilt if tables.has_lag else 0),
         2 * tilt,
         tilt + optimizer.step_max_rad,
         optimizer.step_max_rad * optimizer.increase,
+        math.ldexp(optimizer.step_max_rad, UPPER_BITS - factor),
     )
     share = _fit(max(max(abs(axis.at_once), axis.delayed, axis.decay, tables.held) for axis in tables.axes))
-    bend = _fit(reach.bend, math.ldexp(reach.tilt, SHARE_PRODUCT_BITS - share))
+    bend = _fit(reach.bend, math.ldexp(reach.tilt, UPPER_BITS - share))
     error_limit = min(2 * ranges.position_m, reach.error) * _MARGIN
-    error = min(_fit(error_limit + reach.error), bend - 1)
+    error = min(_fit(settings.horizon.prediction * error_limit + reach.errors), bend - 1)
     position = min(_fit(2 * ranges.position_m), error)
-    slope_bound = math.sqrt(2) * gain * reach.response
+    slope_bound = 2 * gain * reach.response
     slope = _fit(slope_bound)
 
     distance = 2 * settings.horizon.prediction * (error_limit + reach.error)
@@ -173,11 +179,11 @@ def formats(settings: Settings) -> Formats:
         bend=bend,
         error=error,
         share=share,
-        response=_fit(2 * reach.response),
+        response=_fit(reach.response),
         slope=slope,
         tracking=tracking,
         effort=effort,
-        factor=_fit(optimizer.increase),
+        factor=factor,
         cost=tracking + error,
         gradient=tracking + slope,
         error_limit=raw(error_limit, position),
@@ -297,65 +303,34 @@ def _largest_gain(settings: Settings, tables: HorizonTables) -> float:
 
 
 def _reach(settings: Settings, tables: HorizonTables) -> _Reach:
-    """Bound what a prediction computes, by the sizes of its coefficients.
-
-    Gains of roll and pitch are sine and cosine of the heading times one number, so that together they
-    bend at most by the root of the sum of the squares of what each alone does.
-    """
-    tilt_rad = settings.limits.tilt_rad
+    """Bound what a prediction computes, along one axis of the world, by walking with sizes for values."""
+    tilt_rad, steps = settings.limits.tilt_rad, settings.horizon.prediction
     measured_rad = ATTITUDE_LIMIT_RAD if tables.has_lag else 0.0
     gain = _largest_gain(settings, tables)
-    speed = 2 * settings.ranges.velocity_m_s * settings.horizon.prediction_step_s
-    roll, pitch = (
-        _axis_reach(axis, tables.held, settings.horizon, measured_rad, tilt_rad) for axis in tables.axes
-    )
-    tilt, before, after, by_tilt = (
-        [gain * math.sqrt(a * a + b * b) for a, b in zip(of_roll, of_pitch, strict=True)]
-        for of_roll, of_pitch in zip(zip(*roll, strict=True), zip(*pitch, strict=True), strict=True)
-    )
-    largest_turn = math.sqrt(2) * gain * (measured_rad + 2 * tilt_rad)
-    once = tables.response_sum.copy()
-    once[:-1] /= 2
-    responses = [
-        sum(abs(float(after - before)) for before, after in itertools.pairwise(column)) for column in once.T
-    ]
+    bend = tilt = 2 * gain * measured_rad
+    advance = 2 * settings.ranges.velocity_m_s * settings.horizon.prediction_step_s + tables.held * bend
+    error = errors = 0.0
+    to_come = [0.0, 0.0]
+    before_rad = measured_rad
+    for step in range(steps):
+        if step < settings.horizon.control:
+            turn = gain * (before_rad + tilt_rad)
+            before_rad = tilt_rad
+            bend += 2 * turn
+            advance += turn * sum(abs(axis.at_once) for axis in tables.axes)
+            to_come = [size + axis.delayed * turn for size, axis in zip(to_come, tables.axes, strict=True)]
+            tilt = max(tilt, 2 * turn, *to_come)
+        error += advance
+        errors += error
+        advance += bend + sum(to_come)
+        to_come = [size * axis.decay for size, axis in zip(to_come, tables.axes, strict=True)]
     return _Reach(
-        bend=speed + max(*tilt, *before, *after, max(1.0, tables.held) * largest_turn),
-        tilt=max(*tilt, largest_turn),
-        error=max((i + 1) * speed + error for i, error in enumerate(by_tilt)),
-        response=max(responses),
+        bend=advance,
+        tilt=tilt,
+        error=error,
+        errors=errors,
+        response=float(np.abs(tables.response_sum).sum(axis=0).max()),
     )
-
-
-def _axis_reach(
-    axis: AxisConstants, held: float, horizon: Horizon, measured_rad: float, tilt_rad: float
-) -> list[tuple[float, float, float, float]]:
-    """Bound one axis in every step, per unit of gain, by the walk of each of its inputs.
-
-    They are of bend and what is to come of it, of the advance before and after the step, and of the error.
-    """
-    steps, moves = horizon.prediction, horizon.control
-    bounds = [(0.0, 0.0, 0.0, 0.0)] * steps
-    for move in range(-1, moves):
-        size = measured_rad if move < 0 else tilt_rad
-        error, to_come = 0.0, 0.0
-        bend, advance = (1.0, held) if move < 0 else (0.0, 0.0)
-        for step in range(steps):
-            turn = float(step == move) - float(step == move + 1 < moves)
-            before = advance + axis.at_once * turn
-            bend += turn
-            to_come -= axis.delayed * turn
-            error += before
-            advance = before + bend + to_come
-            tilt, first, second, third = bounds[step]
-            bounds[step] = (
-                tilt + size * (abs(bend) + abs(to_come)),
-                first + size * abs(before),
-                second + size * abs(advance),
-                third + size * abs(error),
-            )
-            to_come *= axis.decay
-    return bounds
 
 
 def _fit(*sizes: float) -> int:

@@ -32,11 +32,11 @@ long run(void);
 long run(void) { return nmpc_self_test(&scratch); }
 """
 EFFORT = (
-    "return nmpc_tracking_cost(weights->tracking, distance_m)"
-    " + nmpc_effort_cost(weights->effort, variation_rad);"
+    "return nmpc_tracking_cost(weight.tracking, distance_m)"
+    " + nmpc_effort_cost(weight.effort, variation_rad);"
 )
 HARMED = (
-    "return (weights->effort * variation_rad) + (weights->tracking * (distance_m + (nmpc_real_t)0.001f));"
+    "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
 )
 ABANDONED = """
 import sys

@@ -26,9 +26,9 @@ TINY = {
     "period_share = 0.1": "period_share = 0.002",
 }
 """A budget for the Crazyflie that preset mambo exceeds everywhere."""
-COST = "return nmpc_tracking_cost(weights->tracking, distance_m)"
-WIDENED = "return 1.0000001 * nmpc_tracking_cost(weights->tracking, distance_m)"
-DIVIDED = "return nmpc_tracking_cost(weights->tracking, distance_m) / weights->effort"
+COST = "return nmpc_tracking_cost(weight.tracking, distance_m)"
+WIDENED = "return 1.0000001 * nmpc_tracking_cost(weight.tracking, distance_m)"
+DIVIDED = "return nmpc_tracking_cost(weight.tracking, distance_m) / weight.effort"
 
 
 @lru_cache

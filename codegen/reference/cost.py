@@ -23,7 +23,7 @@ def evaluate(
     tracking = arithmetic.distance_slope(prediction.gain_m[:, :, None], by_move)
 
     change = moves_rad - np.concatenate([last_command_rad[:, None], moves_rad[:, :-1]], axis=1)
-    variation = ordered_sum(np.abs(change).reshape(len(change), -1), axis=1)
+    variation = ordered_sum(np.abs(change).swapaxes(1, 2).reshape(len(change), -1), axis=1)
     effort = arithmetic.effort_slope(weights[:, 1, None, None]) * sign(change)
 
     cost = arithmetic.tracking_cost(weights[:, 0], distance) + arithmetic.effort_cost(

@@ -19,14 +19,6 @@ _SHOWN: Final = 5
 """Alarms that the evidence names; all are in the reports."""
 _PROMISE: Final = "user assertion"
 _GRANTED: Final = "postcondition"
-_SUMS: Final = (
-    "predictor_walk",
-    "predictor_bend",
-    "step_of",
-    "distance_slope",
-    "end_run",
-)
-"""Where fixed point adds what cancels in part, which intervals do not see."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +33,7 @@ class Property:
 
 
 def check(subject: Subject) -> Result:
-    """Prove the absence of run-time errors and the promises of the driver; every alarm is a failure.
-
-    But in fixed point: if nothing but _SUMS is left open, the proof is INCOMPLETE.
-    """
+    """Prove the absence of run-time errors and the promises of the driver; every alarm is a failure."""
     absent = missing("frama-c", "frama-c-base")
     if absent:
         return Result(Outcome.INCOMPLETE, absent)
@@ -75,9 +64,7 @@ def check(subject: Subject) -> Result:
         "statements": statements,
     }
     if alarms:
-        gap = fixed and all(_is_unbounded_sum(alarm, subject) for alarm in alarms)
-        found = _gap_text(alarms, statements) if gap else _alarm_text(alarms)
-        return Result(Outcome.INCOMPLETE if gap else Outcome.FAILED, found, figures, tools)
+        return Result(Outcome.FAILED, _alarm_text(alarms), figures, tools)
     if proven < promised:
         return Result(
             Outcome.FAILED, f"{promised - proven} of {promised} promises were never reached", figures, tools
@@ -141,17 +128,6 @@ def _is_promise(one: Property) -> bool:
     return one.kind == _PROMISE or one.kind.startswith("precondition of ")
 
 
-def _is_unbounded_sum(alarm: Property, subject: Subject) -> bool:
-    """Tell whether an alarm is an overflow in one of _SUMS; Frama-C numbers the inline ones."""
-    prefix = subject.settings.code.prefix
-    function = re.sub(r"_\d+$", "", alarm.function).removeprefix(f"{prefix}_")
-    return (
-        alarm.status == "Unknown"
-        and alarm.kind in ("signed_overflow", "signed_downcast")
-        and function in _SUMS
-    )
-
-
 def _driver(subject: Subject) -> Path:
     return subject.bundle / "proof" / f"{subject.settings.code.prefix}_proof.c"
 
@@ -162,13 +138,6 @@ def _alarm_text(alarms: Sequence[Property]) -> str:
     ]
     rest = [f"{len(alarms) - _SHOWN} more in the tables"] if len(alarms) > _SHOWN else []
     return "; ".join([f"{len(alarms)} alarms", *shown, *rest])
-
-
-def _gap_text(alarms: Sequence[Property], statements: int) -> str:
-    return (
-        f"no other alarm in {statements} statements, but in sums of the prediction: intervals do not "
-        f"bound them, codegen/fixed_point.py does: {_alarm_text(alarms)}"
-    )
 
 
 def _complaint(log: str) -> str:

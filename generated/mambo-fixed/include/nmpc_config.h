@@ -58,9 +58,9 @@ typedef long long nmpc_sum_t;
 #define NMPC_PREDICTION_STEP_SQUARED_S2 1663011337
 
 /* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest to replace them. */
-#define NMPC_TRACKING_WEIGHT 36000
+#define NMPC_TRACKING_WEIGHT 144000
 #define NMPC_EFFORT_WEIGHT 268435456
-#define NMPC_TRACKING_WEIGHT_LIMIT 144000
+#define NMPC_TRACKING_WEIGHT_LIMIT 576000
 #define NMPC_EFFORT_WEIGHT_LIMIT 1073741824
 
 /* Optimizer: Ustep, eta+, eta-, Delta_max, Delta_min and epsilon of Table I. */
@@ -69,13 +69,13 @@ typedef long long nmpc_sum_t;
 #define NMPC_DECREASE 858993459
 #define NMPC_STEP_MAX_RAD 53687091
 #define NMPC_STEP_MIN_RAD 537
-#define NMPC_TOLERANCE 3355443
+#define NMPC_TOLERANCE 1677722
 
 /* No command ever exceeds this, either way. */
 #define NMPC_TILT_LIMIT_RAD 187904819
 
 /* Input beyond these is refused with a status: +/- a range, and the two ends of thrust. */
-#define NMPC_POSITION_RANGE_M 1048576000
+#define NMPC_POSITION_RANGE_M 524288000
 #define NMPC_VELOCITY_RANGE_M_S 838860800
 #define NMPC_ATTITUDE_RANGE_RAD 1744830464
 #define NMPC_YAW_RANGE_RAD 1073741824
@@ -85,15 +85,15 @@ typedef long long nmpc_sum_t;
 /* Bits behind the point. A position of 1.5 m is the number 1.5 * 2^NMPC_POSITION_BITS, and so on: positions, m;
  * velocities, m/s; roll, pitch, moves, command, rad; yaw, rad; thrust acceleration, m/s^2; weights, 1/m and
  * 1/rad; cost, and its gradient per rad. */
-#define NMPC_POSITION_BITS 20
+#define NMPC_POSITION_BITS 19
 #define NMPC_VELOCITY_BITS 23
 #define NMPC_ANGLE_BITS 29
 #define NMPC_YAW_BITS 20
 #define NMPC_THRUST_BITS 25
-#define NMPC_TRACKING_BITS 4
+#define NMPC_TRACKING_BITS 6
 #define NMPC_EFFORT_BITS 28
-#define NMPC_COST_BITS 26
-#define NMPC_GRADIENT_BITS 31
+#define NMPC_COST_BITS 25
+#define NMPC_GRADIENT_BITS 30
 
 /* Numbers of constants, as in NMPC_POSITION(1.5): the nearest, ties away from zero, by the compiler. For values
  * known at run time only there is nmpc_float.h. */
@@ -112,16 +112,16 @@ typedef long long nmpc_sum_t;
 #define NMPC_STEP_BITS 35
 #define NMPC_STEP_SQUARED_BITS 39
 #define NMPC_GAIN_BITS 33
-#define NMPC_BEND_BITS 27
-#define NMPC_ERROR_BITS 22
+#define NMPC_BEND_BITS 25
+#define NMPC_ERROR_BITS 19
 #define NMPC_SHARE_BITS 31
-#define NMPC_RESPONSE_BITS 23
-#define NMPC_SLOPE_BITS 27
+#define NMPC_RESPONSE_BITS 22
+#define NMPC_SLOPE_BITS 24
 #define NMPC_FACTOR_BITS 30
 #define NMPC_SINE_BITS 30
 
 /* A position error beyond this keeps its sign over the horizon whatever the moves, and counts as this. */
-#define NMPC_ERROR_LIMIT_M 136458742
+#define NMPC_ERROR_LIMIT_M 127676294
 
 /* Room that one nmpc_t takes at most; nmpc.c asserts it. */
 #define NMPC_INSTANCE_BYTES 144

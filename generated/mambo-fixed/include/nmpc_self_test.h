@@ -13,7 +13,7 @@
 #define NMPC_SELF_TEST_TICKS 100
 
 /* The digest of all episodes, as the reference computed it. */
-#define NMPC_SELF_TEST_DIGEST 0x0122B226UL
+#define NMPC_SELF_TEST_DIGEST 0x3762BAACUL
 
 #ifdef __cplusplus
 extern "C" {

@@ -8,15 +8,15 @@
 #include "nmpc_float.h"
 
 /* Numbers per unit, and units per number. */
-#define NMPC_POSITION_SCALE 1.048576e+06f
+#define NMPC_POSITION_SCALE 524288.0f
 #define NMPC_VELOCITY_SCALE 8.388608e+06f
 #define NMPC_ANGLE_SCALE 5.368709e+08f
 #define NMPC_YAW_SCALE 1.048576e+06f
 #define NMPC_THRUST_SCALE 3.3554432e+07f
-#define NMPC_TRACKING_SCALE 16.0f
+#define NMPC_TRACKING_SCALE 64.0f
 #define NMPC_EFFORT_SCALE 2.6843546e+08f
 #define NMPC_ANGLE_UNIT 1.8626451e-09f
-#define NMPC_COST_UNIT 1.4901161e-08f
+#define NMPC_COST_UNIT 2.9802322e-08f
 
 /* 2^31: no number reaches it. */
 #define NMPC_NUMBERS_END 2147483648.0f

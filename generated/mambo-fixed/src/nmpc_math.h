@@ -163,7 +163,7 @@ static inline nmpc_sum_t nmpc_effort_slope(nmpc_real_t weight)
 
 static inline nmpc_real_t nmpc_scaled(nmpc_real_t step_rad, nmpc_real_t factor)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)step_rad * factor, NMPC_FACTOR_BITS);
+    return (nmpc_real_t)(((nmpc_sum_t)factor * (step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS)))) >> 32);
 }
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, each within 2e-09 of the true value. */

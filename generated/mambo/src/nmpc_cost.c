@@ -9,7 +9,7 @@
 
 /* The errors along one axis of the world; they keep their sign for many steps in a row. */
 typedef struct {
-    nmpc_sum_t run_m;                   /* sum of the errors since the sign last changed */
+    nmpc_real_t run_m;                  /* sum of the errors since the sign last changed */
     nmpc_bits_t sign;                   /* bits of a value with that sign */
     nmpc_sum_t distance_m;              /* sizes of the errors before */
     nmpc_real_t slopes[NMPC_RESPONSES]; /* what they add to the slope of the distance */
@@ -19,7 +19,7 @@ static inline void start_errors(nmpc_errors_t *errors, nmpc_real_t error_m)
 {
     int k;
 
-    errors->run_m = (nmpc_sum_t)0;
+    errors->run_m = (nmpc_real_t)0;
     errors->sign = nmpc_bits(error_m);
     errors->distance_m = (nmpc_sum_t)0;
     NMPC_UNROLL
@@ -34,13 +34,13 @@ static inline void end_run(nmpc_errors_t *errors, int i)
 {
     int k;
 
-    if (errors->run_m > (nmpc_sum_t)0) {
+    if (errors->run_m > (nmpc_real_t)0) {
         errors->distance_m = errors->distance_m + errors->run_m;
         NMPC_UNROLL
         for (k = 0; k < NMPC_RESPONSES; k++) {
             errors->slopes[k] = errors->slopes[k] + nmpc_predictor_response_sum[i][k];
         }
-    } else if (errors->run_m < (nmpc_sum_t)0) {
+    } else if (errors->run_m < (nmpc_real_t)0) {
         errors->distance_m = errors->distance_m - errors->run_m;
         NMPC_UNROLL
         for (k = 0; k < NMPC_RESPONSES; k++) {
@@ -60,7 +60,7 @@ static inline void walk_to(nmpc_walk_t *walk, nmpc_errors_t *errors, int i)
     sign = nmpc_bits(walk->error_m);
     if ((((sign ^ errors->sign) & NMPC_SIGN_BIT) != 0U) && (nmpc_sign(walk->error_m) != 0)) {
         end_run(errors, i);
-        errors->run_m = (nmpc_sum_t)0;
+        errors->run_m = (nmpc_real_t)0;
         errors->sign = sign;
     }
     errors->run_m = errors->run_m + walk->error_m;
@@ -70,14 +70,15 @@ nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_we
                               const nmpc_real_t last_rad[NMPC_AXES], const nmpc_real_t moves_rad[NMPC_MOVES],
                               nmpc_sum_t gradient[NMPC_MOVES])
 {
+    const nmpc_weights_t weight = *weights;
     nmpc_walk_t walk_x = prediction->x;
     nmpc_walk_t walk_y = prediction->y;
     nmpc_errors_t errors_x;
     nmpc_errors_t errors_y;
     nmpc_sum_t distance_m;
     nmpc_sum_t variation_rad = (nmpc_sum_t)0;
+    int axis;
     int i;
-    int k;
 
     /* Eq 12a. */
     start_errors(&errors_x, walk_x.error_m);
@@ -98,28 +99,37 @@ nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_we
     /* Eq 12b: a move counts by its change from the one before, the first by that from the last command; its
      * slope falls to both moves. */
     NMPC_UNROLL
-    for (k = 0; k < NMPC_MOVES; k++) {
-        const int axis = k % NMPC_AXES;
-        const nmpc_real_t before_rad = (k < NMPC_AXES) ? last_rad[k] : moves_rad[k - NMPC_AXES];
-        const nmpc_real_t change_rad = moves_rad[k] - before_rad;
-        const int response = k / NMPC_AXES_ALIKE;
-        const nmpc_real_t distance_by_move_m = nmpc_distance_slope(
-            prediction->gain_x_m[axis], errors_x.slopes[response], prediction->gain_y_m[axis], errors_y.slopes[response]);
-        nmpc_sum_t effort = (nmpc_sum_t)0;
+    for (axis = 0; axis < NMPC_AXES; axis++) {
+        const nmpc_real_t gain_x_m = prediction->gain_x_m[axis];
+        const nmpc_real_t gain_y_m = prediction->gain_y_m[axis];
+        nmpc_real_t before_rad = last_rad[axis];
+        nmpc_sum_t slope = (nmpc_sum_t)0;
 
-        if (change_rad > (nmpc_real_t)0) {
-            variation_rad = variation_rad + change_rad;
-            effort = nmpc_effort_slope(weights->effort);
-        } else if (change_rad < (nmpc_real_t)0) {
-            variation_rad = variation_rad - change_rad;
-            effort = -nmpc_effort_slope(weights->effort);
-        } else {
-            /* No change, no slope. */
+        NMPC_UNROLL
+        for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+            const int k = (NMPC_AXES * i) + axis;
+            const int response = k / NMPC_AXES_ALIKE;
+            const nmpc_real_t change_rad = moves_rad[k] - before_rad;
+            const nmpc_real_t distance_by_move_m = nmpc_distance_slope(gain_x_m, errors_x.slopes[response], gain_y_m,
+                                                                       errors_y.slopes[response]);
+            nmpc_sum_t effort = (nmpc_sum_t)0;
+
+            if (change_rad > (nmpc_real_t)0) {
+                variation_rad = variation_rad + change_rad;
+                effort = nmpc_effort_slope(weight.effort);
+            } else if (change_rad < (nmpc_real_t)0) {
+                variation_rad = variation_rad - change_rad;
+                effort = -nmpc_effort_slope(weight.effort);
+            } else {
+                /* No change, no slope. */
+            }
+            if (i > 0) {
+                gradient[k - NMPC_AXES] = slope - effort;
+            }
+            slope = nmpc_tracking_slope(weight.tracking, distance_by_move_m) + effort;
+            before_rad = moves_rad[k];
         }
-        gradient[k] = nmpc_tracking_slope(weights->tracking, distance_by_move_m) + effort;
-        if (k >= NMPC_AXES) {
-            gradient[k - NMPC_AXES] = gradient[k - NMPC_AXES] - effort;
-        }
+        gradient[(NMPC_MOVES - NMPC_AXES) + axis] = slope;
     }
-    return nmpc_tracking_cost(weights->tracking, distance_m) + nmpc_effort_cost(weights->effort, variation_rad);
+    return nmpc_tracking_cost(weight.tracking, distance_m) + nmpc_effort_cost(weight.effort, variation_rad);
 }

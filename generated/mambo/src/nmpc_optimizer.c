@@ -47,6 +47,8 @@ static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int slope)
 void nmpc_optimizer_minimize(nmpc_t *self)
 {
     nmpc_rprop_t rprop[NMPC_MOVES];
+    unsigned char updates = 0U;
+    unsigned char converged = 0U;
     int iteration;
     int k;
 
@@ -55,8 +57,6 @@ void nmpc_optimizer_minimize(nmpc_t *self)
         rprop[k].before_rad = self->plan_rad[k];
         rprop[k].direction = 0;
     }
-    self->iterations = 0U;
-    self->converged = 0U;
 
     for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
         const nmpc_sum_t previous_cost = self->cost;
@@ -64,16 +64,18 @@ void nmpc_optimizer_minimize(nmpc_t *self)
         self->cost = nmpc_cost_evaluate(&self->prediction, &self->weights, self->command_rad, self->plan_rad,
                                         self->gradient);
         if ((iteration > 0) && (nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
-            self->converged = 1U;
+            converged = 1U;
         }
-        if (self->converged == 0U) {
-            self->iterations++;
+        if (converged == 0U) {
+            updates++;
         }
         /* Once the cost has come to rest all slopes are level: the plan stays, and the work goes on. */
         for (k = 0; k < NMPC_MOVES; k++) {
-            const int slope = (self->converged == 0U) ? nmpc_sign(self->gradient[k]) : 0;
+            const int slope = (converged == 0U) ? nmpc_sign(self->gradient[k]) : 0;
 
             self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], slope);
         }
     }
+    self->iterations = updates;
+    self->converged = converged;
 }

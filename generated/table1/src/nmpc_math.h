@@ -115,9 +115,9 @@ static inline nmpc_real_t nmpc_bend(nmpc_real_t gain_m, nmpc_real_t turn_rad)
     return gain_m * turn_rad;
 }
 
-static inline nmpc_real_t nmpc_part(nmpc_real_t share, nmpc_real_t bend_m)
+static inline nmpc_real_t nmpc_half(nmpc_real_t bend_m)
 {
-    return share * bend_m;
+    return 0.5f * bend_m;
 }
 
 static inline nmpc_real_t nmpc_first_error(nmpc_real_t difference_m)

@@ -19,8 +19,6 @@ extern "C" {
 #define NMPC_ROLL 0
 #define NMPC_PITCH 1
 
-/* What a turn of roll or pitch adds to the advance at once: a share of its bend. */
-#define NMPC_AT_ONCE 0.5f
 
 /* How far a unit of bend of each move has carried the error, summed over all steps before each; twice that, but
  * once at the end of the horizon. Axes that settle alike share their responses. */
@@ -40,7 +38,7 @@ static inline void nmpc_predictor_bend(nmpc_walk_t *walk, const nmpc_real_t gain
     const nmpc_real_t pitch_m = nmpc_bend(gain_m[NMPC_PITCH], pitch_rad);
     const nmpc_real_t both_m = roll_m + pitch_m;
 
-    walk->advance_m = walk->advance_m + nmpc_part(NMPC_AT_ONCE, both_m);
+    walk->advance_m = walk->advance_m + nmpc_half(both_m);
     walk->bend_m = walk->bend_m + both_m;
 }
 
