@@ -238,8 +238,12 @@ def bound_of(assembly: str, folder: Path) -> StackReport:
             "ldi r16, 1; ldd r16, Z+1; adiw r30, 2; out 0x3e, r31; out 0x3d, r30; ret",
             5,
         ),
+        ("push r28; push r29; call __muldi3_6; pop r29; pop r28; ret", 11),
     ],
-    ids=["none", "pushes", "call to the next", "skip", "skip of four bytes", "frame", "saved by a store"],
+    ids=[
+        *("none", "pushes", "call to the next", "skip", "skip of four bytes", "frame", "saved by a store"),
+        "saved from a helper",
+    ],
 )
 def test_what_the_stack_pointer_goes_through_is_followed(assembly: str, held: int, tmp_path: Path) -> None:
     """The most bytes at any time, the return address of three bytes included."""
@@ -253,6 +257,8 @@ def test_what_the_stack_pointer_goes_through_is_followed(assembly: str, held: in
         ("push r28; pop r29; ret", "`ret` .* returns without the stack pointer"),
         ("ldi r16, 1; ret", "`ret` .* returns without the stack pointer and registers"),
         ("push r16; std Y+1, r0; ldi r16, 0; pop r17; ret", "`ret` .* returns without"),
+        ("call __muldi3_6; ret", "run: `ret` .* returns without the stack pointer and registers"),
+        ("jmp __muldi3_6", "run: `ret` .* returns without the stack pointer and registers"),
         ("1: push r0; rjmp 1b", "ever more stack"),
         ("in r28, 0x3d; in r29, 0x3e; out 0x3d, r28; ret", "`out 0x3d, r28` .* only run time knows"),
         ("in r28, 0x3d; push r0; in r29, 0x3e; out 0x3e, r29; out 0x3d, r28", "only run time knows"),

@@ -1,6 +1,7 @@
 """Worst-case stack: bounds against gcc's own figures and painted stacks, and everything that has no bound."""
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -22,6 +23,8 @@ CORES = {
     "rv32imac": "rv32",
     "avr": "avr",
 }
+WITHOUT = ("avr", "float64")
+"""A double of avr-gcc has 32 bits."""
 PAINT = b"\xa5"
 UNSEEN_BYTES = 16
 """Bytes that paint may outlast: on paths not taken, and at the bottom of frames that is never written."""
@@ -103,10 +106,15 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
     assert all(known.get(name, size) == size for name, size in frames.items())
 
 
-@pytest.mark.parametrize("board", [name for name in BOARDS if name != "avr"])
-def test_double_precision_has_a_bound_too(board: str, tmp_path: Path) -> None:
-    """The compiler's long helpers are walked as any other code."""
-    image = load(linked_controller(BOARDS[board], tmp_path, scalar="float64"))
+@pytest.mark.parametrize(
+    ("board", "scalar"),
+    [(board, scalar) for board in BOARDS for scalar in ("float64", "fixed") if (board, scalar) != WITHOUT],
+)
+def test_other_scalars_have_a_bound_too(
+    board: str, scalar: Literal["float64", "fixed"], tmp_path: Path
+) -> None:
+    """The compiler's long helpers are walked as any other code, those that share registers included."""
+    image = load(linked_controller(BOARDS[board], tmp_path, scalar=scalar))
     emulator = Painted(BOARDS[board], image)
     assert emulator.call("run") == 0
     assert 0 <= worst_case(image, "run").bytes - emulator.high_water_bytes() <= UNSEEN_BYTES

@@ -30,6 +30,8 @@ from codegen.footprint.instructions import (
 
 _DISASSEMBLER: Final = "avr-objdump"
 _RETURN: Final = "return address"
+_EXCEPTIONS: Final = {"__muldi3_6": frozenset({"r28", "r29"})}
+"""A part of libgcc's product of 64 bits, which adds into registers of its caller (lib1funcs.S)."""
 _SP_HIGH: Final = "sp, upper byte"
 
 _WIDE: Final = {"6", "106", "107"}
@@ -81,7 +83,8 @@ def disassembled(image: Image) -> tuple[dict[int, Instruction], Convention]:
     ]
     instructions = {one.address: one for one in _instructions(lines, return_bytes)}
     preserved = {_RETURN, *(f"r{index}" for index in (*range(2, 18), 28, 29))}
-    return instructions, Convention(_RETURN, frozenset(preserved), word_bytes=1, return_bytes=return_bytes)
+    convention = Convention(_RETURN, frozenset(preserved), 1, return_bytes, _EXCEPTIONS)
+    return instructions, convention
 
 
 def _objdump(image: Image) -> str:

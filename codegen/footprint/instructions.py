@@ -4,7 +4,8 @@ The program counter is a register like any other, `pc`: an instruction that jump
 there. Registers that no effect names keep their value.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
 PC: Final = "pc"
@@ -95,10 +96,16 @@ class Convention:
     """The registers of a calling convention: where a call leaves the return address, what it preserves.
 
     Where a call itself pushes the return address, that takes `return_bytes`, and `link` names what is there
-    as if it were a register. Registers are saved on the stack in places of `word_bytes`.
+    as if it were a register. Registers are saved on the stack in places of `word_bytes`. `exceptions` names
+    functions that change some of `preserved` all the same, and which.
     """
 
     link: str
     preserved: frozenset[str]
     word_bytes: int = WORD_BYTES
     return_bytes: int = 0
+    exceptions: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    def preserved_by(self, function: str) -> frozenset[str]:
+        """Return the registers that a function leaves as they were."""
+        return self.preserved - self.exceptions.get(function, frozenset())

@@ -69,9 +69,9 @@ class Knowledge:
             dict(self.words.items() & other.words.items()),
         )
 
-    def after_call(self) -> "Knowledge":
+    def after_call(self, preserved: frozenset[str]) -> "Knowledge":
         """Keep what a call preserves."""
-        kept = self.convention.preserved | {SP}
+        kept = preserved | {SP}
         return replace(self, registers={name: self.registers[name] for name in self.registers.keys() & kept})
 
     def departed(self) -> tuple[Value | None, "Knowledge"]:

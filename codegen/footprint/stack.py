@@ -131,6 +131,7 @@ class _Walker:
     def __init__(self, image: Image, code: Code, function: int) -> None:
         self._image, self._code, self._function = image, code, function
         self._functions = {symbol.address for symbol in image.symbols if symbol.kind == "function"}
+        self._preserved = self._preserved_by(function)
         self._known: dict[int, dict[int, Knowledge]] = defaultdict(dict)
         self._waiting: list[tuple[int, int]] = []
         self._frame = code.convention.return_bytes
@@ -188,13 +189,14 @@ class _Walker:
     def _jump(self, instruction: Instruction, target: Value | None, after: Knowledge) -> None:
         """Return, call a function as the last act, or go on elsewhere."""
         convention = self._code.convention
-        finished = after.unchanged(SP, *convention.preserved)
+        finished = after.unchanged(SP, *self._preserved)
         if target == Value(convention.link, 0):
             if not finished:
                 self._refuse(instruction, "returns without the stack pointer and registers that it came with")
             return
         place = self._place(instruction, target)
-        if finished and after.unchanged(convention.link) and place in self._functions - {self._function}:
+        other = place in self._functions - {self._function} and self._preserved <= self._preserved_by(place)
+        if finished and after.unchanged(convention.link) and other:
             self._note(place, 0)
         else:
             self._arrive(place, after)
@@ -204,11 +206,14 @@ class _Walker:
         convention = self._code.convention
         if place in self._functions:
             self._note(place, after.depth)
-            self._arrive(following, after.after_call())
+            self._arrive(following, after.after_call(self._preserved_by(place)))
         else:
             for effect in (Put(convention.link, None, following), Put(SP, SP, -convention.return_bytes)):
                 after = after.after(effect, self._image)
             self._arrive(place, after)
+
+    def _preserved_by(self, function: int) -> frozenset[str]:
+        return self._code.convention.preserved_by(self._image.name_of(function))
 
     def _note(self, callee: int, held: int) -> None:
         self._calls[callee] = max(held, self._calls.get(callee, 0))

@@ -116,7 +116,7 @@ def linked(board: Board, text: str, folder: Path, *flags: str, name: str = "gues
 
 
 def linked_controller(
-    board: Board, folder: Path, *flags: str, scalar: Literal["float32", "float64"] = "float32"
+    board: Board, folder: Path, *flags: str, scalar: Literal["float32", "float64", "fixed"] = "float32"
 ) -> Path:
     """Link the guest with the controller of preset mambo, and leave gcc's figures of the stack beside it."""
     settings = presets.load("mambo")
