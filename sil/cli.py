@@ -106,7 +106,11 @@ def register(app: typer.Typer) -> None:
         )
     )(fly)
     app.command(
-        epilog=generating.examples("mambo-nmpc table2 -o table2", "mambo-nmpc table2 --sensors -o seen")
+        epilog=generating.examples(
+            "mambo-nmpc table2 -o table2",
+            "mambo-nmpc table2 --scalar fixed -o fixed",
+            "mambo-nmpc table2 --sensors -o seen",
+        )
     )(table2)
 
 
@@ -246,22 +250,25 @@ def table2(
             "--sensors", help="Fly the Table II case through the Mambo's sensors and estimators instead."
         ),
     ] = False,
+    scalar: generating.Scalar = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print rows and verdicts as JSON.", metavar="")
     ] = False,
 ) -> None:
     """Fly Table II of the paper with PD and every preset, and judge its claims."""
     if sensors:
-        _table2_sensed(output, as_json=as_json)
+        _table2_sensed(output, scalar, as_json=as_json)
         return
-    traces = {name: f"{name.lower()}.npz" for name in (PD, *presets.names())}
+    settings = {name: generating.load(name, scalar) for name in presets.names()}
+    traces = {name: f"{name.lower()}.npz" for name in (PD, *settings)}
     with new_results(output, "table2", (*traces.values(), *TABLE2_PICTURES)) as folder:
         with progress_bar("flying Table II") as progress:
-            result = fly_table2(progress)
+            result = fly_table2(settings, progress)
         for name, trace in result.traces.items():
             write_npz(trace, folder / traces[name])
         _draw({PD: result.traces[PD], "NMPC, mambo": result.traces["mambo"]}, folder / "figure3")
         summary = {
+            "scalar": scalar,
             "cases": list(CASES),
             "rows": [asdict(row) for row in result.rows],
             "claims": [asdict(claim) for claim in result.claims],
@@ -273,13 +280,14 @@ def table2(
     typer.echo(f"{echo(str(output))}: {', '.join(TABLE2_PICTURES)} and the traces", err=True)
 
 
-def _table2_sensed(output: Path, *, as_json: bool) -> None:
+def _table2_sensed(output: Path, scalar: str | None, *, as_json: bool) -> None:
+    settings = {name: generating.load(name, scalar) for name in table2_sensed.PRESETS}
     with new_results(output, "table2 --sensors", (SENSED_TABLE,)) as folder:
         with progress_bar("flying Table II with sensors") as progress:
-            rows = fly_sensed(progress)
+            rows = fly_sensed(settings, progress)
         table = table2_sensed.text(rows)
         (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
-        text = summary_text("table2 --sensors", {"rows": [asdict(row) for row in rows]})
+        text = summary_text("table2 --sensors", {"scalar": scalar, "rows": [asdict(row) for row in rows]})
         (folder / SUMMARY).write_text(text, "utf-8")
     typer.echo(text if as_json else table, nl=not as_json)
     typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)

@@ -1,12 +1,12 @@
 """Table II of the paper, flown again: PD and every preset, measured beside printed, claim by claim."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from codegen import presets
+from codegen.settings import Settings
 from sil.baseline import PdController
 from sil.compiled import CompiledController
 from sil.loop import Flight, PositionController, fly
@@ -67,26 +67,23 @@ class Table2:
         return next(row for row in self.rows if (row.case, row.controller) == (case, controller))
 
 
-def fly_table2(progress: Callable[[float], None] | None = None) -> Table2:
-    """Fly every case with the PD and with the compiled C of every preset, 100 s each."""
+def fly_table2(
+    settings: Mapping[str, Settings], progress: Callable[[float], None] | None = None
+) -> Table2:
+    """Fly every case with the PD and with the compiled C of `settings` by name, 100 s each."""
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
-    names = (PD, *presets.names())
+    controllers: dict[str, PositionController] = {PD: PdController()}
+    controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
     traces = {}
-    for index, name in enumerate(names):
+    for index, (name, controller) in enumerate(controllers.items()):
 
         def report(share: float, flown: int = index) -> None:
             if progress is not None:
-                progress((flown + share) / len(names))
+                progress((flown + share) / len(controllers))
 
-        traces[name] = fly(flight, _controller(name), report)
+        traces[name] = fly(flight, controller, report)
     rows = tuple(_rows(traces))
     return Table2(rows, tuple(_claims(rows)), traces)
-
-
-def _controller(name: str) -> PositionController:
-    if name == PD:
-        return PdController()
-    return CompiledController(presets.load(name), len(CASES))
 
 
 def _rows(traces: dict[str, Trace]) -> list[Row]:

@@ -1,12 +1,12 @@
 """The Table II case with sensors: PD and NMPC on the truth, and through both estimators."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from codegen import presets
+from codegen.settings import Settings
 from sil.baseline import PdController
 from sil.compiled import CompiledController
 from sil.loop import Flight, fly
@@ -15,7 +15,8 @@ from sil.sensors.instruments import Sensors
 from sil.table2 import CASES, DURATION_S, INDICES, PD, PRINTED_NMPC, PRINTED_PD, Four, digits
 from sil.traces import SensedTrace
 
-CONTROLLERS: Final = (PD, "mambo", "table1")
+PRESETS: Final = ("mambo", "table1")
+"""Which fly beside the PD."""
 FLIGHTS: Final = 20
 """Flights of a row with noise, seeds 0 and up."""
 
@@ -47,13 +48,14 @@ class SensedRow:
 
 
 def fly_sensed(
+    settings: Mapping[str, Settings],
     progress: Callable[[float], None] | None = None,
     *,
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
 ) -> tuple[SensedRow, ...]:
-    """Fly the case with every controller and every view, controller by controller."""
-    jobs = [(name, view) for name in CONTROLLERS for view in VIEWS]
+    """Fly the case with the PD and the compiled C of `settings` by name, each with every view."""
+    jobs = [(name, view) for name in (PD, *settings) for view in VIEWS]
     rows = []
     for index, (name, view) in enumerate(jobs):
 
@@ -61,18 +63,23 @@ def fly_sensed(
             if progress is not None:
                 progress((flown + share) / len(jobs))
 
-        rows.append(_row(name, view, report, duration_s, flights))
+        rows.append(_row(name, settings.get(name), view, report, duration_s, flights))
     return tuple(rows)
 
 
-def _row(
-    name: str, view: str, progress: Callable[[float], None], duration_s: float, flights: int
+def _row(  # noqa: PLR0913 - one for each thing that a row depends on
+    name: str,
+    settings: Settings | None,
+    view: str,
+    progress: Callable[[float], None],
+    duration_s: float,
+    flights: int,
 ) -> SensedRow:
     sensors = VIEWS[view]
     n = flights if sensors is not None and sensors.noise_scale else 1
     case = next(iter(CASES.values()))
     flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
-    controller = PdController() if name == PD else CompiledController(presets.load(name), n)
+    controller = PdController() if settings is None else CompiledController(settings, n)
     trace = fly(flight, controller, progress)
     tracked = measure(trace)
     seen, drift_m = tracked, np.zeros(n)

@@ -244,6 +244,27 @@ def test_table2_judges_the_claims(tmp_path: Path) -> None:
     assert (mixed.returncode, "holds results of table2, not of fly" in mixed.stderr) == (2, True)
 
 
+@pytest.mark.long
+def test_table2_flies_the_presets_in_another_scalar_type(tmp_path: Path) -> None:
+    """The row of a preset is what `fly` has of it with the same option."""
+    done = command("table2", "--scalar", "fixed", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["scalar"] == "fixed"
+    row = next(row for row in summary["rows"] if row["controller"] == "mambo")
+    flown = command("fly", "--scalar", "fixed", "--json", folder=tmp_path)
+    assert json.loads(flown.stdout)["metrics"]["iae_m_s"] == row["measured"][0]
+
+
+@pytest.mark.parametrize("sensors", [[], ["--sensors"]])
+def test_table2_refuses_an_unknown_scalar_type(sensors: list[str], tmp_path: Path) -> None:
+    """Before anything flies or is written, with what there is."""
+    done = command("table2", "--scalar", "flat", *sensors, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith('--scalar: code.scalar = "flat" must be "float32" or ')
+    assert not list(tmp_path.iterdir())
+
+
 def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     """Ratios are named, and a claim that does not hold is the paper's."""
     row = Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))

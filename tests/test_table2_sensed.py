@@ -2,15 +2,18 @@
 
 import pytest
 
-from sil.table2_sensed import CONTROLLERS, VIEWS, fly_sensed, text
+from codegen import presets
+from sil.table2 import PD
+from sil.table2_sensed import PRESETS, VIEWS, fly_sensed, text
 
 
 @pytest.mark.long
 def test_sensed_table_has_a_row_for_every_controller_and_view() -> None:
     """The truth is seen as it is and drifts nowhere; noise is flown more than once."""
     shares: list[float] = []
-    rows = fly_sensed(shares.append, duration_s=1.0, flights=2)
-    assert [(row.controller, row.view) for row in rows] == [(c, v) for c in CONTROLLERS for v in VIEWS]
+    settings = {name: presets.load(name) for name in PRESETS}
+    rows = fly_sensed(settings, shares.append, duration_s=1.0, flights=2)
+    assert [(row.controller, row.view) for row in rows] == [(c, v) for c in (PD, *PRESETS) for v in VIEWS]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     for row in rows:
