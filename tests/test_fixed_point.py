@@ -1,11 +1,13 @@
 """Fixed point: formats that cannot overflow, refusals that say what would fit, conversions."""
 
+import re
 import subprocess
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
 from numpy.typing import NDArray
 
 from codegen import presets
@@ -19,6 +21,7 @@ from sil.compiled import CompiledController, compiled
 from sil.verify import replay
 from sil.verify.calls import Function, Tape, answers, calls
 from tests.support.cases import settings_case
+from tests.support.strategies import Values, toml, valid_values
 from tests.support.subjects import subject
 from tests.support.tools import require, toolchain
 
@@ -27,6 +30,10 @@ SETTINGS = {
     "mambo": MAMBO,
     "table1-printed": with_option(presets.load("table1-printed"), "code.scalar", "fixed", "test"),
 } | {f"case {index}": settings_case(index, "fixed") for index in range(12)}
+FAULT = re.compile(r"x\.toml: (\S+) = .*(?:write a smaller (\S+)|at (?:least|most) (\S+)(?: with .*)?)")
+"""A refusal by fixed point: the key, and of what to write less, or a value that fits."""
+MOST_ROUNDS = 4
+"""Refusals that a user meets one after the other; a smaller weight is tried a thousandth as large."""
 CONVERSIONS = Path(__file__).parent / "support" / "conversions.c"
 WATCH = ("-O1", "-g", "-fsanitize=undefined", "-fno-sanitize-recover=all")
 
@@ -125,6 +132,28 @@ def test_the_value_that_a_refusal_names_is_taken() -> None:
     parse(text.format(fits), "x.toml")
     with pytest.raises(InvalidSettingsError):
         parse(text.format(0.9 * fits), "x.toml")
+
+
+@given(valid_values())
+def test_any_refusal_has_a_way_out(values: Values) -> None:
+    """Whatever floating point takes: with what refusals name in its place, fixed point takes it as well."""
+    wanted = values | {"code.scalar": "fixed"}
+    for _ in range(MOST_ROUNDS):
+        for fault in faults_of(wanted):
+            named = FAULT.fullmatch(fault)
+            assert named is not None, fault
+            key, other, value = named.groups()
+            wanted |= {other: wanted[other] / 1000} if other else {key: float(value)}
+    assert faults_of(wanted) == []
+
+
+def faults_of(values: Values) -> list[str]:
+    """Return the lines that refuse settings."""
+    try:
+        parse(toml(values), "x.toml")
+    except InvalidSettingsError as refused:
+        return str(refused).splitlines()
+    return []
 
 
 def test_numbers_are_the_nearest_ties_away_from_zero() -> None:

@@ -14,8 +14,9 @@ from codegen import cli
 from codegen.reference import ReferenceController
 from codegen.settings import Settings
 from sil.compiled import CompiledController
+from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run
-from tests.support.strategies import Broken, any_settings, broken_settings
+from tests.support.strategies import Broken, any_settings, broken_settings, settings_in
 from tests.support.strict_builds import built
 
 SHARDS = range(20)
@@ -63,11 +64,11 @@ def is_refused_in_words(app: typer.Typer, broken: Broken, folder: Path) -> None:
     assert [path.name for path in folder.iterdir()] == ["own.toml"]
 
 
-def over_valid_settings(examples: int) -> Callable[[], None]:
+def over_valid_settings(drawn: st.SearchStrategy[Settings], examples: int) -> Callable[[], None]:
     """Return the test of `examples` drawn settings, with each compiler and layout."""
 
     @settings(max_examples=examples, phases=[Phase.generate])  # to shrink takes minutes of compiling
-    @given(any_settings(), st.sampled_from(["gcc", "clang"]), st.booleans())
+    @given(drawn, st.sampled_from(["gcc", "clang"]), st.booleans())
     def test(drawn: Settings, compiler: str, amalgamate: bool) -> None:
         goes_the_whole_way(drawn, compiler, amalgamate=amalgamate)
 
@@ -85,9 +86,10 @@ def over_broken_settings(app: typer.Typer, examples: int, folder: Path) -> Calla
     return test
 
 
-def test_a_handful_of_settings_goes_the_whole_way() -> None:
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_a_few_settings_go_the_whole_way(scalar: str) -> None:
     """Any valid settings: no warning, the self-test passes, and C and reference differ in no bit."""
-    over_valid_settings(5)()
+    over_valid_settings(settings_in(scalar), 2)()
 
 
 def test_some_broken_settings_are_refused_in_words(app: typer.Typer, tmp_path: Path) -> None:
@@ -99,7 +101,7 @@ def test_some_broken_settings_are_refused_in_words(app: typer.Typer, tmp_path: P
 @pytest.mark.parametrize("shard", SHARDS)
 def test_five_hundred_settings_go_the_whole_way(shard: int) -> None:
     """All shards together: 500 different settings, gcc and clang, amalgamated or not."""
-    seed(shard)(over_valid_settings(VALID_EACH))()
+    seed(shard)(over_valid_settings(any_settings(), VALID_EACH))()
 
 
 @pytest.mark.long

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from codegen.settings import Settings
 from codegen.settings.keys import KEYS, Key, spelled
 from codegen.settings.reserved import DEVICES, KEYWORDS, STANDARD_NAMES
+from tests.support.cases import SCALARS
 
 Values = dict[str, Any]
 """Settings by their dotted paths."""
@@ -35,7 +37,7 @@ def numbers(path: str, low: float | None = None, high: float | None = None) -> s
 def valid_values(draw: st.DrawFn) -> Values:
     """Draw valid settings, every key free within the rules, by their dotted paths.
 
-    All are of floating point, for fixed point refuses ranges and weights too far apart.
+    All are of floating point, for fixed point refuses some: see `any_settings`.
     """
     prediction = draw(st.integers(1, 50))
     update = draw(st.sampled_from(["exact", "printed"]))
@@ -77,8 +79,24 @@ def prefixes() -> st.SearchStrategy[str]:
 
 
 def any_settings() -> st.SearchStrategy[Settings]:
-    """Draw valid settings, every key free within the rules."""
-    return valid_values().map(lambda values: Settings.model_validate(nested(values)))
+    """Draw valid settings of any scalar type, every key free within the rules."""
+    return st.sampled_from(SCALARS).flatmap(settings_in)
+
+
+def settings_in(scalar: str) -> st.SearchStrategy[Settings]:
+    """Draw valid settings of a scalar type; for fixed point, what it refuses, nearly half, is drawn again."""
+
+    def representable(values: Values) -> bool:
+        try:
+            Settings.model_validate(nested(values))
+        except ValidationError:
+            if scalar != "fixed":
+                raise
+            return False
+        return True
+
+    drawn = valid_values().map(lambda values: values | {"code.scalar": scalar}).filter(representable)
+    return drawn.map(lambda values: Settings.model_validate(nested(values)))
 
 
 def choices_of(key: Key) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import cffi
 
 from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from codegen.literals import C_TYPES
+from codegen.literals import C_TYPES, SUM_TYPES
 from codegen.render import render, with_prefix
 from codegen.settings import Settings
 from tests.support.tools import require
@@ -26,7 +26,7 @@ _FUNCTIONS: Final = {
 }
 _TYPES: Final = """
 typedef REAL nmpc_real_t;
-typedef REAL nmpc_sum_t;
+typedef SUM nmpc_sum_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
@@ -63,17 +63,18 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
-    return _loaded(folder / "bundle.so", prefix, C_TYPES[scalar])
+    return _loaded(folder / "bundle.so", prefix, scalar)
 
 
-def _loaded(library: Path, prefix: str, real: str) -> ModuleType:
+def _loaded(library: Path, prefix: str, scalar: str) -> ModuleType:
+    real = C_TYPES[scalar]
     sizer = cffi.FFI()
     sizer.cdef(f"int {prefix}_batch_instance_bytes(void);")
     size = getattr(sizer.dlopen(str(library)), f"{prefix}_batch_instance_bytes")()
     ffi = cffi.FFI()
     scalars, rest = divmod(size, sizer.sizeof(real))
     assert rest == 0
-    ffi.cdef(_TYPES.replace("REAL", real).replace("SCALARS", str(scalars)))
+    ffi.cdef(_TYPES.replace("REAL", real).replace("SUM", SUM_TYPES[scalar]).replace("SCALARS", str(scalars)))
     for name, declaration in _FUNCTIONS.items():
         ffi.cdef(declaration.replace(f"nmpc_{name}(", f"{prefix}_{name}("))
     opened = ffi.dlopen(str(library))
