@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.reference import Memory, ReferenceController, Step
+from codegen.reference.arithmetic import arithmetic
 from codegen.reference.math import Real, sign
 from codegen.reference.optimizer import Evaluate, Search, minimize
+from codegen.representation import Representation
 from codegen.settings import Settings
 
 
@@ -20,6 +22,8 @@ class InnerSteps:
     plan_rad: (i, n, control, 2) the plan that each iteration evaluated.
     cost:     (i, n) its cost.
     gradient: (i, n, control, 2) its gradient, per rad.
+
+    With fixed point the numbers are those of the controller, told exactly in float64.
     """
 
     plan_rad: Real
@@ -28,25 +32,34 @@ class InnerSteps:
 
     def decisions(self, settings: Settings) -> NDArray[np.int8]:
         """Return the sign (i, n, control, 2) by which RPROP updates each move: 0 once the cost is at rest."""
-        tolerance = self.cost.dtype.type(settings.optimizer.tolerance)
+        numbers = Representation(settings)
+        tolerance = numbers.told(numbers.constant(settings.optimizer.tolerance, "cost"), "cost")
         at_rest = np.zeros(self.cost.shape, np.bool_)
         at_rest[1:] = np.logical_or.accumulate(np.abs(np.diff(self.cost, axis=0)) < tolerance)
         return np.where(at_rest[:, :, None, None], 0, sign(self.gradient)).astype(np.int8)
 
     def step_sizes_rad(self, settings: Settings) -> Real:
         """Return RPROP's step size (i, n, control, 2) after it has heard the sign of each iteration."""
-        optimizer, scalar = settings.optimizer, self.cost.dtype.type
-        size = np.full_like(self.plan_rad[0], optimizer.initial_step_rad)
+        optimizer, products = settings.optimizer, arithmetic(settings)
+        numbers = products.numbers
+        step_max, step_min, initial = (
+            numbers.constant(step, "angle")
+            for step in (optimizer.step_max_rad, optimizer.step_min_rad, optimizer.initial_step_rad)
+        )
+        increase, decrease = (
+            numbers.constant(factor, "factor") for factor in (optimizer.increase, optimizer.decrease)
+        )
+        size = np.full(self.plan_rad[0].shape, initial)
         before = np.zeros_like(size)
         sizes = []
         for slope in self.decisions(settings).astype(size.dtype):
             agreement = slope * before
-            longer = np.minimum(size * scalar(optimizer.increase), scalar(optimizer.step_max_rad))
-            shorter = np.maximum(size * scalar(optimizer.decrease), scalar(optimizer.step_min_rad))
+            longer = np.minimum(products.scaled(size, increase), step_max)
+            shorter = np.maximum(products.scaled(size, decrease), step_min)
             size = np.where(agreement > 0, longer, np.where(agreement < 0, shorter, size))
-            before = np.where(agreement < 0, scalar(0), slope)
+            before = np.where(agreement < 0, np.zeros_like(slope), slope)
             sizes.append(size)
-        return np.stack(sizes)
+        return numbers.told(np.stack(sizes), "angle")
 
 
 class WatchedController:
@@ -55,6 +68,7 @@ class WatchedController:
     def __init__(self, settings: Settings, n: int = 1) -> None:
         self.settings = settings
         self.controller = ReferenceController(settings, n, self._watch)
+        self._numbers = Representation(settings)
         self.steps: list[InnerSteps] = []
         self._evaluated: list[tuple[Any, Any, Any]] = []
 
@@ -68,7 +82,10 @@ class WatchedController:
     def _watch(self, chosen: Settings, evaluate: Evaluate, start: Real) -> Search:
         def watch(moves_rad: Real) -> tuple[Real, Real]:
             cost, gradient = evaluate(moves_rad)
-            self._evaluated.append((moves_rad.copy(), cost.copy(), gradient.copy()))
+            told, numbers = self._numbers.told, (moves_rad.copy(), cost.copy(), gradient.copy())
+            self._evaluated.append(
+                (told(numbers[0], "angle"), told(numbers[1], "cost"), told(numbers[2], "gradient"))
+            )
             return cost, gradient
 
         return minimize(chosen, watch, start)

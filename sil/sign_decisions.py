@@ -1,18 +1,19 @@
-"""Where float32 and float64 go different ways: RPROP reads signs, and a sign can hang on the last bit.
+"""Where float64 and fewer bits go different ways: RPROP reads signs, and a sign can hang on the last bit.
 
-Both reference controllers are given the same numbers (exact in float32) and the same memory, so a decision
+A controller in float32 or fixed point is compared with float64, one in float64 with float32. Both reference
+controllers are given the same numbers, exact in the type of fewer bits, and the same memory, so a decision
 that differs differs by rounding alone. Whole flights say what becomes of it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.literals import SCALARS
-from codegen.reference import Memory, Status
+from codegen.reference import ReferenceController, Status
+from codegen.representation import COMMAND, STATE, TARGET, THRUST, Representation
 from codegen.settings import Settings
 from sil.compiled import CompiledController
 from sil.inner_steps import InnerSteps, watched_step
@@ -23,7 +24,6 @@ from sil.traces import Trace
 from sil.trajectories import Trajectories
 
 ScalarName = Literal["float32", "float64", "fixed"]
-FEW: Final[ScalarName] = "float32"
 MANY: Final[ScalarName] = "float64"
 
 Make = Callable[[Settings, int], CompiledController]
@@ -32,16 +32,31 @@ Make = Callable[[Settings, int], CompiledController]
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """n control steps about to be made: what the controller is handed and what it remembers, in float32.
+    """n control steps about to be made: what the controller is handed and what it remembers.
 
     state (n, 7), target (n, 4), thrust_acceleration_m_s2 (n,), command_rad (n, 2), plan_rad (n, control, 2).
     """
 
-    state: NDArray[np.float32]
-    target: NDArray[np.float32]
-    thrust_acceleration_m_s2: NDArray[np.float32]
-    command_rad: NDArray[np.float32]
-    plan_rad: NDArray[np.float32]
+    state: NDArray[Any]
+    target: NDArray[Any]
+    thrust_acceleration_m_s2: NDArray[Any]
+    command_rad: NDArray[Any]
+    plan_rad: NDArray[Any]
+
+    def exact(self, settings: Settings) -> "Moments":
+        """Round every number to the nearest that a controller with `settings` can hold."""
+        numbers = Representation(settings)
+
+        def exact(values: NDArray[Any], quantities: Sequence[str]) -> NDArray[Any]:
+            return numbers.told(numbers.taken(values, quantities), *quantities)
+
+        return Moments(
+            exact(self.state, STATE),
+            exact(self.target, TARGET),
+            exact(self.thrust_acceleration_m_s2[:, None], THRUST)[:, 0],
+            exact(self.command_rad, COMMAND),
+            exact(self.plan_rad, COMMAND),
+        )
 
 
 @dataclass(frozen=True)
@@ -87,12 +102,18 @@ def in_scalar(settings: Settings, scalar: ScalarName) -> Settings:
     return settings.model_copy(update={"code": settings.code.model_copy(update={"scalar": scalar})})
 
 
+def with_few(settings: Settings) -> Settings:
+    """Return `settings` with the scalar type of fewer bits that is compared with float64."""
+    return settings if settings.code.scalar == "fixed" else in_scalar(settings, "float32")
+
+
 def disagreement(settings: Settings, inputs: str, moments: Moments) -> Disagreement:
     """Let both scalar types make the same steps, and compare every decision."""
-    few_step, few = _steps(in_scalar(settings, FEW), moments)
-    many_step, many = _steps(in_scalar(settings, MANY), moments)
+    few_settings, many_settings = with_few(settings), in_scalar(settings, MANY)
+    few_step, few = _steps(few_settings, moments)
+    many_step, many = _steps(many_settings, moments)
     accepted = (few_step.status == Status.OK) & (many_step.status == Status.OK)
-    differs = (few.decisions(settings) != many.decisions(settings))[:, accepted]
+    differs = (few.decisions(few_settings) != many.decisions(many_settings))[:, accepted]
     differs = differs.reshape(*differs.shape[:2], -1)
     any_move = differs.any(axis=2)
     steps_differing = any_move.any(axis=0)
@@ -112,18 +133,12 @@ def disagreement(settings: Settings, inputs: str, moments: Moments) -> Disagreem
 
 
 def _steps(settings: Settings, moments: Moments) -> tuple[Any, InnerSteps]:
-    scalar = SCALARS[settings.code.scalar]
-    n = len(moments.state)
-    memory = Memory(
-        command_rad=moments.command_rad.astype(scalar),
-        plan_rad=moments.plan_rad.astype(scalar),
-        weights=np.tile(
-            np.array([settings.cost.tracking_weight, settings.cost.effort_weight], scalar), (n, 1)
-        ),
-        cost=np.zeros(n, scalar),
-        gradient=np.zeros_like(moments.plan_rad, scalar),
-        iterations=np.zeros(n, np.int64),
-        converged=np.zeros(n, np.bool_),
+    numbers = Representation(settings)
+    fresh = ReferenceController(settings, len(moments.state)).memory
+    memory = replace(
+        fresh,
+        command_rad=numbers.taken(moments.command_rad, COMMAND).astype(numbers.computed),
+        plan_rad=numbers.taken(moments.plan_rad, COMMAND).astype(numbers.computed),
     )
     return watched_step(settings, memory, moments.state, moments.target, moments.thrust_acceleration_m_s2)
 
@@ -135,46 +150,49 @@ def _spread(values: NDArray[np.float64]) -> tuple[float, float, float]:
 
 
 def with_random_memory(settings: Settings, inputs: tuple[Any, Any, Any], rng: np.random.Generator) -> Moments:
-    """Give states, targets and thrusts a random memory; every other command is the first move of its plan."""
+    """Give states, targets and thrusts a random memory; every other command is the first move of its plan.
+
+    All is exact in the type of fewer bits.
+    """
     state, target, thrust = (np.asarray(values, np.float32) for values in inputs)
     limit = settings.limits.tilt_rad
     plan = rng.uniform(-limit, limit, (len(state), settings.horizon.control, 2)).astype(np.float32)
     command = plan[:, 0].copy()
     command[::2] = rng.uniform(-limit, limit, command[::2].shape)
     tilt = np.float32(limit)
-    return Moments(state, target, thrust, np.clip(command, -tilt, tilt), np.clip(plan, -tilt, tilt))
+    moments = Moments(state, target, thrust, np.clip(command, -tilt, tilt), np.clip(plan, -tilt, tilt))
+    return moments.exact(with_few(settings))
 
 
 EDGE_SPAN_M: Final = 0.5
 _HALVINGS: Final = 40
-"""More than float32 takes to bring two positions next to each other."""
+"""More than it takes to bring two positions of float32 or fixed point next to each other."""
 
 
 def at_the_edge(settings: Settings, moments: Moments) -> Moments:
     """Move each position to where a decision changes: the adversary's inputs.
 
     Between a position and one EDGE_SPAN_M beside it the decisions of float64 differ somewhere; halving finds
-    two neighbouring float32 between which they do. Moments without such an edge are left out.
+    two neighbouring numbers of the type of fewer bits between which they do. Moments without such an edge are
+    left out.
     """
-    settings = in_scalar(settings, MANY)
-    near, far = moments, _moved(moments, moments.state[:, 0] + np.float32(EDGE_SPAN_M))
+    few, settings = with_few(settings), in_scalar(settings, MANY)
+    near, far = moments, _moved(moments, moments.state[:, 0] + np.float32(EDGE_SPAN_M)).exact(few)
     here = _pattern(settings, near)
     edged = (here != _pattern(settings, far)).any(axis=1)
     near, far, here = _chosen(near, edged), _chosen(far, edged), here[edged]
     for _ in range(_HALVINGS):
-        middle = _moved(near, (near.state[:, 0] + far.state[:, 0]) * np.float32(0.5))
+        middle = _moved(near, (near.state[:, 0] + far.state[:, 0]) * np.float32(0.5)).exact(few)
         same = (_pattern(settings, middle) == here).all(axis=1)
         near = _moved(near, np.where(same, middle.state[:, 0], near.state[:, 0]))
         far = _moved(far, np.where(same, far.state[:, 0], middle.state[:, 0]))
     return near
 
 
-def _moved(moments: Moments, x_m: NDArray[np.float32]) -> Moments:
+def _moved(moments: Moments, x_m: NDArray[Any]) -> Moments:
     state = moments.state.copy()
     state[:, 0] = x_m
-    return Moments(
-        state, moments.target, moments.thrust_acceleration_m_s2, moments.command_rad, moments.plan_rad
-    )
+    return replace(moments, state=state)
 
 
 def _chosen(moments: Moments, rows: NDArray[np.bool_]) -> Moments:
@@ -198,22 +216,24 @@ class _Recording:
     """A controller that writes down each moment before it steps."""
 
     def __init__(self, controller: CompiledController, settings: Settings, n: int) -> None:
-        self._controller = controller
-        self._command = np.zeros((n, 2), np.float32)
-        self._plan = np.zeros((n, settings.horizon.control, 2), np.float32)
-        self.moments: list[tuple[Any, ...]] = []
+        self._controller, self._settings = controller, settings
+        self._command, self._plan = np.zeros((n, 2)), np.zeros((n, settings.horizon.control, 2))
+        self.moments: list[Moments] = []
 
     def step(self, state: Any, target: Any, thrust_acceleration_m_s2: Any) -> Outcome:
         """Write down, and step."""
-        inputs = (values.astype(np.float32) for values in (state, target, thrust_acceleration_m_s2))
-        self.moments.append((*inputs, self._command, self._plan))
+        moments = Moments(state, target, thrust_acceleration_m_s2, self._command, self._plan)
+        self.moments.append(moments.exact(self._settings))
         step = self._controller.step(state, target, thrust_acceleration_m_s2)
         self._command, self._plan = step.command_rad, step.plan_rad
         return step
 
 
 def fly_both(settings: Settings, make: Make) -> tuple[list[Flown], Moments]:
-    """Fly the cases of Table II with both scalar types; return what came of it, and float32's moments."""
+    """Fly the cases of Table II with both scalar types.
+
+    Returns what came of it, and the moments of the type of fewer bits.
+    """
     cases = len(CASES)
     flight = Flight(
         Trajectories(tuple(CASES.values())),
@@ -221,10 +241,15 @@ def fly_both(settings: Settings, make: Make) -> tuple[list[Flown], Moments]:
         flights=cases,
         update_period_s=settings.horizon.update_period_s,
     )
-    few, many = (in_scalar(settings, scalar) for scalar in (FEW, MANY))
+    few, many = with_few(settings), in_scalar(settings, MANY)
     recording = _Recording(make(few, cases), few, cases)
     traces = fly(flight, recording), fly(flight, make(many, cases))
-    moments = Moments(*(np.concatenate(values) for values in zip(*recording.moments, strict=True)))
+    moments = Moments(
+        *(
+            np.concatenate([getattr(one, field.name) for one in recording.moments])
+            for field in fields(Moments)
+        )
+    )
     return _compared(*traces), moments
 
 

@@ -67,9 +67,7 @@ class Table2:
         return next(row for row in self.rows if (row.case, row.controller) == (case, controller))
 
 
-def fly_table2(
-    settings: Mapping[str, Settings], progress: Callable[[float], None] | None = None
-) -> Table2:
+def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], None] | None = None) -> Table2:
     """Fly every case with the PD and with the compiled C of `settings` by name, 100 s each."""
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
     controllers: dict[str, PositionController] = {PD: PdController()}

@@ -63,15 +63,16 @@ def fly_sensed(
             if progress is not None:
                 progress((flown + share) / len(jobs))
 
-        rows.append(_row(name, settings.get(name), view, report, duration_s, flights))
+        rows.append(_row(name, settings.get(name), view, report, duration_s=duration_s, flights=flights))
     return tuple(rows)
 
 
-def _row(  # noqa: PLR0913 - one for each thing that a row depends on
+def _row(
     name: str,
     settings: Settings | None,
     view: str,
     progress: Callable[[float], None],
+    *,
     duration_s: float,
     flights: int,
 ) -> SensedRow:

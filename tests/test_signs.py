@@ -10,26 +10,34 @@ import pytest
 
 from codegen import presets
 from codegen.reference import ReferenceController, Status
+from codegen.representation import Representation
 from codegen.settings import Settings
 from sil.inner_steps import watched_step
 from sil.sign_decisions import (
-    FEW,
     MANY,
     Disagreement,
     Flown,
     Moments,
+    ScalarName,
     at_the_edge,
     disagreement,
     in_scalar,
+    with_few,
     with_random_memory,
 )
-from sil.verify.check import Outcome, Subject
+from sil.verify.check import Outcome
 from sil.verify.inputs import random_inputs
 from sil.verify.signs import check, judge, text
 from tests.support.subjects import subject
 
 MAMBO = presets.load("mambo")
-SETTINGS = [MAMBO, in_scalar(MAMBO, MANY), presets.load("table1")]
+FIXED = in_scalar(MAMBO, "fixed")
+SETTINGS = {
+    "float32": MAMBO,
+    "float64": in_scalar(MAMBO, MANY),
+    "fixed": FIXED,
+    "table1": presets.load("table1"),
+}
 N = 300
 
 
@@ -40,7 +48,7 @@ def moments(settings: Settings, n: int = N, seed: int = 0) -> Moments:
     return with_random_memory(settings, (drawn.state, drawn.target, drawn.thrust), rng)
 
 
-@pytest.mark.parametrize("settings", SETTINGS, ids=["float32", "float64", "table1"])
+@pytest.mark.parametrize("settings", SETTINGS.values(), ids=SETTINGS)
 def test_watching_changes_no_bit(settings: Settings) -> None:
     """The watched step is the step, and the last iteration it saw is the one that the step reports."""
     given = moments(settings)
@@ -59,12 +67,13 @@ def test_watching_changes_no_bit(settings: Settings) -> None:
         assert np.array_equal(inner.gradient[-1][good], step.gradient[good])
 
 
-def test_moves_go_where_the_decisions_say() -> None:
+@pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
+def test_moves_go_where_the_decisions_say(settings: Settings) -> None:
     """A decision that agrees with the one before moves its move against the slope, unless at the limit."""
-    given = moments(MAMBO)
-    plain = ReferenceController(MAMBO, N)
-    _, inner = watched_step(MAMBO, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
-    decisions = inner.decisions(MAMBO).astype(np.int64)
+    given = moments(settings)
+    plain = ReferenceController(settings, N)
+    _, inner = watched_step(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
+    decisions = inner.decisions(settings).astype(np.int64)
     moved = np.sign(np.diff(inner.plan_rad, axis=0))
     first = decisions[0]
     assert np.array_equal(moved[0], -first)  # from level, far from the limit
@@ -74,9 +83,26 @@ def test_moves_go_where_the_decisions_say() -> None:
     assert np.array_equal(moved[1:][onward & inside], -decisions[1:-1][onward & inside])
 
 
-def test_a_cost_at_rest_decides_nothing() -> None:
+@pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
+def test_steps_of_the_search_are_as_long_as_they_are_told(settings: Settings) -> None:
+    """The first moves by the first step size, the next by that which the second decision left."""
+    given = moments(settings)
+    plain = ReferenceController(settings, N)
+    _, inner = watched_step(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
+    sizes, decisions = inner.step_sizes_rad(settings), inner.decisions(settings)
+    assert sizes.dtype == inner.plan_rad.dtype
+    onward = (decisions[1:-1] * decisions[:-2]) > 0
+    inside = np.abs(inner.plan_rad[2:]) < settings.limits.tilt_rad * 0.99
+    walked = np.abs(np.diff(inner.plan_rad.astype(np.float64), axis=0))[1:]
+    assert (onward & inside).sum() > N
+    assert np.allclose(walked[onward & inside], sizes[1:-1][onward & inside], rtol=1e-5, atol=1e-7)
+
+
+@pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
+def test_a_cost_at_rest_decides_nothing(settings: Settings) -> None:
     """With a huge tolerance all decisions after the first are 0."""
-    resting = MAMBO.model_copy(update={"optimizer": MAMBO.optimizer.model_copy(update={"tolerance": 1e6})})
+    optimizer = settings.optimizer.model_copy(update={"tolerance": 1e6})
+    resting = settings.model_copy(update={"optimizer": optimizer})
     given = moments(resting)
     step, inner = watched_step(
         resting,
@@ -90,12 +116,13 @@ def test_a_cost_at_rest_decides_nothing() -> None:
     assert not decisions[1:].any()
 
 
-def test_an_edge_is_where_the_next_number_decides_otherwise() -> None:
-    """One float32 further along x the decisions of float64 are others."""
-    many = in_scalar(MAMBO, MANY)
-    edge = at_the_edge(MAMBO, moments(MAMBO))
-    beside = edge.state.copy()
-    beside[:, 0] = np.nextafter(beside[:, 0], np.float32(np.inf))
+@pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
+def test_an_edge_is_where_the_next_number_decides_otherwise(settings: Settings) -> None:
+    """One float32, or one number of fixed point, further along x the decisions of float64 are others."""
+    many, bits = in_scalar(settings, MANY), Representation(settings).bits
+    edge = at_the_edge(settings, moments(settings))
+    beside, x_m = edge.state.copy(), edge.state[:, 0]
+    beside[:, 0] = x_m + 2.0 ** -bits["position"] if bits else np.nextafter(x_m, np.float32(np.inf))
     memory = replace(
         ReferenceController(many, len(beside)).memory,
         command_rad=edge.command_rad.astype(np.float64),
@@ -110,9 +137,10 @@ def test_an_edge_is_where_the_next_number_decides_otherwise() -> None:
     assert changed.all()
 
 
-def test_the_scalar_types_part_at_edges() -> None:
+@pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
+def test_the_scalar_types_part_at_edges(settings: Settings) -> None:
     """There some decisions differ; every count is consistent with the others."""
-    found = disagreement(MAMBO, "edge", at_the_edge(MAMBO, moments(MAMBO, 1000)))
+    found = disagreement(settings, "edge", at_the_edge(settings, moments(settings, 1000)))
     assert 0 < found.differing_steps < found.steps
     assert found.differing_steps <= found.differing <= found.decisions
     assert found.decisions == found.steps * MAMBO.optimizer.iterations * 2 * MAMBO.horizon.control
@@ -163,13 +191,15 @@ def test_a_check_fails_where_the_scalar_types_do_not_fly_alike(
 
 def test_the_tables_hold_every_count() -> None:
     """A row for each kind of input and each flight."""
-    spelled = text([AGREES], [ALIKE])
+    spelled = text([AGREES], [ALIKE], MAMBO)
     assert "| random | 10 | 1 | 1, 0, 0, 0, 0 | 2 of 200 | 0.010, 0.020, 0.030 | 4.0e-08 |" in spelled
     assert "| eight | 1.91 | 1.92 | 1 / 1 | 1 / 1 | 1 / 1 | 0.010 |" in spelled
-    assert FEW in spelled
+    assert "IAE float32 | IAE float64" in spelled
+    assert "IAE fixed | IAE float64" in text([AGREES], [ALIKE], FIXED)
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
 @pytest.mark.parametrize(
     ("right", "wrong", "outcome"),
     [
@@ -179,18 +209,21 @@ def test_the_tables_hold_every_count() -> None:
     ids=["as generated", "a weight"],
 )
 def test_the_check_flies_the_c_of_the_bundle(
-    tmp_path: Path, right: str, wrong: str, outcome: Outcome
+    tmp_path: Path, settings: Settings, right: str, wrong: str, outcome: Outcome
 ) -> None:
     """A controller that pays 900 times for effort does not fly like the other scalar type."""
     harms = [("src/nmpc_cost.c", right, wrong)] if right else []
-    chosen = subject(MAMBO, tmp_path, *harms)
+    chosen = subject(settings, tmp_path, *harms)
     found = check(chosen)
     assert found.outcome is outcome, found.evidence
     assert "in flight" in (chosen.folder / "signs.md").read_text("utf-8")
 
 
-def test_fixed_point_is_not_compared(tmp_path: Path) -> None:
-    """What compares two other scalar types says nothing about this one: it never passes."""
-    result = check(Subject(in_scalar(MAMBO, "fixed"), tmp_path, tmp_path))
-    assert result.outcome is Outcome.INCOMPLETE
-    assert "fixed point" in result.evidence
+@pytest.mark.parametrize(("scalar", "few"), [("float32",) * 2, ("float64", "float32"), ("fixed",) * 2])
+def test_the_type_of_fewer_bits_holds_the_moments(scalar: ScalarName, few: str) -> None:
+    """Rounding them to it changes none: both types are handed the same numbers."""
+    settings = in_scalar(MAMBO, scalar)
+    assert with_few(settings).code.scalar == few
+    given = moments(settings)
+    again = given.exact(with_few(settings))
+    assert all(getattr(again, name).tobytes() == values.tobytes() for name, values in vars(given).items())

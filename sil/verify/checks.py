@@ -34,6 +34,8 @@ CHECKS: Final = (
     Entry("coverage", "every line and branch of the C runs, or is listed with its reason", coverage.check),
     Entry("mutation", "every small fault of the C shows, or is listed with its reason", mutation.check),
     Entry("work", "a step does the same work whatever it is handed", work.check),
-    Entry("signs", "float32 decides as float64 does but for ties, and flies alike", signs.check),
+    Entry(
+        "signs", "float64, or float32 for float64, decides alike but for ties, and flies alike", signs.check
+    ),
     Entry("faults", "bounded commands and a way back, whatever fails in flight", faults.check),
 )

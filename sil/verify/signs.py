@@ -1,4 +1,4 @@
-"""Check: float32 and float64 decide alike but for ties, and fly alike."""
+"""Check: the controller decides like one of another precision but for ties, and flies alike."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -6,18 +6,21 @@ from typing import Final
 
 import numpy as np
 
+from codegen.representation import Representation
 from codegen.settings import Settings
 from codegen.toolchain import host_toolchain
 from sil.compiled import CompiledController
 from sil.fault_flights import STRAY_M
 from sil.results import finite
 from sil.sign_decisions import (
+    MANY,
     Disagreement,
     Flown,
     Moments,
     at_the_edge,
     disagreement,
     fly_both,
+    with_few,
     with_random_memory,
 )
 from sil.verify.bundle import controller
@@ -36,11 +39,6 @@ def check(subject: Subject) -> Result:
     Raises BuildError, CacheError and FlightError.
     """
     settings = subject.settings
-    if settings.code.scalar == "fixed":
-        return Result(
-            Outcome.INCOMPLETE,
-            "compares float32 with float64, not fixed point; docs/fixed-point.md has how close that comes",
-        )
 
     def make(chosen: Settings, n: int) -> CompiledController:
         own = chosen.code.scalar == settings.code.scalar
@@ -53,7 +51,7 @@ def check(subject: Subject) -> Result:
         disagreement(settings, "at an edge", at_the_edge(settings, _random(settings, EDGE_SEEDS, rng))),
         disagreement(settings, "in flight", moments),
     )
-    (subject.folder / "signs.md").write_text(text(found, flown), "utf-8")
+    (subject.folder / "signs.md").write_text(text(found, flown, settings), "utf-8")
     return judge(found, flown, settings)
 
 
@@ -67,9 +65,7 @@ def judge(found: Sequence[Disagreement], flown: Sequence[Flown], settings: Setti
 
     A controller that strays in both scalar types cannot show that it flies alike: INCOMPLETE.
     """
-    epsilon = float(np.finfo(np.float32).eps)
-    largest_rad = max(settings.limits.tilt_rad, settings.optimizer.step_max_rad)
-    rounding_rad = 4 * settings.optimizer.iterations * epsilon * largest_rad
+    few, rounding_rad = with_few(settings).code.scalar, _rounding_rad(settings)
     wrong = [
         f"{one.inputs}: commands {one.rounding_rad:.2g} rad apart without a differing decision"
         for one in found
@@ -78,7 +74,7 @@ def judge(found: Sequence[Disagreement], flown: Sequence[Flown], settings: Setti
     strays = all(not error_m <= STRAY_M for one in flown for error_m in one.largest_error_m)
     if not strays:
         wrong += [
-            f"{one.case}: IAE {one.few[0]:.4g} in float32, {one.many[0]:.4g} in float64"
+            f"{one.case}: IAE {one.few[0]:.4g} in {few}, {one.many[0]:.4g} in {MANY}"
             for one in flown
             if not abs(one.few[0] / one.many[0] - 1.0) <= ALIKE
         ]
@@ -103,7 +99,21 @@ def judge(found: Sequence[Disagreement], flown: Sequence[Flown], settings: Setti
     )
 
 
-def text(found: Sequence[Disagreement], flown: Sequence[Flown]) -> str:
+def _rounding_rad(settings: Settings) -> float:
+    """Return what rounding can change a command by: four units in the last place for each iteration.
+
+    That of the largest angle; in fixed point all have the same, and it grows with the steps of the search.
+    """
+    optimizer, bits = settings.optimizer, Representation(with_few(settings)).bits
+    if bits is None:
+        largest_rad = max(settings.limits.tilt_rad, optimizer.step_max_rad)
+        return 4 * optimizer.iterations * float(np.finfo(np.float32).eps) * largest_rad
+    growth = optimizer.increase ** (optimizer.iterations - 1)
+    growth = min(growth, optimizer.step_max_rad / optimizer.initial_step_rad)
+    return 4 * optimizer.iterations * 2.0 ** -bits["angle"] * growth
+
+
+def text(found: Sequence[Disagreement], flown: Sequence[Flown], settings: Settings) -> str:
     """Spell both comparisons as Markdown tables."""
     lines = [
         "| inputs | steps | of these decide otherwise | first in iteration 1, 2, ... "
@@ -117,9 +127,10 @@ def text(found: Sequence[Disagreement], flown: Sequence[Flown]) -> str:
             f"{', '.join(map(str, one.first_by_iteration))} | {one.differing} of {one.decisions} | "
             f"{spread} | {one.rounding_rad:.1e} |"
         )
+    few = with_few(settings).code.scalar
     lines += [
         "",
-        "| Table II case | IAE float32 | IAE float64 | ISE | ITSE | ITAE | paths apart, m |",
+        f"| Table II case | IAE {few} | IAE {MANY} | ISE | ITSE | ITAE | paths apart, m |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for case in flown:
