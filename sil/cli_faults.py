@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from codegen import cli as generating
-from codegen import presets
 from codegen.errors import echo
 from sil.cli_boards import AsJson, Source
 from sil.compiled import CompiledController
@@ -21,7 +20,9 @@ FAULT_FILES = ("faults.csv", "faults.png", "faults.svg")
 
 def register(app: typer.Typer) -> None:
     """Add the command of this module to `app`."""
-    app.command(epilog=generating.examples("mambo-nmpc faults mambo -o faults"))(faults)
+    app.command(
+        epilog=generating.examples("mambo-nmpc faults mambo -o faults", "mambo-nmpc faults --scalar fixed")
+    )(faults)
 
 
 def faults(
@@ -31,10 +32,11 @@ def faults(
         Path,
         typer.Option("--output", "-o", help="Folder for the results; earlier ones there are overwritten."),
     ] = Path("faults"),
+    scalar: generating.Scalar = None,
     as_json: AsJson = False,
 ) -> None:
     """Fly with faults of sensors, timing, target and operator; exit 1 if one crashes the drone."""
-    settings = presets.load(source)
+    settings = generating.load(source, scalar)
     with new_results(output, "faults", FAULT_FILES) as folder:
         try:
             with progress_bar("flying with faults") as progress:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from codegen import bundle, presets
+from codegen import bundle
 from codegen import cli as generating
 from codegen.errors import InvalidSettingsError, echo
 from codegen.render import render
@@ -29,6 +29,7 @@ def register(app: typer.Typer) -> None:
             "mambo-nmpc verify",
             "mambo-nmpc verify controller.toml -o evidence",
             "mambo-nmpc verify controller.toml --only proof,rules --json",
+            "mambo-nmpc verify --scalar fixed",
         )
         + "\n\nExit codes: 0 passed; 1 failed, or incomplete because a tool is missing; 2 bad input, or the "
         "system refuses."
@@ -43,10 +44,11 @@ def verify(
         Path,
         typer.Option("--output", "-o", help="Folder for the evidence; an earlier one there is replaced."),
     ] = Path("verification"),
+    scalar: generating.Scalar = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.", metavar="")] = False,
 ) -> None:
     """Prove and test the C that a controller's settings generate, and keep the evidence."""
-    settings = presets.load(source)
+    settings = generating.load(source, scalar)
     chosen = _chosen(only)
     with new_results(output, "verify", (CONTROLLER, REPORTS, PAGE)) as place:
         folder = place.resolve()

@@ -27,13 +27,15 @@ def run(*arguments: str, code: int = 0) -> tuple[str, str]:
 
 @pytest.mark.long
 def test_faults_leave_table_picture_and_json(tmp_path: Path) -> None:
-    """CSV, PNG, SVG and the summary, which stdout repeats."""
-    said, _ = run("faults", "table1", "--json", "-o", "out")
+    """CSV, PNG, SVG and the summary, which stdout repeats; with the scalar type that was asked for."""
+    said, _ = run("faults", "table1", "--scalar", "fixed", "--json", "-o", "out")
     out = tmp_path / "out"
     assert {path.name for path in out.iterdir()} == {*cli_faults.FAULT_FILES, "summary.json"}
     assert (out / "faults.png").read_bytes().startswith(b"\x89PNG")
     assert said == (out / "summary.json").read_text("utf-8")
-    flights = json.loads(said, parse_constant=pytest.fail)["flights"]
+    summary = json.loads(said, parse_constant=pytest.fail)
+    assert summary["settings"] == cli.load("table1", "fixed").digest
+    flights = summary["flights"]
     lines = (out / "faults.csv").read_text("utf-8").splitlines()
     assert len(lines) == 1 + len(flights)
     assert {flight["end"] for flight in flights} == {"back", "away"}
