@@ -77,7 +77,8 @@ class Bench:
         self._prefix = subject.settings.code.prefix
         blocks = [name.replace("nmpc", self._prefix, 1) for name in SUB_BLOCKS]
         self._harness = ("fuzz/replay.c", f"src/{self._prefix}_self_test.c")
-        self._units = [*(f"src/{block}.c" for block in blocks), f"src/{self._prefix}.c"]
+        code = [*blocks, self._prefix, f"{self._prefix}_float"]
+        self._units = [path for name in code if (subject.bundle / (path := f"src/{name}.c")).is_file()]
         self.files = [
             f"include/{self._prefix}_config.h",
             *(f"src/{block}.h" for block in blocks),
