@@ -8,6 +8,7 @@ import pytest
 from codegen import presets
 from codegen.render import render
 from codegen.settings import Settings
+from sil.sign_decisions import in_scalar
 from sil.verify import mutation
 from sil.verify.check import Outcome
 from sil.verify.mutants import Mutant, mutants
@@ -146,11 +147,12 @@ def test_every_reason_is_of_a_mutant_that_there_is() -> None:
         render(presets.load("mambo")),
         render(presets.load("table1")),
         render(Settings.model_validate(wide)),
+        *(render(in_scalar(presets.load(name), "fixed")) for name in ("mambo", "table1")),
     ]
     keys = {
         mutant.key
         for files in bundles
-        for path in {reason.file for reason in REASONS}
+        for path in {reason.file for reason in REASONS} & files.keys()
         for mutant in mutants(path, files[path], "nmpc")
     }
     assert {(reason.file, reason.line, reason.what) for reason in REASONS} <= keys

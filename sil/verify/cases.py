@@ -1,6 +1,7 @@
 """The project's cases: tapes that every run-time check plays, random ones and one for every edge by name."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Final
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.literals import SCALARS, Scalar
+from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
 from codegen.self_test import hover_thrust
 from codegen.settings import Settings
 from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
@@ -25,6 +27,7 @@ from sil.verify.calls import (
 from sil.verify.inputs import Inputs, random_inputs
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.floating]
 
 RANDOM_TAPES: Final = 1000
 
@@ -40,6 +43,7 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
         *_seams(settings, rng),
         *_at_rest(settings),
         *_meeting(settings),
+        *_ends(settings, rng),
     )
     return tapes, tuple(answers(settings, tapes))
 
@@ -90,18 +94,19 @@ def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     ]
     bounds = [(-limit, limit) for limit in symmetric]
     bounds.append((ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2))
-    for index, ends in enumerate(bounds):
-        for value in _around(settings, *ends):
+    for index, (quantity, ends) in enumerate(zip((*STATE, *TARGET, *THRUST), bounds, strict=True)):
+        for value in _around(settings, quantity, *ends):
             good = _good(settings, rng, 4)
             good[1, index] = value
             yield calls(settings, Function.STEP, good)
-    for function, ends in (
-        (Function.SET_WEIGHTS, (0.0, WEIGHT_LIMIT)),
-        (Function.RESET, (-ATTITUDE_LIMIT_RAD, ATTITUDE_LIMIT_RAD)),
-        (Function.RESET, (-tilt, tilt)),
+    numbers = Representation(settings)
+    for function, quantities, lows, highs in (
+        (Function.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit)),
+        (Function.RESET, COMMAND, (-ATTITUDE_LIMIT_RAD,) * 2, (ATTITUDE_LIMIT_RAD,) * 2),
+        (Function.RESET, COMMAND, (-tilt,) * 2, (tilt,) * 2),
     ):
         for index in range(2):
-            for value in _around(settings, *ends):
+            for value in _around(settings, quantities[index], lows[index], highs[index]):
                 pair = np.full((1, 2), 0.1 * tilt)
                 pair[0, index] = value
                 yield _between(settings, rng, calls(settings, function, pair))
@@ -145,28 +150,38 @@ def _at_rest(settings: Settings) -> list[Tape]:
 
     Next to the target the first move overshoots, and the cost changes by about the tracking weight times a
     constant. The largest weight with which that counts as rest is found by bisection; it and its neighbours
-    are the cases.
+    are the cases. In fixed point a number of that weight is many of the cost: there the effort weight, whose
+    numbers are finer than those of the cost, is found by bisection as well.
     """
-    n, scalar = 16, _floating(settings)
+    n, scalar, numbers = 16, _floating(settings), Representation(settings)
+    near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
     steps = np.zeros((n, 12))
-    steps[:, 0:2] = 1e-7 * np.linspace(1, 2, n)[:, None]
+    steps[:, 0:2] = near_m * np.linspace(1, 2, n)[:, None]
     steps[:, 6] = np.linspace(-3, 3, n)
     steps[:, 11] = hover_thrust(settings)
 
-    def tapes(weights: NDArray[np.floating]) -> list[Tape]:
-        pairs = np.stack([weights, np.zeros(n)], axis=1)
+    def tapes(weights: Floats, effort: Floats) -> list[Tape]:
+        pairs = np.stack([weights, effort], axis=1)
         columns = calls(settings, Function.SET_WEIGHTS, pairs), calls(settings, Function.STEP, steps)
         return list(np.stack(columns, axis=1))
 
-    resting, moving = np.zeros(n, scalar), np.full(n, WEIGHT_LIMIT, scalar)
-    for _ in range(4 * np.finfo(scalar).nmant):
-        weights = (resting + moving) / scalar(2)
-        rests = np.array([outcome["iterations"][1] == 1 for outcome in answers(settings, tapes(weights))])
-        resting, moving = np.where(rests, weights, resting), np.where(rests, moving, weights)
+    def between(made: Callable[[Floats], list[Tape]], most: float) -> tuple[Floats, Floats]:
+        resting, moving = np.zeros(n, scalar), np.full(n, most, scalar)
+        for _ in range(4 * np.finfo(scalar).nmant):
+            weights = (resting + moving) / scalar(2)
+            rests = np.array([outcome["iterations"][1] == 1 for outcome in answers(settings, made(weights))])
+            resting, moving = np.where(rests, weights, resting), np.where(rests, moving, weights)
+        return resting, moving
+
+    without = np.zeros(n)
+    resting, moving = between(lambda weights: tapes(weights, without), numbers.tracking_limit)
     found = []
     for _ in range(8):
-        found += tapes(moving)
+        found += tapes(moving, without)
         moving = np.nextafter(moving, scalar(0))
+    if numbers.bits is not None:
+        for effort in between(lambda weights: tapes(resting, weights), numbers.effort_limit):
+            found += tapes(resting, effort)
     return found
 
 
@@ -180,6 +195,29 @@ def _meeting(settings: Settings) -> Iterator[Tape]:
             steps[0, axis], steps[0, 2 + axis] = -way * advance_m, way
             steps[0, 11] = hover_thrust(settings)
             yield calls(settings, Function.STEP, steps)
+
+
+def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Put every input to an end of its range: in fixed point numbers are as large there as they ever get."""
+    numbers = Representation(settings)
+    if numbers.bits is None:
+        return
+    limits = numbers.limits(settings)
+    most = np.array(
+        [
+            *[limits.position] * 2,
+            *[limits.velocity] * 2,
+            *[limits.attitude] * 2,
+            limits.yaw,
+            *[limits.position] * 2,
+            *[limits.velocity] * 2,
+            limits.thrust_most,
+        ]
+    )
+    steps = numbers.told(most * rng.choice([-1, 1], (512, 12)), *STATE, *TARGET, *THRUST)
+    steps[:, 11] = np.abs(steps[:, 11])
+    steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
+    yield from calls(settings, Function.STEP, steps).reshape(-1, 4)
 
 
 def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
@@ -200,12 +238,16 @@ def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
     return np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
 
 
-def _around(settings: Settings, low: float, high: float) -> Array:
-    """Return both ends of a range, their neighbours in the scalar type, and what is no number or no size."""
-    scalar = _floating(settings)
+def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
+    """Return both ends of a range, their neighbours among the numbers, and what is no number or no size."""
+    scalar, numbers = _floating(settings), Representation(settings)
     ends = np.array([low, high], scalar)
     beyond = np.array([-np.inf, np.inf], scalar)
     neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
+    if numbers.bits is not None:
+        ends = numbers.told(numbers.taken(ends[:, None], (quantity,)), quantity)[:, 0]
+        unit = np.ldexp([-1.0, 1.0], -numbers.bits[quantity])
+        neighbours = [ends + unit, ends - unit]
     tiny = np.finfo(scalar).smallest_subnormal
     odd = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, tiny, -tiny], scalar)
     return np.concatenate([ends, *neighbours, odd]).astype(np.float64)

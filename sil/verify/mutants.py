@@ -39,6 +39,8 @@ _ARITHMETIC: Final = {
     "<<": ">>",
     ">>": "<<",
 }
+_SMALL: Final = 100
+"""From here on a whole number may be of the settings: no key names it."""
 _STEPS: Final = {"++": "--", "--": "++", "+=": "-=", "-=": "+=", "*=": "+=", "/=": "*="}
 _LOGIC: Final = {"&&": "||", "||": "&&"}
 _COMPARISONS: Final = {
@@ -191,9 +193,10 @@ def _numbers(token: _Token) -> Iterator[tuple[str, str]]:
         found = re.fullmatch(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)", token.text)
         assert found is not None
         whole, suffix = int(found[1], 0), found[2]
-        yield f"{whole + 1}{suffix}", ""
+        more, less = ("one more", "one less") if whole >= _SMALL else ("", "")
+        yield f"{whole + 1}{suffix}", more
         if whole > 0 or not suffix:
-            yield f"{whole - 1}{suffix}" if whole > 0 else "(-1)", ""
+            yield f"{whole - 1}{suffix}" if whole > 0 else "(-1)", less
         return
     scalar = "float32" if token.text[-1] in "fF" else "float64"
     of_type = literals.SCALARS[scalar]

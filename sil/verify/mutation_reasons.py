@@ -1,7 +1,10 @@
 """Faults that change no bit, and why: a row for every mutant that survives."""
 
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final
 
+from codegen.reference.arithmetic import arithmetic
+from codegen.representation import Representation
 from codegen.settings import Settings
 from sil.verify.reasons import Reason
 
@@ -28,8 +31,46 @@ def _is_float64(settings: Settings) -> bool:
     return settings.code.scalar == "float64"
 
 
+def _tolerates_one(settings: Settings) -> bool:
+    """Whether the tolerance of fixed point is more than one number of the cost."""
+    numbers = Representation(settings)
+    return numbers.bits is not None and bool(numbers.constant(settings.optimizer.tolerance, "cost") > 1)
+
+
+def _does_not_show(of: str, change: int) -> Callable[[Settings], bool]:
+    """Tell whether a factor of fixed point, a number more or less, rounds to the same steps on all paths."""
+
+    def holds(settings: Settings) -> bool:
+        optimizer, products = settings.optimizer, arithmetic(settings)
+        if settings.code.scalar != "fixed" or optimizer.iterations > _MOST_WALKED:
+            return False
+        constant = products.numbers.constant
+        initial, largest, smallest = (
+            constant(step, "angle")
+            for step in (optimizer.initial_step_rad, optimizer.step_max_rad, optimizer.step_min_rad)
+        )
+        factors = {name: constant(getattr(optimizer, name), "factor") for name in ("increase", "decrease")}
+
+        def walked(increase: Any, decrease: Any) -> list[Any]:
+            steps = [initial]
+            for _ in range(optimizer.iterations - 1):
+                longer = [min(products.scaled(step, increase), largest) for step in steps]
+                shorter = [max(products.scaled(step, decrease), smallest) for step in steps]
+                steps = [*steps, *longer, *shorter]
+            return steps
+
+        return walked(**factors) == walked(**factors | {of: factors[of] + change})
+
+    return holds
+
+
+_MOST_WALKED: Final = 8
+"""Iterations up to which every path of step sizes is walked: three ways on from each."""
+
 _STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
+_NO_RUN: Final = "no run ends before the first step"
 _EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
+_REFUSED: Final = "stands for what no format holds; no range contains it, nor its neighbour, nor -2^31"
 _ZERO: Final = "minus zero is compared, and nothing else is done with it"
 _SIGN: Final = "of a slope and of a direction only the sign is read"
 _THIRD: Final = (
@@ -43,9 +84,15 @@ _TERMS: Final = "the table grows by a zero, and a polynomial by a term of zero, 
 
 REASONS: Final[tuple[Reason, ...]] = (
     *(
-        Reason("src/nmpc_predictor.c", f"{{ {row} }},", what, "no run ends before the first step")
+        Reason("src/nmpc_predictor.c", f"{{ {row} }},", what, _NO_RUN)
         for row, responses in (("<real>, <real>, <real>, <real>", 4), ("<real>, <real>", 2))
         for what in ("zero -> one", *(f"zero -> one #{k}" for k in range(1, responses)))
+    ),
+    *(
+        Reason("src/nmpc_predictor.c", f"{{ {row} }},", f"0 -> {wrong}{count}", _NO_RUN)
+        for row, responses in (("0, 0, 0, 0", 4), ("0, 0", 2))
+        for wrong in ("1", "(-1)")
+        for count in ("", *(f" #{k}" for k in range(1, responses)))
     ),
     *(
         Reason(
@@ -73,6 +120,48 @@ REASONS: Final[tuple[Reason, ...]] = (
     *(
         Reason("include/nmpc_config.h", "#define NMPC_STEP_MIN_RAD <real>", what, _STEPS, _steps_stay_long)
         for what in ("next number", "negative")
+    ),
+    *(
+        Reason("include/nmpc_config.h", f"#define NMPC_STEP_{end}_RAD <number>", what, _STEPS, holds)
+        for end, holds in (("MAX", _steps_stay_short), ("MIN", _steps_stay_long))
+        for what in ("one more", "one less")
+    ),
+    *(
+        Reason(
+            "include/nmpc_config.h",
+            f"#define NMPC_{factor.upper()} <number>",
+            what,
+            "rounds to the same steps, on every path that the iterations there are can take",
+            _does_not_show(factor, change),
+        )
+        for factor in ("increase", "decrease")
+        for what, change in (("one more", 1), ("one less", -1))
+    ),
+    Reason(
+        "src/nmpc_math.h",
+        "return (value < (nmpc_sum_t)0) ? -value : value;",
+        "0 -> (-1)",
+        "a cost that falls by one number is at rest either way",
+        _tolerates_one,
+    ),
+    *(
+        Reason("src/nmpc_float.c", "nmpc_real_t number = <number>;", what, _REFUSED)
+        for what in ("one more", "one less")
+    ),
+    Reason(
+        "src/nmpc_float.c",
+        "if ((scaled > -NMPC_NUMBERS_END) && (scaled < NMPC_NUMBERS_END)) {",
+        "> -> >=",
+        _REFUSED,
+    ),
+    *(
+        Reason(
+            "src/nmpc_float.c",
+            "status = nmpc_step(self, NULL, NULL, 0, &next);",
+            what,
+            "null pointers are refused before the thrust is looked at",
+        )
+        for what in ("0 -> 1", "0 -> (-1)")
     ),
     Reason("src/nmpc_math.h", "return (value < (nmpc_sum_t)0) ? -value : value;", "< -> <=", _ZERO),
     *(

@@ -42,8 +42,9 @@ def row(key: Key) -> str:
 
 
 def plain(text: str, prefix: str) -> str:
-    """Return `text` on one line, with the default prefix, and real numbers left out."""
+    """Return `text` on one line, with the default prefix, without reals and whole numbers from 100 on."""
     named = re.sub(
         rf"\b({prefix}|{prefix.upper()})(?=[_.])", lambda name: "nmpc" if name[1] == prefix else "NMPC", text
     )
-    return " ".join(re.sub(r"-?\b\d+\.\d*(e[-+]?\d+)?f?|-?\b\d+e-?\d+f?", "<real>", named).split())
+    without_reals = re.sub(r"-?\b\d+\.\d*(e[-+]?\d+)?f?|-?\b\d+e-?\d+f?", "<real>", named)
+    return " ".join(re.sub(r"\b\d{3,}\b", "<number>", without_reals).split())

@@ -113,6 +113,54 @@ static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_flo
            && (found->pitch_rad == ((float)command->pitch_rad * unit_rad));
 }
 
+/* The largest float that is not beyond a number. */
+static float largest_float(nmpc_real_t number, int bits)
+{
+    const float unit = 1.0f / (float)((nmpc_sum_t)1 << bits);
+    const float found = (float)number * unit;
+
+    return (((double)found / (double)unit) > (double)number) ? (found * 0.99999994f) : found;
+}
+
+/* Halves of a number are rounded away from zero, and less than a half towards it. */
+static int rounds_halves(nmpc_t *self)
+{
+    const float angle_unit_rad = 1.0f / (float)((nmpc_sum_t)1 << NMPC_ANGLE_BITS);
+    const nmpc_float_weights_t weights = { 0.49999997f / (float)((nmpc_sum_t)1 << NMPC_TRACKING_BITS),
+                                           0.5f / (float)((nmpc_sum_t)1 << NMPC_EFFORT_BITS) };
+    const float given[3] = { 0.49999997f, 0.5f, 1.5f };
+    const nmpc_real_t nearest[3] = { 0, 1, 2 };
+    int is_good = (nmpc_float_set_weights(self, &weights) == NMPC_OK) && (self->weights.tracking == 0)
+                  && (self->weights.effort == 1);
+    int i;
+
+    for (i = 0; i < 3; i++) {
+        const nmpc_float_command_t last = { given[i] * angle_unit_rad, -given[i] * angle_unit_rad };
+
+        is_good = is_good && (nmpc_float_reset(self, &last) == NMPC_OK) && (self->command_rad[0] == nearest[i])
+                  && (self->command_rad[1] == -nearest[i]);
+    }
+    return is_good;
+}
+
+/* The largest floats within the ranges are accepted. */
+static int takes_the_ends(nmpc_t *self)
+{
+    const float position_m = largest_float(NMPC_POSITION_RANGE_M, NMPC_POSITION_BITS);
+    const float velocity_m_s = largest_float(NMPC_VELOCITY_RANGE_M_S, NMPC_VELOCITY_BITS);
+    const float attitude_rad = largest_float(NMPC_ATTITUDE_RANGE_RAD, NMPC_ANGLE_BITS);
+    const nmpc_float_state_t state = { { position_m, -position_m },
+                                       { velocity_m_s, -velocity_m_s },
+                                       attitude_rad,
+                                       -attitude_rad,
+                                       largest_float(NMPC_YAW_RANGE_RAD, NMPC_YAW_BITS) };
+    const nmpc_float_target_t target = { { -position_m, position_m }, { -velocity_m_s, velocity_m_s } };
+    const float thrust_m_s2 = largest_float(NMPC_THRUST_ACCELERATION_MAX_M_S2, NMPC_THRUST_BITS);
+    nmpc_float_command_t command;
+
+    return nmpc_float_step(self, &state, &target, thrust_m_s2, &command) == NMPC_OK;
+}
+
 /* Steps with floats and with the numbers that they are, and with floats that no format holds. */
 static int passes_floats(nmpc_t *self)
 {
@@ -130,7 +178,7 @@ static int passes_floats(nmpc_t *self)
     const nmpc_command_t last_numbers = { NMPC_ANGLE(0.125), NMPC_ANGLE(-0.25) };
     const nmpc_float_weights_t weights = { NMPC_TRACKING_WEIGHT / (float)(1L << NMPC_TRACKING_BITS),
                                            NMPC_EFFORT_WEIGHT / (float)(1L << NMPC_EFFORT_BITS) };
-    const float unheld[3] = { NAN, INFINITY, -INFINITY };
+    const float unheld[4] = { NAN, INFINITY, -INFINITY, 2147483648.0f / (float)(1L << NMPC_THRUST_BITS) };
     nmpc_t other;
     nmpc_command_t command;
     nmpc_float_command_t found;
@@ -155,12 +203,12 @@ static int passes_floats(nmpc_t *self)
                   == ((float)nmpc_last_cost(&other) / (float)((nmpc_sum_t)1 << NMPC_COST_BITS)))
               && is_alike(nmpc_float_step(self, NULL, &target, 9.75f, &found), NMPC_NULL_POINTER, &found, &command)
               && is_alike(nmpc_float_step(self, &state, NULL, 9.75f, &found), NMPC_NULL_POINTER, &found, &command);
-    for (i = 0; i < 3; i++) {
+    for (i = 0; i < 4; i++) {
         is_good = is_good
                   && is_alike(nmpc_float_step(self, &state, &target, unheld[i], &found),
                               (expected == NMPC_OK) ? NMPC_BAD_THRUST : expected, &found, &command);
     }
-    return is_good;
+    return is_good && rounds_halves(self) && takes_the_ends(self);
 }
 #else
 static int passes_floats(nmpc_t *self)
