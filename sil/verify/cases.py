@@ -1,5 +1,6 @@
 """The project's cases: tapes that every run-time check plays, random ones and one for every edge by name."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
@@ -198,7 +199,10 @@ def _meeting(settings: Settings) -> Iterator[Tape]:
 
 
 def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Put every input to an end of its range: in fixed point numbers are as large there as they ever get."""
+    """Put every input to an end of its range, where numbers of fixed point are as large as they ever get.
+
+    And start a number from the tilt limit, pulled there: a turn as small as they ever get.
+    """
     numbers = Representation(settings)
     if numbers.bits is None:
         return
@@ -218,6 +222,14 @@ def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     steps[:, 11] = np.abs(steps[:, 11])
     steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
     yield from calls(settings, Function.STEP, steps).reshape(-1, 4)
+
+    near_rad = settings.limits.tilt_rad - math.ldexp(1, -numbers.bits["angle"])
+    signs = np.array(list(itertools.product((-1, 1), repeat=4)))
+    pulled = np.zeros((len(signs), 12))
+    pulled[:, 0:2] = signs[:, 2:] * min(1.0, settings.ranges.position_m)
+    pulled[:, 11] = hover_thrust(settings)
+    columns = calls(settings, Function.RESET, near_rad * signs[:, :2]), calls(settings, Function.STEP, pulled)
+    yield from np.stack(columns, axis=1)
 
 
 def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:

@@ -143,7 +143,7 @@ static int rounds_halves(nmpc_t *self)
     return is_good;
 }
 
-/* The largest floats within the ranges are accepted. */
+/* The largest floats within the ranges are accepted, an attitude beyond is not. */
 static int takes_the_ends(nmpc_t *self)
 {
     const float position_m = largest_float(NMPC_POSITION_RANGE_M, NMPC_POSITION_BITS);
@@ -156,9 +156,15 @@ static int takes_the_ends(nmpc_t *self)
                                        largest_float(NMPC_YAW_RANGE_RAD, NMPC_YAW_BITS) };
     const nmpc_float_target_t target = { { -position_m, position_m }, { -velocity_m_s, velocity_m_s } };
     const float thrust_m_s2 = largest_float(NMPC_THRUST_ACCELERATION_MAX_M_S2, NMPC_THRUST_BITS);
+    nmpc_float_state_t rolled = state;
+    nmpc_float_state_t pitched = state;
     nmpc_float_command_t command;
 
-    return nmpc_float_step(self, &state, &target, thrust_m_s2, &command) == NMPC_OK;
+    rolled.roll_rad = 2.0f * attitude_rad;
+    pitched.pitch_rad = 2.0f * attitude_rad;
+    return (nmpc_float_step(self, &state, &target, thrust_m_s2, &command) == NMPC_OK)
+           && (nmpc_float_step(self, &rolled, &target, thrust_m_s2, &command) == NMPC_BAD_STATE)
+           && (nmpc_float_step(self, &pitched, &target, thrust_m_s2, &command) == NMPC_BAD_STATE);
 }
 
 /* Steps with floats and with the numbers that they are, and with floats that no format holds. */
