@@ -82,7 +82,7 @@ def _found(trace: Trace) -> dict[str, list[Any]]:
     """Return what became of n flights, each value a list of n."""
     refused = (trace.status != 0) & (trace.status != NOT_CALLED)
     found: dict[str, list[Any]] = {
-        CRASHED: _crashed(trace).astype(int).tolist(),
+        CRASHED: crashed(trace).astype(int).tolist(),
         REFUSED: refused.sum(axis=0).tolist(),
     }
     views = [("", INDICES, trace)]
@@ -94,7 +94,7 @@ def _found(trace: Trace) -> dict[str, list[Any]]:
     return found | {DIGEST: [trace.digest(flight) for flight in range(trace.flights)]}
 
 
-def _crashed(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def crashed(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Tell which flights were lost, tilted too far to carry the weight, or touched the ground (n,)."""
     flown = trace.time_s >= 0.0
     angles_rad: FloatArray = trace.euler_rad[flown]
