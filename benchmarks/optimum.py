@@ -1,12 +1,14 @@
 """The problems of eq 12 written out for a linear program, and controllers that search them otherwise.
 
 For a given yaw and thrust the predicted errors are affine in the moves, with attitude lag too. So eq 12 is
-the 1-norm of affine rows: a linear program, which HiGHS solves to the optimum. The rows come from the model's exact discretisation, written down a second time; every step of a controller here
-asserts that they give the reference's own cost.
+the 1-norm of affine rows: a linear program, which HiGHS solves to the optimum. The rows come from the exact
+discretisation of the model, written down a second time; every step of a controller here asserts that they
+give the reference's own cost.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +21,9 @@ from codegen.reference.optimizer import Evaluate, Search, minimize
 from codegen.settings import Settings
 
 Array = NDArray[np.float64]
+
+TOLERANCES: Final = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+"""The tightest that HiGHS takes."""
 
 
 @dataclass(frozen=True)
@@ -58,17 +63,18 @@ class Problems:
         n, rows, moves = self.slope.shape
         signs = np.hstack([-np.eye(moves), np.eye(moves)])
         limits = np.full((n, 2 * moves), self.limit_rad)
+        unit = np.abs(self.slope).max()  # the tolerances are absolute
         solved = linprog(
-            np.concatenate([-self.offset, limits], axis=1).ravel(),
-            A_eq=block_diag([np.hstack([slope.T, signs]) for slope in self.slope], format="csr"),
+            np.concatenate([-self.offset / unit, limits], axis=1).ravel(),
+            A_eq=block_diag([np.hstack([slope.T / unit, signs]) for slope in self.slope], format="csr"),
             b_eq=np.zeros(n * moves),
             bounds=np.tile([(-1.0, 1.0)] * rows + [(0.0, np.inf)] * 2 * moves, (n, 1)),
             method="highs-ds",
-            options={"presolve": False},
+            options=TOLERANCES,
         )
         assert solved.status == 0, solved.message
         found: Array = solved.eqlin.marginals.reshape(n, -1, 2)
-        assert np.allclose(self.cost(found).sum(), -solved.fun, rtol=1e-9, atol=1e-6)
+        assert np.allclose(self.cost(found).sum(), -unit * solved.fun, rtol=1e-7, atol=1e-6)
         return found
 
 

@@ -1,12 +1,12 @@
 """What a better search buys in flight: more iterations, the best iterate, another start, the exact optimum.
 
-Prints Markdown tables: a preset that sees the truth, the same through sensors and estimators, and the exact
-optimum with other effort weights. Settings fly as compiled C in float32; what is no setting flies as the
-reference in float64, with another search (`benchmarks.optimum`). Some five minutes on two processors.
+Prints Markdown tables: each preset seeing the truth, and through sensors; then the optimum with other effort
+weights. Settings fly as compiled C in float32; what is no setting flies as the reference in float64 with a
+search of its own (`benchmarks.optimum`). A few minutes on two processors.
 """
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -27,99 +27,178 @@ from sil.metrics import Metrics, measure
 from sil.scenario import Scenario, flight_of
 from sil.traces import SensedTrace
 
+PRESETS: Final = ("table1", "mambo")
+EFFORT_WEIGHTS: Final = (1.0, 100.0, 200.0, 300.0, 1000.0)
+STARTS: Final = {"last_command": "last command", "plan": "last plan"}
+EXACT: Final = "exact optimum"
 BOARD: Final = "crazyflie"
+BESIDE_M: Final = ((0.0, 0.0), (1e-3, 0.0), (0.0, 1e-3))
 SEEDS: Final = 8
 SENSED_S: Final = 40.0
-MILLIMETRE: Final = 1e-3
 
-TABLE_2: Final = tuple(
-    Scenario(start_offset_m=(x, y, 0.0)) for x, y in ((0.0, 0.0), (MILLIMETRE, 0.0), (0.0, MILLIMETRE))
-)
-"""The Table II case, 100 s; the two others start a millimetre beside, to show what chance does."""
 TRUTH: Final = (
-    *TABLE_2,
+    *(Scenario(start_offset_m=(x, y, 0.0)) for x, y in BESIDE_M),
     Scenario(wind_m_s2=(0.5, 0.0)),
     Scenario(wind_m_s2=(0.0, 0.5)),
     Scenario(motor_lag_s=0.03),
 )
+"""100 s: the Table II case, two more that start a millimetre beside, a steady push along x and y, a lag."""
 SENSED: Final = tuple(
     Scenario(seed=seed, duration_s=SENSED_S, sensors="mambo-derotated", wind_speed_m_s=wind)
     for wind in (0.0, LIGHT_M_S)
     for seed in range(SEEDS)
 )
-"""Noise alone, then noise and gusts, of the same seeds."""
+"""Noise alone, then noise and gusts of the same seeds."""
+
+TRUTH_HEAD: Final = (
+    *("search", "instructions: mean, most", "IAE", "started 1 mm beside", "ISE", "ITAE", "variation"),
+    *("push along x: IAE", "along y", "motor lag: IAE", "variation"),
+)
+SENSED_HEAD: Final = (
+    *("search", "noise: IAE", "as seen", "variation", "gusts: IAE", "as seen", "variation", "crashed"),
+)
 
 
 @dataclass(frozen=True)
 class Entrant:
-    """A preset, and how it is changed or searched otherwise.
+    """Settings that fly as they are, or with a search that is no setting."""
 
-    iterations, warm_start, effort_weight: None leaves that of the preset.
-    """
-
-    preset: str
-    title: str
-    iterations: int | None = None
-    warm_start: str | None = None
-    effort_weight: float | None = None
+    settings: Settings
     searching: Searching | None = None
-
-    def settings(self) -> Settings:
-        """Return the settings it flies with."""
-        settings = presets.load(self.preset)
-        optimizer = {"iterations": self.iterations, "warm_start": self.warm_start}
-        return settings.model_copy(
-            update={
-                "optimizer": settings.optimizer.model_copy(update=_given(optimizer)),
-                "cost": settings.cost.model_copy(update=_given({"effort_weight": self.effort_weight})),
-            }
-        )
 
     def controller(self, n: int) -> PositionController:
         """Return n controllers."""
         if self.searching is None:
-            return CompiledController(self.settings(), n)
-        return SearchingController(self.settings(), n, self.searching)
-
-
-def _given(values: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
+            return CompiledController(self.settings, n)
+        return SearchingController(self.settings, n, self.searching)
 
 
 @dataclass(frozen=True)
 class Flown:
-    """What became of the flights of a world; `seen_iae_m_s` is as the estimators show it."""
+    """What became of the flights of a world; `seen_iae_m_s` (n,) is as the estimators show it."""
 
     metrics: Metrics
     seen_iae_m_s: FloatArray
     crashed: int
 
 
+def entrants(preset: str) -> dict[str, Entrant]:
+    """Return a preset with every search, by title."""
+    settings = presets.load(preset)
+    kept = settings.optimizer.warm_start
+    other = next(start for start in STARTS if start != kept)
+
+    def tried(iterations: int, searching: Searching | None = None, start: str = kept) -> Entrant:
+        optimizer = {"iterations": iterations, "warm_start": start}
+        return Entrant(changed(settings, optimizer=optimizer), searching)
+
+    return {
+        **{f"{k} iterations, from the {STARTS[kept]}": tried(k) for k in (5, 10, 20)},
+        **{f"{k}, the best plan met": tried(k, best_iterate) for k in (5, 20)},
+        **{f"{k}, from the {STARTS[other]}": tried(k, start=other) for k in (5, 20)},
+        **{f"{k}, from level": tried(k, from_level) for k in (5, 20)},
+        EXACT: Entrant(settings, optimum),
+    }
+
+
+def weighted() -> dict[tuple[str, str], Entrant]:
+    """Return `mambo` with every effort weight, and `mambo-robust`, searched more and more, by two titles."""
+    mambo = presets.load("mambo")
+    several = {
+        f"mambo, {weight:g}": changed(mambo, cost={"effort_weight": weight}) for weight in EFFORT_WEIGHTS
+    }
+    several["mambo-robust"] = presets.load("mambo-robust")
+    found = {}
+    for title, settings in several.items():
+        for k in (settings.optimizer.iterations, 20):
+            found[title, f"{k} iterations"] = Entrant(changed(settings, optimizer={"iterations": k}))
+        found[title, EXACT] = Entrant(settings, optimum)
+    return found
+
+
+def changed(settings: Settings, **sections: dict[str, Any]) -> Settings:
+    """Return settings with some keys of some sections changed."""
+    update = {name: getattr(settings, name).model_copy(update=keys) for name, keys in sections.items()}
+    return settings.model_copy(update=update)
+
+
 def fly_world(entrant: Entrant, world: Sequence[Scenario]) -> Flown:
     """Fly all flights of a world at once."""
-    flight = flight_of(world, entrant.settings().horizon.update_period_s)
+    flight = flight_of(world, entrant.settings.horizon.update_period_s)
     trace = fly(flight, entrant.controller(len(world)))
     seen = trace.as_seen() if isinstance(trace, SensedTrace) else trace
     return Flown(measure(trace), measure(seen).iae_m_s, int(crashed(trace).sum()))
 
 
 def instructions(entrant: Entrant) -> str:
-    """Count the instructions of a step on the board, mean and most; of what has C."""
+    """Count the instructions of a step on the board, of what has C."""
     if entrant.searching is not None:
         return "-"
-    counts = measure_footprint(entrant.settings(), boards.load(BOARD)).counts
+    counts = measure_footprint(entrant.settings, boards.load(BOARD)).counts
     return "-" if counts is None else f"{counts.mean:.0f}, {counts.most}"
 
 
-def entrants(preset: str) -> list[Entrant]:
-    """Return a preset as it is, and with every other search."""
-    kept = presets.load(preset).optimizer.warm_start
-    other = {"plan": "last_command", "last_command": "plan"}[kept]
-    beside = f"from the {other.replace('_', ' ').replace('plan', 'last plan')}"
+def _digits(value: float) -> str:
+    return f"{value:#.3g}".rstrip(".")
+
+
+def _mean(values: FloatArray) -> str:
+    """Spell a mean and its standard error."""
+    error = values.std(ddof=1) / np.sqrt(len(values))
+    return f"{_digits(values.mean())} ± {error:.2g}"
+
+
+def truth_cells(flown: Flown) -> list[str]:
+    """Spell the flights of `TRUTH`."""
+    found, beside = flown.metrics, len(BESIDE_M)
+    iae, variation = found.iae_m_s, found.command_variation_rad
     return [
-        *(Entrant(preset, f"{k} iterations", k) for k in (5, 10, 20)),
-        *(Entrant(preset, f"best of {k}", k, searching=best_iterate) for k in (5, 20)),
-        *(Entrant(preset, f"{k}, {beside}", k, other) for k in (5, 20)),
-        *(Entrant(preset, f"{k}, from level", k, searching=from_level) for k in (5, 20)),
-        Entrant(preset, "exact optimum", searching=optimum),
+        *(_digits(iae[0]), ", ".join(map(_digits, iae[1:beside]))),
+        *(_digits(found.ise_m2_s[0]), _digits(found.itae_m_s2[0]), f"{variation[0]:.4f}"),
+        *map(_digits, iae[beside:]),
+        f"{variation[-1]:.4f}",
     ]
+
+
+def sensed_cells(flown: Flown) -> list[str]:
+    """Spell the flights of `SENSED`."""
+    found = flown.metrics
+    cells = []
+    for case in (slice(0, SEEDS), slice(SEEDS, None)):
+        variation = found.command_variation_rad[case].mean()
+        cells += [_mean(found.iae_m_s[case]), _mean(flown.seen_iae_m_s[case]), f"{variation:.4f}"]
+    return [*cells, f"{flown.crashed}"]
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Spell a Markdown table."""
+    lines = [" | ".join(head), " | ".join(["---"] * len(head)), *(" | ".join(row) for row in rows)]
+    return "\n".join(f"| {line} |" for line in lines)
+
+
+def main() -> None:
+    """Fly everything in processes of their own, and print."""
+    searched = {preset: entrants(preset) for preset in PRESETS}
+    with_every_search = [one for several in searched.values() for one in several.values()]
+    everyone = {*with_every_search, *weighted().values()}
+    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
+        truth = {one: pool.submit(fly_world, one, TRUTH) for one in everyone}
+        sensed = {one: pool.submit(fly_world, one, SENSED) for one in everyone}
+        counted = {one: pool.submit(instructions, one) for one in with_every_search}
+        in_truth = {one: truth_cells(flown.result()) for one, flown in truth.items()}
+        in_noise = {one: sensed_cells(flown.result()) for one, flown in sensed.items()}
+        count = {one: counting.result() for one, counting in counted.items()}
+    for preset, several in searched.items():
+        rows = [(title, count[one], *in_truth[one]) for title, one in several.items()]
+        print(f"`{preset}`, seeing the truth:\n\n{table(TRUTH_HEAD, rows)}\n")
+        rows = [(title, *in_noise[one]) for title, one in several.items()]
+        print(f"`{preset}`, through sensors:\n\n{table(SENSED_HEAD, rows)}\n")
+    rows = [
+        (*titles, in_truth[one][0], in_truth[one][4], *in_noise[one]) for titles, one in weighted().items()
+    ]
+    head = ("preset, effort weight", "search", "IAE", "variation", *SENSED_HEAD[1:])
+    print(f"Other effort weights:\n\n{table(head, rows)}")
+
+
+if __name__ == "__main__":
+    main()
