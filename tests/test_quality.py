@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.optimum import Model, Problems, SearchingController, best_iterate, from_level, optimum
+from benchmarks.quality import PRESETS, entrants
 from codegen import presets
 from codegen.reference import ReferenceController
 from codegen.reference.optimizer import minimize
@@ -84,3 +85,15 @@ def test_searches_are_ordered_by_what_they_find() -> None:
         assert np.any(best < last) == (start is best_rad)
     from_best = from_level(settings, problems, best_rad)
     np.testing.assert_array_equal(from_best, minimize(settings, problems.evaluate, level).moves_rad)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_first_row_is_the_preset_as_it_is(name: str) -> None:
+    """Everything is compared with the preset itself; of the rest only the search differs."""
+    first, *others = entrants(name).values()
+    assert first.settings == presets.load(name)
+    assert first.searching is None
+    for other in others:
+        kept = {"optimizer": first.settings.optimizer}
+        assert other.settings.model_copy(update=kept) == first.settings
+        assert other not in (first, *(one for one in others if one is not other))
