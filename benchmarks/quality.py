@@ -2,7 +2,7 @@
 
 Prints Markdown tables: each preset seeing the truth, and through sensors; then the optimum with other effort
 weights. Settings fly as compiled C in float32; what is no setting flies as the reference in float64 with a
-search of its own (`benchmarks.optimum`). A few minutes on two processors.
+search of its own (`benchmarks.optimum`). Some six minutes on two processors.
 """
 
 import os
