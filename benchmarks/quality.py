@@ -2,7 +2,7 @@
 
 Prints Markdown tables: each preset seeing the truth, and through sensors; then the optimum with other effort
 weights. Settings fly as compiled C in float32; what is no setting flies as the reference in float64 with a
-search of its own (`benchmarks.optimum`). Some six minutes on two processors.
+search of its own (`benchmarks.searches`). Some six minutes on two processors.
 """
 
 import os
@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.optimum import Searching, SearchingController, best_iterate, from_level, optimum
+from benchmarks.searches import Searching, SearchingController, best_iterate, from_level, optimum
 from codegen import boards, presets
 from codegen.settings import Settings
 from sil.arrays import FloatArray

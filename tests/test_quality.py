@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.optimum import Model, Problems, SearchingController, best_iterate, from_level, optimum
+from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
 from benchmarks.quality import PRESETS, entrants
 from codegen import presets
 from codegen.reference import ReferenceController
