@@ -12,31 +12,25 @@ be generated or built gets a row that says why.
 """
 
 import argparse
-import ctypes
 import filecmp
-import json
-import os
 import re
-import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from benchmarks import peers_setups as problem
-from benchmarks.peers_programs import OURS, Program, programs
+from benchmarks.ours import bundle_program, peers_model
+from benchmarks.peers_c import NotHereError, definitions, generate, run_tool, sources
+from benchmarks.peers_programs import Program, programs
 from codegen import boards, presets
 from codegen.errors import BuildError
 from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
@@ -47,9 +41,6 @@ from codegen.footprint.sizes import added, sections
 from codegen.footprint.stack import worst_case
 from codegen.render import render
 from codegen.settings import Settings
-from codegen.toolchain import host_toolchain
-
-Optima = dict[str, list[list[float]]]
 
 _BOARD: Final = "crazyflie"
 _VEHICLE: Final = "mambo"
@@ -71,10 +62,6 @@ _CLOCK_S: Final = 1.1
 """Between two runs of a generator, so that what writes the time writes another."""
 
 
-class _NotHereError(Exception):
-    """A peer cannot be generated or built here; its text is the reason."""
-
-
 @dataclass(frozen=True)
 class _Row:
     """One line of the table; `absent` is the reason why there is none."""
@@ -93,41 +80,7 @@ class _Row:
     vehicle: str = ""
     warnings: int = 0
     same: str = ""
-    above: str = "-"
-    tilt: str = "-"
     absent: str = ""
-
-
-def _run(line: list[str], folder: Path | None = None) -> str:
-    """Run a command; returns its stdout, raises _NotHereError with its last words."""
-    done = subprocess.run(
-        line,
-        cwd=folder,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        errors="replace",
-        check=False,
-    )
-    if done.returncode:
-        said = [text for text in (done.stderr or done.stdout).splitlines() if text.strip()]
-        raise _NotHereError(said[-1] if said else f"exit code {done.returncode}")
-    return done.stdout
-
-
-def _generate(python: str, name: str, folder: Path) -> dict[str, str]:
-    """Let the peer write into `folder`; returns the versions that wrote it."""
-    said = _run([python, "-m", "benchmarks.peers_setups", name, str(folder)], Path(__file__).parents[1])
-    versions: dict[str, str] = json.loads(said.splitlines()[-1])
-    return versions
-
-
-def _sources(program: Program, folder: Path) -> list[Path]:
-    return sorted({path for pattern in program.sources for path in folder.glob(pattern)})
-
-
-def _flags(program: Program, folder: Path) -> list[str]:
-    return [f"-D{name}" for name in program.defines] + [f"-I{folder / name}" for name in program.includes]
 
 
 def _compiler(program: Program, command: str) -> str:
@@ -145,9 +98,9 @@ def _link(program: Program, found: Builder, folder: Path, work: Path) -> tuple[P
     glue.write_text(program.glue, "utf-8")
     empty.write_text(_EMPTY, "utf-8")
     objects: list[Path] = []
-    for source in [*_sources(program, folder), glue]:
+    for source in [*sources(program, folder), glue]:
         objects.append(work / f"{len(objects)}.o")
-        _compile([compiler, *flags, *_flags(program, folder), "-c", str(source), "-o", str(objects[-1])])
+        _compile([compiler, *flags, *definitions(program, folder), "-c", str(source), "-o", str(objects[-1])])
     tail = [*_NEWLIB, f"-Wl,-e,{ENTRY},-u,{ENTRY}", "-lm", "-o"]
     with_peer, without = work / "program.elf", work / "empty.elf"
     _compile([compiler, *flags, *map(str, objects), *tail, str(with_peer)])
@@ -156,12 +109,12 @@ def _link(program: Program, found: Builder, folder: Path, work: Path) -> tuple[P
 
 
 def _compile(line: list[str]) -> None:
-    """Run the cross compiler; raises _NotHereError with its first error."""
+    """Run the cross compiler; raises NotHereError with its first error."""
     done = subprocess.run(line, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode:
         errors = [text for text in done.stderr.splitlines() if re.search("error|cannot find|undefined", text)]
         first = errors[0] if errors else done.stderr.partition("\n")[0]
-        raise _NotHereError(re.sub(r"^\S*/", "", first))
+        raise NotHereError(re.sub(r"^\S*/", "", first))
 
 
 def _defined(path: Path) -> set[str]:
@@ -182,13 +135,13 @@ def _warnings(program: Program, compiler: str, flags: tuple[str, ...], folder: P
     strict = [flag for flag in _STRICT if program.language == "c" or flag not in _C_ONLY]
     dialect = [program.dialect, *COMPILE_FLAGS[1:]]
     places = set()
-    for source in _sources(program, folder):
+    for source in sources(program, folder):
         line = [
             _compiler(program, compiler),
             *dialect,
             *flags,
             *strict,
-            *_flags(program, folder),
+            *definitions(program, folder),
             "-c",
             str(source),
         ]
@@ -206,12 +159,12 @@ def _under_vehicle_flags(program: Program, folder: Path) -> str:
     except BuildError:
         return "no compiler here"
     refused = 0
-    sources = _sources(program, folder)
-    for source in sources:
+    files = sources(program, folder)
+    for source in files:
         line = [*found.toolchain.command, *found.board.compiler.flags, "-O2", "-Wall", "-Werror"]
-        line += [*_flags(program, folder), "-c", str(source), "-o", "/dev/null"]
+        line += [*definitions(program, folder), "-c", str(source), "-o", "/dev/null"]
         refused += subprocess.run(line, capture_output=True, check=False).returncode != 0
-    return "yes" if not refused else f"no: {refused} of {len(sources)} files"
+    return "yes" if not refused else f"no: {refused} of {len(files)} files"
 
 
 def _differing(first: Path, second: Path) -> str:
@@ -230,15 +183,6 @@ def _timeless(path: Path) -> bytes:
     return re.sub(rb"\d\d:\d\d:\d\d", b"", path.read_bytes())
 
 
-def _clear(program: Program, folder: Path) -> None:
-    """Delete what generating built beside text."""
-    for product in [path for pattern in program.products for path in folder.glob(pattern)]:
-        if product.is_dir():
-            shutil.rmtree(product)
-        else:
-            product.unlink()
-
-
 def _stack(image: Image) -> str:
     """Return the proven bound of the stack, or the function that has none."""
     try:
@@ -247,57 +191,18 @@ def _stack(image: Image) -> str:
         return f"no bound: {str(error).removeprefix(f'{image.path.name}: ').partition(':')[0].split()[0]}"
 
 
-def _tried(program: Program, folder: Path, work: Path, optima: Optima) -> tuple[str, str]:
-    """Build for this machine and plan: the cost above the optimum, median and most, and the largest tilt."""
-    suffix = "cpp" if program.language == "c++" else "c"
-    library, glue = work / "host.so", work / f"host.{suffix}"
-    glue.write_text(program.glue, "utf-8")
-    host = [*host_toolchain().command] if program.language == "c" else ["c++"]
-    line = [*host, *COMPILE_FLAGS[1:], "-w", "-shared", "-fPIC", *_flags(program, folder)]
-    _run([*line, *map(str, _sources(program, folder)), str(glue), "-lm", "-o", str(library)])
-    try:
-        with ProcessPoolExecutor(1) as pool:
-            plans = pool.submit(_plans, library, optima["inputs"]).result()
-    except BrokenProcessPool:
-        return "crashes", "-"
-    tilt = f"{np.abs(plans).max():.4f}"
-    if program.cost not in optima:
-        return "-", tilt
-    above = [
-        problem.cost(program.cost, np.array(inputs), np.clip(plan, -problem.TILT_RAD, problem.TILT_RAD))
-        / least[0]
-        - 1
-        for inputs, plan, least in zip(optima["inputs"], plans, optima[program.cost], strict=True)
-    ]
-    return f"{100 * statistics.median(above):.2f} / {100 * max(above):.2f} %", tilt
-
-
-def _plans(library: Path, inputs: list[list[float]]) -> problem.Matrix:
-    """Return the plan (n, 4) that a library makes of each input, one after the other."""
-    call, moves, plans = ctypes.CDLL(str(library)).run, (ctypes.c_float * 4)(), []
-    with Path("/dev/null").open("w") as nowhere:
-        os.dup2(nowhere.fileno(), 1)
-    for one in inputs:
-        call((ctypes.c_float * 4)(*one[:4]), (ctypes.c_float * 2)(*one[4:]), moves)
-        plans.append(list(moves))
-    return np.array(plans)
-
-
-def _measure(program: Program, python: str, found: Builder, optima: Optima, work: Path) -> _Row:
+def _measure(program: Program, python: str, found: Builder, work: Path) -> _Row:
     """Generate, build and measure one peer."""
     row = _Row(program.title, program.cost, program.scalar)
     first, folder = work / "first", work / "c"
     try:
-        versions = _generate(python, program.name, folder)
-        _clear(program, folder)
+        versions = generate(python, program, folder)
         folder.rename(first)
         time.sleep(_CLOCK_S)
-        _generate(python, program.name, folder)
-        _clear(program, folder)
+        generate(python, program, folder)
         row = replace(row, versions=", ".join(f"{name} {version}" for name, version in versions.items()))
         elf, empty, own = _link(program, found, folder, work)
         sizes, image = added(elf, empty, program.name), load(elf)
-        above, tilt = _tried(program, folder, work, optima)
         return replace(
             row,
             flash=sizes.flash.total,
@@ -308,10 +213,8 @@ def _measure(program: Program, python: str, found: Builder, optima: Optima, work
             vehicle=_under_vehicle_flags(program, folder),
             warnings=_warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
             same=_differing(first, folder),
-            above=above,
-            tilt=tilt,
         )
-    except (_NotHereError, BuildError) as error:
+    except (NotHereError, BuildError) as error:
         return replace(row, absent=str(error))
 
 
@@ -329,7 +232,7 @@ def _linked(image: Image) -> dict[str, Any]:
     }
 
 
-def _ours(title: str, settings: Settings, found: Builder, optima: Optima | None, work: Path) -> _Row:
+def _ours(title: str, settings: Settings, found: Builder, work: Path) -> _Row:
     """Measure ours: the least firmware, and the same checks as for the peers."""
     files = render(settings)
     sizes = added(found.firmware(files, work), found.firmware(files, work, empty=True), PREFIX)
@@ -337,12 +240,11 @@ def _ours(title: str, settings: Settings, found: Builder, optima: Optima | None,
     settings_file = work / "controller.toml"
     settings_file.write_text(files["controller.toml"], "utf-8")
     line = [sys.executable, "-c", "from sil.cli import main; main()", "generate", str(settings_file)]
-    _run([*line, "-o", str(folder)])
+    run_tool([*line, "-o", str(folder)])
     folder.rename(first)
     time.sleep(_CLOCK_S)
-    _run([*line, "-o", str(folder)])
-    program = Program("ours", title, "1-norm", settings.code.scalar, ("src/*.c",), ("include", "src"), OURS)
-    above, tilt = _tried(program, folder, work, optima) if optima else ("-", "-")
+    run_tool([*line, "-o", str(folder)])
+    program = bundle_program(title, settings)
     image = load(work / "firmware" / "program.elf")
     return _Row(
         title,
@@ -356,16 +258,7 @@ def _ours(title: str, settings: Settings, found: Builder, optima: Optima | None,
         vehicle=_under_vehicle_flags(program, folder),
         warnings=_warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
         same=_differing(first, folder),
-        above=above,
-        tilt=tilt,
     )
-
-
-def _optima(python: str, work: Path) -> Optima:
-    """Return inputs and the least cost of each, found by the peers' SciPy."""
-    _run([python, "-m", "benchmarks.peers_setups", "optima", str(work)])
-    found: Optima = json.loads((work / "optima.json").read_text("utf-8"))
-    return found
 
 
 def _table(rows: list[_Row]) -> str:
@@ -380,8 +273,6 @@ def _table(rows: list[_Row]) -> str:
         "heap",
         "double helpers",
         "libm, printf",
-        "above the optimum",
-        "largest tilt",
         "Mambo's flags",
         "warnings",
         "same again",
@@ -399,8 +290,6 @@ def _table(rows: list[_Row]) -> str:
                 r.scalar,
                 *sizes,
                 r.libm_printf,
-                r.above,
-                r.tilt,
                 r.vehicle,
                 f"{r.warnings:,}",
                 r.same,
@@ -421,20 +310,12 @@ def main() -> None:
     rows = []
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as place:
         work = Path(place)
-        try:
-            optima = _optima(arguments.python, work)
-        except _NotHereError as error:
-            sys.exit(f"the peers' Python lacks NumPy or SciPy: {error}")
-        alike = presets.load("table1")
-        alike = alike.model_copy(
-            update={"horizon": alike.horizon.model_copy(update={"prediction_step_s": problem.STEP_S})}
-        )
         every: dict[str, Callable[[Path], _Row]] = {
-            "mambo": partial(_ours, "mambo-nmpc, preset mambo", presets.load("mambo"), found, None),
-            "table1": partial(_ours, "mambo-nmpc, the peers' model", alike, found, optima),
+            "mambo": partial(_ours, "mambo-nmpc, preset mambo", presets.load("mambo"), found),
+            "table1": partial(_ours, "mambo-nmpc, the peers' model", peers_model(), found),
         }
         for program in programs(*problem.literals()):
-            every[program.name] = partial(_measure, program, arguments.python, found, optima)
+            every[program.name] = partial(_measure, program, arguments.python, found)
         for name, measure in every.items():
             if arguments.only in (None, name):
                 (work / name).mkdir()

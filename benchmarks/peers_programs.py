@@ -10,8 +10,8 @@ from typing import Final, Literal
 
 Cost = Literal["1-norm", "quadratic", "quadratic, other problem"]
 
-_SIGNATURE: Final = "void run(const float error[4], const float last[2], float moves[4])"
-_HEAD: Final = f"{_SIGNATURE};\n\n{_SIGNATURE}\n"
+SIGNATURE: Final = "void run(const float error[4], const float last[2], float moves[4])"
+HEAD: Final = f"{SIGNATURE};\n\n{SIGNATURE}\n"
 
 
 @dataclass(frozen=True)
@@ -35,36 +35,10 @@ class Program:
     products: tuple[str, ...] = ()
 
 
-OURS: Final = (
-    '#include "nmpc.h"\n\nnmpc_t nmpc_controller;\n\n'
-    + _HEAD
-    + """{
-    nmpc_state_t state = {{0.0f, 0.0f}, {0.0f, 0.0f}, 0.0f, 0.0f, 0.0f};
-    nmpc_target_t target = {{0.0f, 0.0f}, {0.0f, 0.0f}};
-    nmpc_command_t command;
-    int i;
-
-    state.position_m[0] = error[0];
-    state.velocity_m_s[0] = error[1];
-    state.position_m[1] = error[2];
-    state.velocity_m_s[1] = error[3];
-    state.roll_rad = command.roll_rad = last[0];
-    state.pitch_rad = command.pitch_rad = last[1];
-    nmpc_init(&nmpc_controller);
-    nmpc_reset(&nmpc_controller, &command);
-    nmpc_step(&nmpc_controller, &state, &target, 9.81f, &command);
-    for (i = 0; i < 4; i++) {
-        moves[i] = nmpc_controller.plan_rad[i];
-    }
-}
-"""
-)
-"""Ours as the peers are called; the size is that of the least firmware, which only steps."""
-
 _OSQP_CONDENSED: Final = (
     '#include "osqp.h"\n#include "workspace.h"\n\n'
     "static const float from_state[4][4] = {%(gradient)s};\n\n"
-    + _HEAD.replace("%", "%%")
+    + HEAD.replace("%", "%%")
     + """{
     float q[4];
     int i;
@@ -87,7 +61,7 @@ _OSQP_CONDENSED: Final = (
 _OSQP_STATES: Final = (
     '#include "osqp.h"\n#include "workspace.h"\n\n'
     "static float q[48], lower[48], upper[48];\n\n"
-    + _HEAD
+    + HEAD
     + """{
     int i;
 
@@ -111,7 +85,7 @@ _OSQP_STATES: Final = (
 
 _CVXPYGEN: Final = (
     '#include "cpg_workspace.h"\n#include "cpg_solve.h"\n\n'
-    + _HEAD
+    + HEAD
     + """{
     int i;
 
@@ -145,7 +119,7 @@ _CASADI: Final = (
     '#include "mpc.h"\n\n'
     "static const casadi_real *arg[mpc_SZ_ARG];\nstatic casadi_real *res[mpc_SZ_RES];\n"
     "static casadi_int iw[mpc_SZ_IW];\nstatic casadi_real w[mpc_SZ_W];\n\n"
-    + _HEAD
+    + HEAD
     + """{
     casadi_real parameters[6];
     int i, memory;
@@ -166,7 +140,7 @@ _CASADI: Final = (
 
 _TINYMPC: Final = (
     '#include "tinympc/tiny_api.hpp"\n#include "tinympc/tiny_data.hpp"\n\nextern "C" '
-    + _HEAD.replace(f"\n\n{_SIGNATURE}", f'\n\nextern "C" {_SIGNATURE}')
+    + HEAD.replace(f"\n\n{SIGNATURE}", f'\n\nextern "C" {SIGNATURE}')
     + """{
     tinyVector x0(4);
 

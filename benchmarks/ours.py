@@ -1,0 +1,109 @@
+"""Our controller, called as the peers are, `run(error, last, moves)`, and the same by plain roll-out.
+
+A caller that hands back the command it was given, flies on: the plan is kept, if the settings keep it. Any
+other last command makes it start over from there.
+"""
+
+import math
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+from benchmarks import peers_setups as problem
+from benchmarks.peers_programs import HEAD, Program
+from codegen import presets
+from codegen.literals import real
+from codegen.render import render
+from codegen.representation import Representation
+from codegen.settings import Settings
+
+_GLUE: Final = (
+    '#include "nmpc.h"\n\nstatic nmpc_t controller;\nstatic float given[2];\nstatic int is_set;\n\n'
+    + HEAD.replace("%", "%%")
+    + """{
+    nmpc_state_t state = {{0, 0}, {0, 0}, 0, 0, 0};
+    const nmpc_target_t target = {{0, 0}, {0, 0}};
+    nmpc_command_t command;
+    int i;
+
+    if (!is_set) {
+        nmpc_init(&controller);
+        is_set = 1;
+    }
+    state.position_m[0] = (nmpc_real_t)(error[0] * %(position)s);
+    state.velocity_m_s[0] = (nmpc_real_t)(error[1] * %(velocity)s);
+    state.position_m[1] = (nmpc_real_t)(error[2] * %(position)s);
+    state.velocity_m_s[1] = (nmpc_real_t)(error[3] * %(velocity)s);
+    state.roll_rad = command.roll_rad = (nmpc_real_t)(last[0] * %(angle)s);
+    state.pitch_rad = command.pitch_rad = (nmpc_real_t)(last[1] * %(angle)s);
+    if (last[0] != given[0] || last[1] != given[1]) {
+        nmpc_reset(&controller, &command);
+    }
+    nmpc_step(&controller, &state, &target, (nmpc_real_t)(9.81f * %(thrust)s), &command);
+    for (i = 0; i < 4; i++) {
+        moves[i] = (float)controller.plan_rad[i] / %(angle)s;
+    }
+    given[0] = moves[0];
+    given[1] = moves[1];
+}
+"""
+)
+_ROLLOUT: Final = """/* What benchmarks/rollout.c wants to know beyond nmpc_config.h. */
+#define ROLLOUT_HAS_LAG {has_lag}
+#define ROLLOUT_KEEPS_PLAN {keeps_plan}
+#define ROLLOUT_DECAY {{{decay}}}
+#define ROLLOUT_SPEED_LACK {{{speed_lack}}}
+#define ROLLOUT_SHIFT_LACK {{{shift_lack}}}
+"""
+
+
+def peers_model() -> Settings:
+    """Return the settings that are the problem of the peers: preset table1 with their prediction step."""
+    settings = presets.load("table1")
+    horizon = settings.horizon.model_copy(update={"prediction_step_s": problem.STEP_S})
+    return settings.model_copy(update={"horizon": horizon})
+
+
+def bundle_program(title: str, settings: Settings) -> Program:
+    """Return how the bundle of `settings` is built and called."""
+    bits = Representation(settings).bits or dict.fromkeys(("position", "velocity", "angle", "thrust"), 0)
+    factors = {name: real(math.ldexp(1, bits[name]), "float32") for name in bits}
+    return Program(
+        "ours", title, "1-norm", settings.code.scalar, ("src/*.c",), ("include", "src"), _GLUE % factors
+    )
+
+
+def rollout_program(title: str, settings: Settings) -> Program:
+    """Return how the plain roll-out with the model and the optimizer of `settings` is built and called."""
+    glue = resources.files("benchmarks").joinpath("rollout.c").read_text("utf-8")
+    return Program("rollout", title, "1-norm", settings.code.scalar, (), (".", "include"), glue)
+
+
+def place_bundle(settings: Settings, folder: Path) -> None:
+    """Write the bundle of `settings` below `folder`."""
+    for path, text in render(settings).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, "utf-8")
+
+
+def place_rollout(settings: Settings, folder: Path) -> None:
+    """Write the headers of the roll-out below `folder`; it knows rprop+ and the exact position update alone."""
+    place_bundle(settings, folder)
+    step_s, model = settings.horizon.prediction_step_s, settings.model
+    decay, speed_lack, shift_lack = [], [], []
+    for lag_s in (model.roll_lag_s, model.pitch_lag_s):
+        decay.append(math.exp(-step_s / lag_s) if lag_s else 0.0)
+        speed_lack.append(lag_s * (1 - decay[-1]))
+        shift_lack.append(lag_s * (step_s - speed_lack[-1]))
+    header = _ROLLOUT.format(
+        has_lag=int(model.roll_lag_s > 0 or model.pitch_lag_s > 0),
+        keeps_plan=int(settings.optimizer.warm_start == "plan"),
+        decay=_pair(decay, settings),
+        speed_lack=_pair(speed_lack, settings),
+        shift_lack=_pair(shift_lack, settings),
+    )
+    (folder / "rollout.h").write_text(header, "utf-8")
+
+
+def _pair(values: list[float], settings: Settings) -> str:
+    return ", ".join(real(value, settings.code.scalar) for value in values)
