@@ -55,7 +55,8 @@ class Sizes:
 def build(program: Program, folder: Path, flags: tuple[str, ...], library: Path) -> Path:
     """Build `program`, whose C is in `folder`, as the shared library `library`; raises NotHereError.
 
-    With NATIVE, peers may fuse multiplication and addition; ours and the roll-out keep the order of their bits.
+    Peers may fuse multiplication and addition where `flags` name a machine that can; ours and the roll-out
+    keep to their bits.
     """
     work = library.with_suffix("")
     work.mkdir(parents=True)

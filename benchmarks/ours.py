@@ -66,8 +66,9 @@ def peers_model() -> Settings:
 
 def bundle_program(title: str, settings: Settings) -> Program:
     """Return how the bundle of `settings` is built and called."""
-    bits = Representation(settings).bits or dict.fromkeys(("position", "velocity", "angle", "thrust"), 0)
-    factors = {name: real(math.ldexp(1, bits[name]), "float32") for name in bits}
+    bits = Representation(settings).bits or {}
+    quantities = ("position", "velocity", "angle", "thrust")
+    factors = {name: real(math.ldexp(1, bits.get(name, 0)), "float32") for name in quantities}
     return Program(
         "ours", title, "1-norm", settings.code.scalar, ("src/*.c",), ("include", "src"), _GLUE % factors
     )
@@ -87,7 +88,7 @@ def place_bundle(settings: Settings, folder: Path) -> None:
 
 
 def place_rollout(settings: Settings, folder: Path) -> None:
-    """Write the headers of the roll-out below `folder`; it knows rprop+ and the exact position update alone."""
+    """Write the headers of the roll-out, which knows rprop+ and the exact position update alone."""
     place_bundle(settings, folder)
     step_s, model = settings.horizon.prediction_step_s, settings.model
     decay, speed_lack, shift_lack = [], [], []

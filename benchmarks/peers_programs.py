@@ -5,7 +5,7 @@ pitch last commanded. Out: roll and pitch of the first and of the second move. B
 hold stand in these lines, and count.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 Cost = Literal["1-norm", "quadratic", "quadratic, other problem"]
@@ -34,6 +34,40 @@ class Program:
     dialect: str = "-std=c99"
     products: tuple[str, ...] = ()
 
+
+_DAQP: Final = (
+    '#include "api.h"\n#include "utils.h"\n#include "problem.h"\n\n'
+    "static c_float linear[4], plan[4], multipliers[4];\n"
+    "static c_float upper[4] = {%(tilt)s, %(tilt)s, %(tilt)s, %(tilt)s};\n"
+    "static c_float lower[4] = {-%(tilt)s, -%(tilt)s, -%(tilt)s, -%(tilt)s};\n"
+    "static int sense[4];\n"
+    "static DAQPProblem problem = {4, 4, 4, hessian, linear, NULL, upper, lower, sense, NULL, 0, 0};\n"
+    "static DAQPResult result = {plan, multipliers, 0, 0, 0, 0, 0, 0, 0};\n"
+    "static DAQPWorkspace workspace;\n"
+    "static int is_set_up;\n\n"
+    + HEAD.replace("%", "%%")
+    + """{
+    int i;
+
+    if (!is_set_up) {
+        setup_daqp(&problem, &workspace, NULL);
+        is_set_up = 1;
+    }
+    for (i = 0; i < 4; i++) {
+        const c_float *row = &from_state[4 * i];
+
+        linear[i] = row[0] * error[0] + row[1] * error[1] + row[2] * error[2] + row[3] * error[3];
+    }
+    linear[0] -= %(effort)s * last[0];
+    linear[1] -= %(effort)s * last[1];
+    daqp_update_ldp(DAQP_UPDATE_v, &workspace, &problem);
+    daqp_solve(&result, &workspace);
+    for (i = 0; i < 4; i++) {
+        moves[i] = (float)plan[i];
+    }
+}
+"""
+)
 
 _OSQP_CONDENSED: Final = (
     '#include "osqp.h"\n#include "workspace.h"\n\n'
@@ -164,7 +198,35 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
     """
     numbers = {"tilt": tilt, "effort": effort, "gradient": gradient}
     ecos = "c/solver_code"
+    cvxpygen_osqp = Program(
+        "cvxpygen-osqp",
+        "CVXPYgen, OSQP",
+        "1-norm",
+        "float64",
+        sources=(
+            "c/src/cpg_workspace.c",
+            "c/src/cpg_solve.c",
+            "c/solver_code/src/*.c",
+            "c/solver_code/workspace.c",
+        ),
+        includes=(
+            "c/include",
+            "c/solver_code",
+            "c/solver_code/inc/public",
+            "c/solver_code/inc/private",
+        ),
+        glue=_CVXPYGEN,
+    )
     return (
+        Program(
+            "daqp",
+            "DAQP, four moves, condensed by hand",
+            "quadratic",
+            "float64",
+            sources=("csrc/src/*.c",),
+            includes=("csrc/include", "."),
+            glue=_DAQP % numbers,
+        ),
         Program(
             "osqp-condensed",
             "OSQP, four moves, condensed by hand",
@@ -201,25 +263,8 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
             includes=(".",),
             glue=_CASADI,
         ),
-        Program(
-            "cvxpygen-osqp",
-            "CVXPYgen, OSQP",
-            "1-norm",
-            "float64",
-            sources=(
-                "c/src/cpg_workspace.c",
-                "c/src/cpg_solve.c",
-                "c/solver_code/src/*.c",
-                "c/solver_code/workspace.c",
-            ),
-            includes=(
-                "c/include",
-                "c/solver_code",
-                "c/solver_code/inc/public",
-                "c/solver_code/inc/private",
-            ),
-            glue=_CVXPYGEN,
-        ),
+        cvxpygen_osqp,
+        replace(cvxpygen_osqp, name="cvxpygen-squares", cost="quadratic"),
         Program(
             "cvxpygen-ecos",
             "CVXPYgen, ECOS",

@@ -15,8 +15,10 @@ the position error and on the change of the moves.
 
 import importlib.metadata
 import json
+import shutil
 import subprocess
 import sys
+import tarfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -33,8 +35,6 @@ GRAVITY_M_S2: Final = 9.81
 TILT_RAD: Final = 0.35
 TRACKING: Final = 2250.0
 EFFORT: Final = 1.0
-STATES: Final = 200
-"""Random inputs that the plans of every peer are tried on."""
 
 _HALF: Final = STEP_S * STEP_S / 2
 A: Final = np.kron(np.eye(2), np.array([[1.0, STEP_S], [0.0, 1.0]]))
@@ -63,16 +63,6 @@ def changes() -> Matrix:
     return np.eye(4) - np.eye(4, k=-2)
 
 
-def cost(kind: str, inputs: Matrix, moves: Matrix) -> float:
-    """Return the 1-norm or quadratic cost of `moves` (4,), for `inputs` (6,): state, last command."""
-    from_state, from_moves = condensed()
-    error = from_state @ inputs[:4] + from_moves @ moves
-    change = changes() @ moves - np.concatenate([inputs[4:], [0.0, 0.0]])
-    if kind == "1-norm":
-        return float(TRACKING * np.abs(error).sum() + EFFORT * np.abs(change).sum())
-    return float(TRACKING * error @ error + EFFORT * change @ change)
-
-
 def literals() -> tuple[str, str, str]:
     """Return literals of C: limit, twice the effort weight, gradient of the quadratic cost from the state."""
     from_state, from_moves = condensed()
@@ -81,32 +71,34 @@ def literals() -> tuple[str, str, str]:
     return f"{TILT_RAD}f", f"{2 * EFFORT}f", ", ".join(rows)
 
 
-def optima(folder: Path) -> None:
-    """Write optima.json: random inputs, up to 0.5 m and 1 m/s off, and the least cost of each kind."""
-    from scipy import optimize, sparse
+def hessian() -> Matrix:
+    """Return (4, 4) the Hessian of the quadratic cost of the moves."""
+    _, moves = condensed()
+    found: Matrix = 2 * (TRACKING * moves.T @ moves + EFFORT * changes().T @ changes())
+    return found
 
+
+def daqp(folder: Path) -> None:
+    """Write a QP of the four moves alone for the C interface: https://darnstrom.github.io/daqp.
+
+    The C is that of the source distribution, which the Makefile keeps beside the Python of the peers; of its
+    generator only the Julia package has one.
+    """
+    (archive,) = Path(sys.prefix, "sdist").glob(f"daqp-{importlib.metadata.version('daqp')}.tar.gz")
+    with tarfile.open(archive) as source:
+        source.extractall(folder, filter="data")
+    (unpacked,) = folder.glob("daqp-*")
+    (unpacked / "csrc").rename(folder / "csrc")
+    shutil.rmtree(unpacked)
     from_state, from_moves = condensed()
-    weights = np.concatenate([np.full(2 * PREDICTION, TRACKING), np.full(4, EFFORT)])
-    rows = np.vstack([from_moves, changes()])
-    random = np.random.default_rng(1)
-    inputs = random.uniform(-1, 1, (STATES, 6)) * np.array([0.5, 1.0, 0.5, 1.0, 0.1, 0.1])
-    found: dict[str, list[list[float]]] = {"inputs": inputs.tolist(), "1-norm": [], "quadratic": []}
-    for one in inputs:
-        right = np.concatenate([-from_state @ one[:4], one[4:], [0.0, 0.0]])
-        root = np.sqrt(weights)
-        squares = optimize.lsq_linear(
-            rows * root[:, None], right * root, (-TILT_RAD, TILT_RAD), method="bvls", tol=1e-14
+    gradient = 2 * TRACKING * from_moves.T @ from_state
+    tables = {"hessian[16]": hessian(), "from_state[16]": gradient}
+    (folder / "problem.h").write_text(
+        "".join(
+            f"static c_float {name} = {{{', '.join(repr(float(v)) for v in table.ravel())}}};\n"
+            for name, table in tables.items()
         )
-        slack = -sparse.identity(len(rows))
-        least = optimize.linprog(
-            np.concatenate([np.zeros(4), weights]),
-            sparse.vstack([sparse.hstack([rows, slack]), sparse.hstack([-rows, slack])]),
-            np.concatenate([right, -right]),
-            bounds=[(-TILT_RAD, TILT_RAD)] * 4 + [(0, None)] * len(rows),
-        )
-        found["quadratic"].append([cost("quadratic", one, squares.x)])
-        found["1-norm"].append([cost("1-norm", one, least.x[:4])])
-    (folder / "optima.json").write_text(json.dumps(found), "utf-8")
+    )
 
 
 def osqp_condensed(folder: Path) -> None:
@@ -118,11 +110,9 @@ def osqp_condensed(folder: Path) -> None:
     import osqp
     from scipy import sparse
 
-    _, moves = condensed()
-    hessian = 2 * (TRACKING * moves.T @ moves + EFFORT * changes().T @ changes())
     solver = osqp.OSQP()
     solver.setup(
-        sparse.triu(hessian, format="csc"),
+        sparse.triu(hessian(), format="csc"),
         np.zeros(4),
         sparse.identity(4, format="csc"),
         np.full(4, -TILT_RAD),
@@ -148,7 +138,7 @@ def osqp_states(folder: Path) -> None:
         sparse.kron(sparse.identity(PREDICTION + 1), sparse.diags(weight)),
         sparse.csc_matrix(EFFORT * changes().T @ changes()),
     ]
-    hessian = 2 * sparse.block_diag(blocks)
+    weights = 2 * sparse.block_diag(blocks)
     moved = np.zeros((states, 4))
     for step in range(PREDICTION):
         move = 2 * min(step, CONTROL - 1)
@@ -160,7 +150,7 @@ def osqp_states(folder: Path) -> None:
     constraints = sparse.vstack([sparse.hstack([stepped, sparse.csc_matrix(moved)]), bounds], format="csc")
     solver = osqp.OSQP()
     solver.setup(
-        sparse.triu(hessian, format="csc"),
+        sparse.triu(weights, format="csc"),
         np.zeros(states + 4),
         constraints,
         np.concatenate([np.zeros(states), np.full(4, -TILT_RAD)]),
@@ -173,27 +163,33 @@ def osqp_states(folder: Path) -> None:
 
 def cvxpygen_osqp(folder: Path) -> None:
     """Write the 1-norm problem for OSQP: https://github.com/cvxgrp/cvxpygen, its MPC example."""
-    _cvxpygen(folder, "OSQP")
+    _cvxpygen(folder, "OSQP", "norm1")
 
 
 def cvxpygen_ecos(folder: Path) -> None:
     """Write the 1-norm problem for ECOS."""
-    _cvxpygen(folder, "ECOS")
+    _cvxpygen(folder, "ECOS", "norm1")
 
 
-def _cvxpygen(folder: Path, solver: str) -> None:
+def cvxpygen_squares(folder: Path) -> None:
+    """Write the quadratic problem for OSQP."""
+    _cvxpygen(folder, "OSQP", "sum_squares")
+
+
+def _cvxpygen(folder: Path, solver: str, measure: str) -> None:
     import cvxpy
     from cvxpygen import cpg
 
+    size = getattr(cvxpy, measure)
     moves = cvxpy.Variable((2, CONTROL), name="moves")
     states = cvxpy.Variable((4, PREDICTION + 1), name="states")
     state = cvxpy.Parameter(4, name="state")
     last = cvxpy.Parameter(2, name="last")
     held = [moves[:, min(step, CONTROL - 1)] for step in range(PREDICTION)]
     cost = (
-        TRACKING * cvxpy.norm1(states[list(POSITIONS), 1:])
-        + EFFORT * cvxpy.norm1(moves[:, 0] - last)
-        + EFFORT * cvxpy.norm1(moves[:, 1] - moves[:, 0])
+        TRACKING * size(states[list(POSITIONS), 1:])
+        + EFFORT * size(moves[:, 0] - last)
+        + EFFORT * size(moves[:, 1] - moves[:, 0])
     )
     rules = [states[:, 0] == state, cvxpy.abs(moves) <= TILT_RAD]
     rules += [states[:, k + 1] == A @ states[:, k] + B @ held[k] for k in range(PREDICTION)]
@@ -270,11 +266,12 @@ def tinympc(folder: Path) -> None:
 
 
 SETUPS: Final[dict[str, tuple[Callable[[Path], None], tuple[str, ...]]]] = {
-    "optima": (optima, ("scipy",)),
+    "daqp": (daqp, ("daqp",)),
     "osqp-condensed": (osqp_condensed, ("osqp",)),
     "osqp-states": (osqp_states, ("osqp",)),
     "cvxpygen-osqp": (cvxpygen_osqp, ("cvxpygen", "cvxpy", "osqp")),
     "cvxpygen-ecos": (cvxpygen_ecos, ("cvxpygen", "cvxpy", "ecos")),
+    "cvxpygen-squares": (cvxpygen_squares, ("cvxpygen", "cvxpy", "osqp")),
     "casadi-qrqp": (casadi_qrqp, ("casadi",)),
     "casadi-sqp": (casadi_sqp, ("casadi",)),
     "tinympc": (tinympc, ("tinympc",)),

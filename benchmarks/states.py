@@ -1,0 +1,51 @@
+"""The inputs that every contender plans for: errors against the target, and the last command."""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from codegen import presets
+from sil.compiled import CompiledController
+from sil.loop import Flight, fly
+from sil.trajectories import Bernoulli
+
+Inputs = NDArray[np.float32]
+"""(n, 6): x (m), vx (m/s), y, vy of the drone less the target's; roll and pitch last commanded (rad)."""
+
+COUNT: Final = 1000
+_LAST_RAD: Final = 0.1
+_RANGES: Final = {"W": (0.5, 1.0), "T": (0.05, 0.1), "F": (0.005, 0.01)}
+_NOISE: Final = (0.01, 0.05)
+_SEED: Final = 1
+_SETTLED_S: Final = 10.0
+
+MEANING: Final = {
+    "W": "random, within 0.5 m and 1 m/s",
+    "T": "random, within 5 cm and 10 cm/s",
+    "F": "random, within 5 mm and 1 cm/s",
+    "C": "100 Hz along the figure of eight of Table II, noise of 1 cm and 5 cm/s",
+}
+"""In the first three the last command is random too, within 0.1 rad; along C it is the contender's own."""
+
+
+def state_sets() -> dict[str, Inputs]:
+    """Return the sets, (COUNT, 6) each."""
+    random = np.random.default_rng(_SEED)
+    sets = {}
+    for name, (position_m, velocity_m_s) in _RANGES.items():
+        scale = [position_m, velocity_m_s, position_m, velocity_m_s, _LAST_RAD, _LAST_RAD]
+        sets[name] = (random.uniform(-1, 1, (COUNT, 6)) * scale).astype(np.float32)
+    sets["C"] = _flown(random)
+    return sets
+
+
+def _flown(random: np.random.Generator) -> Inputs:
+    """Fly preset mambo for 10 s, once it has caught up with the target, and add what a sensor would."""
+    flight = Flight(Bernoulli(2.0, 0.5), duration_s=_SETTLED_S + 0.01 * COUNT)
+    trace: Any = fly(flight, CompiledController(presets.load("mambo")))
+    error = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2]], -1) - trace.target
+    x, y, vx, vy = error[-COUNT:, 0].T
+    noise = random.standard_normal((COUNT, 4)) * [_NOISE[0], _NOISE[1], _NOISE[0], _NOISE[1]]
+    seen = np.stack([x, vx, y, vy], 1) + noise
+    return np.concatenate([seen, np.zeros((COUNT, 2))], 1).astype(np.float32)
