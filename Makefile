@@ -2,7 +2,7 @@
 # make test       set up, check style and types, run the tests; with CI=true also the long ones
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
-# make bench      time flights against RotorPy
+# make bench      time flights against RotorPy, and updates against peers; results in build/bench
 # make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
 
@@ -12,6 +12,8 @@ BIN = $(VENV)/bin
 SETUP = $(VENV)/.installed
 SETUP_TEST = $(VENV)/.installed-test
 SETUP_BENCH = $(VENV)/.installed-bench
+PEERS = build/peers
+SETUP_PEERS = $(PEERS)/.installed
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
 # What the tests want beside a C compiler; named as Debian names it.
@@ -55,15 +57,21 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo --scalar fixed -o generated/mambo-fixed
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1
 
-bench: $(SETUP_BENCH)
+bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights
+	$(BIN)/python -m benchmarks.times --python $(PEERS)/bin/python --output build/bench
+
+bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
+	$(BIN)/python -m benchmarks.peers --python $(PEERS)/bin/python
 
 # The generators of others live in an environment of their own; TinyMPC asks for a SciPy that new Pythons lack.
-bench-peers: $(SETUP_TEST)
-	$(PYTHON) -m venv --clear build/peers
-	build/peers/bin/python -m pip install --quiet osqp==1.1.3 casadi==3.8.2 cvxpygen==1.0.2
-	build/peers/bin/python -m pip install --quiet --no-deps tinympc==0.0.8
-	$(BIN)/python -m benchmarks.peers --python build/peers/bin/python
+# Of DAQP the C is wanted, which only the source distribution has.
+$(SETUP_PEERS): Makefile
+	$(PYTHON) -m venv --clear $(PEERS)
+	$(PEERS)/bin/python -m pip install --quiet osqp==1.1.3 casadi==3.8.2 cvxpygen==1.0.2 daqp==0.11.0
+	$(PEERS)/bin/python -m pip install --quiet --no-deps tinympc==0.0.8
+	$(PEERS)/bin/python -m pip download --quiet --no-deps --no-binary daqp --dest $(PEERS)/sdist daqp==0.11.0
+	@touch $@
 
 # A virtual environment without pip is what a stopped run left, and is made anew.
 define SET_UP

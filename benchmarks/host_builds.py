@@ -69,7 +69,7 @@ def build(program: Program, folder: Path, flags: tuple[str, ...], library: Path)
     contract = "off" if program.name in ("ours", "rollout") else "fast"
     line = [*compiler, program.dialect, *_COMMON, *flags, f"-ffp-contract={contract}"]
     line += [*definitions(program, folder), "-c"]
-    objects = []
+    objects: list[str] = []
     for source in sources(program, folder):
         objects.append(str(work / f"{len(objects)}.o"))
         run_tool([*line, str(source), "-o", objects[-1]])

@@ -72,12 +72,11 @@ def costs(kind: Cost, lags_s: Lags, inputs: Array, moves: Array) -> Array:
     return found
 
 
-def least(kind: Cost, lags_s: Lags, inputs: Array) -> Array:
-    """Return the least cost (n,) that any plan within the limit has for `inputs` (n, 6)."""
+def best(kind: Cost, lags_s: Lags, inputs: Array) -> Array:
+    """Return the plans (n, 4) within the limit that cost least for `inputs` (n, 6)."""
     from_input, rows = _residuals(lags_s)
     solve = _least_sum if kind == "1-norm" else _least_squares
-    plans = np.array([solve(rows, -(from_input @ one)) for one in inputs])
-    return costs(kind, lags_s, inputs, plans)
+    return np.array([solve(rows, -(from_input @ one)) for one in inputs])
 
 
 def _least_sum(rows: Array, right: Array) -> Array:
@@ -107,7 +106,6 @@ def _least_squares(rows: Array, right: Array) -> Array:
 def above(kind: Cost, lags_s: Lags, inputs: Array, plans: Array) -> Array:
     """Return by what share (n,) the cost of `plans` (n, 4), cut to the limit, is above the least."""
     inputs, plans = inputs.astype(np.float64), plans.astype(np.float64)
-    found: Array = (
-        costs(kind, lags_s, inputs, np.clip(plans, -TILT_RAD, TILT_RAD)) / least(kind, lags_s, inputs) - 1
-    )
+    least = costs(kind, lags_s, inputs, best(kind, lags_s, inputs))
+    found: Array = costs(kind, lags_s, inputs, np.clip(plans, -TILT_RAD, TILT_RAD)) / least - 1
     return found

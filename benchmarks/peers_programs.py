@@ -25,7 +25,7 @@ class Program:
     name: str
     title: str
     cost: Cost
-    scalar: Literal["float32", "float64"]
+    scalar: Literal["float32", "float64", "fixed"]
     sources: tuple[str, ...]
     includes: tuple[str, ...]
     glue: str
@@ -41,8 +41,8 @@ _DAQP: Final = (
     "static c_float upper[4] = {%(tilt)s, %(tilt)s, %(tilt)s, %(tilt)s};\n"
     "static c_float lower[4] = {-%(tilt)s, -%(tilt)s, -%(tilt)s, -%(tilt)s};\n"
     "static int sense[4];\n"
-    "static DAQPProblem problem = {4, 4, 4, hessian, linear, NULL, upper, lower, sense, NULL, 0, 0};\n"
-    "static DAQPResult result = {plan, multipliers, 0, 0, 0, 0, 0, 0, 0};\n"
+    "static DAQPProblem problem = {4, 4, 4, hessian, linear, NULL, upper, lower, sense};\n"
+    "static DAQPResult result = {plan, multipliers};\n"
     "static DAQPWorkspace workspace;\n"
     "static int is_set_up;\n\n"
     + HEAD.replace("%", "%%")
@@ -69,12 +69,45 @@ _DAQP: Final = (
 """
 )
 
+_DAQP_SLACKS: Final = (
+    '#include "api.h"\n#include "utils.h"\n#include "problem.h"\n\n'
+    "static c_float plan[28], multipliers[76];\n"
+    "static int sense[76];\n"
+    "static DAQPProblem problem = {28, 76, 28, hessian, linear, constraints, upper, lower, sense};\n"
+    "static DAQPResult result = {plan, multipliers};\n"
+    "static DAQPWorkspace workspace;\n"
+    "static int is_set_up;\n\n"
+    + HEAD
+    + """{
+    int i;
+
+    for (i = 0; i < 24; i++) {
+        const c_float *row = &from_input[6 * i];
+
+        upper[28 + i] = row[0] * error[0] + row[1] * error[1] + row[2] * error[2] + row[3] * error[3] +
+                        row[4] * last[0] + row[5] * last[1];
+        upper[52 + i] = -upper[28 + i];
+    }
+    if (!is_set_up) {
+        setup_daqp(&problem, &workspace, NULL);
+        is_set_up = 1;
+    } else {
+        daqp_update_ldp(DAQP_UPDATE_d, &workspace, &problem);
+    }
+    daqp_solve(&result, &workspace);
+    for (i = 0; i < 4; i++) {
+        moves[i] = (float)plan[i];
+    }
+}
+"""
+)
+
 _OSQP_CONDENSED: Final = (
     '#include "osqp.h"\n#include "workspace.h"\n\n'
-    "static const float from_state[4][4] = {%(gradient)s};\n\n"
+    "static const OSQPFloat from_state[4][4] = {%(gradient)s};\n\n"
     + HEAD.replace("%", "%%")
     + """{
-    float q[4];
+    OSQPFloat q[4];
     int i;
 
     for (i = 0; i < 4; i++) {
@@ -86,7 +119,7 @@ _OSQP_CONDENSED: Final = (
     osqp_update_data_vec(&solver, q, OSQP_NULL, OSQP_NULL);
     osqp_solve(&solver);
     for (i = 0; i < 4; i++) {
-        moves[i] = solver.solution->x[i];
+        moves[i] = (float)solver.solution->x[i];
     }
 }
 """
@@ -94,7 +127,7 @@ _OSQP_CONDENSED: Final = (
 
 _OSQP_STATES: Final = (
     '#include "osqp.h"\n#include "workspace.h"\n\n'
-    "static float q[48], lower[48], upper[48];\n\n"
+    "static OSQPFloat q[48], lower[48], upper[48];\n\n"
     + HEAD
     + """{
     int i;
@@ -111,7 +144,7 @@ _OSQP_STATES: Final = (
     osqp_update_data_vec(&solver, q, lower, upper);
     osqp_solve(&solver);
     for (i = 0; i < 4; i++) {
-        moves[i] = solver.solution->x[44 + i];
+        moves[i] = (float)solver.solution->x[44 + i];
     }
 }
 """
@@ -155,7 +188,7 @@ _CASADI: Final = (
     "static casadi_int iw[mpc_SZ_IW];\nstatic casadi_real w[mpc_SZ_W];\n\n"
     + HEAD
     + """{
-    casadi_real parameters[6];
+    casadi_real parameters[6], found[4];
     int i, memory;
 
     for (i = 0; i < 4; i++) {
@@ -164,10 +197,13 @@ _CASADI: Final = (
     parameters[4] = last[0];
     parameters[5] = last[1];
     arg[0] = parameters;
-    res[0] = moves;
+    res[0] = found;
     memory = mpc_checkout();
     mpc(arg, res, iw, w, memory);
     mpc_release(memory);
+    for (i = 0; i < 4; i++) {
+        moves[i] = (float)found[i];
+    }
 }
 """
 )
@@ -228,6 +264,15 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
             glue=_DAQP % numbers,
         ),
         Program(
+            "daqp-slacks",
+            "DAQP, moves and slacks",
+            "1-norm",
+            "float64",
+            sources=("csrc/src/*.c",),
+            includes=("csrc/include", "."),
+            glue=_DAQP_SLACKS,
+        ),
+        Program(
             "osqp-condensed",
             "OSQP, four moves, condensed by hand",
             "quadratic",
@@ -264,7 +309,7 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
             glue=_CASADI,
         ),
         cvxpygen_osqp,
-        replace(cvxpygen_osqp, name="cvxpygen-squares", cost="quadratic"),
+        replace(cvxpygen_osqp, name="cvxpygen-squares", title="CVXPYgen, OSQP, squares", cost="quadratic"),
         Program(
             "cvxpygen-ecos",
             "CVXPYgen, ECOS",
@@ -306,3 +351,13 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
             products=("build", "*.so"),
         ),
     )
+
+
+def host_programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
+    """Return the same, and CasADi also in double, its default, as in float it often gives up."""
+    found = []
+    for program in programs(tilt, effort, gradient):
+        found.append(program)
+        if program.glue == _CASADI:
+            found.append(replace(program, name=f"{program.name}-float64", scalar="float64"))
+    return tuple(found)

@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tarfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -78,11 +79,40 @@ def hessian() -> Matrix:
     return found
 
 
-def daqp(folder: Path) -> None:
-    """Write a QP of the four moves alone for the C interface: https://darnstrom.github.io/daqp.
+def daqp_squares(folder: Path) -> None:
+    """Write a QP of the four moves alone for DAQP's C interface: https://darnstrom.github.io/daqp."""
+    from_state, from_moves = condensed()
+    _daqp(folder, {"hessian[16]": hessian(), "from_state[16]": 2 * TRACKING * from_moves.T @ from_state})
 
-    The C is that of the source distribution, which the Makefile keeps beside the Python of the peers; of its
-    generator only the Julia package has one.
+
+def daqp_slacks(folder: Path) -> None:
+    """Write the 1-norm for the same: four moves, and a slack for each of the 24 terms, between two rows."""
+    from_state, from_moves = condensed()
+    rows = np.vstack([from_moves, changes()])
+    terms = len(rows)
+    from_input = np.zeros((terms, 6))
+    from_input[:-4, :4] = -from_state
+    from_input[-4:-2, 4:] = np.eye(2)
+    weights = np.concatenate([np.zeros(4), np.full(terms - 4, TRACKING), np.full(4, EFFORT)])
+    constraints = np.vstack([np.hstack([sign * rows, -np.eye(terms)]) for sign in (1, -1)])
+    _daqp(
+        folder,
+        {
+            "hessian[784]": np.zeros((28, 28)),
+            "linear[28]": weights,
+            "constraints[1344]": constraints,
+            "from_input[144]": from_input,
+            "upper[76]": np.concatenate([np.full(4, TILT_RAD), np.full(72, 1e30)]),
+            "lower[76]": np.concatenate([np.full(4, -TILT_RAD), np.zeros(24), np.full(48, -1e30)]),
+        },
+    )
+
+
+def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
+    """Place DAQP's C, and the problem as `tables` by C declarator.
+
+    The C is that of the source distribution, which the Makefile keeps beside the Python of the peers: it has
+    no generator, which comes with the Julia package alone.
     """
     (archive,) = Path(sys.prefix, "sdist").glob(f"daqp-{importlib.metadata.version('daqp')}.tar.gz")
     with tarfile.open(archive) as source:
@@ -90,9 +120,6 @@ def daqp(folder: Path) -> None:
     (unpacked,) = folder.glob("daqp-*")
     (unpacked / "csrc").rename(folder / "csrc")
     shutil.rmtree(unpacked)
-    from_state, from_moves = condensed()
-    gradient = 2 * TRACKING * from_moves.T @ from_state
-    tables = {"hessian[16]": hessian(), "from_state[16]": gradient}
     (folder / "problem.h").write_text(
         "".join(
             f"static c_float {name} = {{{', '.join(repr(float(v)) for v in table.ravel())}}};\n"
@@ -161,22 +188,8 @@ def osqp_states(folder: Path) -> None:
     solver.codegen(str(folder), parameters="vectors", use_float=True, force_rewrite=True, extension_name=None)
 
 
-def cvxpygen_osqp(folder: Path) -> None:
-    """Write the 1-norm problem for OSQP: https://github.com/cvxgrp/cvxpygen, its MPC example."""
-    _cvxpygen(folder, "OSQP", "norm1")
-
-
-def cvxpygen_ecos(folder: Path) -> None:
-    """Write the 1-norm problem for ECOS."""
-    _cvxpygen(folder, "ECOS", "norm1")
-
-
-def cvxpygen_squares(folder: Path) -> None:
-    """Write the quadratic problem for OSQP."""
-    _cvxpygen(folder, "OSQP", "sum_squares")
-
-
 def _cvxpygen(folder: Path, solver: str, measure: str) -> None:
+    """Write the problem for `solver`: https://github.com/cvxgrp/cvxpygen, its MPC example."""
     import cvxpy
     from cvxpygen import cpg
 
@@ -198,17 +211,8 @@ def _cvxpygen(folder: Path, solver: str, measure: str) -> None:
     cpg.generate_code(problem, code_dir=str(folder), solver=solver, wrapper=False)
 
 
-def casadi_qrqp(folder: Path) -> None:
-    """Write one QP for qrqp, in float32: https://web.casadi.org/docs/#generating-c-code."""
-    _casadi(folder, "qrqp")
-
-
-def casadi_sqp(folder: Path) -> None:
-    """Write sqpmethod on qrqp, in float32."""
-    _casadi(folder, "sqpmethod")
-
-
-def _casadi(folder: Path, solver: str) -> None:
+def _casadi(folder: Path, solver: str, real: str) -> None:
+    """Write one QP for qrqp, or sqpmethod on it: https://web.casadi.org/docs/#generating-c-code."""
     import casadi
 
     parameters = casadi.MX.sym("parameters", 6)
@@ -236,9 +240,7 @@ def _casadi(folder: Path, solver: str) -> None:
         solve = casadi.nlpsol("solve", "sqpmethod", problem, options)
     found = solve(x0=casadi.DM.zeros(4), p=parameters, lbx=-TILT_RAD, ubx=TILT_RAD)["x"]
     step_function = casadi.Function("mpc", [parameters], [found], ["parameters"], ["moves"])
-    generator = casadi.CodeGenerator(
-        "mpc.c", {"casadi_real": "float", "casadi_int": "int", "with_header": True}
-    )
+    generator = casadi.CodeGenerator("mpc.c", {"casadi_real": real, "casadi_int": "int", "with_header": True})
     generator.add(step_function)
     folder.mkdir(parents=True, exist_ok=True)
     generator.generate(f"{folder}/")
@@ -265,15 +267,19 @@ def tinympc(folder: Path) -> None:
             raise
 
 
+_CVXPYGEN: Final = ("cvxpygen", "cvxpy", "osqp")
 SETUPS: Final[dict[str, tuple[Callable[[Path], None], tuple[str, ...]]]] = {
-    "daqp": (daqp, ("daqp",)),
+    "daqp": (daqp_squares, ("daqp",)),
+    "daqp-slacks": (daqp_slacks, ("daqp",)),
     "osqp-condensed": (osqp_condensed, ("osqp",)),
     "osqp-states": (osqp_states, ("osqp",)),
-    "cvxpygen-osqp": (cvxpygen_osqp, ("cvxpygen", "cvxpy", "osqp")),
-    "cvxpygen-ecos": (cvxpygen_ecos, ("cvxpygen", "cvxpy", "ecos")),
-    "cvxpygen-squares": (cvxpygen_squares, ("cvxpygen", "cvxpy", "osqp")),
-    "casadi-qrqp": (casadi_qrqp, ("casadi",)),
-    "casadi-sqp": (casadi_sqp, ("casadi",)),
+    "cvxpygen-osqp": (partial(_cvxpygen, solver="OSQP", measure="norm1"), _CVXPYGEN),
+    "cvxpygen-ecos": (partial(_cvxpygen, solver="ECOS", measure="norm1"), ("cvxpygen", "cvxpy", "ecos")),
+    "cvxpygen-squares": (partial(_cvxpygen, solver="OSQP", measure="sum_squares"), _CVXPYGEN),
+    "casadi-qrqp": (partial(_casadi, solver="qrqp", real="float"), ("casadi",)),
+    "casadi-qrqp-float64": (partial(_casadi, solver="qrqp", real="double"), ("casadi",)),
+    "casadi-sqp": (partial(_casadi, solver="sqpmethod", real="float"), ("casadi",)),
+    "casadi-sqp-float64": (partial(_casadi, solver="sqpmethod", real="double"), ("casadi",)),
     "tinympc": (tinympc, ("tinympc",)),
 }
 """Who writes into a folder, and the packages whose versions tell what it wrote."""

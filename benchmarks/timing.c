@@ -67,21 +67,3 @@ void timing_measure(run_t *run, const float *inputs, int count, int follows, con
         last[1] = plan[1];
     }
 }
-
-/* The same without a clock between the calls: what `count` of them took, in ns. */
-double timing_back_to_back(run_t *run, const float *inputs, int count, int follows, float *moves)
-{
-    run_t *const timed = (run != NULL) ? run : timing_nothing;
-    float last[2] = {0.0f, 0.0f};
-    const long long start_ns = now_ns();
-    int i;
-
-    for (i = 0; i < count; i++) {
-        float *plan = &moves[4 * i];
-
-        timed(&inputs[6 * i], follows ? last : &inputs[6 * i + 4], plan);
-        last[0] = plan[0];
-        last[1] = plan[1];
-    }
-    return (double)(now_ns() - start_ns);
-}
