@@ -359,5 +359,6 @@ def host_programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
     for program in programs(tilt, effort, gradient):
         found.append(program)
         if program.glue == _CASADI:
-            found.append(replace(program, name=f"{program.name}-float64", scalar="float64"))
+            names = {"name": f"{program.name}-float64", "title": f"{program.title}, double"}
+            found.append(replace(program, scalar="float64", **names))
     return tuple(found)

@@ -111,8 +111,8 @@ def daqp_slacks(folder: Path) -> None:
 def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
     """Place DAQP's C, and the problem as `tables` by C declarator.
 
-    The C is that of the source distribution, which the Makefile keeps beside the Python of the peers: it has
-    no generator, which comes with the Julia package alone.
+    The C is that of the source distribution, which the Makefile keeps beside the Python of the peers; the
+    code generator is not in it.
     """
     (archive,) = Path(sys.prefix, "sdist").glob(f"daqp-{importlib.metadata.version('daqp')}.tar.gz")
     with tarfile.open(archive) as source:

@@ -226,14 +226,13 @@ def main() -> None:
     sets = state_sets()
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as place:
         work = Path(place)
-        rows: list[Row] = []
-        libraries: Libraries = {}
-        planned: dict[str, Any] = {}
-        for contender in contenders(arguments.python):
-            print(f"building {contender.program.title}", file=sys.stderr)
-            row, built, planned[contender.name] = _prepared(contender, sets, work)
-            rows.append(row)
-            libraries |= built
+        print("generating, building, trying", file=sys.stderr)
+        with ProcessPoolExecutor() as pool:
+            prepare = partial(_prepared, sets=sets, work=work)
+            prepared = list(pool.map(prepare, contenders(arguments.python)))
+        rows = [row for row, _, _ in prepared]
+        libraries = {key: path for _, built, _ in prepared for key, path in built.items()}
+        planned = {row.name: plans_found for row, _, plans_found in prepared}
         timing = work / "timing.so"
         source = resources.files("benchmarks").joinpath("timing.c")
         run_tool([*host_toolchain().command, "-O2", "-shared", "-fPIC", str(source), "-o", str(timing)])

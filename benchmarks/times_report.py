@@ -7,6 +7,7 @@ from typing import Final
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from benchmarks.host_builds import Sizes
 from sil.plots import style
@@ -18,7 +19,7 @@ FLAGS: Final = {
 SETS: Final = ("W", "T", "F", "C")
 OURS: Final = "ours"
 """The row that the others are held against."""
-_COLOURS: Final = {"ours": "#0072B2", "1-norm": "#E69F00", "quadratic": "#7f7f7f"}
+_COLOURS: Final = {"ours": "#0072B2", "others, 1-norm": "#E69F00", "others, quadratic": "#7f7f7f"}
 _MARKERS: Final = {"W": "o", "T": "s", "F": "^", "C": "D"}
 
 
@@ -67,11 +68,42 @@ def _lines(rows: list[tuple[str, ...]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rest))
 
 
-def _ratio(row: Row, ours: Row, flags: str) -> str:
-    """Say how many times as long as ours it takes, over the sets."""
-    ratios = [row.times[flags].hot[name][0] / ours.times[flags].hot[name][0] for name in SETS]
+def _ratios(row: Row, other: Row, flags: str, sets: tuple[str, ...] = SETS) -> list[float]:
+    """Return how many times as long as the other it takes, by set."""
+    return [row.times[flags].hot[name][0] / other.times[flags].hot[name][0] for name in sets]
+
+
+def _range(ratios: list[float]) -> str:
     low, high = (f"{value:,.0f}" if value >= 10 else f"{value:.2g}" for value in (min(ratios), max(ratios)))
     return low if low == high else f"{low} to {high}"
+
+
+def _aims_table(rows: list[Row]) -> str:
+    """Hold medians against what the project aims at, by set where it says nothing else."""
+    measured = {row.name: row for row in rows if row.times}
+    ours = measured[OURS]
+    peers = [row for name, row in measured.items() if not name.startswith((OURS, "mambo", "rollout"))]
+    same_cost = [row for row in peers if row.cost == "1-norm"]
+    lines: list[tuple[str, ...]] = [
+        ("ratio of medians", "aim", *(f"`{spelled}`" for spelled in FLAGS.values()))
+    ]
+    for title, aim, one, other, sets in (
+        ("ours over its plain roll-out", "0.33", OURS, "rollout", SETS),
+        ("preset mambo over its plain roll-out", "0.33", "mambo", "rollout-mambo", SETS),
+        ("ours over DAQP, fine states (F)", "at most 2", OURS, "daqp", ("F",)),
+    ):
+        if other in measured:
+            found = [_range(_ratios(measured[one], measured[other], flags, sets)) for flags in FLAGS]
+            lines.append((title, aim, *found))
+    for title, aim, group in (
+        ("the fastest peer over ours", "above 1", peers),
+        ("the fastest peer with the 1-norm over ours", "at least 1,000", same_cost),
+    ):
+        if group:
+            by_row = [[_ratios(row, ours, flags) for row in group] for flags in FLAGS]
+            found = [_range([min(by_set) for by_set in zip(*ratios, strict=True)]) for ratios in by_row]
+            lines.append((title, aim, *found))
+    return _lines(lines)
 
 
 def _times_table(rows: list[Row], flags: str) -> str:
@@ -85,7 +117,7 @@ def _times_table(rows: list[Row], flags: str) -> str:
             continue
         timing = row.times[flags]
         cells = tuple(f"{timing.hot[name][0]:,.0f} / {timing.hot[name][1]:,.0f}" for name in SETS)
-        lines.append((*start, *cells, f"{timing.cold:,.0f}", _ratio(row, ours, flags)))
+        lines.append((*start, *cells, f"{timing.cold:,.0f}", _range(_ratios(row, ours, flags))))
     return _lines(lines)
 
 
@@ -118,6 +150,7 @@ def write_report(
     parts = [machine]
     for flags, spelled in FLAGS.items():
         parts += [f"`{spelled}`, ns an update, median / 99th percentile:", _times_table(rows, flags)]
+    parts += ["Against the aims, from the least to the most over W, T, F and C:", _aims_table(rows)]
     parts += ["How good the plans are, and what they take (bytes, x86-64, `-O2`):", _quality_table(rows)]
     same = "; ".join(f"{title}, {count} states" for title, count in agreement.items())
     versions: dict[str, str] = {}
@@ -156,8 +189,9 @@ def _draw(rows: list[Row], stem: Path) -> None:
             axes.set_title(spelled)
         panels[0].set_yticks(range(len(rows)), [row.title for row in rows])
         panels[0].invert_yaxis()
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        handles, _ = panels[0].get_legend_handles_labels()
+        patches = [Patch(color=colour, label=kind) for kind, colour in _COLOURS.items()]
+        figure.legend(handles=[*patches, *handles], loc="outside lower center", ncols=8)
         figure.savefig(stem.with_suffix(".png"), dpi=160, metadata={"Software": None})
         figure.savefig(stem.with_suffix(".svg"), metadata={"Date": None, "Creator": None})
 
@@ -165,7 +199,7 @@ def _draw(rows: list[Row], stem: Path) -> None:
 def _draw_panel(axes: Axes, rows: list[Row], flags: str) -> None:
     for place, row in enumerate(rows):
         mine = row.name == OURS or row.name.startswith(("ours", "mambo"))
-        colour = _COLOURS["ours" if mine else "1-norm" if row.cost == "1-norm" else "quadratic"]
+        colour = _COLOURS["ours" if mine else f"others, {row.cost.partition(',')[0]}"]
         timing = row.times[flags]
         for name, marker in _MARKERS.items():
             median, most = timing.hot[name]
