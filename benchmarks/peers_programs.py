@@ -258,10 +258,11 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
             "daqp",
             "DAQP, four moves, condensed by hand",
             "quadratic",
-            "float64",
+            "float32",
             sources=("csrc/src/*.c",),
             includes=("csrc/include", "."),
             glue=_DAQP % numbers,
+            defines=("DAQP_SINGLE_PRECISION",),
         ),
         Program(
             "daqp-slacks",
@@ -354,11 +355,11 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
 
 
 def host_programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
-    """Return the same, and CasADi also in double, its default, as in float it often gives up."""
+    """Return the same, and DAQP and CasADi also in double, their default: in float CasADi often gives up."""
     found = []
     for program in programs(tilt, effort, gradient):
         found.append(program)
-        if program.glue == _CASADI:
-            names = {"name": f"{program.name}-float64", "title": f"{program.title}, double"}
-            found.append(replace(program, scalar="float64", **names))
+        if program.name in ("daqp", "casadi-qrqp", "casadi-sqp"):
+            name, title = f"{program.name}-float64", f"{program.title}, double"
+            found.append(replace(program, name=name, title=title, scalar="float64", defines=()))
     return tuple(found)

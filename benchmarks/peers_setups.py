@@ -270,6 +270,7 @@ def tinympc(folder: Path) -> None:
 _CVXPYGEN: Final = ("cvxpygen", "cvxpy", "osqp")
 SETUPS: Final[dict[str, tuple[Callable[[Path], None], tuple[str, ...]]]] = {
     "daqp": (daqp_squares, ("daqp",)),
+    "daqp-float64": (daqp_squares, ("daqp",)),
     "daqp-slacks": (daqp_slacks, ("daqp",)),
     "osqp-condensed": (osqp_condensed, ("osqp",)),
     "osqp-states": (osqp_states, ("osqp",)),
