@@ -185,10 +185,10 @@ int clock_gettime(clockid_t clock, struct timespec *now)
 _CASADI: Final = (
     '#include "mpc.h"\n\n'
     "static const casadi_real *arg[mpc_SZ_ARG];\nstatic casadi_real *res[mpc_SZ_RES];\n"
-    "static casadi_int iw[mpc_SZ_IW];\nstatic casadi_real w[mpc_SZ_W];\n\n"
+    "static casadi_int iw[mpc_SZ_IW];\nstatic casadi_real w[mpc_SZ_W], found[4];\n\n"
     + HEAD
     + """{
-    casadi_real parameters[6], found[4];
+    casadi_real parameters[6];
     int i, memory;
 
     for (i = 0; i < 4; i++) {
