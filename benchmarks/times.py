@@ -223,7 +223,10 @@ def main() -> None:
     parser.add_argument("--output", "-o", type=Path, default=Path("build/bench"), help="folder to write into")
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="passes through every set")
     arguments = parser.parse_args()
-    sets = state_sets()
+    try:
+        sets = state_sets()
+    except BuildError as error:
+        sys.exit(str(error))
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as place:
         work = Path(place)
         print("generating, building, trying", file=sys.stderr)
