@@ -32,12 +32,9 @@ long run(void);
 long run(void) { return nmpc_self_test(&scratch); }
 """
 EFFORT = (
-    "return nmpc_tracking_cost(weight.tracking, distance_m)"
-    " + nmpc_effort_cost(weight.effort, variation_rad);"
+    "return nmpc_tracking_cost(weight.tracking, distance_m) + nmpc_effort_cost(weight.effort, variation_rad);"
 )
-HARMED = (
-    "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
-)
+HARMED = "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
 ABANDONED = """
 import sys
 from importlib import resources

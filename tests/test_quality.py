@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
 from benchmarks.quality import PRESETS, entrants
+from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
 from codegen import presets
 from codegen.reference import ReferenceController
 from codegen.reference.optimizer import minimize
