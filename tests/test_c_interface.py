@@ -1,5 +1,7 @@
 """What a caller of the generated C may rely on, whatever it passes in."""
 
+from functools import cache
+from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
@@ -22,11 +24,17 @@ MAMBO = presets.load("mambo")
 HOVER_STATE, HOVER_TARGET, HOVER_THRUST = np.zeros(7), np.array([0.5, -0.4, 0.0, 0.0]), 9.81
 
 
+@cache
+def built(settings: Settings) -> ModuleType:
+    """Build the C of `settings`, once for all tests."""
+    return compiled(settings, toolchain("gcc"))
+
+
 def controller(kind: str, n: int = 1) -> Controller:
     """Make a controller of preset mambo."""
     if kind == "reference":
         return ReferenceController(MAMBO, n)
-    return CompiledController(MAMBO, n, compiled(MAMBO, toolchain("gcc")))
+    return CompiledController(MAMBO, n, built(MAMBO))
 
 
 def after_one_step(kind: str) -> tuple[Controller, NDArray[Any]]:
@@ -130,7 +138,7 @@ def test_weights_change_the_cost_and_bad_ones_nothing(kind: str) -> None:
 
 def test_null_pointers_get_a_status_and_a_safe_command() -> None:
     """Each argument null by itself: a status, and the last good command where there is room for one."""
-    extension = compiled(MAMBO, toolchain("gcc"))
+    extension = built(MAMBO)
     ffi, lib = extension.ffi, extension.lib
     self = ffi.new("nmpc_t *")
     state, target = ffi.new("nmpc_state_t *"), ffi.new("nmpc_target_t *", {"position_m": [0.5, 0.5]})
@@ -170,7 +178,7 @@ def any_number(limit: float, width: Literal[32, 64]) -> st.SearchStrategy[float]
 def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: st.DataObject) -> None:
     """Whatever the input, among good ones: a documented status and |command| <= tilt limit."""
     chosen = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
-    used = CompiledController(chosen, 1, compiled(chosen, toolchain("gcc")))
+    used = CompiledController(chosen, 1, built(chosen))
     width = WIDTHS[scalar]
     position, speed = any_number(1000, width), any_number(100, width)
     angle, yaw = any_number(3.25, width), any_number(1024, width)
@@ -198,7 +206,7 @@ def test_the_self_test_passes_and_names_the_first_difference() -> None:
 
 def test_the_version_traces_a_binary_to_its_settings() -> None:
     """The string in the binary names the generator and the digest of the settings."""
-    extension = compiled(MAMBO, toolchain("gcc"))
+    extension = built(MAMBO)
     text = extension.ffi.string(extension.lib.nmpc_version()).decode()
     assert text.startswith("mambo-nmpc ")
     assert text.endswith(f"settings {MAMBO.digest[:16]}")

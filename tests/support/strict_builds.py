@@ -41,14 +41,14 @@ _QUIET: Final = '#pragma GCC diagnostic ignored "-Wmissing-prototypes"\n'
 
 
 def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) -> ModuleType:
-    """Build the bundle of `settings`, its example included, and load it; returns what has `ffi` and `lib`.
+    """Build the bundle of `settings`, and load it; returns what has `ffi` and `lib`.
 
     The names in `lib` have the prefix nmpc, whatever the prefix of the settings. A word of the compiler is a
     failed assertion.
     """
     prefix, scalar = settings.code.prefix, settings.code.scalar
     batch = _QUIET + resources.files("sil").joinpath("batch.c").read_text("utf-8")
-    files = render(settings, amalgamate=amalgamate) | {"batch.c": with_prefix(batch, prefix)}
+    files = render(settings, amalgamate=amalgamate, with_digest=False) | {"batch.c": with_prefix(batch, prefix)}
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
