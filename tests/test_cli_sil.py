@@ -223,6 +223,7 @@ def test_flying_again_overwrites_our_own_results(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "flight" / "summary.json").read_text())["duration_s"] == 0.2
 
 
+@pytest.mark.long
 def test_table2_judges_the_claims(tmp_path: Path) -> None:
     """The PD row is reproduced, table1 and mambo beat the claim, the printed step does not fly."""
     done = command("table2", "--json", folder=tmp_path)

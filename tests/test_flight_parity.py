@@ -40,7 +40,7 @@ def assert_same_bits(a: Trace, b: Trace) -> None:
 
 
 @pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("preset", ["mambo", "table1"])
+@pytest.mark.parametrize("preset", ["mambo", pytest.param("table1", marks=pytest.mark.long)])
 @pytest.mark.parametrize("condition", CONDITIONS)
 def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str, scalar: str) -> None:
     """The closed loop amplifies the least difference: there is none, in any array of the trace."""
@@ -70,7 +70,8 @@ def indices(metrics: Metrics) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("preset", "least"), [("table1", PRINTED_IMPROVEMENT), ("mambo", (20, 300, 300, 20))]
+    ("preset", "least"),
+    [pytest.param("table1", PRINTED_IMPROVEMENT, marks=pytest.mark.long), ("mambo", (20, 300, 300, 20))],
 )
 def test_the_presets_improve_on_the_pd(preset: str, least: tuple[float, ...]) -> None:
     """On the Table II case: table1 by more than the paper prints, mambo by far more."""

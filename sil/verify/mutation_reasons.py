@@ -201,14 +201,4 @@ REASONS: Final[tuple[Reason, ...]] = (
         "its sine and cosine have the same bits in both",
         _is_float32,
     ),
-    *(
-        Reason(
-            "src/nmpc_cost.c",
-            "const nmpc_real_t before_rad = (k < NMPC_AXES) ? last_rad[k] : moves_rad[k - NMPC_AXES];",
-            what,
-            "undefined, and hidden by the layout of nmpc_t: the last command stands before the plan, so one "
-            "array's neighbour is the other",
-        )
-        for what in ("< -> <=", "< -> >=")
-    ),
 )

@@ -48,7 +48,9 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
     """
     prefix, scalar = settings.code.prefix, settings.code.scalar
     batch = _QUIET + resources.files("sil").joinpath("batch.c").read_text("utf-8")
-    files = render(settings, amalgamate=amalgamate, with_digest=False) | {"batch.c": with_prefix(batch, prefix)}
+    files = render(settings, amalgamate=amalgamate, with_digest=False) | {
+        "batch.c": with_prefix(batch, prefix)
+    }
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
