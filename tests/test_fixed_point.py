@@ -99,8 +99,8 @@ def test_intermediates_use_their_formats(name: str) -> None:
     ("text", "message"),
     [
         (
-            "[cost]\ntracking_weight = 0.05\neffort_weight = 5000.0",
-            "cost.tracking_weight = 0.05 must not be so small beside cost.effort_weight = 5000",
+            "[cost]\ntracking_weight = 0.01\neffort_weight = 5000.0",
+            "cost.tracking_weight = 0.01 must not be so small beside cost.effort_weight = 5000",
         ),
         (
             "[cost]\ntracking_weight = 1e6\neffort_weight = 1e-5",
@@ -127,7 +127,7 @@ def test_the_value_that_a_refusal_names_is_taken() -> None:
     """The nearest weight that fits, rounded up to three digits, is accepted; a tenth less is not."""
     text = '[cost]\ntracking_weight = {}\neffort_weight = 5000.0\n[code]\nscalar = "fixed"'
     with pytest.raises(InvalidSettingsError) as refused:
-        parse(text.format(0.05), "x.toml")
+        parse(text.format(0.01), "x.toml")
     fits = float(str(refused.value).rpartition("at least ")[2])
     parse(text.format(fits), "x.toml")
     with pytest.raises(InvalidSettingsError):
