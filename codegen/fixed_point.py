@@ -246,9 +246,13 @@ def _too_wide(settings: Settings) -> Refusal:
     by_speed = 2 * ranges.velocity_m_s * horizon.prediction_step_s * horizon.prediction
     name = "velocity_m_s" if by_speed > reach / 2 else "thrust_acceleration_max_m_s2"
     fits = _nearest(settings, "ranges", name, 0.1, lambda changed: _fine_errors(formats(changed)))
+    least = ranges.thrust_acceleration_min_m_s2 if name == "thrust_acceleration_max_m_s2" else 0.0
+    way_out = "write a smaller horizon.prediction_step_s"
+    if fits and float(_down(fits)) > least:
+        way_out = f"write at most {_down(fits)}"
     rule = (
-        f'lets errors reach {reach:.3g} m over the horizon, coarser than 1 mm with code.scalar = "fixed"; '
-        + (f"write at most {_down(fits)}" if fits else "shorten the horizon")
+        f"lets errors reach {reach:.3g} m over the horizon, coarser than 1 mm with "
+        f'code.scalar = "fixed"; {way_out}'
     )
     return Refusal("ranges", name, rule)
 

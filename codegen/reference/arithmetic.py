@@ -142,7 +142,8 @@ class FixedArithmetic:
 
     def travel(self, velocity_m_s: Real) -> Real:
         f = self._formats
-        return rounded(self._step_s * velocity_m_s, f.step + f.velocity - f.bend)
+        half = 2 ** (f.bend - f.error - 1)
+        return rounded(self._step_s * velocity_m_s, f.step + f.velocity - f.bend) + half
 
     def bend(self, gain_m: Real, turn_rad: Real) -> Real:
         f = self._formats
@@ -156,7 +157,7 @@ class FixedArithmetic:
         return np.clip(difference_m, -f.error_limit, f.error_limit) * 2 ** (f.error - f.position)
 
     def step_of(self, advance_m: Real) -> Real:
-        return rounded(advance_m, self._formats.bend - self._formats.error)
+        return advance_m >> (self._formats.bend - self._formats.error)
 
     def distance_slope(self, gain_m: Real, slopes: Real) -> Real:
         f = self._formats

@@ -31,6 +31,11 @@ def _is_float64(settings: Settings) -> bool:
     return settings.code.scalar == "float64"
 
 
+def _adds_up(settings: Settings) -> bool:
+    """Whether the errors of several steps add up in a word of fixed point."""
+    return settings.code.scalar == "fixed" and settings.horizon.prediction > 1
+
+
 def _tolerates_one(settings: Settings) -> bool:
     """Whether the tolerance of fixed point is more than one number of the cost."""
     numbers = Representation(settings)
@@ -192,6 +197,13 @@ REASONS: Final[tuple[Reason, ...]] = (
             ("<real>, <real>, <real>", "a thousandth more #2"),
             ("- (count * quarter_turn_rad[2]);", "- -> +"),
         )
+    ),
+    Reason(
+        "src/nmpc_math.h",
+        "#define NMPC_SIGN_BIT ((nmpc_bits_t)1 << 31)",
+        "31 -> 30",
+        "an error has its highest two bits in common, for the sum of all has room in a word",
+        _adds_up,
     ),
     Reason(
         "src/nmpc_math.c",

@@ -103,10 +103,12 @@ static inline nmpc_real_t nmpc_component(nmpc_real_t push_m, nmpc_real_t sine)
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)push_m * sine, NMPC_SINE_BITS);
 }
 
+/* The advance carries half the resolution of an error on its way, so that what it adds to one is rounded. */
 static inline nmpc_real_t nmpc_travel(nmpc_real_t velocity_m_s)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)NMPC_PREDICTION_STEP_S * velocity_m_s,
-                                     NMPC_STEP_BITS + NMPC_VELOCITY_BITS - NMPC_BEND_BITS);
+                                     NMPC_STEP_BITS + NMPC_VELOCITY_BITS - NMPC_BEND_BITS)
+           + ((nmpc_real_t)1 << (NMPC_BEND_BITS - NMPC_ERROR_BITS - 1));
 }
 
 /* The two products of a walk are rounded down: that is half the work, and by far the most of it. */
@@ -130,8 +132,7 @@ static inline nmpc_real_t nmpc_first_error(nmpc_real_t difference_m)
 
 static inline nmpc_real_t nmpc_step_of(nmpc_real_t advance_m)
 {
-    return (advance_m + ((nmpc_real_t)1 << (NMPC_BEND_BITS - NMPC_ERROR_BITS - 1)))
-           >> (NMPC_BEND_BITS - NMPC_ERROR_BITS);
+    return advance_m >> (NMPC_BEND_BITS - NMPC_ERROR_BITS);
 }
 
 static inline nmpc_real_t nmpc_distance_slope(nmpc_real_t gain_x_m, nmpc_real_t slope_x, nmpc_real_t gain_y_m,
