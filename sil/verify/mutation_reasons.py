@@ -31,6 +31,10 @@ def _is_float64(settings: Settings) -> bool:
     return settings.code.scalar == "float64"
 
 
+def _axes_alike(settings: Settings) -> bool:
+    return settings.model.roll_lag_s == settings.model.pitch_lag_s
+
+
 def _adds_up(settings: Settings) -> bool:
     """Whether the errors of several steps add up in a word of fixed point."""
     return settings.code.scalar == "fixed" and settings.horizon.prediction > 1
@@ -197,6 +201,13 @@ REASONS: Final[tuple[Reason, ...]] = (
             ("<real>, <real>, <real>", "a thousandth more #2"),
             ("- (count * quarter_turn_rad[2]);", "- -> +"),
         )
+    ),
+    Reason(
+        "src/nmpc_predictor.h",
+        "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_ALIKE)",
+        "/ -> *",
+        "a wider table, whose further columns nobody reads",
+        _axes_alike,
     ),
     Reason(
         "src/nmpc_math.h",

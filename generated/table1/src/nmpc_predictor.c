@@ -20,12 +20,11 @@ const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_
     { 50.0f, 142.5f }
 };
 
-/* Start a walk: robot and target keep their velocity. */
+/* Start a walk: robot and target keep their velocity. Bend and tilt stay level, as nmpc_init() set them. */
 static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t velocity_m_s)
 {
     walk->error_m = nmpc_first_error(error_m);
     walk->advance_m = nmpc_travel(velocity_m_s);
-    walk->bend_m = (nmpc_real_t)0;
 }
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
@@ -47,8 +46,6 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     prediction->gain_y_m[NMPC_PITCH] = -across_m;
 
     /* Eqs 9-11 without moves. */
-    prediction->tilt_rad[NMPC_ROLL] = (nmpc_real_t)0;
-    prediction->tilt_rad[NMPC_PITCH] = (nmpc_real_t)0;
     start_walk(&prediction->x, state->position_m[0] - target->position_m[0],
                state->velocity_m_s[0] - target->velocity_m_s[0]);
     start_walk(&prediction->y, state->position_m[1] - target->position_m[1],
