@@ -21,7 +21,7 @@ from sil.compiled import compiled_digest
 from sil.emulated import GUEST, emulated_digest
 from sil.extension import load_extension
 from sil.same_bits import BOARD_COMPILERS, HOST_COMPILERS, REFERENCE, builds, same_bits
-from tests.support.cases import settings_case
+from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require, toolchain
 
 MAMBO = presets.load("mambo")
@@ -71,7 +71,7 @@ def test_compilers_and_boards_share_one_digest() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("scalar", SCALARS)
 def test_everything_shares_one_digest(scalar: str) -> None:
     """All boards that are emulated, with and without an FPU."""
     check_every_build(EMULATED, scalar)
