@@ -162,6 +162,7 @@ static inline nmpc_sum_t nmpc_effort_slope(nmpc_real_t weight)
     return weight * ((nmpc_sum_t)1 << (NMPC_GRADIENT_BITS - NMPC_EFFORT_BITS));
 }
 
+/* A step has room for the shift too, and is rounded down. */
 static inline nmpc_real_t nmpc_scaled(nmpc_real_t step_rad, nmpc_real_t factor)
 {
     return (nmpc_real_t)(((nmpc_sum_t)factor * (step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS)))) >> 32);
