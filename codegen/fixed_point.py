@@ -9,7 +9,7 @@ A position error beyond what the horizon can change keeps its sign there whateve
 a little more than that reach, which changes neither a slope nor a difference of costs, and leaves the bits to
 the errors that matter.
 
-The errors of a whole horizon add up in one word. Distance, cost and gradient have 64 bits, of which they use
+The sizes of the errors of a whole horizon add up in one word. Distance, cost and gradient have 64 bits, of which they use
 no more than 53: a double holds them.
 """
 
@@ -111,7 +111,7 @@ class _Reach:
     tilt:     of what a share is taken of: bend of a turn or of the measured tilt, and what is to come, m.
     error:    of what is added to the first error, m.
     errors:   of the sum of that over the horizon, m.
-    response: of the sum of responses to a move with the signs of all runs.
+    response: of the sum of responses to a move, with whatever signs and of whatever steps.
     """
 
     bend: float
@@ -333,7 +333,7 @@ def _reach(settings: Settings, tables: HorizonTables) -> _Reach:
         tilt=tilt,
         error=error,
         errors=errors,
-        response=float(np.abs(tables.response_sum).sum(axis=0).max()),
+        response=float(steps * np.abs(tables.response_sum).max()),
     )
 
 

@@ -19,7 +19,7 @@ WARNING_FLAGS: Final = (
     "-Wmissing-prototypes",
 )
 
-PROOF_PREPROCESSING: Final = ("-msse2", "-mfpmath=sse")
+PROOF_PREPROCESSING: Final = ("-msse2", "-mfpmath=sse", "-U__GNUC__")
 """Frama-C takes the sizes of a 32-bit machine; these keep the preprocessor from naming its x87."""
 
 PROOFS: Final = {

@@ -35,7 +35,13 @@ typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
 typedef struct { nmpc_real_t error_m, advance_m, bend_m; ...; } nmpc_walk_t;
 typedef struct { nmpc_real_t gain_x_m[2], gain_y_m[2]; nmpc_walk_t x, y; ...; } nmpc_prediction_t;
-typedef struct { ...; } nmpc_t;
+typedef struct {
+    nmpc_weights_t weights;
+    nmpc_prediction_t prediction;
+    nmpc_real_t command_rad[2], plan_rad[...];
+    nmpc_sum_t gradient[...];
+    ...;
+} nmpc_t;
 typedef struct {
     int *status;
     nmpc_command_t *command;
@@ -56,8 +62,7 @@ void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
 void nmpc_predictor_turn(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_walk_t *, nmpc_walk_t *);
 void nmpc_predictor_walk(nmpc_walk_t *);
-nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *, const nmpc_weights_t *, const nmpc_real_t *,
-                              const nmpc_real_t *, nmpc_sum_t *);
+nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
 
 void nmpc_batch_init(nmpc_t *, int);
 void nmpc_batch_step(nmpc_t *, int, const nmpc_state_t *, const nmpc_target_t *, const nmpc_real_t *,

@@ -95,7 +95,7 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
     predictor = Predictor(settings, horizon_tables(settings), blocks.products)
     limits, taken, computed = blocks.numbers.limits(settings), blocks.numbers.taken, blocks.computed
     rng = np.random.default_rng(index)
-    prediction = ffi.new("nmpc_prediction_t *")
+    prediction, controller = ffi.new("nmpc_prediction_t *"), ffi.new("nmpc_t *")
 
     for _ in range(50):
         state = taken(rng.normal(0, 1, (1, 7)) * [1, 1, 1, 1, 0.3, 0.3, 10], STATE)
@@ -133,19 +133,18 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
                 errors[0].astype(blocks.scalar)
             )
 
-        gradient = np.zeros(moves_count, blocks.numbers.wide)
-        c_cost = lib.nmpc_cost_evaluate(
-            prediction,
-            blocks.pointer("nmpc_weights_t", weights),
-            blocks.pointer("nmpc_real_t", last),
-            blocks.pointer("nmpc_real_t", moves),
-            blocks.pointer("nmpc_sum_t", gradient),
-        )
+        controller.prediction = prediction[0]
+        controller.weights = blocks.pointer("nmpc_weights_t", weights)[0]
+        controller.command_rad = last[0].tolist()
+        controller.plan_rad = moves.ravel().tolist()
+        c_cost = lib.nmpc_cost_evaluate(controller)
         expected_cost, expected_gradient = cost.evaluate(
             predictor, expected, *map(computed, (weights, moves, last))
         )
         assert bits(blocks.numbers.wide(c_cost)) == bits(expected_cost)
-        assert bits(gradient) == bits(expected_gradient)
+        assert bits(np.array(ffi.unpack(controller.gradient, moves_count), blocks.numbers.wide)) == bits(
+            expected_gradient
+        )
 
 
 @pytest.mark.parametrize("scalar", SCALARS)

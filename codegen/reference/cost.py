@@ -37,20 +37,18 @@ def evaluate(
 def _distance(predictor: Predictor, errors_m: Real) -> tuple[Real, Real]:
     """Add up the sizes of the errors (prediction, n, 2): (n,), and their slopes (n, 2, responses).
 
-    Errors of one sign follow each other in runs, and the slope is summed by parts: where a run ends, the
-    responses of all steps so far count with its sign, twice if another run follows, which takes them back.
+    The slopes are summed by parts, from the last part to the first: where errors change their sign, the
+    responses of all steps before count twice, once to take them back from the part after. The sign of an
+    error is its sign bit; errors that are all zero have no slope.
     """
     scalar = errors_m.dtype.type
-    run, distance = np.zeros_like(errors_m[0]), np.zeros_like(errors_m[0])
-    slopes = np.zeros((*run.shape, predictor.response_sum.shape[1]), scalar)
-    for error, responses in zip(errors_m, predictor.response_sum[:-1], strict=True):
-        ends = np.where(error > 0, run < 0, (error < 0) & (run > 0))
-        if np.any(ends):
-            ended = np.where(ends, run, scalar(0))
-            distance = distance + np.abs(ended)
-            slopes = slopes + (sign(ended)[..., None] * responses)
-            run = run - ended
-        run = run + error
-    distance = distance + np.abs(run)
-    slopes = slopes + (sign(run)[..., None] * predictor.response_sum[-1])
-    return distance[:, 0] + distance[:, 1], slopes
+    distance = ordered_sum(np.abs(errors_m), axis=0)
+    below = np.signbit(errors_m) if errors_m.dtype.kind == "f" else errors_m < 0
+    changes = below[1:] != below[:-1]
+    slopes = np.broadcast_to(
+        predictor.response_sum[-1], (*distance.shape, predictor.response_sum.shape[1])
+    )
+    for change, responses in zip(changes[::-1], predictor.response_sum[-2:0:-1], strict=True):
+        slopes = np.where(change[..., None], responses - slopes, slopes)
+    sign_of_first = np.where(distance == 0, scalar(0), np.where(below[0], scalar(-1), scalar(1)))
+    return distance[:, 0] + distance[:, 1], sign_of_first[..., None] * slopes
