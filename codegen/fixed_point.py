@@ -9,8 +9,8 @@ A position error beyond what the horizon can change keeps its sign there whateve
 a little more than that reach, which changes neither a slope nor a difference of costs, and leaves the bits to
 the errors that matter.
 
-The sizes of the errors of a whole horizon add up in one word. Distance, cost and gradient have 64 bits, of which they use
-no more than 53: a double holds them.
+The sizes of the errors of a whole horizon add up in one word. Distance, cost and gradient have 64 bits, of
+which they use no more than 53: a double holds them.
 """
 
 import math

@@ -43,10 +43,10 @@ class HorizonTables:
     axes:            roll and pitch.
     has_lag:         whether the measured attitude enters the prediction.
     axes_alike:      axes that share a response, 2 if both lags are equal, else 1.
-    response_sum:    (prediction + 1, responses) sum, over all steps before each, of how far a unit of bend
-                     of each move has carried the error; twice that, but for the last row, the end of the
-                     horizon. Moves are ordered roll, pitch of the first, and so on; where both axes settle
-                     alike, each pair of moves shares one response. The last move is held to the end.
+    response_sum:    (prediction, responses) sum, over all steps to each, of how far a unit of bend of each
+                     move has carried the error; twice that, but for the last step. Moves are ordered roll,
+                     pitch of the first, and so on; where both axes settle alike, each pair of moves shares
+                     one response. The last move is held to the end.
     """
 
     step_squared_s2: float
@@ -96,10 +96,10 @@ def _axis(period_s: float, lag_s: float, held: float) -> AxisConstants:
 
 def _response_sum(horizon: Horizon, axes: tuple[AxisConstants, ...]) -> NDArray[np.float64]:
     """Walk with a unit of bend of each move, taken back by the next, and add up the errors twice."""
-    sums = np.zeros((horizon.prediction + 1, horizon.control, len(axes)))
+    sums = np.zeros((horizon.prediction, horizon.control, len(axes)))
     for axis, constants in enumerate(axes):
         for move in range(horizon.control):
-            error = advance = bend = to_come = 0.0
+            total = error = advance = bend = to_come = 0.0
             for step in range(horizon.prediction):
                 turn = float(step == move) - float(step == move + 1 < horizon.control)
                 advance = advance + (constants.at_once * turn)
@@ -108,6 +108,7 @@ def _response_sum(horizon: Horizon, axes: tuple[AxisConstants, ...]) -> NDArray[
                 error = error + advance
                 advance = advance + (bend + to_come)
                 to_come = to_come * constants.decay
-                sums[step + 1, move, axis] = sums[step, move, axis] + error
+                total = total + error
+                sums[step, move, axis] = total
     sums[:-1] *= 2
-    return sums.reshape(horizon.prediction + 1, -1)
+    return sums.reshape(horizon.prediction, -1)

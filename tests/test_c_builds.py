@@ -13,9 +13,11 @@ from codegen import presets
 from codegen.errors import InvalidSettingsError
 from codegen.flags import WARNING_FLAGS
 from codegen.frozen import frozen_digest
+from codegen.literals import C_TYPES
 from codegen.render import render
 from codegen.settings import Settings
 from codegen.settings.controller_toml import with_option
+from sil.sign_decisions import in_scalar
 from sil.verify.dialects import DIALECTS
 from tests.support.cases import settings_case
 from tests.support.tools import require
@@ -163,6 +165,16 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     assert abs(last[2] - 1.0) < 0.05
     shell("make", "-s", "clean", folder=tmp_path)
     assert not (tmp_path / "build").exists()
+
+
+@pytest.mark.parametrize("scalar", C_TYPES)
+def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: str, tmp_path: Path) -> None:
+    """They lack operations that gcc and clang have, and loops written out."""
+    require("make", "make")
+    settings = in_scalar(presets.load("mambo"), scalar)
+    placed(settings, tmp_path)
+    printed = shell("make", "-s", "run", "CC=gcc -U__GNUC__", folder=tmp_path)
+    assert f"digest: 0x{frozen_digest(settings, 1000):08X} after 100000 steps\n" in printed
 
 
 def test_another_digest_than_the_reference_s_fails_the_example(tmp_path: Path) -> None:

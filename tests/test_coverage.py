@@ -8,7 +8,7 @@ import pytest
 from codegen import presets
 from sil.sign_decisions import in_scalar
 from sil.verify import coverage
-from sil.verify.check import Outcome
+from sil.verify.check import Outcome, Result
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require
@@ -19,6 +19,13 @@ DEAD = (
     "    nmpc_status_t status = NMPC_OK;\n\n    if (status == NMPC_BAD_THRUST) {\n"
     "        return NMPC_BAD_COMMAND;\n    }\n    if (!(is_good",
 )
+LOOP = "for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {"
+
+
+def explained_outside_the_self_test(result: Result) -> list[str]:
+    """Return the lines whose gaps needed a reason."""
+    gaps = (row["gap"] for row in result.figures["explained"])
+    return [gap.partition(": ")[2].partition(": ")[2] for gap in gaps if "self_test" not in gap]
 
 
 @pytest.fixture(autouse=True)
@@ -28,12 +35,12 @@ def _tools() -> None:
 
 
 def test_every_line_is_run_and_every_branch_taken(tmp_path: Path) -> None:
-    """What no case reaches is explained, and nothing of the controller itself is."""
+    """What no case reaches is explained: beside the self-test, that the bound of a loop is not used up."""
     result = coverage.check(subject(presets.load("mambo"), tmp_path))
     assert result.outcome is Outcome.PASSED, result.evidence
     assert result.figures["branches"] > 100
     assert json.loads(json.dumps(result.figures)) == result.figures
-    assert all("self_test" in row["gap"] for row in result.figures["explained"])
+    assert explained_outside_the_self_test(result) == [LOOP]
 
 
 @pytest.mark.long
@@ -53,7 +60,7 @@ def test_floats_around_whole_numbers_are_run(tmp_path: Path) -> None:
     """In fixed point nmpc_float.c is played too; no gap of it needs a reason."""
     result = coverage.check(subject(in_scalar(presets.load("mambo"), "fixed"), tmp_path))
     assert result.outcome is Outcome.PASSED, result.evidence
-    assert all("self_test" in row["gap"] for row in result.figures["explained"])
+    assert explained_outside_the_self_test(result) == [LOOP]
 
 
 def test_floats_that_differ_from_their_numbers_fail(tmp_path: Path) -> None:

@@ -34,8 +34,8 @@ HARMS = {
     "one move too many": Harm(STEP, r"k < NMPC_MOVES", "k <= NMPC_MOVES"),
     "a table is read past its end": Harm(
         COST,
-        r"NMPC_LAST_STEP - nmpc_lowest_one",
-        "(NMPC_LAST_STEP + 2U) - nmpc_lowest_one",
+        r"\(NMPC_LAST_STEP - 1U\) - nmpc_lowest_one",
+        "(NMPC_LAST_STEP + 1U) - nmpc_lowest_one",
     ),
     "a bad input leaves the command unset": Harm(
         STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""

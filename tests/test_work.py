@@ -43,13 +43,16 @@ def read(folder: Path, text: str, compiler: str = "gcc") -> Reading:
         ("i = 8; i < 8; i++", 0),
         ("i = 9; i <= 8; i++", 0),
         ("i = SIZE; i < SIZE * SIZE; i++", 6),
+        ("i = 0; (x != 0) && (i < 8); i++", (0, 8)),
     ],
 )
-def test_passes_of_a_loop_are_those_of_python(tmp_path: Path, head: str, passes: int) -> None:
+def test_passes_of_a_loop_are_those_of_python(
+    tmp_path: Path, head: str, passes: int | tuple[int, int]
+) -> None:
     """Every form that is allowed, counted by hand."""
     found = read(tmp_path, "#define SIZE 3\n" + LOOP.replace("i = 0; i < 8; i++", head))
     assert found.faults == ()
-    assert list(found.trips.values()) == [passes]
+    assert list(found.trips.values()) == [passes if isinstance(passes, tuple) else (passes, passes)]
 
 
 TWO_LOOPS = "for (i = 0; i < 3; i++) { } for (i = 0; i < 4; i++) { }"
@@ -60,6 +63,10 @@ FAULTS = {
     "no step": ("i++", "", "from a constant to a constant"),
     "no end": ("i < 8", "", "go on while i"),
     "a second condition": ("i < 8", "(i < 8) && (sum < 9)", "go on while i"),
+    "a second condition first": ("i < 8", "(sum < 9) && (i < 8)", "go on while i"),
+    "a word that something is done to": ("i < 8", "(g(x) != 0) && (i < 8)", "go on while i"),
+    "a word that has a certain value": ("i < 8", "(x != 1) && (i < 8)", "go on while i"),
+    "an end by either of two": ("i < 8", "(x != 0) || (i < 8)", "go on while i"),
     "an end that may be missed": ("i < 8", "i != 8", "go on while i"),
     "away from its end": ("i++", "i--", "towards its end"),
     "another counter": ("i < 8", "x < 8", "go on while i"),
@@ -115,7 +122,7 @@ def test_a_switch_and_an_inner_loop_may_stand_in_a_loop(tmp_path: Path) -> None:
     body = "int k;\nfor (k = 0; k < 3; k++) {\nswitch (x) {\ncase 1: sum++;\nbreak;\ndefault: break;\n}\n}"
     found = read(tmp_path, LOOP.replace("sum += x;", body))
     assert found.faults == ()
-    assert sorted(found.trips.values()) == [3, 8]
+    assert sorted(found.trips.values()) == [(3, 3), (8, 8)]
 
 
 RUNS = """
@@ -151,6 +158,22 @@ def test_runs_are_counted_over_every_way(tmp_path: Path) -> None:
     assert (least["f"], least["two"], least["one"]) == (1, 0, 3 * (1 + 1))
     assert (most["f"], most["two"], most["one"]) == (1, 3 * 2 + 1, 3 * (2 + 1 + 2) + 2 + 1)
     assert [count for place, count in least.items() if "a.c" in place] == [3]
+
+
+def test_a_loop_that_may_end_sooner_may_make_no_pass(tmp_path: Path) -> None:
+    """What it calls runs as often as it makes a pass."""
+    text = RUNS.replace("i = 0; i < 3", "i = 0; (x != 0) && (i < 3)")
+    least, most = runs(read(tmp_path, text), "f")
+    assert (least["one"], most["one"]) == (0, 3 * (2 + 1 + 2) + 2 + 1)
+    assert [count for place, count in most.items() if "a.c" in place] == [3]
+
+
+def test_operations_of_the_compiler_are_no_calls(tmp_path: Path) -> None:
+    """Any other builtin is."""
+    text = "int f(unsigned long x) { return __builtin_ctzl(x); }\n"
+    assert read(tmp_path, text).faults == ()
+    found = read(tmp_path, text.replace("ctzl", "popcountl"))
+    assert ["does not define" in fault for fault in found.faults] == [True]
 
 
 def checked(chosen: Subject) -> Result:
@@ -308,4 +331,4 @@ def test_without_the_names_of_the_sub_blocks_nothing_is_said(tmp_path: Path) -> 
 def test_both_compilers_leave_the_same_loops(tmp_path: Path) -> None:
     """Standard headers included, which pycparser would not read as they are."""
     text = "#include <stdint.h>\n#include <string.h>\n" + LOOP
-    assert read(tmp_path, text, "gcc").trips == read(tmp_path, text, "clang").trips == {"a.c:7": 8}
+    assert read(tmp_path, text, "gcc").trips == read(tmp_path, text, "clang").trips == {"a.c:7": (8, 8)}

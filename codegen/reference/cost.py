@@ -38,17 +38,15 @@ def _distance(predictor: Predictor, errors_m: Real) -> tuple[Real, Real]:
     """Add up the sizes of the errors (prediction, n, 2): (n,), and their slopes (n, 2, responses).
 
     The slopes are summed by parts, from the last part to the first: where errors change their sign, the
-    responses of all steps before count twice, once to take them back from the part after. The sign of an
-    error is its sign bit; errors that are all zero have no slope.
+    responses of all steps up to there count twice, for the part after had taken them with the other sign.
+    The sign of an error is its sign bit; errors that are all zero have no slope.
     """
     scalar = errors_m.dtype.type
     distance = ordered_sum(np.abs(errors_m), axis=0)
     below = np.signbit(errors_m) if errors_m.dtype.kind == "f" else errors_m < 0
     changes = below[1:] != below[:-1]
-    slopes = np.broadcast_to(
-        predictor.response_sum[-1], (*distance.shape, predictor.response_sum.shape[1])
-    )
-    for change, responses in zip(changes[::-1], predictor.response_sum[-2:0:-1], strict=True):
+    slopes = np.broadcast_to(predictor.response_sum[-1], (*distance.shape, predictor.response_sum.shape[1]))
+    for change, responses in zip(changes[::-1], predictor.response_sum[-2::-1], strict=True):
         slopes = np.where(change[..., None], responses - slopes, slopes)
     sign_of_first = np.where(distance == 0, scalar(0), np.where(below[0], scalar(-1), scalar(1)))
     return distance[:, 0] + distance[:, 1], sign_of_first[..., None] * slopes

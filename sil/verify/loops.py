@@ -31,6 +31,9 @@ _MEETS: Final[dict[str, Callable[[int, int], bool]]] = {
     ">=": operator.ge,
 }
 
+_OF_THE_COMPILER: Final = {"__builtin_ctzl", "__builtin_ctzll", "__builtin_fabs", "__builtin_fabsf"}
+"""What looks like a function and is an operation, or a table where a processor lacks it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Unit:
@@ -58,29 +61,34 @@ def place(node: Any) -> str:
     return f"{Path(node.coord.file).name}:{node.coord.line}"
 
 
+Passes = tuple[int, int]
+"""How many passes a loop makes whenever it is entered: at least, at most."""
+
+
 @dataclass(frozen=True, eq=False)
 class Reading:
     """What the units of a library hold.
 
-    trips:  the passes that each loop (file:line) makes whenever it is entered.
+    trips:  the passes of each loop (file:line).
     faults: what breaks a rule, each with its place.
     """
 
     defined: Mapping[str, Any]
     """Every function by name; one in a header stands in several units, alike."""
-    trips: Mapping[str, int]
+    trips: Mapping[str, Passes]
     faults: Sequence[str]
 
 
 def read_loops(units: Sequence[Unit]) -> Reading:
     """Read every function, and hold it against the rules.
 
-    A loop is a `for` from a constant to a constant by a constant. Nothing in it writes its counter, nothing
-    leaves it early. Calls go to functions of the library by name, and never in a circle. Names are those of
-    an amalgamated library, where no two files have a function of their own by the same name.
+    A loop is a `for` from a constant to a constant by a constant; it may end sooner when a word has no ones
+    left. Nothing in it writes its counter, nothing leaves it early. Calls go to functions of the library by
+    name, and never in a circle, or to what the compiler has instead of a function. Names are those of an
+    amalgamated library, where no two files have a function of their own by the same name.
     """
     defined = {name: node for unit in units for name, node in unit.functions.items()}
-    trips: dict[str, int] = {}
+    trips: dict[str, Passes] = {}
     faults: list[str] = []
     for unit in units:
         loops = [place(node) for node in walk(unit.tree) if isinstance(node, c_ast.For)]
@@ -89,10 +97,10 @@ def read_loops(units: Sequence[Unit]) -> Reading:
             faults += _jumps(name, node)
             for loop in (found for found in walk(node) if isinstance(found, c_ast.For)):
                 passes = _passes(loop, _counters(node))
-                if isinstance(passes, int):
-                    trips[place(loop)] = passes
-                else:
+                if isinstance(passes, str):
                     faults.append(f"{place(loop)}: {name}: {passes}")
+                else:
+                    trips[place(loop)] = passes
     faults += _calls(defined)
     return Reading(defined, trips, tuple(dict.fromkeys(faults)))
 
@@ -136,9 +144,12 @@ def _is_plain_int(node: Any) -> bool:
     )
 
 
-def _passes(loop: Any, counters: set[str]) -> int | str:
+def _passes(loop: Any, counters: set[str]) -> Passes | str:
     """Return how many passes a `for` makes, or which rule it breaks."""
     begin, test, step = loop.init, loop.cond, loop.next
+    may_end_sooner = isinstance(test, c_ast.BinaryOp) and test.op == "&&" and _has_ones(test.left)
+    if may_end_sooner:
+        test = test.right
     if not (isinstance(begin, c_ast.Assignment) and begin.op == "=" and isinstance(begin.lvalue, c_ast.ID)):
         return "a loop must begin with counter = constant"
     counter = begin.lvalue.name
@@ -156,7 +167,17 @@ def _passes(loop: Any, counters: set[str]) -> int | str:
     trips = max(0, -(-(last - first) // by))
     if test.op in {"<=", ">="} and _MEETS[test.op](first, last):
         trips = (last - first) // by + 1
-    return _disturbance(loop.stmt, counter) or trips
+    return _disturbance(loop.stmt, counter) or (0 if may_end_sooner else trips, trips)
+
+
+def _has_ones(test: Any) -> bool:
+    """Tell whether a condition is that a word, a variable, has ones."""
+    return (
+        isinstance(test, c_ast.BinaryOp)
+        and test.op == "!="
+        and isinstance(test.left, c_ast.ID)
+        and constant(test.right) == 0
+    )
 
 
 def _step(step: Any, counter: str) -> int | None:
@@ -221,12 +242,14 @@ def _calls(defined: Mapping[str, Any]) -> list[str]:
     below: dict[str, set[str]] = {}
     for name, node in defined.items():
         calls = [found for found in walk(node) if isinstance(found, c_ast.FuncCall)]
-        known = [call for call in calls if isinstance(call.name, c_ast.ID) and call.name.name in defined]
+        named = [call for call in calls if isinstance(call.name, c_ast.ID)]
+        known = [call for call in named if call.name.name in defined]
+        inline = [call for call in named if call.name.name in _OF_THE_COMPILER]
         below[name] = {call.name.name for call in known}
         faults += [
             f"{place(call)}: {name} calls what the library does not define"
             for call in calls
-            if call not in known
+            if call not in known and call not in inline
         ]
     for name, called in below.items():
         reached: set[str] = set()

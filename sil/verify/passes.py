@@ -38,16 +38,17 @@ def _runs(reading: Reading, node: Any) -> Runs:
         case c_ast.BinaryOp(op="&&" | "||"):
             least = of("left")[0]
         case c_ast.For():
-            trips = reading.trips[place(node)]
-            passes = Counter({place(node): trips})
-            least, most = (_times(count, trips) + passes for count in of("stmt"))
+            least, most = (
+                _times(count, trips) + Counter({place(node): trips})
+                for count, trips in zip(of("stmt"), reading.trips[place(node)], strict=True)
+            )
         case c_ast.Compound():
             least = Counter()
             for statement, part in parts.values():
                 least += part[0]
                 if any(isinstance(found, c_ast.Return) for found in walk(statement)):
                     break  # what follows may not run
-        case c_ast.FuncCall():
+        case c_ast.FuncCall() if node.name.name in reading.defined:
             called = runs(reading, node.name.name)
             least, most = least + called[0], most + called[1]
         case _:

@@ -112,7 +112,7 @@ def judge(reading: Reading, counted: Counted, settings: Settings) -> Result:
         return Result(Outcome.FAILED, "; ".join(wrong), figures)
     return Result(
         Outcome.PASSED,
-        f"{len(reading.trips)} loops, each from a constant to a constant; {iterations} evaluations in "
+        f"{len(reading.trips)} loops, each bounded by a constant; {iterations} evaluations in "
         f"each of {figures['accepted']} accepted steps, none in {figures['refused']} refused; "
         f"{figures['fewest_passes']} to {figures['most_passes']} passes of all loops in a step",
         figures,
@@ -132,7 +132,13 @@ def _loops(
 ) -> list[dict[str, Any]]:
     """Return for every loop of a step how often it may run, and ran."""
     return [
-        {"loop": loop, "passes": trips, "least": least[loop], "most": most[loop], "seen": list(seen[loop])}
+        {
+            "loop": loop,
+            "passes": list(trips),
+            "least": least[loop],
+            "most": most[loop],
+            "seen": list(seen[loop]),
+        }
         for loop, trips in reading.trips.items()
         if most[loop]
     ]
