@@ -93,7 +93,7 @@ typedef long long nmpc_sum_t;
 #define NMPC_TRACKING_BITS 6
 #define NMPC_EFFORT_BITS 28
 #define NMPC_COST_BITS 25
-#define NMPC_GRADIENT_BITS 30
+#define NMPC_GRADIENT_BITS 28
 
 /* Numbers of constants, as in NMPC_POSITION(1.5): the nearest, ties away from zero, by the compiler. For values
  * known at run time only there is nmpc_float.h. */
@@ -115,8 +115,8 @@ typedef long long nmpc_sum_t;
 #define NMPC_BEND_BITS 25
 #define NMPC_ERROR_BITS 19
 #define NMPC_SHARE_BITS 31
-#define NMPC_RESPONSE_BITS 22
-#define NMPC_SLOPE_BITS 24
+#define NMPC_RESPONSE_BITS 21
+#define NMPC_SLOPE_BITS 22
 #define NMPC_FACTOR_BITS 30
 #define NMPC_SINE_BITS 30
 

@@ -2,9 +2,7 @@
  *
  * What `make proof` examines, by abstract interpretation with Frama-C's plug-in Eva: whatever the numbers, and in
  * whatever order the functions are called, as often as you like, there is no access to memory out of bounds or
- * uninitialised, no division by zero, no shift too far, no command beyond the tilt limit, and no overflow, but for
- * alarms in the sums of the prediction: intervals do not know that what is to come takes back of a bend, nor that
- * runs of errors alternate. Those sums are bounded where the formats are chosen, outside of this proof.
+ * uninitialised, no overflow, no division by zero, no shift too far, and no command beyond the tilt limit.
  *
  * take_numbers() calls everything, and takes for granted what turn_everywhere() shows: that sine and cosine, of
  * any heading, do not overflow and are not larger than one, but for rounding.

@@ -16,18 +16,20 @@ typedef char nmpc_assert_shift_rounds_down[(((-3) >> 1) == -2) ? 1 : -1];
 extern "C" {
 #endif
 
-/* Put before a loop over moves, axes or responses to have it written out: on a Cortex-M4F that keeps their sums in registers
- * and saves 6 to 9 % of the instructions of a step. Other compilers judge for themselves. */
+/* Put before a loop over moves, axes or responses to have it written out: on a Cortex-M4F that keeps their sums in
+ * registers. Other compilers judge for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
 #else
 #define NMPC_UNROLL
 #endif
 
-static inline nmpc_sum_t nmpc_absolute(nmpc_sum_t value)
-{
-    return (value < (nmpc_sum_t)0) ? -value : value;
-}
+/* The same for the loop over predicted steps; on a desk it runs a tenth faster as it stands. */
+#if defined(__x86_64__)
+#define NMPC_UNROLL_STEPS
+#else
+#define NMPC_UNROLL_STEPS NMPC_UNROLL
+#endif
 
 /* The sign of zero, of either sign, is 0. */
 static inline int nmpc_sign(nmpc_sum_t value)
@@ -35,14 +37,13 @@ static inline int nmpc_sign(nmpc_sum_t value)
     return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);
 }
 
-/* The bits of a value; the highest is its sign. Where there is no FPU, reading that is much cheaper than a
+/* The bits of a value; the highest is its sign. Where there is no FPU, reading bits is much cheaper than a
  * comparison. */
 #if defined(__SIZEOF_INT__) && (__SIZEOF_INT__ < 4)
 typedef unsigned long nmpc_bits_t;
 #else
 typedef unsigned int nmpc_bits_t;
 #endif
-#define NMPC_SIGN_BIT ((nmpc_bits_t)1 << 31)
 
 static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
 {
@@ -53,6 +54,38 @@ static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
 
     view.real = value;
     return view.bits;
+}
+
+/* A word with a bit for each predicted step, and the place of the last. */
+typedef unsigned long nmpc_steps_t;
+#define NMPC_LAST_STEP 9U
+
+/* 1 if `value` is below zero, or the negative zero. */
+static inline nmpc_steps_t nmpc_is_below(nmpc_real_t value)
+{
+    const nmpc_bits_t sign = nmpc_bits(value) >> 31U;
+
+    return (nmpc_steps_t)sign;
+}
+
+/* The place of the lowest one in `word`, which has one. */
+static inline unsigned int nmpc_lowest_one(nmpc_steps_t word)
+{
+#if defined(__GNUC__)
+    return (unsigned int)__builtin_ctzl(word);
+#else
+    unsigned int place = 0U;
+
+    while ((((word >> place) & 1U) == 0U) && (place < (NMPC_LAST_STEP - 1U))) {
+        place++;
+    }
+    return place;
+#endif
+}
+
+static inline nmpc_sum_t nmpc_absolute(nmpc_sum_t value)
+{
+    return (value < (nmpc_sum_t)0) ? -value : value;
 }
 
 static inline nmpc_real_t nmpc_smaller(nmpc_real_t a, nmpc_real_t b)

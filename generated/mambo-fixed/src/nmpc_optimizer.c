@@ -47,11 +47,12 @@ static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int slope)
 void nmpc_optimizer_minimize(nmpc_t *self)
 {
     nmpc_rprop_t rprop[NMPC_MOVES];
-    unsigned char updates = 0U;
-    unsigned char converged = 0U;
+    int updates = 0;
+    int converged = 0;
     int iteration;
     int k;
 
+    NMPC_UNROLL
     for (k = 0; k < NMPC_MOVES; k++) {
         rprop[k].step_rad = NMPC_INITIAL_STEP_RAD;
         rprop[k].before_rad = self->plan_rad[k];
@@ -61,21 +62,20 @@ void nmpc_optimizer_minimize(nmpc_t *self)
     for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
         const nmpc_sum_t previous_cost = self->cost;
 
-        self->cost = nmpc_cost_evaluate(&self->prediction, &self->weights, self->command_rad, self->plan_rad,
-                                        self->gradient);
+        self->cost = nmpc_cost_evaluate(self);
         if ((iteration > 0) && (nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
-            converged = 1U;
+            converged = 1;
         }
-        if (converged == 0U) {
+        if (converged == 0) {
             updates++;
         }
         /* Once the cost has come to rest all slopes are level: the plan stays, and the work goes on. */
         for (k = 0; k < NMPC_MOVES; k++) {
-            const int slope = (converged == 0U) ? nmpc_sign(self->gradient[k]) : 0;
+            const int slope = (converged == 0) ? nmpc_sign(self->gradient[k]) : 0;
 
             self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], slope);
         }
     }
-    self->iterations = updates;
-    self->converged = converged;
+    self->iterations = (unsigned char)updates;
+    self->converged = (unsigned char)converged;
 }

@@ -11,10 +11,8 @@
 extern "C" {
 #endif
 
-/* Return the cost of `moves_rad`, of which the first follows `last_rad`; fill `gradient`, per rad. */
-nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_weights_t *weights,
-                              const nmpc_real_t last_rad[NMPC_AXES], const nmpc_real_t moves_rad[NMPC_MOVES],
-                              nmpc_sum_t gradient[NMPC_MOVES]);
+/* Return the cost of the plan, of which the first move follows the last command; fill the gradient. */
+nmpc_sum_t nmpc_cost_evaluate(nmpc_t *self);
 
 #ifdef __cplusplus
 }

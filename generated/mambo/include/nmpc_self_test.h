@@ -13,7 +13,7 @@
 #define NMPC_SELF_TEST_TICKS 100
 
 /* The digest of all episodes, as the reference computed it. */
-#define NMPC_SELF_TEST_DIGEST 0x3BCFCB6DUL
+#define NMPC_SELF_TEST_DIGEST 0x258F5794UL
 
 #ifdef __cplusplus
 extern "C" {

@@ -7,94 +7,84 @@
 #include "nmpc_math.h"
 #include "nmpc_predictor.h"
 
-/* The errors along one axis of the world; they keep their sign for many steps in a row. */
+/* The errors along one axis of the world. */
 typedef struct {
-    nmpc_real_t run_m;                  /* sum of the errors since the sign last changed */
-    nmpc_bits_t sign;                   /* bits of a value with that sign */
-    nmpc_sum_t distance_m;              /* sizes of the errors before */
-    nmpc_real_t slopes[NMPC_RESPONSES]; /* what they add to the slope of the distance */
+    nmpc_real_t distance_m; /* the sum of their sizes */
+    nmpc_steps_t below;     /* a bit each, the last one's lowest: 1 below zero */
 } nmpc_errors_t;
 
-static inline void start_errors(nmpc_errors_t *errors, nmpc_real_t error_m)
+/* Walk to the next step and take note of the error there. */
+static inline void walk_on(nmpc_walk_t *walk, nmpc_errors_t *errors)
 {
+    nmpc_predictor_walk(walk);
+    errors->distance_m = errors->distance_m + (nmpc_real_t)nmpc_absolute(walk->error_m);
+    errors->below = (errors->below << 1) | nmpc_is_below(walk->error_m);
+}
+
+/* Sum the slopes of the distance by parts, from the last part to the first: where errors change their sign, the
+ * responses of all steps up to there count twice, for the part after had taken them with the other sign. Errors
+ * that are all zero have no slope. */
+static inline void find_slopes(const nmpc_errors_t *errors, nmpc_real_t slopes[NMPC_RESPONSES])
+{
+    static const nmpc_real_t signs[] = { (nmpc_real_t)1, -(nmpc_real_t)1 };
+    nmpc_real_t sign = (nmpc_real_t)0;
+    nmpc_steps_t changes = (errors->below ^ (errors->below >> 1)) & (((nmpc_steps_t)1 << NMPC_LAST_STEP) - 1U);
+    int part;
     int k;
 
-    errors->run_m = (nmpc_real_t)0;
-    errors->sign = nmpc_bits(error_m);
-    errors->distance_m = (nmpc_sum_t)0;
     NMPC_UNROLL
     for (k = 0; k < NMPC_RESPONSES; k++) {
-        errors->slopes[k] = (nmpc_real_t)0;
+        slopes[k] = nmpc_predictor_response_sum[NMPC_LAST_STEP][k];
     }
-}
+    for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {
+        const unsigned int i = (NMPC_LAST_STEP - 1U) - nmpc_lowest_one(changes);
 
-/* End the run before step `i`. Its slope is summed by parts: the responses of all steps so far count with its
- * sign, twice if another run follows, which takes them back once. */
-static inline void end_run(nmpc_errors_t *errors, int i)
-{
-    int k;
-
-    if (errors->run_m > (nmpc_real_t)0) {
-        errors->distance_m = errors->distance_m + errors->run_m;
         NMPC_UNROLL
         for (k = 0; k < NMPC_RESPONSES; k++) {
-            errors->slopes[k] = errors->slopes[k] + nmpc_predictor_response_sum[i][k];
+            slopes[k] = nmpc_predictor_response_sum[i][k] - slopes[k];
         }
-    } else if (errors->run_m < (nmpc_real_t)0) {
-        errors->distance_m = errors->distance_m - errors->run_m;
-        NMPC_UNROLL
-        for (k = 0; k < NMPC_RESPONSES; k++) {
-            errors->slopes[k] = errors->slopes[k] - nmpc_predictor_response_sum[i][k];
-        }
-    } else {
-        /* No error, no slope. */
+        changes = changes & (changes - 1U);
+    }
+    if (nmpc_bits(errors->distance_m) != 0U) {
+        sign = signs[errors->below >> NMPC_LAST_STEP];
+    }
+    NMPC_UNROLL
+    for (k = 0; k < NMPC_RESPONSES; k++) {
+        slopes[k] = sign * slopes[k];
     }
 }
 
-/* Walk to step `i` and add the error there. */
-static inline void walk_to(nmpc_walk_t *walk, nmpc_errors_t *errors, int i)
+nmpc_sum_t nmpc_cost_evaluate(nmpc_t *self)
 {
-    nmpc_bits_t sign;
-
-    nmpc_predictor_walk(walk);
-    sign = nmpc_bits(walk->error_m);
-    if ((((sign ^ errors->sign) & NMPC_SIGN_BIT) != 0U) && (nmpc_sign(walk->error_m) != 0)) {
-        end_run(errors, i);
-        errors->run_m = (nmpc_real_t)0;
-        errors->sign = sign;
-    }
-    errors->run_m = errors->run_m + walk->error_m;
-}
-
-nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_weights_t *weights,
-                              const nmpc_real_t last_rad[NMPC_AXES], const nmpc_real_t moves_rad[NMPC_MOVES],
-                              nmpc_sum_t gradient[NMPC_MOVES])
-{
-    const nmpc_weights_t weight = *weights;
+    const nmpc_prediction_t *const prediction = &self->prediction;
+    const nmpc_real_t *const moves_rad = self->plan_rad;
+    const nmpc_weights_t weight = self->weights;
     nmpc_walk_t walk_x = prediction->x;
     nmpc_walk_t walk_y = prediction->y;
-    nmpc_errors_t errors_x;
-    nmpc_errors_t errors_y;
+    nmpc_errors_t errors_x = { (nmpc_real_t)0, 0U };
+    nmpc_errors_t errors_y = { (nmpc_real_t)0, 0U };
+    nmpc_real_t slopes_x[NMPC_RESPONSES];
+    nmpc_real_t slopes_y[NMPC_RESPONSES];
     nmpc_sum_t distance_m;
     nmpc_sum_t variation_rad = (nmpc_sum_t)0;
     int axis;
     int i;
 
     /* Eq 12a. */
-    start_errors(&errors_x, walk_x.error_m);
-    start_errors(&errors_y, walk_y.error_m);
+    NMPC_UNROLL
     for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
         nmpc_predictor_turn(prediction, moves_rad, i, &walk_x, &walk_y);
-        walk_to(&walk_x, &errors_x, i);
-        walk_to(&walk_y, &errors_y, i);
+        walk_on(&walk_x, &errors_x);
+        walk_on(&walk_y, &errors_y);
     }
+    NMPC_UNROLL_STEPS
     for (i = NMPC_CONTROL_HORIZON; i < NMPC_PREDICTION_HORIZON; i++) {
-        walk_to(&walk_x, &errors_x, i);
-        walk_to(&walk_y, &errors_y, i);
+        walk_on(&walk_x, &errors_x);
+        walk_on(&walk_y, &errors_y);
     }
-    end_run(&errors_x, NMPC_PREDICTION_HORIZON);
-    end_run(&errors_y, NMPC_PREDICTION_HORIZON);
-    distance_m = errors_x.distance_m + errors_y.distance_m;
+    find_slopes(&errors_x, slopes_x);
+    find_slopes(&errors_y, slopes_y);
+    distance_m = (nmpc_sum_t)errors_x.distance_m + errors_y.distance_m;
 
     /* Eq 12b: a move counts by its change from the one before, the first by that from the last command; its
      * slope falls to both moves. */
@@ -102,7 +92,7 @@ nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_we
     for (axis = 0; axis < NMPC_AXES; axis++) {
         const nmpc_real_t gain_x_m = prediction->gain_x_m[axis];
         const nmpc_real_t gain_y_m = prediction->gain_y_m[axis];
-        nmpc_real_t before_rad = last_rad[axis];
+        nmpc_real_t before_rad = self->command_rad[axis];
         nmpc_sum_t slope = (nmpc_sum_t)0;
 
         NMPC_UNROLL
@@ -110,8 +100,8 @@ nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_we
             const int k = (NMPC_AXES * i) + axis;
             const int response = k / NMPC_AXES_ALIKE;
             const nmpc_real_t change_rad = moves_rad[k] - before_rad;
-            const nmpc_real_t distance_by_move_m = nmpc_distance_slope(gain_x_m, errors_x.slopes[response], gain_y_m,
-                                                                       errors_y.slopes[response]);
+            const nmpc_real_t distance_by_move_m = nmpc_distance_slope(gain_x_m, slopes_x[response], gain_y_m,
+                                                                       slopes_y[response]);
             nmpc_sum_t effort = (nmpc_sum_t)0;
 
             if (change_rad > (nmpc_real_t)0) {
@@ -124,12 +114,12 @@ nmpc_sum_t nmpc_cost_evaluate(const nmpc_prediction_t *prediction, const nmpc_we
                 /* No change, no slope. */
             }
             if (i > 0) {
-                gradient[k - NMPC_AXES] = slope - effort;
+                self->gradient[k - NMPC_AXES] = slope - effort;
             }
             slope = nmpc_tracking_slope(weight.tracking, distance_by_move_m) + effort;
             before_rad = moves_rad[k];
         }
-        gradient[(NMPC_MOVES - NMPC_AXES) + axis] = slope;
+        self->gradient[(NMPC_MOVES - NMPC_AXES) + axis] = slope;
     }
     return nmpc_tracking_cost(weight.tracking, distance_m) + nmpc_effort_cost(weight.effort, variation_rad);
 }

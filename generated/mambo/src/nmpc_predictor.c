@@ -6,8 +6,7 @@
  */
 #include "nmpc_predictor.h"
 
-const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_RESPONSES] = {
-    { 0.0f, 0.0f, 0.0f, 0.0f },
+const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES] = {
     { 0.06457953f, 0.11179243f, 0.0f, 0.0f },
     { 0.4921019f, 0.8219046f, 0.06457953f, 0.11179243f },
     { 1.5842701f, 2.5605955f, 0.55668145f, 0.93369704f },

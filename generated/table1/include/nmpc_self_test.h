@@ -13,7 +13,7 @@
 #define NMPC_SELF_TEST_TICKS 100
 
 /* The digest of all episodes, as the reference computed it. */
-#define NMPC_SELF_TEST_DIGEST 0x698187F0UL
+#define NMPC_SELF_TEST_DIGEST 0x9249FB69UL
 
 #ifdef __cplusplus
 extern "C" {

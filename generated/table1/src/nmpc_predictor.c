@@ -6,8 +6,7 @@
  */
 #include "nmpc_predictor.h"
 
-const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_RESPONSES] = {
-    { 0.0f, 0.0f },
+const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES] = {
     { 1.0f, 0.0f },
     { 4.0f, 1.0f },
     { 9.0f, 5.0f },

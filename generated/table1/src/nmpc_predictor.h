@@ -20,11 +20,11 @@ extern "C" {
 #define NMPC_PITCH 1
 
 
-/* How far a unit of bend of each move has carried the error, summed over all steps before each; twice that, but
- * once at the end of the horizon. Axes that settle alike share their responses. */
+/* How far a unit of bend of each move has carried the error, summed over all steps to each; twice that, but for
+ * the last step. Axes that settle alike share their responses. */
 #define NMPC_AXES_ALIKE 2
 #define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_ALIKE)
-extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON + 1][NMPC_RESPONSES];
+extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES];
 
 /* Evaluate eq 8 at the present heading and thrust, and find where the walks start without moves. */
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
