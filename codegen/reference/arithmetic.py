@@ -162,7 +162,8 @@ class FixedArithmetic:
     def distance_slope(self, gain_m: Real, slopes: Real) -> Real:
         f = self._formats
         shares = gain_m * slopes
-        return rounded(shares[:, 0] + shares[:, 1], f.gain + f.response - f.slope)
+        slope: Real = (shares[:, 0] + shares[:, 1]) >> (f.gain + f.response - f.slope)
+        return slope
 
     def tracking_cost(self, weight: Real, distance_m: Real) -> Real:
         return weight * distance_m

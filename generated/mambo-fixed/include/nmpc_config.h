@@ -115,7 +115,7 @@ typedef long long nmpc_sum_t;
 #define NMPC_BEND_BITS 25
 #define NMPC_ERROR_BITS 19
 #define NMPC_SHARE_BITS 31
-#define NMPC_RESPONSE_BITS 21
+#define NMPC_RESPONSE_BITS 20
 #define NMPC_SLOPE_BITS 22
 #define NMPC_FACTOR_BITS 30
 #define NMPC_SINE_BITS 30

@@ -13,7 +13,7 @@
 #define NMPC_SELF_TEST_TICKS 100
 
 /* The digest of all episodes, as the reference computed it. */
-#define NMPC_SELF_TEST_DIGEST 0xB4B23D89UL
+#define NMPC_SELF_TEST_DIGEST 0x2C85F95AUL
 
 #ifdef __cplusplus
 extern "C" {

@@ -168,11 +168,12 @@ static inline nmpc_real_t nmpc_step_of(nmpc_real_t advance_m)
     return advance_m >> (NMPC_BEND_BITS - NMPC_ERROR_BITS);
 }
 
+/* Rounded down as well. */
 static inline nmpc_real_t nmpc_distance_slope(nmpc_real_t gain_x_m, nmpc_real_t slope_x, nmpc_real_t gain_y_m,
                                               nmpc_real_t slope_y)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)gain_x_m * slope_x) + ((nmpc_sum_t)gain_y_m * slope_y),
-                                     NMPC_GAIN_BITS + NMPC_RESPONSE_BITS - NMPC_SLOPE_BITS);
+    return (nmpc_real_t)((((nmpc_sum_t)gain_x_m * slope_x) + ((nmpc_sum_t)gain_y_m * slope_y))
+                         >> (NMPC_GAIN_BITS + NMPC_RESPONSE_BITS - NMPC_SLOPE_BITS));
 }
 
 static inline nmpc_sum_t nmpc_tracking_cost(nmpc_real_t weight, nmpc_sum_t distance_m)
