@@ -56,6 +56,11 @@ class HorizonTables:
     axes_alike: int
     response_sum: NDArray[np.float64]
 
+    @property
+    def halves(self) -> bool:
+        """Whether every turn adds half of its bend to the next advance: no lag, and exact positions."""
+        return not self.has_lag and self.held == 0.5
+
 
 def horizon_tables(settings: Settings) -> HorizonTables:
     """Derive the prediction constants from the horizon and the model of `settings`."""

@@ -2,8 +2,9 @@
 
 import math
 import re
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, Final
 
 import jinja2
 
@@ -54,7 +55,7 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     the header state the digest of the frozen steps: what is compiled to run at once need not wait for it.
     """
     numbers = Representation(settings)
-    environment = _environment(literals.Spelling(settings.code.scalar, numbers.bits))
+    environment = _environment()
     public: tuple[str, ...] = PUBLIC_HEADERS
     code: tuple[str, ...] = SOURCES
     if numbers.formats is not None:
@@ -93,7 +94,9 @@ def with_prefix(text: str, prefix: str) -> str:
     return _OWN_NAME.sub(lambda name: prefix if name[1] == "nmpc" else prefix.upper(), text)
 
 
-def _environment(spelling: literals.Spelling) -> jinja2.Environment:
+@cache
+def _environment() -> jinja2.Environment:
+    """Return what holds the compiled templates; "spelling" of the context says how numbers are spelled."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("templates", ""),
         undefined=jinja2.StrictUndefined,
@@ -102,8 +105,19 @@ def _environment(spelling: literals.Spelling) -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.filters |= {"real": spelling.real, "row": spelling.row, "rows": spelling.rows}
+    environment.filters |= {name: _spelled(name) for name in ("real", "row", "rows")}
     return environment
+
+
+def _spelled(name: str) -> Callable[..., str]:
+    """Return a filter: the method `name` of the spelling that the context has."""
+
+    @jinja2.pass_context
+    def spelled(context: jinja2.runtime.Context, *arguments: Any, **options: Any) -> str:
+        text: str = getattr(context["spelling"], name)(*arguments, **options)
+        return text
+
+    return spelled
 
 
 def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
@@ -112,6 +126,7 @@ def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
     scalar = settings.code.scalar
     return {
         "settings": settings,
+        "spelling": literals.Spelling(scalar, numbers.bits),
         "parameters": [
             (f"{section}.{key}", value)
             for section, values in settings.model_dump().items()

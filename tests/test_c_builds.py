@@ -13,13 +13,11 @@ from codegen import presets
 from codegen.errors import InvalidSettingsError
 from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from codegen.frozen import frozen_digest
-from codegen.literals import C_TYPES
 from codegen.render import render
 from codegen.settings import Settings
 from codegen.settings.controller_toml import with_option
-from sil.sign_decisions import in_scalar
 from sil.verify.dialects import DIALECTS
-from tests.support.cases import settings_case
+from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require
 
 STRICT = [*WARNING_FLAGS, "-Werror"]
@@ -167,11 +165,11 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     assert not (tmp_path / "build").exists()
 
 
-@pytest.mark.parametrize("scalar", C_TYPES)
+@pytest.mark.parametrize("scalar", SCALARS)
 def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: str, tmp_path: Path) -> None:
     """They lack operations that gcc and clang have, and loops written out."""
     require("gcc", "gcc")
-    settings = in_scalar(presets.load("mambo"), scalar)
+    settings = with_option(presets.load("mambo"), "code.scalar", scalar, "test")
     sources = sorted(placed(settings, tmp_path).glob("src/*.c"))
     gcc = ("gcc", *COMPILE_FLAGS, "-Iinclude")
     shell(*gcc, "-U__GNUC__", "-c", *sources, folder=tmp_path)

@@ -3,11 +3,11 @@
 import pytest
 
 from codegen import presets
-from codegen.literals import C_TYPES
 from codegen.render import render
-from sil.sign_decisions import in_scalar
+from codegen.settings.controller_toml import with_option
 from sil.verify import coverage_reasons, mutation_reasons
 from sil.verify.reasons import Reason, plain
+from tests.support.cases import SCALARS
 
 
 @pytest.fixture(scope="module")
@@ -15,8 +15,8 @@ def generated() -> dict[str, str]:
     """Return each file as all presets in all scalar types have it, one after the other."""
     texts: dict[str, str] = {}
     for name in presets.names():
-        for scalar in C_TYPES:
-            files = render(in_scalar(presets.load(name), scalar), with_digest=False)
+        for scalar in SCALARS:
+            files = render(with_option(presets.load(name), "code.scalar", scalar, "test"), with_digest=False)
             texts |= {path: texts.get(path, "") + plain(text, "nmpc") for path, text in files.items()}
     return texts
 
