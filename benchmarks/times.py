@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from benchmarks import peers_setups as problem
 from benchmarks.host_builds import NATIVE, PORTABLE, build, plans, silence, sizes
-from benchmarks.optimum import Lags, above
+from benchmarks.optimum import above
 from benchmarks.ours import bundle_program, peers_model, place_bundle, place_rollout, rollout_program
 from benchmarks.peers_c import NotHereError, generate, run_tool
 from benchmarks.peers_programs import Program, host_programs
@@ -59,12 +59,15 @@ _BUILDS: Final = {"portable": PORTABLE, "native": NATIVE}
 
 @dataclass(frozen=True)
 class Contender:
-    """What is measured: `write` puts its C into a folder, and returns the versions that wrote it."""
+    """What is measured: `write` puts its C into a folder, and returns the versions that wrote it.
+
+    Its plans are held against the optimum of the problem of `settings`.
+    """
 
     name: str
     program: Program
     write: Callable[[Path], dict[str, str]]
-    lags_s: Lags = (0.0, 0.0)
+    settings: Settings
 
 
 def contenders(python: str) -> list[Contender]:
@@ -78,9 +81,7 @@ def contenders(python: str) -> list[Contender]:
         "mambo": ("mambo-nmpc, preset mambo", mambo),
     }
     found = [
-        Contender(
-            name, bundle_program(title, settings), partial(_place, place_bundle, settings), _lags(settings)
-        )
+        Contender(name, bundle_program(title, settings), partial(_place, place_bundle, settings), settings)
         for name, (title, settings) in variants.items()
     ]
     for name, title, settings in (
@@ -88,13 +89,9 @@ def contenders(python: str) -> list[Contender]:
         ("rollout-mambo", "preset mambo, plain roll-out", mambo),
     ):
         write = partial(_place, place_rollout, settings)
-        found.append(Contender(name, rollout_program(title, settings), write, _lags(settings)))
+        found.append(Contender(name, rollout_program(title, settings), write, settings))
     peers = host_programs(*problem.literals())
-    return found + [Contender(peer.name, peer, partial(generate, python, peer)) for peer in peers]
-
-
-def _lags(settings: Settings) -> Lags:
-    return settings.model.roll_lag_s, settings.model.pitch_lag_s
+    return found + [Contender(peer.name, peer, partial(generate, python, peer), alike) for peer in peers]
 
 
 def _place(place: Callable[[Settings, Path], None], settings: Settings, folder: Path) -> dict[str, str]:
@@ -131,7 +128,7 @@ def _prepared(contender: Contender, sets: dict[str, Inputs], work: Path) -> tupl
     if program.cost != "quadratic, other problem":
         for name, (last, planned, _) in tried.items():
             inputs = np.concatenate([sets[name][:, :4], last], 1)
-            shares = above(program.cost, contender.lags_s, inputs[::_SAMPLE], planned[::_SAMPLE])
+            shares = above(program.cost, contender.settings, inputs[::_SAMPLE], planned[::_SAMPLE])
             excess[name] = (float(np.median(shares)), float(np.percentile(shares, 99)))
     heap = tried["W"][2]
     row = replace(
