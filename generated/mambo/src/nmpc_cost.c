@@ -36,6 +36,7 @@ static inline void find_slopes(const nmpc_errors_t *errors, nmpc_real_t slopes[N
     for (k = 0; k < NMPC_RESPONSES; k++) {
         slopes[k] = nmpc_predictor_response_sum[NMPC_LAST_STEP][k];
     }
+    /* One pass for each change of sign; the count bounds the loop for whoever does not see the word run out. */
     for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {
         const unsigned int i = (NMPC_LAST_STEP - 1U) - nmpc_lowest_one(changes);
 
