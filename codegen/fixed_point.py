@@ -179,7 +179,7 @@ def formats(settings: Settings) -> Formats:
         bend=bend,
         error=error,
         share=share,
-        response=_fit(2 * reach.response),  # gcc does worse with a shift of their products by a whole word
+        response=_fit(2 * reach.response),  # a bit to spare: gcc shifts by less than 32 in fewer instructions
         slope=slope,
         tracking=tracking,
         effort=effort,

@@ -20,7 +20,8 @@ WARNING_FLAGS: Final = (
 )
 
 PROOF_PREPROCESSING: Final = ("-msse2", "-mfpmath=sse", "-U__GNUC__")
-"""Frama-C takes the sizes of a 32-bit machine; these keep the preprocessor from naming its x87."""
+"""Frama-C takes the sizes of a 32-bit machine; two keep the preprocessor from naming its x87, and without
+__GNUC__ two operations of gcc and clang are spelled out in C."""
 
 PROOFS: Final = {
     # NaN is an alarm wherever an operation gives it.

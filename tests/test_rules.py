@@ -20,6 +20,10 @@ SETTINGS = (
     {name: presets.load(name) for name in presets.names()}
     | {f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)}
     | {"fixed": in_scalar(presets.load("mambo"), "fixed")}
+    | {
+        f"{steps} steps": with_option(presets.load("mambo"), "horizon.prediction", steps, "test")
+        for steps in (2, 33)
+    }
 )
 HARMS = {
     "15.1 goto": Harm("src/nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),

@@ -1,9 +1,9 @@
 """Products and constants of the controller, by what they mean: `nmpc_math.h` has the same, by the same names.
 
 In floating point a product is one multiplication. In fixed point it is one multiplication to 64 bits and one
-shift to the format of the result, rounded to nearest, ties up; the products of a walk and of a step of the
-optimizer are rounded down. Sums, differences and comparisons are plain in both. The arrays of a fixed point
-reference are int64, and none of their numbers needs more.
+shift to the format of the result, rounded to nearest, ties up; the products of a walk, of a slope of the
+distance and of a step of the optimizer are rounded down. Sums, differences and comparisons are plain in
+both. The arrays of a fixed point reference are int64, and none of their numbers needs more.
 """
 
 from functools import lru_cache

@@ -37,9 +37,10 @@ def evaluate(
 def _distance(predictor: Predictor, errors_m: Real) -> tuple[Real, Real]:
     """Add up the sizes of the errors (prediction, n, 2): (n,), and their slopes (n, 2, responses).
 
-    The slopes are summed by parts, from the last part to the first: where errors change their sign, the
-    responses of all steps up to there count twice, for the part after had taken them with the other sign.
-    The sign of an error is its sign bit; errors that are all zero have no slope.
+    A slope, by the bend of a move, is the sum of the responses of all steps, each with the sign of its error.
+    It is summed by parts, from the last part to the first: with S(i) the sum of responses of steps 0..i,
+    signs + + - - give 2 S(1) - S(3); `response_sum` holds 2 S(i), in its last row S. The sign of an error is
+    its sign bit; errors that are all zero have no slope.
     """
     scalar = errors_m.dtype.type
     distance = ordered_sum(np.abs(errors_m), axis=0)

@@ -32,7 +32,7 @@ _MEETS: Final[dict[str, Callable[[int, int], bool]]] = {
 }
 
 _OF_THE_COMPILER: Final = {"__builtin_ctzl", "__builtin_ctzll", "__builtin_fabs", "__builtin_fabsf"}
-"""What looks like a function and is an operation, or a table where a processor lacks it."""
+"""What looks like a function and is an operation, or a call into libgcc where a processor lacks it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -78,7 +78,6 @@ _MOST_WALKED: Final = 8
 _STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
 _EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
 _REFUSED: Final = "stands for what no format holds; no range contains it, nor its neighbour, nor -2^31"
-_ZERO: Final = "minus zero is compared, and nothing else is done with it"
 _SIGN: Final = "of a slope and of a direction only the sign is read"
 _THIRD: Final = (
     "not the same, and out of sight: the third part, 3.5e-27, changes a sine that is nearly zero, and every "
@@ -180,7 +179,13 @@ REASONS: Final[tuple[Reason, ...]] = (
         )
         for what in ("0 -> 1", "0 -> (-1)")
     ),
-    Reason("src/nmpc_math.h", "return (value < (nmpc_sum_t)0) ? -value : value;", "< -> <=", _ZERO),
+    Reason(
+        "src/nmpc_math.h",
+        "return (value < (nmpc_sum_t)0) ? -value : value;",
+        "< -> <=",
+        "zero negated is zero",
+        _is_fixed,
+    ),
     *(
         Reason(
             "src/nmpc_math.h",

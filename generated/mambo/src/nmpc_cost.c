@@ -21,9 +21,10 @@ static inline void walk_on(nmpc_walk_t *walk, nmpc_errors_t *errors)
     errors->below = (errors->below << 1) | nmpc_is_below(walk->error_m);
 }
 
-/* Sum the slopes of the distance by parts, from the last part to the first: where errors change their sign, the
- * responses of all steps up to there count twice, for the part after had taken them with the other sign. Errors
- * that are all zero have no slope. */
+/* Find the slopes of the distance by the bend of each move: the responses of all steps, each with the sign of its
+ * error. They are summed by parts, from the last part to the first. With S(i) the sum of responses of steps 0..i,
+ * signs + + - - give 2 S(1) - S(3); the table holds 2 S(i), in its last row S. Errors that are all zero have no
+ * slope. */
 static inline void find_slopes(const nmpc_errors_t *errors, nmpc_real_t slopes[NMPC_RESPONSES])
 {
     static const nmpc_real_t signs[] = { (nmpc_real_t)1, -(nmpc_real_t)1 };
@@ -36,7 +37,7 @@ static inline void find_slopes(const nmpc_errors_t *errors, nmpc_real_t slopes[N
     for (k = 0; k < NMPC_RESPONSES; k++) {
         slopes[k] = nmpc_predictor_response_sum[NMPC_LAST_STEP][k];
     }
-    /* One pass for each change of sign; the count bounds the loop for whoever does not see the word run out. */
+    /* Step i is the last before a change of sign. The changes run out first; the count is there to be seen. */
     for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {
         const unsigned int i = (NMPC_LAST_STEP - 1U) - nmpc_lowest_one(changes);
 

@@ -63,7 +63,8 @@ static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
     return view.bits;
 }
 
-/* A word with a bit for each predicted step, and the place of the last. */
+/* A word with a bit for each predicted step, counted from 0: the last step's is the lowest, the first step's that at
+ * place NMPC_LAST_STEP. */
 typedef unsigned long nmpc_steps_t;
 #define NMPC_LAST_STEP 9U
 
@@ -81,10 +82,10 @@ static inline unsigned int nmpc_lowest_one(nmpc_steps_t word)
 #if defined(__GNUC__)
     return (unsigned int)__builtin_ctzl(word);
 #else
-    unsigned int place = 0U;
+    unsigned int place;
 
-    while ((((word >> place) & 1U) == 0U) && (place < (NMPC_LAST_STEP - 1U))) {
-        place++;
+    for (place = 0U; ((place + 1U) < NMPC_LAST_STEP) && (((word >> place) & 1U) == 0U); place++) {
+        /* Nothing to do on the way. */
     }
     return place;
 #endif
