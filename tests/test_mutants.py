@@ -94,7 +94,7 @@ MUTANTS = [
     Mutant("y looks where x is", PREDICTOR, "state->position_m[1] - target", "state->position_m[0] - target"),
     Mutant("pitch takes roll's response", COST, "slopes_x[response]", "slopes_x[response - axis]"),
     Mutant("a change of sign is found a step late", COST, "(NMPC_LAST_STEP - 1U) - nmpc_lowest_one", "NMPC_LAST_STEP - nmpc_lowest_one"),
-    Mutant("a change of sign before the horizon", COST, "<< NMPC_LAST_STEP) - 1U)", "<< (NMPC_LAST_STEP + 1U)) - 1U)"),
+    Mutant("the first change of sign goes unseen", COST, "<< NMPC_LAST_STEP) - 1U)", "<< (NMPC_LAST_STEP - 1U)) - 1U)"),
     Mutant("one change of sign too few", COST, "part = 1;", "part = NMPC_PREDICTION_HORIZON - 1;"),
     Mutant("the gradient of pitch takes the gain of roll", COST, "gain_x_m[axis]", "gain_x_m[0]"),
     Mutant("pitch decays like roll", PREDICTOR_H, "nmpc_part(NMPC_PITCH_DECAY, walk->pitch", "nmpc_part(NMPC_ROLL_DECAY, walk->pitch"),
