@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.peers_c import definitions, run_tool, sources
 from benchmarks.peers_programs import Program
-from codegen.toolchain import host_toolchain
+from mambo_nmpc.codegen.toolchain import host_toolchain
 
 Array = NDArray[Any]
 

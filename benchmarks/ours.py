@@ -11,11 +11,11 @@ from typing import Final
 
 from benchmarks import peers_setups as problem
 from benchmarks.peers_programs import HEAD, Program
-from codegen import presets
-from codegen.literals import real
-from codegen.render import render
-from codegen.representation import Representation
-from codegen.settings import Settings
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.literals import real
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
 
 _GLUE: Final = (
     '#include "nmpc.h"\n\nstatic nmpc_t controller;\nstatic float given[2];\nstatic int is_set;\n\n'

@@ -15,17 +15,17 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.searches import Searching, SearchingController, best_iterate, from_level, optimum
-from codegen import boards, presets
-from codegen.settings import Settings
-from sil.arrays import FloatArray
-from sil.campaign.flights import crashed
-from sil.compiled import CompiledController
-from sil.footprint import measure_footprint
-from sil.gusts import LIGHT_M_S
-from sil.loop import PositionController, fly
-from sil.metrics import Metrics, measure
-from sil.scenario import Scenario, flight_of
-from sil.traces import SensedTrace
+from mambo_nmpc.codegen import boards, presets
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.campaign.flights import crashed
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.footprint import measure_footprint
+from mambo_nmpc.sil.gusts import LIGHT_M_S
+from mambo_nmpc.sil.loop import PositionController, fly
+from mambo_nmpc.sil.metrics import Metrics, measure
+from mambo_nmpc.sil.scenario import Scenario, flight_of
+from mambo_nmpc.sil.traces import SensedTrace
 
 PRESETS: Final = ("table1", "mambo")
 EFFORT_WEIGHTS: Final = (1.0, 100.0, 200.0, 300.0, 1000.0)

@@ -16,9 +16,9 @@ from scipy.linalg import expm
 from scipy.optimize import linprog
 from scipy.sparse import block_diag
 
-from codegen.reference import ReferenceController, Status, Step
-from codegen.reference.optimizer import Evaluate, Search, minimize
-from codegen.settings import Settings
+from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
+from mambo_nmpc.codegen.reference.optimizer import Evaluate, Search, minimize
+from mambo_nmpc.codegen.settings import Settings
 
 Array = NDArray[np.float64]
 

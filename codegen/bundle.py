@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-import codegen
-from codegen import exchange
-from codegen.errors import ForeignFilesError, LayoutError, UnwritableError, echo
-from codegen.exchange import JOURNAL, MANIFEST, STAND_IN
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen import exchange
+from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, UnwritableError, echo
+from mambo_nmpc.codegen.exchange import JOURNAL, MANIFEST, STAND_IN
 
 GENERATOR = "mambo-nmpc"
 

@@ -16,9 +16,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-import codegen
-from codegen import bundle, exchange, presets
-from codegen.errors import (
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen import bundle, exchange, presets
+from mambo_nmpc.codegen.errors import (
     BAD_INPUT,
     INTERRUPTED,
     NO_READER,
@@ -28,8 +28,8 @@ from codegen.errors import (
     UnwritableError,
     echo,
 )
-from codegen.render import render
-from codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings, controller_toml
 
 EXIT_CODES = (
     "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "

@@ -21,9 +21,9 @@ from typing import Final
 
 import numpy as np
 
-from codegen.horizon import HorizonTables, horizon_tables
-from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
-from codegen.settings.model import Settings
+from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
+from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.settings.model import Settings
 
 WORD_BITS: Final = 31
 """Bits of a number beside its sign."""

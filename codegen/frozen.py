@@ -13,11 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.fixed_point import LARGEST
-from codegen.reference import ReferenceController, Step
-from codegen.reference.math import Real, rounded
-from codegen.representation import STATE, TARGET, Limits, Representation
-from codegen.settings import Settings
+from mambo_nmpc.codegen.fixed_point import LARGEST
+from mambo_nmpc.codegen.reference import ReferenceController, Step
+from mambo_nmpc.codegen.reference.math import Real, rounded
+from mambo_nmpc.codegen.representation import STATE, TARGET, Limits, Representation
+from mambo_nmpc.codegen.settings import Settings
 
 TICKS: Final = 100
 """Steps of an episode."""

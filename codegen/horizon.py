@@ -16,8 +16,8 @@ from decimal import Decimal, localcontext
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.settings import Settings
-from codegen.settings.model import Horizon
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Horizon
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from codegen.fixed_point import LARGEST, raw
+from mambo_nmpc.codegen.fixed_point import LARGEST, raw
 
 Scalar = type[np.floating[Any]]
 """The scalar type of a floating point controller, `numpy.float32` or `numpy.float64`."""

@@ -4,10 +4,10 @@ import difflib
 from importlib import resources
 from pathlib import Path
 
-from codegen.errors import SourceNotFoundError, echo
-from codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.errors import SourceNotFoundError, echo
+from mambo_nmpc.codegen.settings import Settings, controller_toml
 
-_FOLDER = resources.files("codegen") / "data" / "presets"
+_FOLDER = resources.files("mambo_nmpc.codegen") / "data" / "presets"
 
 
 def names() -> tuple[str, ...]:

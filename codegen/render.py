@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import jinja2
 
-import codegen
-from codegen import boards, literals
-from codegen.fixed_point import SINE_BITS
-from codegen.flags import (
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen import boards, literals
+from mambo_nmpc.codegen.fixed_point import SINE_BITS
+from mambo_nmpc.codegen.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
     PROOF_PREPROCESSING,
@@ -19,14 +19,14 @@ from codegen.flags import (
     WARNING_FLAGS,
     proofs,
 )
-from codegen.frozen import HELD, TICKS, episodes, frozen_digest, spread
-from codegen.horizon import horizon_tables
-from codegen.representation import STATE, THRUST, WEIGHTS, Representation
-from codegen.self_test import hover_thrust, self_test
-from codegen.settings import Settings
-from codegen.settings.controller_toml import to_toml
-from codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
-from codegen.trigonometry import SINE_ERRORS, fixed_trigonometry, trigonometry
+from mambo_nmpc.codegen.frozen import HELD, TICKS, episodes, frozen_digest, spread
+from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.representation import STATE, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.self_test import hover_thrust, self_test
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import to_toml
+from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.trigonometry import SINE_ERRORS, fixed_trigonometry, trigonometry
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
 SUB_BLOCKS: Final = ("nmpc_math", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
@@ -98,7 +98,7 @@ def with_prefix(text: str, prefix: str) -> str:
 def _environment() -> jinja2.Environment:
     """Return what holds the compiled templates; "spelling" of the context says how numbers are spelled."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("templates", ""),
+        loader=jinja2.PackageLoader("mambo_nmpc.templates", ""),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.fixed_point import LARGEST, SINE_BITS, Formats, formats, raw
-from codegen.literals import SCALARS
-from codegen.settings import Settings
-from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, formats, raw
+from mambo_nmpc.codegen.literals import SCALARS
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 
 STATE: Final = (*["position"] * 2, *["velocity"] * 2, *["angle"] * 2, "yaw")
 TARGET: Final = (*["position"] * 2, *["velocity"] * 2)

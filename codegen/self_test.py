@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from codegen.literals import SCALARS
-from codegen.reference import ReferenceController, Status
-from codegen.settings import Settings
+from mambo_nmpc.codegen.literals import SCALARS
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.settings import Settings
 
 STEPS: Final = 24
 _GOLDEN_RATIO: Final = 0.6180339887498949

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from codegen.errors import UnreadableFileError, echo
+from mambo_nmpc.codegen.errors import UnreadableFileError, echo
 
 LARGEST_FILE_BYTES = 64_000
 

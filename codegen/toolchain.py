@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from codegen.errors import BuildError, echo
+from mambo_nmpc.codegen.errors import BuildError, echo
 
 
 @dataclass(frozen=True)

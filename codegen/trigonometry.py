@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from codegen.fixed_point import SINE_BITS, WORD_BITS, Formats
-from codegen.literals import SCALARS
+from mambo_nmpc.codegen.fixed_point import SINE_BITS, WORD_BITS, Formats
+from mambo_nmpc.codegen.literals import SCALARS
 
 SINE_ERRORS: Final = {"float32": 1.2e-7, "float64": 2.3e-16, "fixed": 2e-9}
 """Largest absolute error of sine and cosine within YAW_LIMIT_RAD: about one ulp of 1; two in fixed point."""

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sil.arrays import FloatArray
-from sil.table2 import PD
-from sil.traces import Trace
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.table2 import PD
+from mambo_nmpc.sil.traces import Trace
 
 LONGEST_S: Final = 200.0
 """What is shown of a long flight, in s."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sil.arrays import FloatArray
+from mambo_nmpc.sil.arrays import FloatArray
 
 POSITION_P_RAD_M = 0.24
 POSITION_D_RAD_S_M = 0.1

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter, MaxNLocator
 
-from codegen.boards import Board
-from sil.footprint import Footprint
-from sil.plots import COMMAND, FLOWN, style
-from sil.sweep import Point, budgets
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.sil.footprint import Footprint
+from mambo_nmpc.sil.plots import COMMAND, FLOWN, style
+from mambo_nmpc.sil.sweep import Point, budgets
 
 SWEPT: Final = {
     "flash_bytes": "flash, B",

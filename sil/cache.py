@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from sil.errors import CacheError
+from mambo_nmpc.sil.errors import CacheError
 
 _WORK: Final = "build-"
 _ABANDONED_S: Final = 3600.0

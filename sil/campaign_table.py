@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from codegen.errors import echo
-from sil.campaign.statistics import Table
-from sil.errors import ResultsError
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.campaign.statistics import Table
+from mambo_nmpc.sil.errors import ResultsError
 
 COMPARED: Final = {
     "iae_m_s": "IAE, m s",

@@ -13,14 +13,14 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from codegen import boards, presets
-from codegen import cli as generating
-from codegen.errors import echo
-from codegen.footprint.build import builder
-from codegen.reference import ReferenceController
-from codegen.representation import TARGET, Representation
-from codegen.settings import Settings
-from sil import (
+from mambo_nmpc.codegen import boards, presets
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.footprint.build import builder
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.representation import TARGET, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil import (
     cli_boards,
     cli_campaign,
     cli_faults,
@@ -30,23 +30,23 @@ from sil import (
     report,
     table2_sensed,
 )
-from sil.baseline import PdController
-from sil.cli_replay import fly_again
-from sil.compiled import CompiledController
-from sil.disturbances import Disturbances
-from sil.emulated import EmulatedController, build_guest
-from sil.errors import FlightError, TrajectoryError
-from sil.gusts import LIGHT_M_S
-from sil.loop import Flight, PositionController, Start
-from sil.loop import fly as simulate
-from sil.plant.vehicle import Vehicle
-from sil.progress import progress_bar
-from sil.results import SUMMARY, new_results, summary_text
-from sil.sensors.instruments import Sensors
-from sil.table2 import CASES, PD, fly_table2
-from sil.table2_sensed import fly_sensed
-from sil.traces import Trace, write_csv, write_npz
-from sil.trajectories import CURVES, Trajectory, Waypoints
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.cli_replay import fly_again
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.disturbances import Disturbances
+from mambo_nmpc.sil.emulated import EmulatedController, build_guest
+from mambo_nmpc.sil.errors import FlightError, TrajectoryError
+from mambo_nmpc.sil.gusts import LIGHT_M_S
+from mambo_nmpc.sil.loop import Flight, PositionController, Start
+from mambo_nmpc.sil.loop import fly as simulate
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.progress import progress_bar
+from mambo_nmpc.sil.results import SUMMARY, new_results, summary_text
+from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.table2 import CASES, PD, fly_table2
+from mambo_nmpc.sil.table2_sensed import fly_sensed
+from mambo_nmpc.sil.traces import Trace, write_csv, write_npz
+from mambo_nmpc.sil.trajectories import CURVES, Trajectory, Waypoints
 
 
 class SensorsKind(Enum):
@@ -295,7 +295,7 @@ def _table2_sensed(output: Path, scalar: str | None, *, as_json: bool) -> None:
 
 def _draw(flights: Mapping[str, Trace], stem: Path) -> None:
     """Draw, and only then load the plotting library: generating C does without it."""
-    from sil.plots import draw_flights  # noqa: PLC0415 - loaded when drawing
+    from mambo_nmpc.sil.plots import draw_flights  # noqa: PLC0415 - loaded when drawing
 
     draw_flights(flights, stem)
 

@@ -9,19 +9,19 @@ from typing import Annotated
 
 import typer
 
-from codegen import boards
-from codegen import cli as generating
-from codegen.boards import Board
-from codegen.errors import BuildError, InvalidSettingsError, echo
-from codegen.frozen import TICKS, episodes
-from codegen.settings import Settings
-from sil import footprint_report
-from sil.doctor import doctor_text, examine
-from sil.footprint import Footprint, measure_footprint
-from sil.progress import progress_bar
-from sil.results import SUMMARY, new_results, summary_text
-from sil.same_bits import REFERENCE, BuildDigest, builds, same_bits
-from sil.sweep import Grid, Point, budgets, largest_fit, sweep, write_points
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.errors import BuildError, InvalidSettingsError, echo
+from mambo_nmpc.codegen.frozen import TICKS, episodes
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil import footprint_report
+from mambo_nmpc.sil.doctor import doctor_text, examine
+from mambo_nmpc.sil.footprint import Footprint, measure_footprint
+from mambo_nmpc.sil.progress import progress_bar
+from mambo_nmpc.sil.results import SUMMARY, new_results, summary_text
+from mambo_nmpc.sil.same_bits import REFERENCE, BuildDigest, builds, same_bits
+from mambo_nmpc.sil.sweep import Grid, Point, budgets, largest_fit, sweep, write_points
 
 FOOTPRINT_FILES = ("footprint.png", "footprint.svg", "footprint.html")
 SWEEP_FILES = ("sweep.csv", "sweep.png", "sweep.svg")
@@ -75,7 +75,7 @@ def footprint(
         measured, missing = _measured(settings, chosen, optimisation)
         summary = footprint_report.summary(measured, source, settings)
         if folder is not None:
-            from sil.board_plots import draw_footprints  # noqa: PLC0415 - loaded when drawing
+            from mambo_nmpc.sil.board_plots import draw_footprints  # noqa: PLC0415 - loaded when drawing
 
             draw_footprints(measured, folder / "footprint")
             (folder / "footprint.html").write_text(footprint_report.page(summary), "utf-8")
@@ -172,7 +172,7 @@ def sweep_command(
             for point in sweep(settings, chosen, grid):
                 points.append(point)
                 progress(len(points) / total)
-        from sil.board_plots import draw_sweep  # noqa: PLC0415 - loaded when drawing
+        from mambo_nmpc.sil.board_plots import draw_sweep  # noqa: PLC0415 - loaded when drawing
 
         write_points(points, folder / "sweep.csv")
         draw_sweep(points, chosen, settings.horizon.update_period_s, folder / "sweep")

@@ -8,18 +8,18 @@ from typing import Annotated, Any
 
 import typer
 
-from codegen import cli as generating
-from codegen.errors import echo
-from codegen.exchange import put
-from sil.campaign import file
-from sil.campaign.executors import Pool, cluster, processes
-from sil.campaign.file import Campaign
-from sil.campaign.report import RECORDS, campaign_text, numeric, summary_of, write_records
-from sil.campaign.run import fly_missing, missing, opened
-from sil.campaign.store import TABLE, Store, refusals
-from sil.cli_boards import AsJson
-from sil.progress import counting_bar
-from sil.results import SUMMARY, summary_text
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.exchange import put
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes
+from mambo_nmpc.sil.campaign.file import Campaign
+from mambo_nmpc.sil.campaign.report import RECORDS, campaign_text, numeric, summary_of, write_records
+from mambo_nmpc.sil.campaign.run import fly_missing, missing, opened
+from mambo_nmpc.sil.campaign.store import TABLE, Store, refusals
+from mambo_nmpc.sil.cli_boards import AsJson
+from mambo_nmpc.sil.progress import counting_bar
+from mambo_nmpc.sil.results import SUMMARY, summary_text
 
 PICTURE = "campaign"
 _MOST_FLIGHTS = 100_000
@@ -94,7 +94,7 @@ def _fly(chosen: Campaign, store: Store, flights: int, pool: Pool) -> None:
 
 def _finish(chosen: Campaign, store: Store) -> dict[str, Any]:
     """Put the table in order, and write what follows from it, the summary last."""
-    from sil.campaign.plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
+    from mambo_nmpc.sil.campaign.plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
 
     store.put_in_order()
     write_records(chosen, store)

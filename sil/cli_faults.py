@@ -5,15 +5,15 @@ from typing import Annotated
 
 import typer
 
-from codegen import cli as generating
-from codegen.errors import echo
-from sil.cli_boards import AsJson, Source
-from sil.compiled import CompiledController
-from sil.errors import FlightError
-from sil.fault_flights import End, fly_faults
-from sil.fault_report import records, table, write_csv
-from sil.progress import progress_bar
-from sil.results import SUMMARY, new_results, summary_text
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.cli_boards import AsJson, Source
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.fault_flights import End, fly_faults
+from mambo_nmpc.sil.fault_report import records, table, write_csv
+from mambo_nmpc.sil.progress import progress_bar
+from mambo_nmpc.sil.results import SUMMARY, new_results, summary_text
 
 FAULT_FILES = ("faults.csv", "faults.png", "faults.svg")
 
@@ -43,7 +43,7 @@ def faults(
                 verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), progress)
         except FlightError as error:
             raise FlightError(f"{echo(source)}: {error}") from error
-        from sil.fault_plots import draw_faults  # noqa: PLC0415 - loaded when drawing
+        from mambo_nmpc.sil.fault_plots import draw_faults  # noqa: PLC0415 - loaded when drawing
 
         draw_faults(verdicts, folder / "faults")
         write_csv(verdicts, folder / "faults.csv")

@@ -4,16 +4,16 @@ from pathlib import Path
 
 import typer
 
-from codegen.errors import echo
-from sil import report
-from sil.baseline import PdController
-from sil.errors import FlightError
-from sil.inner_steps import WatchedController, write_inner_steps
-from sil.loop import fly as simulate
-from sil.progress import progress_bar
-from sil.results import SUMMARY, new_results, summary_text
-from sil.scenario import flight_of, read_record
-from sil.traces import write_csv, write_npz
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil import report
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.inner_steps import WatchedController, write_inner_steps
+from mambo_nmpc.sil.loop import fly as simulate
+from mambo_nmpc.sil.progress import progress_bar
+from mambo_nmpc.sil.results import SUMMARY, new_results, summary_text
+from mambo_nmpc.sil.scenario import flight_of, read_record
+from mambo_nmpc.sil.traces import write_csv, write_npz
 
 COMMAND = "fly --replay"
 REPLAY_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
@@ -43,7 +43,7 @@ def fly_again(context: typer.Context, file: Path, output: Path, *, as_json: bool
         write_npz(trace, folder / "trace.npz")
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
-        from sil.plots import draw_flights  # noqa: PLC0415 - loaded when drawing
+        from mambo_nmpc.sil.plots import draw_flights  # noqa: PLC0415 - loaded when drawing
 
         draw_flights({file.name: trace}, folder / "flight")
         recorded = record.trace_sha256

@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
-from codegen import cli as generating
-from codegen.errors import FileExistsRefusedError, UnwritableError, echo
-from codegen.exchange import put
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_nmpc.codegen.exchange import put
 
 MARK = '<meta name="generator" content="mambo-nmpc">'
 """What marks a page as ours, which may be written anew."""
@@ -33,7 +33,7 @@ def report(
     ] = Path("report.html"),
 ) -> None:
     """Show results on one HTML page that needs no network and no other file."""
-    from sil.report_page import report_page  # noqa: PLC0415 - it loads the plotting library
+    from mambo_nmpc.sil.report_page import report_page  # noqa: PLC0415 - it loads the plotting library
 
     name = echo(str(output))
     try:

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codegen import cli as generating
-from codegen.errors import echo
-from codegen.exchange import put
-from sil.campaign.executors import processes
-from sil.campaign.store import claim, refusals
-from sil.progress import counting_bar
-from sil.results import locked
-from sil.tuning import file
-from sil.tuning.file import Tuning
-from sil.tuning.front import RULE, chosen, controller_text, front_csv, pareto_front
-from sil.tuning.study import Judged, judged, open_study, search
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.exchange import put
+from mambo_nmpc.sil.campaign.executors import processes
+from mambo_nmpc.sil.campaign.store import claim, refusals
+from mambo_nmpc.sil.progress import counting_bar
+from mambo_nmpc.sil.results import locked
+from mambo_nmpc.sil.tuning import file
+from mambo_nmpc.sil.tuning.file import Tuning
+from mambo_nmpc.sil.tuning.front import RULE, chosen, controller_text, front_csv, pareto_front
+from mambo_nmpc.sil.tuning.study import Judged, judged, open_study, search
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -102,7 +102,7 @@ def _base(tuning: Tuning, found: list[Judged]) -> list[Judged]:
 
 def _finish(tuning: Tuning, found: list[Judged], folder: Path) -> None:
     """Write what follows from the trials, the controller last."""
-    from sil.tuning.plots import draw_front  # noqa: PLC0415 - loaded when drawing
+    from mambo_nmpc.sil.tuning.plots import draw_front  # noqa: PLC0415 - loaded when drawing
 
     with refusals(folder):
         put(folder / f"{FRONT}.csv", front_csv(pareto_front(found)).encode())

@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
-from codegen import bundle
-from codegen import cli as generating
-from codegen.errors import InvalidSettingsError, echo
-from codegen.render import render
-from codegen.settings import Settings
-from sil import verify_report
-from sil.progress import progress_bar
-from sil.results import SUMMARY, new_results, summary_text
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.checks import CHECKS, Entry
-from sil.verify_report import PAGE, Verified, line, verdict
+from mambo_nmpc.codegen import bundle
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil import verify_report
+from mambo_nmpc.sil.progress import progress_bar
+from mambo_nmpc.sil.results import SUMMARY, new_results, summary_text
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.checks import CHECKS, Entry
+from mambo_nmpc.sil.verify_report import PAGE, Verified, line, verdict
 
 CONTROLLER, REPORTS = "controller/", "checks/"
 NAMES = ", ".join(entry.name for entry in CHECKS)

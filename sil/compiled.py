@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.reference import Step
-from codegen.render import render
-from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from codegen.settings import Settings
-from codegen.toolchain import Toolchain, host_toolchain
-from sil.extension import load_extension
+from mambo_nmpc.codegen.reference import Step
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
+from mambo_nmpc.sil.extension import load_extension
 
 
 def plainly_named(settings: Settings) -> Settings:

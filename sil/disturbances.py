@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from sil.arrays import FloatArray, PerFlight
-from sil.gusts import Gusts
-from sil.plant.vehicle import STEP_S, Moment, Vehicle, VehicleState
+from mambo_nmpc.sil.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.gusts import Gusts
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Moment, Vehicle, VehicleState
 
 
 @dataclass(frozen=True, eq=False)

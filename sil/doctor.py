@@ -12,10 +12,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Final, Literal
 
-from codegen import boards
-from codegen.boards import Board
-from codegen.errors import BuildError, echo
-from codegen.toolchain import host_toolchain
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.errors import BuildError, echo
+from mambo_nmpc.codegen.toolchain import host_toolchain
 
 LIBFUZZER: Final = "libFuzzer"
 """A library of clang's, and no command: what links a fuzzer."""

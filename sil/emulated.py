@@ -9,16 +9,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from codegen.footprint.build import Builder
-from codegen.frozen import TICKS
-from codegen.reference import Step
-from codegen.render import render
-from codegen.representation import OUTCOME, Representation
-from codegen.settings import Settings
-from sil.compiled import DIRT, as_arrays, plainly_named
-from sil.errors import EmulatorError
-from sil.machine import TIME_LIMIT_S, start
-from sil.machine_avr import Long
+from mambo_nmpc.codegen.footprint.build import Builder
+from mambo_nmpc.codegen.frozen import TICKS
+from mambo_nmpc.codegen.reference import Step
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.representation import OUTCOME, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.compiled import DIRT, as_arrays, plainly_named
+from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.machine import TIME_LIMIT_S, start
+from mambo_nmpc.sil.machine_avr import Long
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
 """Functions of the guest that are called from outside."""
@@ -35,7 +35,7 @@ _MOST_PADDING: Final = 16
 
 def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
     """Build the program for an emulated core: the bundle of `settings` and the loop over n controllers."""
-    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    glue = resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
     return builder.guest(render(plainly_named(settings), with_digest=False), glue, GUEST, folder)
 
 

@@ -1,6 +1,6 @@
 """What can go wrong while flying, one class per thing a caller would do differently."""
 
-from codegen.errors import MamboNmpcError
+from mambo_nmpc.codegen.errors import MamboNmpcError
 
 
 class TrajectoryError(MamboNmpcError):

@@ -18,12 +18,12 @@ from typing import Final
 
 import cffi
 
-from codegen.errors import BuildError
-from codegen.flags import COMPILE_FLAGS
-from codegen.literals import C_TYPES, SUM_TYPES
-from codegen.toolchain import Toolchain
-from sil.cache import cached
-from sil.errors import CacheError
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS
+from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.cache import cached
+from mambo_nmpc.sil.errors import CacheError
 
 _DECLARATIONS: Final = """
 typedef REAL nmpc_real_t;
@@ -78,7 +78,7 @@ def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> 
 
     It is built with `toolchain` unless the cache has it. Raises BuildError and CacheError.
     """
-    glue = _INCLUDES + resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    glue = _INCLUDES + resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
     made_of = (
         files,

@@ -12,20 +12,20 @@ from typing import Final
 
 import numpy as np
 
-from codegen.reference import Status
-from codegen.settings import Settings
-from sil.arrays import FloatArray
-from sil.compiled import CompiledController
-from sil.errors import FlightError
-from sil.fault_scenarios import TO_THE_END, Scenario, scenarios
-from sil.faults import Fault, FaultyController, LevellingCaller, ReweightedController, WeightChange
-from sil.loop import Flight, fly
-from sil.metrics import TRANSIENT_S, horizontal_error_m
-from sil.plant.loops import THRUST_LIMIT_N, WEIGHT_N
-from sil.plant.vehicle import Vehicle
-from sil.table2 import CASES
-from sil.traces import Trace
-from sil.trajectories import Hover, Trajectories, Trajectory
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.fault_scenarios import TO_THE_END, Scenario, scenarios
+from mambo_nmpc.sil.faults import Fault, FaultyController, LevellingCaller, ReweightedController, WeightChange
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.metrics import TRANSIENT_S, horizontal_error_m
+from mambo_nmpc.sil.plant.loops import THRUST_LIMIT_N, WEIGHT_N
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.table2 import CASES
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Hover, Trajectories, Trajectory
 
 DURATION_S: Final = 100.0
 ONSETS_S: Final = (20.0, 23.1, 26.3, 29.4)

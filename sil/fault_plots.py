@@ -5,9 +5,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from sil.board_plots import save
-from sil.fault_flights import COURSES, STRAY_M, Verdict
-from sil.plots import COMMAND, FLOWN, style
+from mambo_nmpc.sil.board_plots import save
+from mambo_nmpc.sil.fault_flights import COURSES, STRAY_M, Verdict
+from mambo_nmpc.sil.plots import COMMAND, FLOWN, style
 
 
 def draw_faults(verdicts: Sequence[Verdict], stem: Path) -> tuple[Path, Path]:

@@ -7,9 +7,9 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, Final
 
-from codegen.reference import Status
-from sil.fault_flights import COURSES, ORDER, Verdict
-from sil.link import NOT_CALLED
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.sil.fault_flights import COURSES, ORDER, Verdict
+from mambo_nmpc.sil.link import NOT_CALLED
 
 _NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
 

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from codegen.reference import Status
-from codegen.settings import Settings
-from sil.faults import (
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.faults import (
     Alter,
     Drop,
     always,
@@ -21,7 +21,7 @@ from sil.faults import (
     yaw_shifted,
     yaw_wrapped,
 )
-from sil.link import NOT_CALLED
+from mambo_nmpc.sil.link import NOT_CALLED
 
 TO_THE_END: Final = math.inf
 

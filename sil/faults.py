@@ -12,9 +12,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sil.arrays import FloatArray, IntArray
-from sil.link import NOT_CALLED
-from sil.loop import Outcome, PositionController
+from mambo_nmpc.sil.arrays import FloatArray, IntArray
+from mambo_nmpc.sil.link import NOT_CALLED
+from mambo_nmpc.sil.loop import Outcome, PositionController
 
 
 @dataclass(frozen=True, eq=False)

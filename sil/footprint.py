@@ -6,23 +6,23 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from codegen.boards import Board
-from codegen.footprint.build import ENTRY, PREFIX, Builder, builder
-from codegen.footprint.disassembly import is_readable
-from codegen.footprint.elf import load
-from codegen.footprint.gate import Forbidden, forbidden
-from codegen.footprint.sizes import Added, added
-from codegen.footprint.stack import StackReport, worst_case
-from codegen.render import render
-from codegen.settings import Settings
-from sil.baseline import PdController
-from sil.compiled import plainly_named
-from sil.emulated import build_guest
-from sil.errors import EmulatorError
-from sil.instructions import InstructionCounts, count_instructions, in_flight, spread
-from sil.loop import Flight, fly
-from sil.traces import Trace
-from sil.trajectories import Bernoulli
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.footprint.build import ENTRY, PREFIX, Builder, builder
+from mambo_nmpc.codegen.footprint.disassembly import is_readable
+from mambo_nmpc.codegen.footprint.elf import load
+from mambo_nmpc.codegen.footprint.gate import Forbidden, forbidden
+from mambo_nmpc.codegen.footprint.sizes import Added, added
+from mambo_nmpc.codegen.footprint.stack import StackReport, worst_case
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.compiled import plainly_named
+from mambo_nmpc.sil.emulated import build_guest
+from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.instructions import InstructionCounts, count_instructions, in_flight, spread
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Bernoulli
 
 COUNTED_STEPS: Final = 300
 """Steps that are counted: a sixth in flight, a third from everywhere, half in search of the worst."""

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-import codegen
-from codegen.settings import Settings
-from sil.footprint import Footprint, Limit
-from sil.page import render_page
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.footprint import Footprint, Limit
+from mambo_nmpc.sil.page import render_page
 
 _HEAD = ("board", "flash B", "RAM B", "stack B", "instructions a step", "time ms", "period", "")
 

@@ -9,7 +9,7 @@ import weakref
 from collections.abc import Sequence
 from typing import IO, Final
 
-from sil.errors import EmulationError
+from mambo_nmpc.sil.errors import EmulationError
 
 PATIENCE_S: Final = 10.0
 """Time that the emulator gets to start, and to answer whatever does not run the guest."""

@@ -19,8 +19,8 @@ from typing import Final
 
 import numpy as np
 
-from sil.arrays import FloatArray, PerFlight
-from sil.randomness import Draws, Purpose
+from mambo_nmpc.sil.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.randomness import Draws, Purpose
 
 FOOT_M: Final = 0.3048
 LOWEST_FT: Final = 10.0

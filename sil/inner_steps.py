@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.reference import Memory, ReferenceController, Step
-from codegen.reference.arithmetic import arithmetic
-from codegen.reference.math import Real, sign
-from codegen.reference.optimizer import Evaluate, Search, minimize
-from codegen.representation import Representation
-from codegen.settings import Settings
+from mambo_nmpc.codegen.reference import Memory, ReferenceController, Step
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.math import Real, sign
+from mambo_nmpc.codegen.reference.optimizer import Evaluate, Search, minimize
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.footprint.elf import load
-from codegen.settings import Settings
-from sil.arrays import FloatArray
-from sil.emulated import EmulatedController
-from sil.traces import Trace
+from mambo_nmpc.codegen.footprint.elf import load
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.emulated import EmulatedController
+from mambo_nmpc.sil.traces import Trace
 
 HARNESS: Final = (
     "nmpc_batch_init",

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sil.arrays import FloatArray, IntArray, PerFlight
-from sil.randomness import Draws, Purpose
+from mambo_nmpc.sil.arrays import FloatArray, IntArray, PerFlight
+from mambo_nmpc.sil.randomness import Draws, Purpose
 
 NOT_CALLED: Final = -1
 """What stands for a status where the controller was not called."""

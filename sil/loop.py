@@ -17,18 +17,18 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sil.arrays import FloatArray, IntArray, PerFlight
-from sil.disturbances import Disturbances, World
-from sil.errors import FlightError
-from sil.link import NOT_CALLED, Drops, Link, Wire
-from sil.plant import loops
-from sil.plant.airframe import MAMBO
-from sil.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
-from sil.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
-from sil.sensors.instruments import Sensors
-from sil.sensors.suite import Suite
-from sil.traces import SensedTrace, Trace
-from sil.trajectories import Trajectory
+from mambo_nmpc.sil.arrays import FloatArray, IntArray, PerFlight
+from mambo_nmpc.sil.disturbances import Disturbances, World
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.link import NOT_CALLED, Drops, Link, Wire
+from mambo_nmpc.sil.plant import loops
+from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
+from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.sensors.suite import Suite
+from mambo_nmpc.sil.traces import SensedTrace, Trace
+from mambo_nmpc.sil.trajectories import Trajectory
 
 HEIGHT_REFERENCE_M = -1.1
 """z of every flight, up being negative."""

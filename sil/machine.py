@@ -9,8 +9,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Final, Protocol
 
-from sil.machine_avr import AvrMachine
-from sil.machine_unicorn import MODELS, UnicornMachine
+from mambo_nmpc.sil.machine_avr import AvrMachine
+from mambo_nmpc.sil.machine_unicorn import MODELS, UnicornMachine
 
 TIME_LIMIT_S: Final = 1.0
 AVR: Final = "avr"

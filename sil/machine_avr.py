@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 from elftools.elf.elffile import ELFFile
 
-from codegen.errors import BuildError
-from codegen.toolchain import Toolchain, host_toolchain
-from sil.cache import cached
-from sil.errors import EmulationError, EmulatorError
-from sil.gdb import GdbStub
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
+from mambo_nmpc.sil.cache import cached
+from mambo_nmpc.sil.errors import EmulationError, EmulatorError
+from mambo_nmpc.sil.gdb import GdbStub
 
 _EMULATOR: Final = "qemu-system-avr"
 _TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux"}
@@ -186,7 +186,7 @@ def _file(name: str, content: bytes) -> int:
 
 def _plugin() -> Path:
     """Return the plugin that counts, built here for the QEMU that is here, once."""
-    source = resources.files("sil").joinpath("qemu_count.c").read_text("utf-8")
+    source = resources.files("mambo_nmpc.sil").joinpath("qemu_count.c").read_text("utf-8")
     said = subprocess.run([_EMULATOR, "--version"], capture_output=True, text=True, check=False).stdout
     version = re.search(r"version (\d+)", said)
     if version is None:

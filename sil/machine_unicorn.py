@@ -11,9 +11,9 @@ import unicorn
 from elftools.elf.elffile import ELFFile
 from unicorn import arm_const, riscv_const
 
-from codegen.footprint.disassembly import disassemble
-from codegen.footprint.elf import load
-from sil.errors import EmulationError
+from mambo_nmpc.codegen.footprint.disassembly import disassemble
+from mambo_nmpc.codegen.footprint.elf import load
+from mambo_nmpc.sil.errors import EmulationError
 
 _WATCHED_SLOWDOWN: Final = 30
 """How much longer a call may take when every run of instructions is reported to Python."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sil.arrays import FloatArray
-from sil.traces import Trace
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.traces import Trace
 
 TRANSIENT_S = 10.0
 """What is left out of a flight to judge it without its start."""

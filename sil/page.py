@@ -9,7 +9,7 @@ from typing import Any, Final
 import jinja2
 from markupsafe import Markup
 
-from sil.table2 import digits, spelled
+from mambo_nmpc.sil.table2 import digits, spelled
 
 _SCRIPT: Final = "flight.js"
 _DASH: Final = "\N{EN DASH}"
@@ -20,7 +20,7 @@ def render_page(template: str, context: Mapping[str, Any]) -> str:
 
     The page forbids itself the network and every script but ours.
     """
-    loader = jinja2.PackageLoader("templates", "report")
+    loader = jinja2.PackageLoader("mambo_nmpc.templates", "report")
     environment = jinja2.Environment(
         loader=loader,
         undefined=jinja2.StrictUndefined,

@@ -13,14 +13,14 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sil.board_plots import SWEPT, PlainLogFormatter, draw_swept
-from sil.campaign.flights import CRASHED
-from sil.campaign.statistics import Table, judged
-from sil.campaign_table import COMPARED
-from sil.plots import COLUMN_LABELS, COMMAND, FLOWN, TARGET, draw_column, style
-from sil.sweep import Point
-from sil.table2 import PD
-from sil.traces import Trace
+from mambo_nmpc.sil.board_plots import SWEPT, PlainLogFormatter, draw_swept
+from mambo_nmpc.sil.campaign.flights import CRASHED
+from mambo_nmpc.sil.campaign.statistics import Table, judged
+from mambo_nmpc.sil.campaign_table import COMPARED
+from mambo_nmpc.sil.plots import COLUMN_LABELS, COMMAND, FLOWN, TARGET, draw_column, style
+from mambo_nmpc.sil.sweep import Point
+from mambo_nmpc.sil.table2 import PD
+from mambo_nmpc.sil.traces import Trace
 
 _WIDTH_INCHES: Final = 4.2
 _HUES: Final = ("#2ca02c", FLOWN, "#9467bd", "#8c564b", "#e377c2")

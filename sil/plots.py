@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sil.metrics import horizontal_error_m
-from sil.traces import Trace
+from mambo_nmpc.sil.metrics import horizontal_error_m
+from mambo_nmpc.sil.traces import Trace
 
 TARGET, FLOWN, COMMAND = "#c4c4c4", "#0072B2", "#E69F00"
 """Colours that stay apart for colour-blind readers and in grey (Okabe and Ito)."""

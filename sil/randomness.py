@@ -9,7 +9,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from sil.arrays import FloatArray
+from mambo_nmpc.sil.arrays import FloatArray
 
 BLOCK = 64
 """Rows drawn at a time; the numbers do not depend on it."""

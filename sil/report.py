@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from codegen.reference import Status
-from codegen.settings import Settings
-from sil.link import NOT_CALLED
-from sil.metrics import TRANSIENT_S, Metrics, measure
-from sil.table2 import (
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.link import NOT_CALLED
+from mambo_nmpc.sil.metrics import TRANSIENT_S, Metrics, measure
+from mambo_nmpc.sil.table2 import (
     CASES,
     INDICES,
     PRINTED_IMPROVEMENT,
@@ -20,7 +20,7 @@ from sil.table2 import (
     Table2,
     digits,
 )
-from sil.traces import SensedTrace, Trace
+from mambo_nmpc.sil.traces import SensedTrace, Trace
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
 _UNITS |= {"_rad": "rad", "_m": "m"}

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sil.animation import animate
-from sil.campaign.store import TABLE
-from sil.campaign_table import read_table
-from sil.page import render_page
-from sil.page_plots import distributions, flight_columns, sweep_panels
-from sil.report import named
-from sil.summaries import (
+from mambo_nmpc.sil.animation import animate
+from mambo_nmpc.sil.campaign.store import TABLE
+from mambo_nmpc.sil.campaign_table import read_table
+from mambo_nmpc.sil.page import render_page
+from mambo_nmpc.sil.page_plots import distributions, flight_columns, sweep_panels
+from mambo_nmpc.sil.report import named
+from mambo_nmpc.sil.summaries import (
     CampaignSummary,
     FaultsSummary,
     Flown,
@@ -29,9 +29,9 @@ from sil.summaries import (
     VerifySummary,
     read_summary,
 )
-from sil.sweep import Point
-from sil.table2 import INDICES, PD, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD
-from sil.traces import Trace, read_npz
+from mambo_nmpc.sil.sweep import Point
+from mambo_nmpc.sil.table2 import INDICES, PD, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD
+from mambo_nmpc.sil.traces import Trace, read_npz
 
 
 @dataclass(frozen=True)

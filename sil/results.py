@@ -18,9 +18,9 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, Final
 
-import codegen
-from codegen.errors import ForeignFilesError, UnwritableError, echo
-from sil.errors import BusyError
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
+from mambo_nmpc.sil.errors import BusyError
 
 SUMMARY: Final = "summary.json"
 """The file that marks a folder as ours: removed first, written last."""

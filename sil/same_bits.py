@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from codegen.boards import Board
-from codegen.errors import BuildError
-from codegen.footprint.build import OPTIMISATIONS, Builder, builder, clang_builder
-from codegen.frozen import frozen_digest
-from codegen.settings import Settings
-from codegen.toolchain import Toolchain
-from sil.compiled import compiled, compiled_digest
-from sil.emulated import build_guest, emulated_digest
-from sil.errors import EmulatorError
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.footprint.build import OPTIMISATIONS, Builder, builder, clang_builder
+from mambo_nmpc.codegen.frozen import frozen_digest
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.compiled import compiled, compiled_digest
+from mambo_nmpc.sil.emulated import build_guest, emulated_digest
+from mambo_nmpc.sil.errors import EmulatorError
 
 HOST_COMPILERS: Final = ("gcc", "clang")
 BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}

@@ -13,17 +13,17 @@ from typing import Any, Final, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from codegen.errors import echo
-from codegen.settings import Settings
-from sil.arrays import FloatArray
-from sil.disturbances import Disturbances
-from sil.errors import FlightError, ScenarioError
-from sil.link import Link
-from sil.loop import Flight, Offset, Start
-from sil.plant.airframe import MAMBO
-from sil.plant.vehicle import Vehicle
-from sil.sensors.instruments import Sensors
-from sil.trajectories import CURVES, Trajectories
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.disturbances import Disturbances
+from mambo_nmpc.sil.errors import FlightError, ScenarioError
+from mambo_nmpc.sil.link import Link
+from mambo_nmpc.sil.loop import Flight, Offset, Start
+from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 1
 LARGEST_FILE_BYTES: Final = 1_000_000

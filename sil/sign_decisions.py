@@ -12,16 +12,16 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.reference import ReferenceController, Status
-from codegen.representation import COMMAND, STATE, TARGET, THRUST, Representation
-from codegen.settings import Settings
-from sil.compiled import CompiledController
-from sil.inner_steps import InnerSteps, watched_step
-from sil.loop import Flight, Outcome, fly
-from sil.metrics import measure
-from sil.table2 import CASES, DURATION_S
-from sil.traces import Trace
-from sil.trajectories import Trajectories
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.inner_steps import InnerSteps, watched_step
+from mambo_nmpc.sil.loop import Flight, Outcome, fly
+from mambo_nmpc.sil.metrics import measure
+from mambo_nmpc.sil.table2 import CASES, DURATION_S
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Trajectories
 
 ScalarName = Literal["float32", "float64", "fixed"]
 MANY: Final[ScalarName] = "float64"

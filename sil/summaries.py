@@ -7,9 +7,9 @@ from typing import Any, ClassVar, Final
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from codegen.errors import echo
-from sil.errors import ResultsError
-from sil.results import SUMMARY
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.errors import ResultsError
+from mambo_nmpc.sil.results import SUMMARY
 
 Number = float | None
 """A measured value; None where there is none, for JSON spells no NaN."""

@@ -11,13 +11,13 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
-from codegen.boards import Board
-from codegen.settings import Settings
-from sil.compiled import CompiledController
-from sil.footprint import measure_footprint
-from sil.loop import Flight, fly
-from sil.metrics import measure
-from sil.table2 import CASES
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.footprint import measure_footprint
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.metrics import measure
+from mambo_nmpc.sil.table2 import CASES
 
 COUNTED_STEPS: Final = 60
 

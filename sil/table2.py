@@ -6,13 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from codegen.settings import Settings
-from sil.baseline import PdController
-from sil.compiled import CompiledController
-from sil.loop import Flight, PositionController, fly
-from sil.metrics import measure
-from sil.traces import Trace
-from sil.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.loop import Flight, PositionController, fly
+from mambo_nmpc.sil.metrics import measure
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
 
 INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")
 PRINTED_PD: Final = (63.02, 47.86, 2460.0, 3200.0)

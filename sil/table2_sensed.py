@@ -6,14 +6,14 @@ from typing import Final
 
 import numpy as np
 
-from codegen.settings import Settings
-from sil.baseline import PdController
-from sil.compiled import CompiledController
-from sil.loop import Flight, fly
-from sil.metrics import Metrics, measure
-from sil.sensors.instruments import Sensors
-from sil.table2 import CASES, DURATION_S, INDICES, PD, PRINTED_NMPC, PRINTED_PD, Four, digits
-from sil.traces import SensedTrace
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.metrics import Metrics, measure
+from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.table2 import CASES, DURATION_S, INDICES, PD, PRINTED_NMPC, PRINTED_PD, Four, digits
+from mambo_nmpc.sil.traces import SensedTrace
 
 PRESETS: Final = ("mambo", "table1")
 """Which fly beside the PD."""

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from sil.arrays import FloatArray, IntArray
-from sil.errors import TraceError
+from mambo_nmpc.sil.arrays import FloatArray, IntArray
+from mambo_nmpc.sil.errors import TraceError
 
 CSV_COLUMNS = (
     *("time_s", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"),

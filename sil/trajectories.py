@@ -14,9 +14,9 @@ from typing import Final, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from codegen.errors import echo
-from sil.arrays import FloatArray
-from sil.errors import TrajectoryError
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.errors import TrajectoryError
 
 STEP_TIME_S = 1.0
 COLUMNS = ("time_s", "x_m", "y_m")

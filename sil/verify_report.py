@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import codegen
-from codegen.settings import Settings
-from codegen.settings.controller_toml import to_toml
-from sil.page import render_page
-from sil.verify.check import Outcome, Result
-from sil.verify.checks import CHECKS, Entry
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import to_toml
+from mambo_nmpc.sil.page import render_page
+from mambo_nmpc.sil.verify.check import Outcome, Result
+from mambo_nmpc.sil.verify.checks import CHECKS, Entry
 
 PAGE: Final = "verify.html"
 

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.footprint.build import Builder
-from codegen.footprint.elf import FootprintError, load
-from codegen.footprint.stack import StackReport, worst_case
-from codegen.frozen import frozen_digest
-from codegen.render import render
-from codegen.settings.controller_toml import with_option
-from sil.emulated import GUEST, EmulatedController, build_guest, emulated_digest
-from sil.errors import EmulationError, EmulatorError
-from sil.machine import Machine, start
-from sil.machine_avr import AvrMachine, Long
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.footprint.build import Builder
+from mambo_nmpc.codegen.footprint.elf import FootprintError, load
+from mambo_nmpc.codegen.footprint.stack import StackReport, worst_case
+from mambo_nmpc.codegen.frozen import frozen_digest
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.emulated import GUEST, EmulatedController, build_guest, emulated_digest
+from mambo_nmpc.sil.errors import EmulationError, EmulatorError
+from mambo_nmpc.sil.machine import Machine, start
+from mambo_nmpc.sil.machine_avr import AvrMachine, Long
 from tests.support.cases import settings_case
 from tests.support.linking import BOARDS, Board, linked
 from tests.support.tools import board_builder, only
@@ -39,7 +39,7 @@ ABANDONED = """
 import sys
 from importlib import resources
 from pathlib import Path
-from sil.machine import start
+from mambo_nmpc.sil.machine import start
 machine = start(Path(sys.argv[1]), "avr")
 print(machine._stub._process.pid, flush=True)
 sys.stdin.read()
@@ -190,7 +190,7 @@ def test_a_controller_too_large_for_the_ram_is_refused(mega: Builder, tmp_path: 
 def test_a_guest_that_leaves_no_room_is_refused(mega: Builder, tmp_path: Path) -> None:
     """What a controller takes with its inputs and its outcome must not run into the stack."""
     settings = presets.load("mambo")
-    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8") + "char nmpc_ballast[5750] = {1};"
+    glue = resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8") + "char nmpc_ballast[5750] = {1};"
     elf = mega.guest(render(settings, with_digest=False), glue, (*GUEST, "nmpc_ballast"), tmp_path)
     with pytest.raises(EmulatorError, match=r"^a controller .* take \d{3} B, of which .* has \d+ B free$"):
         EmulatedController(settings, elf, "avr")

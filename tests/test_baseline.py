@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sil.baseline import PdController
+from mambo_nmpc.sil.baseline import PdController
 
 FloatArray = NDArray[np.float64]
 

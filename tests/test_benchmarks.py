@@ -11,9 +11,9 @@ from benchmarks.host_builds import build, plans
 from benchmarks.ours import bundle_program, peers_model, place_bundle, place_rollout, rollout_program
 from benchmarks.peers_programs import Cost, Program
 from benchmarks.searches import Array
-from codegen import presets
-from codegen.settings import Settings
-from codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from tests.support.tools import require
 
 

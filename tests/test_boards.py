@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from codegen import boards
-from codegen.boards import Board
-from codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
 from tests.support.tools import require
 
 FOLDER = Path(boards.__file__).parent / "data" / "boards"

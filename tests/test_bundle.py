@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import bundle
-from codegen.bundle import Changes, Drift
-from codegen.errors import ForeignFilesError, LayoutError, UnwritableError
+from mambo_nmpc.codegen import bundle
+from mambo_nmpc.codegen.bundle import Changes, Drift
+from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, UnwritableError
 from tests.support.bundles import FILES, NEXT, content, expected
 
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.errors import InvalidSettingsError
-from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from codegen.frozen import frozen_digest
-from codegen.render import render
-from codegen.settings import Settings
-from codegen.settings.controller_toml import with_option
-from sil.verify.dialects import DIALECTS
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import InvalidSettingsError
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_nmpc.codegen.frozen import frozen_digest
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.verify.dialects import DIALECTS
 from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require
 

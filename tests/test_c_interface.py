@@ -10,13 +10,13 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from codegen import presets
-from codegen.literals import SCALARS
-from codegen.reference import ReferenceController, Status
-from codegen.render import render
-from codegen.settings import Settings
-from sil.compiled import CompiledController, compiled
-from sil.extension import load_extension
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.literals import SCALARS
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.compiled import CompiledController, compiled
+from mambo_nmpc.sil.extension import load_extension
 from tests.support.parity import Controller
 from tests.support.tools import toolchain
 

@@ -8,13 +8,13 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from codegen.errors import MamboNmpcError, UnreadableFileError
-from sil.campaign import file
-from sil.campaign.distributions import Distribution, Domain, parse
-from sil.campaign.flights import INDICES
-from sil.campaign.parameters import PARAMETERS, draw
-from sil.campaign.statistics import improvement, proportion, quantiles, summarise, worst
-from sil.plant.airframe import MAMBO
+from mambo_nmpc.codegen.errors import MamboNmpcError, UnreadableFileError
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
+from mambo_nmpc.sil.campaign.flights import INDICES
+from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
+from mambo_nmpc.sil.campaign.statistics import improvement, proportion, quantiles, summarise, worst
+from mambo_nmpc.sil.plant.airframe import MAMBO
 
 ROOT = Path(__file__).parent.parent
 DEFAULTS = {name: parameter.default for name, parameter in PARAMETERS.items()}

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from codegen.errors import INTERRUPTED, ForeignFilesError, UnwritableError
-from sil.campaign import file
-from sil.campaign.executors import Pool, cluster, processes
-from sil.campaign.flights import fly_batch
-from sil.campaign.run import fly_missing, opened, table_columns
-from sil.errors import BusyError, FlightError, WorkerError
-from sil.scenario import read_record
+from mambo_nmpc.codegen.errors import INTERRUPTED, ForeignFilesError, UnwritableError
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes
+from mambo_nmpc.sil.campaign.flights import fly_batch
+from mambo_nmpc.sil.campaign.run import fly_missing, opened, table_columns
+from mambo_nmpc.sil.errors import BusyError, FlightError, WorkerError
+from mambo_nmpc.sil.scenario import read_record
 from tests.support.tools import require_module
 
 FLIGHTS = 6
@@ -46,7 +46,7 @@ def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc."""
-    line = [sys.executable, "-c", "from sil.__main__ import main; main()", *map(str, arguments)]
+    line = [sys.executable, "-c", "from mambo_nmpc.sil.__main__ import main; main()", *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
 
 
@@ -127,10 +127,10 @@ def test_a_worst_flight_replays_to_the_bit(whole: Path, tmp_path: Path) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from sil.campaign import file
-from sil.campaign.executors import processes
-from sil.campaign.flights import fly_batch
-from sil.campaign.run import fly_missing, opened
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.executors import processes
+from mambo_nmpc.sil.campaign.flights import fly_batch
+from mambo_nmpc.sil.campaign.run import fly_missing, opened
 def progress(finished):
     if finished >= 2:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -155,8 +155,8 @@ def test_a_killed_campaign_goes_on_to_the_same_bytes(source: Path, whole: Path, 
 
 STOPPED = """
 import os, signal
-from sil.__main__ import main
-from sil.campaign.store import Store
+from mambo_nmpc.sil.__main__ import main
+from mambo_nmpc.sil.campaign.store import Store
 add = Store.add
 def add_and_stop(self, rows):
     add(self, rows)

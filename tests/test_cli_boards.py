@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import sil.cli
-from codegen import boards, cli, presets
-from sil import cli_boards
-from sil.board_plots import draw_footprints
-from sil.footprint import measure_footprint
+import mambo_nmpc.sil.cli
+from mambo_nmpc.codegen import boards, cli, presets
+from mambo_nmpc.sil import cli_boards
+from mambo_nmpc.sil.board_plots import draw_footprints
+from mambo_nmpc.sil.footprint import measure_footprint
 from tests.support.tools import board_builder, only, require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'

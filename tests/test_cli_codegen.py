@@ -14,12 +14,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from codegen import cli, errors, presets
-from codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen import cli, errors, presets
+from mambo_nmpc.codegen.settings import Settings, controller_toml
 
-COMMAND = "from codegen import cli; app = cli.root(); cli.register(app); app()"
+COMMAND = "from mambo_nmpc.codegen import cli; app = cli.root(); cli.register(app); app()"
 INTERRUPTED = """
-from codegen import cli
+from mambo_nmpc.codegen import cli
 app = cli.root()
 cli.register(app)
 @app.command()

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from codegen import cli
-from sil import cli_faults
+from mambo_nmpc.codegen import cli
+from mambo_nmpc.sil import cli_faults
 
 
 @pytest.fixture(autouse=True)

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from codegen.errors import INTERRUPTED
-from sil.loop import Flight
-from sil.report import table2_text
-from sil.table2 import Claim, Row, Table2
-from sil.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
+from mambo_nmpc.codegen.errors import INTERRUPTED
+from mambo_nmpc.sil.loop import Flight
+from mambo_nmpc.sil.report import table2_text
+from mambo_nmpc.sil.table2 import Claim, Row, Table2
+from mambo_nmpc.sil.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 
 
 def command(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc in `folder`."""
-    script = "from sil.cli import main; main()"
+    script = "from mambo_nmpc.sil.cli import main; main()"
     line = [sys.executable, "-c", script, *map(str, arguments)]
     return subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
 
@@ -28,7 +28,7 @@ def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
     (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
     search = os.pathsep.join([str(tmp_path), *sys.path])
     done = subprocess.run(
-        [sys.executable, "-m", "sil", "presets"],
+        [sys.executable, "-m", "mambo_nmpc", "presets"],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": search},
         capture_output=True,
@@ -198,7 +198,7 @@ def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
     before = {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()}
     script = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
-        "from sil.cli import main; main()"
+        "from mambo_nmpc.sil.cli import main; main()"
     )
     line = [sys.executable, "-c", script, "fly", "--controller", "pd", "--duration-s", "1"]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from codegen import cli
-from sil import cli_verify
-from sil.verify.check import Outcome, Result
-from sil.verify.checks import CHECKS, Entry
-from sil.verify_report import Verified, closing, verdict
+from mambo_nmpc.codegen import cli
+from mambo_nmpc.sil import cli_verify
+from mambo_nmpc.sil.verify.check import Outcome, Result
+from mambo_nmpc.sil.verify.checks import CHECKS, Entry
+from mambo_nmpc.sil.verify_report import Verified, closing, verdict
 from tests.support.tools import require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'

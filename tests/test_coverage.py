@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from sil.sign_decisions import in_scalar
-from sil.verify import coverage
-from sil.verify.check import Outcome, Result
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.sil.sign_decisions import in_scalar
+from mambo_nmpc.sil.verify import coverage
+from mambo_nmpc.sil.verify.check import Outcome, Result
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from sil.verify.check import Outcome
-from sil.verify.dialects import DIALECTS, check
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.dialects import DIALECTS, check
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 

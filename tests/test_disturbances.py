@@ -5,17 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from sil.baseline import PdController
-from sil.disturbances import Disturbances
-from sil.errors import FlightError
-from sil.gusts import FOOT_M, Gusts, low_altitude, mean_speed_m_s
-from sil.link import NOT_CALLED, Link
-from sil.loop import Flight, Offset, fly
-from sil.plant import loops
-from sil.plant.rigid_body import RigidBody
-from sil.plant.vehicle import STEP_S
-from sil.traces import Trace
-from sil.trajectories import Bernoulli, Hover
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.disturbances import Disturbances
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.gusts import FOOT_M, Gusts, low_altitude, mean_speed_m_s
+from mambo_nmpc.sil.link import NOT_CALLED, Link
+from mambo_nmpc.sil.loop import Flight, Offset, fly
+from mambo_nmpc.sil.plant import loops
+from mambo_nmpc.sil.plant.rigid_body import RigidBody
+from mambo_nmpc.sil.plant.vehicle import STEP_S
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Bernoulli, Hover
 
 
 def hover(duration_s: float = 1.0, flights: int = 1, **more: object) -> Trace:

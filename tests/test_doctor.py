@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import boards
-from sil import doctor
-from sil.doctor import LIBFUZZER, Finding, doctor_text, examine
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.sil import doctor
+from mambo_nmpc.sil.doctor import LIBFUZZER, Finding, doctor_text, examine
 
 ENDLESS = "while :; do :; done"
 

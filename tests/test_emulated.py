@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen import boards, presets
-from codegen.reference import ReferenceController
-from codegen.render import render
-from codegen.settings import Settings
-from sil.emulated import GUEST, EmulatedController, build_guest
-from sil.errors import EmulationError
-from sil.machine import CORES as KNOWN_CORES
-from sil.machine import Machine, start
+from mambo_nmpc.codegen import boards, presets
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.emulated import GUEST, EmulatedController, build_guest
+from mambo_nmpc.sil.errors import EmulationError
+from mambo_nmpc.sil.machine import CORES as KNOWN_CORES
+from mambo_nmpc.sil.machine import Machine, start
 from tests.support.cases import SCALARS, settings_case
 from tests.support.parity import Run, differences, inputs_of_steps
 from tests.support.tools import board_builder
@@ -123,7 +123,7 @@ def test_every_core_has_the_bits_of_the_reference(name: str, scalar: str, index:
 def test_memory_is_dirty_before_init(tmp_path: Path) -> None:
     """Without nmpc_init a refused input is answered with what was in memory, which is not zero."""
     settings = presets.load("mambo")
-    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    glue = resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
     assert glue.count("nmpc_init(&controllers[i]);") == 1
     idle = glue.replace("nmpc_init(&controllers[i]);", "(void)controllers[i];")
     elf = board_builder("crazyflie").guest(render(settings, with_digest=False), idle, GUEST, tmp_path)

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from codegen import bundle
-from codegen.errors import BuildError
-from codegen.exchange import JOURNAL, STAND_IN, is_left_over
-from codegen.render import render
-from codegen.settings import Settings
+from mambo_nmpc.codegen import bundle
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.exchange import JOURNAL, STAND_IN, is_left_over
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
 from tests.support.bundles import FILES, NEXT, content, expected
 from tests.support.tools import toolchain
 
@@ -40,7 +40,7 @@ MINE = {"src/mine.txt": b"mine", "build/nmpc.o": b"\0"}
 STOPPED_RUNS = """
 import json, os, shutil, signal, sys
 from pathlib import Path
-from codegen import bundle
+from mambo_nmpc.codegen import bundle
 
 start, root, how, files = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], json.loads(sys.argv[4])
 seen = 0
@@ -75,7 +75,7 @@ for operation in range(1, 1000):
 STOPPED_AT_A_RENAME = """
 import json, os, signal, sys
 from pathlib import Path
-from codegen import bundle
+from mambo_nmpc.codegen import bundle
 
 def hook(event, arguments):
     global left
@@ -93,8 +93,8 @@ bundle.write(json.load(sys.stdin), Path(sys.argv[1]), force=True)
 FULL_DISK = """
 import json, resource, sys
 from pathlib import Path
-from codegen import bundle
-from codegen.errors import UnwritableError
+from mambo_nmpc.codegen import bundle
+from mambo_nmpc.codegen.errors import UnwritableError
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 try:

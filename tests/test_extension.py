@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.errors import BuildError
-from codegen.toolchain import Toolchain, host_toolchain
-from sil.cache import cache_folder, cached
-from sil.compiled import CompiledController, compiled
-from sil.errors import CacheError
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
+from mambo_nmpc.sil.cache import cache_folder, cached
+from mambo_nmpc.sil.compiled import CompiledController, compiled
+from mambo_nmpc.sil.errors import CacheError
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -181,7 +181,7 @@ def test_two_processes_may_build_the_same_code_at_once(empty_cache: Path) -> Non
     """Both fly, and one file remains."""
     require("cc", "gcc")
     script = (
-        "from codegen import presets; from sil.compiled import CompiledController as C;"
+        "from mambo_nmpc.codegen import presets; from mambo_nmpc.sil.compiled import CompiledController as C;"
         "print(C(presets.load('table1')).step([[0]*7], [[1,0,0,0]], [9.81]).command_rad.tolist())"
     )
     command = [sys.executable, "-c", script]

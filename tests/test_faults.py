@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from codegen import bundle, presets
-from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from codegen.reference import Status
-from codegen.render import render
-from sil.compiled import CompiledController
-from sil.fault_flights import End, Verdict, fly_faults
-from sil.fault_report import table
-from sil.fault_scenarios import Scenario, scenarios
-from sil.faults import (
+from mambo_nmpc.codegen import bundle, presets
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.fault_flights import End, Verdict, fly_faults
+from mambo_nmpc.sil.fault_report import table
+from mambo_nmpc.sil.fault_scenarios import Scenario, scenarios
+from mambo_nmpc.sil.faults import (
     Applied,
     Fault,
     FaultyController,
@@ -38,13 +38,13 @@ from sil.faults import (
     yaw_shifted,
     yaw_wrapped,
 )
-from sil.link import NOT_CALLED
-from sil.loop import Flight, PositionController, fly
-from sil.table2 import CASES
-from sil.traces import Trace
-from sil.trajectories import Hover
-from sil.verify.check import Outcome
-from sil.verify.faults import check, judge
+from mambo_nmpc.sil.link import NOT_CALLED
+from mambo_nmpc.sil.loop import Flight, PositionController, fly
+from mambo_nmpc.sil.table2 import CASES
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Hover
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.faults import check, judge
 from tests.support.subjects import subject
 from tests.support.tools import require
 

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from numpy.typing import NDArray
 
-from codegen import presets
-from codegen.errors import InvalidSettingsError
-from codegen.fixed_point import LARGEST, formats, raw
-from codegen.reference import ReferenceController, Status
-from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from codegen.settings import Settings
-from codegen.settings.controller_toml import parse, with_option
-from sil.compiled import CompiledController, compiled
-from sil.verify import replay
-from sil.verify.calls import Function, Tape, answers, calls
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import InvalidSettingsError
+from mambo_nmpc.codegen.fixed_point import LARGEST, formats, raw
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
+from mambo_nmpc.sil.compiled import CompiledController, compiled
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.calls import Function, Tape, answers, calls
 from tests.support.cases import settings_case
 from tests.support.strategies import Values, toml, valid_values
 from tests.support.subjects import subject

@@ -5,17 +5,17 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from codegen import presets
-from codegen.reference import ReferenceController
-from codegen.settings import Settings
-from sil.baseline import PdController
-from sil.compiled import CompiledController, compiled
-from sil.loop import Flight, Start, fly
-from sil.metrics import Metrics, measure
-from sil.plant.vehicle import Vehicle
-from sil.table2 import PRINTED_IMPROVEMENT
-from sil.traces import Trace
-from sil.trajectories import Bernoulli
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.compiled import CompiledController, compiled
+from mambo_nmpc.sil.loop import Flight, Start, fly
+from mambo_nmpc.sil.metrics import Metrics, measure
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.table2 import PRINTED_IMPROVEMENT
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Bernoulli
 from tests.support.cases import SCALARS
 from tests.support.tools import toolchain
 

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from codegen import boards, presets
-from codegen.errors import BuildError
-from codegen.footprint.elf import load
-from codegen.footprint.gate import Forbidden, forbidden
-from codegen.render import render
-from codegen.settings import Settings
-from codegen.settings.controller_toml import with_option
-from sil import footprint_report
-from sil.footprint import Footprint, measure_footprint
+from mambo_nmpc.codegen import boards, presets
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.footprint.elf import load
+from mambo_nmpc.codegen.footprint.gate import Forbidden, forbidden
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil import footprint_report
+from mambo_nmpc.sil.footprint import Footprint, measure_footprint
 from tests.support.tools import board_builder, only
 
 MAMBO = presets.load("mambo")

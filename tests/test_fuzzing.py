@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.render import render
-from sil.verify import fuzzing, replay
-from sil.verify.check import Outcome
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.sil.verify import fuzzing, replay
+from mambo_nmpc.sil.verify.check import Outcome
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require

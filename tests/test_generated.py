@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import bundle, presets
-from codegen.render import render
-from codegen.settings.controller_toml import read
+from mambo_nmpc.codegen import bundle, presets
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings.controller_toml import read
 
 GENERATED = Path(__file__).parent.parent / "generated"
 BUNDLES = {

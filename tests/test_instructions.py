@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 import unicorn
 
-from codegen import presets
-from codegen.footprint.disassembly import disassemble
-from codegen.footprint.elf import Image, load
-from codegen.reference import ReferenceController
-from codegen.render import render
-from sil.baseline import PdController
-from sil.emulated import GUEST, EmulatedController, build_guest
-from sil.instructions import HARNESS, CountingController, Inputs, count_instructions, in_flight, spread
-from sil.loop import Flight, fly
-from sil.machine_unicorn import UnicornMachine
-from sil.trajectories import Bernoulli
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.footprint.disassembly import disassemble
+from mambo_nmpc.codegen.footprint.elf import Image, load
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.emulated import GUEST, EmulatedController, build_guest
+from mambo_nmpc.sil.instructions import HARNESS, CountingController, Inputs, count_instructions, in_flight, spread
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.machine_unicorn import UnicornMachine
+from mambo_nmpc.sil.trajectories import Bernoulli
 from tests.support.cases import settings_case
 from tests.support.tools import board_builder
 
@@ -131,7 +131,7 @@ def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) 
         "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
         f"__asm({' '.join(_quoted(line) for line in assembly.splitlines())});\n"
     )
-    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    glue = resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
     assert glue.count("nmpc_step(") == 1
     elf = board_builder(name).guest(
         render(MAMBO, with_digest=False),

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sil.baseline import PdController, PdOutcome
-from sil.errors import FlightError
-from sil.loop import Flight, Start, fly
-from sil.metrics import measure
-from sil.plant.airframe import MAMBO
-from sil.plant.vehicle import Vehicle
-from sil.traces import Trace
-from sil.trajectories import Bernoulli, Circle, Gerono, Hover, Step, Trajectories, Trajectory
+from mambo_nmpc.sil.baseline import PdController, PdOutcome
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.loop import Flight, Start, fly
+from mambo_nmpc.sil.metrics import measure
+from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.traces import Trace
+from mambo_nmpc.sil.trajectories import Bernoulli, Circle, Gerono, Hover, Step, Trajectories, Trajectory
 
 FloatArray = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sil.metrics import TRANSIENT_S, measure
-from sil.traces import Trace
+from mambo_nmpc.sil.metrics import TRANSIENT_S, measure
+from mambo_nmpc.sil.traces import Trace
 
 FloatArray = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import pytest
 
-from codegen.reference import ReferenceController
-from codegen.render import render
-from codegen.settings import Settings
-from sil.compiled import CompiledController
-from sil.extension import load_extension
-from sil.verify.inputs import Inputs
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.extension import load_extension
+from mambo_nmpc.sil.verify.inputs import Inputs
 from tests.support.parity import Run, differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.render import render
-from sil.sign_decisions import ScalarName, in_scalar
-from sil.verify import mutation
-from sil.verify.check import Outcome
-from sil.verify.mutants import Mutant, mutants
-from sil.verify.mutation import Bench, Fate, Judged, summary
-from sil.verify.mutation_reasons import REASONS
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.sil.sign_decisions import ScalarName, in_scalar
+from mambo_nmpc.sil.verify import mutation
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.mutants import Mutant, mutants
+from mambo_nmpc.sil.verify.mutation import Bench, Fate, Judged, summary
+from mambo_nmpc.sil.verify.mutation_reasons import REASONS
 from tests.support.subjects import subject
 from tests.support.tools import require
 

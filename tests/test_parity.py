@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from codegen.horizon import horizon_tables
-from codegen.reference import ReferenceController, cost
-from codegen.reference.arithmetic import arithmetic
-from codegen.reference.predictor import Predictor
-from codegen.representation import COMMAND, STATE, TARGET, THRUST
-from codegen.settings import Settings
-from codegen.settings.limits import YAW_LIMIT_RAD
-from codegen.trigonometry import SINE_ERRORS
-from sil.compiled import CompiledController, compiled
+from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.reference import ReferenceController, cost
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
+from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
+from mambo_nmpc.sil.compiled import CompiledController, compiled
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.tools import toolchain

@@ -7,12 +7,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from sil.plant import loops
-from sil.plant.airframe import GRAVITY_M_S2, MAMBO
-from sil.plant.integrator import NODES, bogacki_shampine
-from sil.plant.rigid_body import RigidBody, world_velocity
-from sil.plant.rotors import Rotors, mix
-from sil.plant.vehicle import STEP_S, Vehicle, VehicleState, thrust_demand
+from mambo_nmpc.sil.plant import loops
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO
+from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
+from mambo_nmpc.sil.plant.rigid_body import RigidBody, world_velocity
+from mambo_nmpc.sil.plant.rotors import Rotors, mix
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Vehicle, VehicleState, thrust_demand
 
 FloatArray = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from codegen import presets
-from codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
-from codegen.settings import Settings
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
+from mambo_nmpc.codegen.settings import Settings
 
 
 def departures(settings: Settings) -> dict[str, Any]:

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.flags import proofs
-from codegen.settings import Settings
-from sil.verify.check import Outcome
-from sil.verify.proof import check, read_properties
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.flags import proofs
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.proof import check, read_properties
 from tests.support.cases import settings_case
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from benchmarks.quality import PRESETS, entrants
 from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
-from codegen import presets
-from codegen.reference import ReferenceController
-from codegen.reference.optimizer import minimize
-from codegen.settings import Settings
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.reference.optimizer import minimize
+from mambo_nmpc.codegen.settings import Settings
 from tests.support.cases import settings_case
 
 Inputs = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]

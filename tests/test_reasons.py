@@ -2,11 +2,11 @@
 
 import pytest
 
-from codegen import presets
-from codegen.render import render
-from codegen.settings.controller_toml import with_option
-from sil.verify import coverage_reasons, mutation_reasons
-from sil.verify.reasons import Reason, plain
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.verify import coverage_reasons, mutation_reasons
+from mambo_nmpc.sil.verify.reasons import Reason, plain
 from tests.support.cases import SCALARS
 
 

@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from codegen.horizon import horizon_tables
-from codegen.reference import ReferenceController, cost
-from codegen.reference.arithmetic import arithmetic
-from codegen.reference.predictor import Predictor
-from codegen.settings import Settings
+from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.reference import ReferenceController, cost
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.settings import Settings
 from tests.support.cases import settings_case
 
 Array = NDArray[np.float64]

@@ -5,14 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen import presets
-from codegen.errors import BuildError
-from codegen.reference import Status
-from codegen.settings import Settings
-from sil.verify import replay
-from sil.verify.calls import NULL_COMMAND, NULL_SELF, UNWRITTEN_RAD, Function, answers, calls, tape_from
-from sil.verify.cases import cases
-from sil.verify.check import Subject
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.calls import NULL_COMMAND, NULL_SELF, UNWRITTEN_RAD, Function, answers, calls, tape_from
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Subject
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import sil.cli
-from codegen import cli
-from sil import cli_boards, cli_report, footprint_report, verify_report
-from sil.animation import LONGEST_S, animate
-from sil.results import SUMMARY
-from sil.summaries import read_summary
-from sil.traces import Trace
+import mambo_nmpc.sil.cli
+from mambo_nmpc.codegen import cli
+from mambo_nmpc.sil import cli_boards, cli_report, footprint_report, verify_report
+from mambo_nmpc.sil.animation import LONGEST_S, animate
+from mambo_nmpc.sil.results import SUMMARY
+from mambo_nmpc.sil.summaries import read_summary
+from mambo_nmpc.sil.traces import Trace
 from tests.support.results import FOLDERS, HOSTILE, campaign_folder, fly_folder, trace
 from tests.support.tools import board_builder
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sil.report_page import report_page
+from mambo_nmpc.sil.report_page import report_page
 from tests.support.browser import Browser, browser
 from tests.support.results import FOLDERS
 

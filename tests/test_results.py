@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen.errors import ForeignFilesError, MamboNmpcError, UnwritableError
-from sil.errors import BusyError
-from sil.results import SUMMARY, new_results, summary_text
+from mambo_nmpc.codegen.errors import ForeignFilesError, MamboNmpcError, UnwritableError
+from mambo_nmpc.sil.errors import BusyError
+from mambo_nmpc.sil.results import SUMMARY, new_results, summary_text
 
 
 def run(folder: Path, content: str = "new", command: str = "fly") -> None:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.render import DEVIATIONS, render
-from codegen.settings.controller_toml import with_option
-from sil.sign_decisions import in_scalar
-from sil.verify.check import Outcome
-from sil.verify.rules import check, deviations
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.render import DEVIATIONS, render
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.sign_decisions import in_scalar
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require

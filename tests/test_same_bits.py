@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen import boards, presets
-from codegen.errors import BuildError
-from codegen.footprint.build import OPTIMISATIONS, builder, clang_builder
-from codegen.frozen import TICKS, episodes, frozen_digest, frozen_inputs
-from codegen.reference import ReferenceController, Status
-from codegen.render import render
-from codegen.settings import Settings
-from codegen.settings.controller_toml import read
-from codegen.toolchain import host_toolchain
-from sil.compiled import compiled_digest
-from sil.emulated import GUEST, emulated_digest
-from sil.extension import load_extension
-from sil.same_bits import BOARD_COMPILERS, HOST_COMPILERS, REFERENCE, builds, same_bits
+from mambo_nmpc.codegen import boards, presets
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.footprint.build import OPTIMISATIONS, builder, clang_builder
+from mambo_nmpc.codegen.frozen import TICKS, episodes, frozen_digest, frozen_inputs
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.controller_toml import read
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.compiled import compiled_digest
+from mambo_nmpc.sil.emulated import GUEST, emulated_digest
+from mambo_nmpc.sil.extension import load_extension
+from mambo_nmpc.sil.same_bits import BOARD_COMPILERS, HOST_COMPILERS, REFERENCE, builds, same_bits
 from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require, toolchain
 
@@ -85,7 +85,7 @@ def test_a_harmed_bundle_has_another_digest(harm: str, compiler: str, tmp_path: 
     path, line, instead = HARM[harm]
     files = render(MAMBO, with_digest=False)
     assert files[path].count(line) == 1
-    glue = resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    glue = resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
     good, harmed = (
         BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2").guest(bundle, glue, GUEST, tmp_path / name)
         for name, bundle in {

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from sil.verify import sanitizers
-from sil.verify.check import Outcome
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.sil.verify import sanitizers
+from mambo_nmpc.sil.verify.check import Outcome
 from tests.support.cases import CORNER_HORIZONS, settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require

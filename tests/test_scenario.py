@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from codegen import presets
-from sil.baseline import PdController
-from sil.compiled import CompiledController
-from sil.errors import FlightError, ScenarioError
-from sil.inner_steps import WatchedController
-from sil.loop import Flight, fly
-from sil.scenario import Record, Scenario, flight_of, read_record, write_record
-from sil.traces import SEEN_COLUMNS, SensedTrace, read_npz, write_npz
-from sil.trajectories import Bernoulli
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.errors import FlightError, ScenarioError
+from mambo_nmpc.sil.inner_steps import WatchedController
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.scenario import Record, Scenario, flight_of, read_record, write_record
+from mambo_nmpc.sil.traces import SEEN_COLUMNS, SensedTrace, read_npz, write_npz
+from mambo_nmpc.sil.trajectories import Bernoulli
 
 MAMBO = presets.load("mambo")
 HARD = Scenario(
@@ -163,7 +163,7 @@ def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
     write_record(good.model_copy(update={"trace_sha256": "0" * 64}), tmp_path / "other.json")
 
     def again(*arguments: str) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "sil", "fly", *arguments]
+        line = [sys.executable, "-m", "mambo_nmpc", "fly", *arguments]
         return subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
 
     done = again("--replay", "good.json", "-o", "good")

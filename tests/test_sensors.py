@@ -7,17 +7,17 @@ import pytest
 import scipy.linalg
 import scipy.signal
 
-from sil.arrays import FloatArray
-from sil.baseline import PdController
-from sil.loop import Flight, Start, fly
-from sil.plant.airframe import GRAVITY_M_S2
-from sil.plant.vehicle import STEP_S, Seen
-from sil.sensors import estimators, instruments
-from sil.sensors.estimators import Altitude, Attitude, Velocity
-from sil.sensors.instruments import NOISE_VARIANCES, Instruments, Readings, Sensors
-from sil.sensors.suite import Suite
-from sil.traces import SensedTrace, Trace
-from sil.trajectories import Bernoulli
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.loop import Flight, Start, fly
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
+from mambo_nmpc.sil.sensors import estimators, instruments
+from mambo_nmpc.sil.sensors.estimators import Altitude, Attitude, Velocity
+from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Instruments, Readings, Sensors
+from mambo_nmpc.sil.sensors.suite import Suite
+from mambo_nmpc.sil.traces import SensedTrace, Trace
+from mambo_nmpc.sil.trajectories import Bernoulli
 
 QUIET = Sensors(noise_scale=0.0)
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
-from codegen.settings import Settings, controller_toml
-from codegen.settings.keys import KEYS, Key, spelled
+from mambo_nmpc.codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
+from mambo_nmpc.codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.settings.keys import KEYS, Key, spelled
 from tests.support.strategies import NUMBERS, RESERVED, any_settings, nested, toml
 
 COMPANIONS: dict[str, dict[str, float]] = {

@@ -10,10 +10,10 @@ from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from codegen import cli
-from codegen.reference import ReferenceController
-from codegen.settings import Settings
-from sil.compiled import CompiledController
+from mambo_nmpc.codegen import cli
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.compiled import CompiledController
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.strategies import Broken, any_settings, broken_settings, settings_in

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen import presets
-from codegen.reference import ReferenceController, Status
-from codegen.representation import Representation
-from codegen.settings import Settings
-from sil.inner_steps import watched_step
-from sil.sign_decisions import (
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.inner_steps import watched_step
+from mambo_nmpc.sil.sign_decisions import (
     MANY,
     Disagreement,
     Flown,
@@ -25,9 +25,9 @@ from sil.sign_decisions import (
     with_few,
     with_random_memory,
 )
-from sil.verify.check import Outcome
-from sil.verify.inputs import random_inputs
-from sil.verify.signs import check, judge, text
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.inputs import random_inputs
+from mambo_nmpc.sil.verify.signs import check, judge, text
 from tests.support.subjects import subject
 
 MAMBO = presets.load("mambo")

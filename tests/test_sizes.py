@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from codegen.footprint.elf import FootprintError, load
-from codegen.footprint.gate import Forbidden, forbidden
-from codegen.footprint.sizes import Added, Parts, added, sections
+from mambo_nmpc.codegen.footprint.elf import FootprintError, load
+from mambo_nmpc.codegen.footprint.gate import Forbidden, forbidden
+from mambo_nmpc.codegen.footprint.sizes import Added, Parts, added, sections
 from tests.support.linking import BOARDS, linked, linked_controller
 from tests.support.tools import require
 

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from codegen.footprint.elf import FootprintError, Image, load
-from codegen.footprint.stack import Frame, StackReport, direct_callers, worst_case
-from sil.machine import start
+from mambo_nmpc.codegen.footprint.elf import FootprintError, Image, load
+from mambo_nmpc.codegen.footprint.stack import Frame, StackReport, direct_callers, worst_case
+from mambo_nmpc.sil.machine import start
 from tests.support.linking import BOARDS, Board, linked, linked_controller
 from tests.support.tools import require
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from codegen import boards, cli, presets
-from codegen.boards import Board
-from sil import cli_boards
-from sil.board_plots import draw_sweep
-from sil.sweep import Grid, Point, largest_fit, sweep, write_points
+from mambo_nmpc.codegen import boards, cli, presets
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.sil import cli_boards
+from mambo_nmpc.sil.board_plots import draw_sweep
+from mambo_nmpc.sil.sweep import Grid, Point, largest_fit, sweep, write_points
 from tests.support.tools import board_builder, require
 
 POINT = Point(

@@ -2,9 +2,9 @@
 
 import pytest
 
-from codegen import presets
-from sil.table2 import PD
-from sil.table2_sensed import PRESETS, VIEWS, fly_sensed, text
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.sil.table2 import PD
+from mambo_nmpc.sil.table2_sensed import PRESETS, VIEWS, fly_sensed, text
 
 
 @pytest.mark.long

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sil.baseline import PdController
-from sil.errors import TraceError
-from sil.loop import Flight, fly
-from sil.traces import CSV_COLUMNS, Trace, read_npz, write_csv, write_npz
-from sil.trajectories import Bernoulli, Circle, Trajectories
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.errors import TraceError
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.traces import CSV_COLUMNS, Trace, read_npz, write_csv, write_npz
+from mambo_nmpc.sil.trajectories import Bernoulli, Circle, Trajectories
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sil.errors import TrajectoryError
-from sil.trajectories import (
+from mambo_nmpc.sil.errors import TrajectoryError
+from mambo_nmpc.sil.trajectories import (
     Bernoulli,
     Circle,
     Gerono,

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from codegen import presets
-from codegen.errors import INTERRUPTED, ForeignFilesError, InvalidSettingsError
-from codegen.settings import controller_toml
-from sil.campaign.executors import Pool
-from sil.campaign.store import claim
-from sil.cli_tune import tune
-from sil.errors import StudyError
-from sil.tuning import file
-from sil.tuning.front import IAE_ALLOWANCE, chosen, pareto_front
-from sil.tuning.study import CRASH_ERROR_M, Judged, judge, judged, open_study, search
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import INTERRUPTED, ForeignFilesError, InvalidSettingsError
+from mambo_nmpc.codegen.settings import controller_toml
+from mambo_nmpc.sil.campaign.executors import Pool
+from mambo_nmpc.sil.campaign.store import claim
+from mambo_nmpc.sil.cli_tune import tune
+from mambo_nmpc.sil.errors import StudyError
+from mambo_nmpc.sil.tuning import file
+from mambo_nmpc.sil.tuning.front import IAE_ALLOWANCE, chosen, pareto_front
+from mambo_nmpc.sil.tuning.study import CRASH_ERROR_M, Judged, judge, judged, open_study, search
 from tests.support.tools import require_module
 
 TRIALS = 3
@@ -76,7 +76,7 @@ def found_in(folder: Path, source: Path, storage: str | None = None) -> list[Jud
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc."""
-    line = [sys.executable, "-c", "from sil.__main__ import main; main()", *map(str, arguments)]
+    line = [sys.executable, "-c", "from mambo_nmpc.sil.__main__ import main; main()", *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
 
 
@@ -262,7 +262,7 @@ def test_the_documented_study_is_the_default_one(tmp_path: Path) -> None:
 STOPPED = """
 import os, signal
 from optuna import Study
-from sil.__main__ import main
+from mambo_nmpc.sil.__main__ import main
 tell = Study.tell
 def tell_and_stop(self, *arguments, **options):
     tell(self, *arguments, **options)

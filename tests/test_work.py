@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from codegen import presets
-from codegen.settings import Settings
-from codegen.toolchain import Toolchain
-from sil.verify import work
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.loops import Reading, read_loops, read_unit
-from sil.verify.passes import runs
-from sil.verify.work import Counted, judge
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.verify import work
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.loops import Reading, read_loops, read_unit
+from mambo_nmpc.sil.verify.passes import runs
+from mambo_nmpc.sil.verify.work import Counted, judge
 from tests.support.subjects import subject
 from tests.support.tools import require
 

@@ -5,7 +5,7 @@ from typing import Any, Final
 import capstone
 from capstone import arm_const as arm
 
-from codegen.footprint.instructions import (
+from mambo_nmpc.codegen.footprint.instructions import (
     PC,
     SP,
     WORD_BYTES,

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from codegen.footprint.elf import Image
-from codegen.footprint.instructions import (
+from mambo_nmpc.codegen.footprint.elf import Image
+from mambo_nmpc.codegen.footprint.instructions import (
     PC,
     SP,
     Convention,

@@ -13,10 +13,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Final
 
-from codegen.boards import Board
-from codegen.errors import BuildError
-from codegen.flags import COMPILE_FLAGS
-from codegen.toolchain import Toolchain
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS
+from mambo_nmpc.codegen.toolchain import Toolchain
 
 ENTRY: Final = "run"
 PREFIX: Final = "nmpc"
@@ -43,7 +43,7 @@ _CLANG_TARGETS: Final = {
 }
 """What clang calls the architecture of an emulated core; the rest it reads from the board's flags."""
 _CLANG_NO_LIBRARY: Final = ("-ffreestanding",)
-_PACKAGE: Final = resources.files("codegen.footprint")
+_PACKAGE: Final = resources.files("mambo_nmpc.codegen.footprint")
 
 
 @dataclass(frozen=True)

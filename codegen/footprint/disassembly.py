@@ -8,9 +8,9 @@ from typing import Any, Final
 
 import capstone
 
-from codegen.footprint import arm, avr, riscv
-from codegen.footprint.elf import Image, Section
-from codegen.footprint.instructions import Convention, Instruction
+from mambo_nmpc.codegen.footprint import arm, avr, riscv
+from mambo_nmpc.codegen.footprint.elf import Image, Section
+from mambo_nmpc.codegen.footprint.instructions import Convention, Instruction
 
 _A32: Final = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_ARM)
 _THUMB: Final = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_THUMB | capstone.CS_MODE_MCLASS)

@@ -13,7 +13,7 @@ from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
-from codegen.errors import MamboNmpcError
+from mambo_nmpc.codegen.errors import MamboNmpcError
 
 _ARM: Final = "EM_ARM"
 _KINDS: Final[dict[str, Literal["function", "object"]]] = {"STT_FUNC": "function", "STT_OBJECT": "object"}

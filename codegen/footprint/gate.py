@@ -4,9 +4,9 @@ import re
 from dataclasses import dataclass
 from typing import Final
 
-from codegen.footprint.disassembly import is_readable
-from codegen.footprint.elf import Image, Symbol
-from codegen.footprint.stack import direct_callers
+from mambo_nmpc.codegen.footprint.disassembly import is_readable
+from mambo_nmpc.codegen.footprint.elf import Image, Symbol
+from mambo_nmpc.codegen.footprint.stack import direct_callers
 
 _LIBM: Final = (
     "acos|acosh|asin|asinh|atan|atan2|atanh|cbrt|ceil|copysign|cos|cosh|erf|erfc|exp|exp2|expm1|fabs|fdim|floor|"

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from codegen.footprint.elf import Image
-from codegen.footprint.instructions import (
+from mambo_nmpc.codegen.footprint.elf import Image
+from mambo_nmpc.codegen.footprint.instructions import (
     PC,
     SP,
     Convention,

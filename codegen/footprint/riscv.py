@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from capstone import riscv_const as riscv
 
-from codegen.footprint.instructions import (
+from mambo_nmpc.codegen.footprint.instructions import (
     PC,
     WORD_BYTES,
     Convention,

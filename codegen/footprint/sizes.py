@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from codegen.footprint.elf import Image, Symbol, load
+from mambo_nmpc.codegen.footprint.elf import Image, Symbol, load
 
 Part = Literal["own", "helpers", "grown"]
 _PARTS: Final[tuple[Part, ...]] = ("own", "helpers", "grown")

@@ -10,10 +10,10 @@ from collections import defaultdict
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from codegen.footprint.disassembly import Code, disassemble
-from codegen.footprint.elf import Image
-from codegen.footprint.instructions import SP, Instruction, Put
-from codegen.footprint.knowledge import Knowledge, Value
+from mambo_nmpc.codegen.footprint.disassembly import Code, disassemble
+from mambo_nmpc.codegen.footprint.elf import Image
+from mambo_nmpc.codegen.footprint.instructions import SP, Instruction, Put
+from mambo_nmpc.codegen.footprint.knowledge import Knowledge, Value
 
 _MOST_DEPTHS: Final = 32
 """Depths of the stack at one instruction, from which on a loop is taken to grow it."""

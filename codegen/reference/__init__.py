@@ -5,6 +5,6 @@ settings, so that both compute the same bits. Nothing here calls `@`, `numpy.dot
 free to reorder additions.
 """
 
-from codegen.reference.controller import Memory, ReferenceController, Status, Step
+from mambo_nmpc.codegen.reference.controller import Memory, ReferenceController, Status, Step
 
 __all__ = ["Memory", "ReferenceController", "Status", "Step"]

@@ -11,12 +11,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from codegen.fixed_point import SINE_BITS, Formats
-from codegen.horizon import horizon_tables
-from codegen.reference.math import Real, fixed_sine_cosine, rounded, sine_cosine
-from codegen.representation import Representation
-from codegen.settings import Settings
-from codegen.trigonometry import fixed_trigonometry, trigonometry
+from mambo_nmpc.codegen.fixed_point import SINE_BITS, Formats
+from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.reference.math import Real, fixed_sine_cosine, rounded, sine_cosine
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
 
 
 class Arithmetic(Protocol):

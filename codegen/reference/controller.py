@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.horizon import horizon_tables
-from codegen.reference import cost, optimizer
-from codegen.reference.arithmetic import arithmetic
-from codegen.reference.math import Real
-from codegen.reference.predictor import Predictor
-from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
-from codegen.settings import Settings
+from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.reference import cost, optimizer
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.math import Real
+from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
+from mambo_nmpc.codegen.settings import Settings
 
 
 class Status(IntEnum):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from codegen.reference.math import Real, ordered_sum, sign
-from codegen.reference.predictor import Prediction, Predictor
+from mambo_nmpc.codegen.reference.math import Real, ordered_sum, sign
+from mambo_nmpc.codegen.reference.predictor import Prediction, Predictor
 
 
 def evaluate(

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.fixed_point import SINE_BITS
-from codegen.trigonometry import FixedTrigonometry, Trigonometry
+from mambo_nmpc.codegen.fixed_point import SINE_BITS
+from mambo_nmpc.codegen.trigonometry import FixedTrigonometry, Trigonometry
 
 Real = NDArray[Any]
 """An array of the controller's scalar type, or with fixed point of int64."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.reference.arithmetic import arithmetic
-from codegen.reference.math import Real, sign
-from codegen.settings import Settings
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.math import Real, sign
+from mambo_nmpc.codegen.settings import Settings
 
 Evaluate = Callable[[Real], tuple[Real, Real]]
 """Moves (n, control, 2) -> cost (n,) and gradient (n, control, 2)."""

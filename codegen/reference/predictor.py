@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from codegen.horizon import HorizonTables
-from codegen.reference.arithmetic import Arithmetic
-from codegen.reference.math import Real
-from codegen.settings import Settings
+from mambo_nmpc.codegen.horizon import HorizonTables
+from mambo_nmpc.codegen.reference.arithmetic import Arithmetic
+from mambo_nmpc.codegen.reference.math import Real
+from mambo_nmpc.codegen.settings import Settings
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from codegen.errors import InvalidSettingsError, echo
-from codegen.settings.faults import faults
-from codegen.settings.keys import KEYS, SECTIONS, spelled
-from codegen.settings.model import Settings
-from codegen.toml_file import parse_document, read_text
+from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
+from mambo_nmpc.codegen.settings.faults import faults
+from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, spelled
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.toml_file import parse_document, read_text
 
 COLUMNS = 88
 

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from codegen.errors import echo
-from codegen.settings.keys import KEYS, SECTIONS, Key
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key
 
 _LONGEST_NUMBER_BITS = 190
 """Whole numbers up to here (58 digits) are repeated in a message, longer ones described."""

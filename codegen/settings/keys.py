@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from codegen.settings.model import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 
 @dataclass(frozen=True)

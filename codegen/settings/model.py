@@ -22,7 +22,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from codegen.settings import reserved
+from mambo_nmpc.codegen.settings import reserved
 
 SHORTEST_LAG_S = 0.001
 """An attitude lag is 0 (none) or at least this: below it the exact discretisation is a unit step."""
@@ -339,7 +339,7 @@ class Settings(_Section):
     def _representable(self) -> Self:
         if self.code.scalar != "fixed":
             return self
-        from codegen.fixed_point import refusals  # noqa: PLC0415 - it takes settings
+        from mambo_nmpc.codegen.fixed_point import refusals  # noqa: PLC0415 - it takes settings
 
         refused = refusals(self)
         if refused:

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Final
 
-import codegen
-from codegen.errors import MamboNmpcError, echo
-from sil.errors import WorkerError
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen.errors import MamboNmpcError, echo
+from mambo_nmpc.sil.errors import WorkerError
 
 PATIENCE_S: Final = 5.0
 """Time within which a scheduler must answer."""

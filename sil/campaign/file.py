@@ -24,14 +24,14 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from codegen import presets
-from codegen.errors import InvalidSettingsError, MamboNmpcError, echo
-from codegen.settings import Settings
-from codegen.toml_file import parse_document, read_text
-from sil.campaign.distributions import Distribution, parse
-from sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values
-from sil.errors import FlightError
-from sil.scenario import Scenario, flight_of
+from mambo_nmpc.codegen import presets
+from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toml_file import parse_document, read_text
+from mambo_nmpc.sil.campaign.distributions import Distribution, parse
+from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.scenario import Scenario, flight_of
 
 PD: Final = "pd"
 

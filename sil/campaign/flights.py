@@ -10,19 +10,19 @@ from typing import Any, Final
 
 import numpy as np
 
-import codegen
-from sil.arrays import FloatArray
-from sil.baseline import PdController
-from sil.campaign.file import Entrant, scenario
-from sil.campaign.parameters import Draw
-from sil.compiled import CompiledController
-from sil.errors import WorkerError
-from sil.fault_flights import CRASH_TILT_RAD
-from sil.link import NOT_CALLED
-from sil.loop import PositionController, fly
-from sil.metrics import Metrics, measure
-from sil.scenario import flight_of
-from sil.traces import SensedTrace, Trace
+import mambo_nmpc.codegen
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.campaign.file import Entrant, scenario
+from mambo_nmpc.sil.campaign.parameters import Draw
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.errors import WorkerError
+from mambo_nmpc.sil.fault_flights import CRASH_TILT_RAD
+from mambo_nmpc.sil.link import NOT_CALLED
+from mambo_nmpc.sil.loop import PositionController, fly
+from mambo_nmpc.sil.metrics import Metrics, measure
+from mambo_nmpc.sil.scenario import flight_of
+from mambo_nmpc.sil.traces import SensedTrace, Trace
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
 """Of the true flight."""

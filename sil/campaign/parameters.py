@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from sil.campaign.distributions import Distribution, Domain, parse
-from sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
+from mambo_nmpc.sil.plant.airframe import MAMBO
 
 
 @dataclass(frozen=True)

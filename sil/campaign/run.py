@@ -5,13 +5,13 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Final
 
-import codegen
-from sil.campaign.executors import Pool
-from sil.campaign.file import Campaign
-from sil.campaign.flights import columns, fly_batch
-from sil.campaign.parameters import PARAMETERS
-from sil.campaign.store import Store, open_store
-from sil.errors import FlightError
+import mambo_nmpc.codegen
+from mambo_nmpc.sil.campaign.executors import Pool
+from mambo_nmpc.sil.campaign.file import Campaign
+from mambo_nmpc.sil.campaign.flights import columns, fly_batch
+from mambo_nmpc.sil.campaign.parameters import PARAMETERS
+from mambo_nmpc.sil.campaign.store import Store, open_store
+from mambo_nmpc.sil.errors import FlightError
 
 MOST_IN_A_BATCH: Final = 100
 """Flights for NumPy at once: a trace of 100 s takes 2 MB, and more gain little."""

@@ -15,10 +15,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-import codegen
-from codegen.errors import ForeignFilesError, UnwritableError, echo
-from codegen.exchange import put
-from sil.results import GENERATOR, locked
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
+from mambo_nmpc.codegen.exchange import put
+from mambo_nmpc.sil.results import GENERATOR, locked
 
 TABLE: Final = "flights.csv"
 FLIGHT: Final = "flight"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sil.arrays import FloatArray, PerFlight
-from sil.plant.airframe import Airframe
+from mambo_nmpc.sil.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.airframe import Airframe
 
 WRENCH_SIGNS = np.array(
     [

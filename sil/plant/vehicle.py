@@ -5,11 +5,11 @@ from functools import cached_property
 
 import numpy as np
 
-from sil.arrays import FloatArray, PerFlight
-from sil.plant import loops
-from sil.plant.airframe import MAMBO, Airframe
-from sil.plant.integrator import NODES, bogacki_shampine
-from sil.plant.rigid_body import (
+from mambo_nmpc.sil.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant import loops
+from mambo_nmpc.sil.plant.airframe import MAMBO, Airframe
+from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
+from mambo_nmpc.sil.plant.rigid_body import (
     EULER,
     POSITION,
     RATES,
@@ -19,7 +19,7 @@ from sil.plant.rigid_body import (
     to_body,
     world_velocity,
 )
-from sil.plant.rotors import Rotors, mix
+from mambo_nmpc.sil.plant.rotors import Rotors, mix
 
 STEP_S = loops.PERIOD_S
 """Integration step, and period of the stock loops: commands are held over it."""

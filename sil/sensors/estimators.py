@@ -10,11 +10,11 @@ from typing import Final
 
 import numpy as np
 
-from sil.arrays import FloatArray
-from sil.plant.airframe import GRAVITY_M_S2
-from sil.plant.rigid_body import to_body, to_world
-from sil.plant.vehicle import STEP_S, Seen
-from sil.sensors.instruments import PA_PER_M, SONAR_LEAST_M, Readings
+from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.rigid_body import to_body, to_world
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
+from mambo_nmpc.sil.sensors.instruments import PA_PER_M, SONAR_LEAST_M, Readings
 
 ACCELEROMETER_TAPS: Final = (0.02640772, 0.14053, 0.33306, 0.33306, 0.14053, 0.02640772)
 """Low-pass filter before the attitude estimator (order 5, cut-off 0.1 of 100 Hz)."""

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from sil.plant.vehicle import Seen
-from sil.sensors.estimators import Estimators
-from sil.sensors.instruments import Instruments, Sensors
+from mambo_nmpc.sil.plant.vehicle import Seen
+from mambo_nmpc.sil.sensors.estimators import Estimators
+from mambo_nmpc.sil.sensors.instruments import Instruments, Sensors
 
 
 class Suite:

@@ -5,9 +5,9 @@ import io
 from collections.abc import Sequence
 from typing import Final
 
-from codegen.settings import controller_toml
-from sil.tuning.file import Tuning, rounded
-from sil.tuning.study import Judged, study_name
+from mambo_nmpc.codegen.settings import controller_toml
+from mambo_nmpc.sil.tuning.file import Tuning, rounded
+from mambo_nmpc.sil.tuning.study import Judged, study_name
 
 IAE_ALLOWANCE: Final = 1.1
 """The chosen point has an IAE of at most this times the least found."""

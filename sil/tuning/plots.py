@@ -5,10 +5,10 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from sil.board_plots import save
-from sil.plots import style
-from sil.tuning.front import chosen, pareto_front
-from sil.tuning.study import Judged
+from mambo_nmpc.sil.board_plots import save
+from mambo_nmpc.sil.plots import style
+from mambo_nmpc.sil.tuning.front import chosen, pareto_front
+from mambo_nmpc.sil.tuning.study import Judged
 
 
 def draw_front(trials: Sequence[Judged], base: Sequence[Judged], stem: Path) -> tuple[Path, Path]:

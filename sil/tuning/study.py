@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-import codegen
-from codegen.errors import echo
-from sil.campaign.distributions import Distribution
-from sil.campaign.executors import Pool
-from sil.campaign.file import Entrant
-from sil.campaign.flights import CRASHED, Row, fly_batch
-from sil.errors import StudyError
-from sil.tuning.file import Tuning
+import mambo_nmpc.codegen
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.campaign.distributions import Distribution
+from mambo_nmpc.sil.campaign.executors import Pool
+from mambo_nmpc.sil.campaign.file import Entrant
+from mambo_nmpc.sil.campaign.flights import CRASHED, Row, fly_batch
+from mambo_nmpc.sil.errors import StudyError
+from mambo_nmpc.sil.tuning.file import Tuning
 
 if TYPE_CHECKING:
     from optuna import Study, Trial

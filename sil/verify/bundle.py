@@ -2,10 +2,10 @@
 
 import re
 
-from codegen.toolchain import host_toolchain
-from sil.compiled import CompiledController, compiled
-from sil.extension import load_extension
-from sil.verify.check import Subject
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.compiled import CompiledController, compiled
+from mambo_nmpc.sil.extension import load_extension
+from mambo_nmpc.sil.verify.check import Subject
 
 
 def library(subject: Subject) -> dict[str, str]:

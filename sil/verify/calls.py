@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.reference import Memory, ReferenceController, Status
-from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from codegen.settings import Settings
+from mambo_nmpc.codegen.reference import Memory, ReferenceController, Status
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.settings import Settings
 
 Tape = NDArray[Any]
 """Calls one after the other, an array of `call_type`."""

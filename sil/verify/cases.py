@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.literals import SCALARS, Scalar
-from codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from codegen.self_test import hover_thrust
-from codegen.settings import Settings
-from codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
-from sil.verify.calls import (
+from mambo_nmpc.codegen.literals import SCALARS, Scalar
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.self_test import hover_thrust
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_nmpc.sil.verify.calls import (
     NULL_COMMAND,
     NULL_FIRST,
     NULL_SECOND,
@@ -25,7 +25,7 @@ from sil.verify.calls import (
     answers,
     calls,
 )
-from sil.verify.inputs import Inputs, random_inputs
+from mambo_nmpc.sil.verify.inputs import Inputs, random_inputs
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]

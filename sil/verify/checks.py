@@ -2,7 +2,7 @@
 
 from typing import Final, NamedTuple
 
-from sil.verify import (
+from mambo_nmpc.sil.verify import (
     coverage,
     dialects,
     faults,
@@ -14,7 +14,7 @@ from sil.verify import (
     signs,
     work,
 )
-from sil.verify.check import Check
+from mambo_nmpc.sil.verify.check import Check
 
 
 class Entry(NamedTuple):

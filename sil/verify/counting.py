@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pycparser import c_ast, c_generator
 
-from codegen.errors import BuildError
-from codegen.flags import COMPILE_FLAGS
-from codegen.render import with_prefix
-from codegen.representation import STATE, TARGET, THRUST, Representation
-from codegen.settings import Settings
-from codegen.toolchain import Toolchain
-from sil.verify.loops import Unit, place, walk
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS
+from mambo_nmpc.codegen.render import with_prefix
+from mambo_nmpc.codegen.representation import STATE, TARGET, THRUST, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.verify.loops import Unit, place, walk
 
 TOGETHER: Final = 100
 """Controllers that step in turn."""
@@ -43,7 +43,7 @@ def counting_program(
         text = c_generator.CGenerator().visit(_counting(unit, index))
         source.write_text(f"extern unsigned int {_COUNTS}[];\n{text}", "utf-8")
         sources.append(source.name)
-    driver = resources.files("sil").joinpath("verify/work.c").read_text("utf-8")
+    driver = resources.files("mambo_nmpc.sil").joinpath("verify/work.c").read_text("utf-8")
     prefix = settings.code.prefix
     (work / "work.c").write_text(
         with_prefix(driver, prefix).replace(f"{prefix}_work_", "nmpc_work_"), "utf-8"

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from codegen.errors import BuildError
-from sil.doctor import command_version
-from sil.verify import replay
-from sil.verify.cases import cases
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.coverage_reasons import REASONS
-from sil.verify.reasons import plain, reason_for, row
-from sil.verify.tools import missing as missing_tool
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.coverage_reasons import REASONS
+from mambo_nmpc.sil.verify.reasons import plain, reason_for, row
+from mambo_nmpc.sil.verify.tools import missing as missing_tool
 
 FLAGS: Final = ("--coverage", "-O0")
 

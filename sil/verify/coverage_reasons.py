@@ -2,8 +2,8 @@
 
 from typing import Final
 
-from codegen.settings import Settings
-from sil.verify.reasons import Reason
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.verify.reasons import Reason
 
 _SELF_TEST: Final = (
     "a build that computes the bits of the reference passes its self-test: it never finds a difference"

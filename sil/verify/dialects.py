@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from codegen.flags import WARNING_FLAGS
-from codegen.settings import Settings
-from sil.doctor import command_version
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.tools import missing, run
+from mambo_nmpc.codegen.flags import WARNING_FLAGS
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.tools import missing, run
 
 _UNSUFFIXED: Final = "-Wunsuffixed-float-constants"
 _CXX: Final = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Wundef")

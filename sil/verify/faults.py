@@ -5,15 +5,15 @@ from functools import partial
 
 import numpy as np
 
-from codegen.representation import Representation
-from codegen.settings import Settings
-from codegen.toolchain import host_toolchain
-from sil.fault_flights import STRAY_M, End, Verdict, fly_faults
-from sil.fault_report import records, table, write_csv
-from sil.fault_scenarios import TO_THE_END, scenarios
-from sil.results import finite
-from sil.verify.bundle import controller
-from sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.fault_flights import STRAY_M, End, Verdict, fly_faults
+from mambo_nmpc.sil.fault_report import records, table, write_csv
+from mambo_nmpc.sil.fault_scenarios import TO_THE_END, scenarios
+from mambo_nmpc.sil.results import finite
+from mambo_nmpc.sil.verify.bundle import controller
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 
 
 def check(subject: Subject) -> Result:

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from codegen.errors import BuildError
-from codegen.settings import Settings
-from codegen.toolchain import Toolchain
-from sil.doctor import command_version
-from sil.verify import replay
-from sil.verify.calls import Tape, answers, call_type, tape_from
-from sil.verify.cases import random_tapes
-from sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.calls import Tape, answers, call_type, tape_from
+from mambo_nmpc.sil.verify.cases import random_tapes
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 
 RUNS: Final = 500_000
 SEED: Final = 1

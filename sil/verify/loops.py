@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from pycparser import c_ast, c_parser
 
-from codegen.toolchain import Toolchain
+from mambo_nmpc.codegen.toolchain import Toolchain
 
 _PREPROCESS: Final = ("-std=c99", "-E", "-D__attribute__(x)=", "-D__extension__=", "-D__restrict=")
 """What the headers of a C library say beyond C99 is nothing to a reader of loops."""

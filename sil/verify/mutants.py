@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from codegen import literals
-from sil.verify.reasons import Key, plain
+from mambo_nmpc.codegen import literals
+from mambo_nmpc.sil.verify.reasons import Key, plain
 
 _TOKEN: Final = re.compile(
     r"""(?P<define>^[ \t]*\#[ \t]*define[ \t]+\w+(\([^)]*\))?(?=[ \t]))

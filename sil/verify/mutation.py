@@ -12,16 +12,16 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Final
 
-from codegen.errors import BuildError
-from codegen.render import SUB_BLOCKS
-from codegen.toolchain import Toolchain
-from sil.doctor import command_version
-from sil.verify import replay
-from sil.verify.cases import cases
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.mutants import Mutant, mutants
-from sil.verify.mutation_reasons import REASONS
-from sil.verify.reasons import reason_for, row
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.render import SUB_BLOCKS
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.mutants import Mutant, mutants
+from mambo_nmpc.sil.verify.mutation_reasons import REASONS
+from mambo_nmpc.sil.verify.reasons import reason_for, row
 
 AT_ONCE: Final = 2
 SLOWER: Final = 20

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from codegen.reference.arithmetic import arithmetic
-from codegen.representation import Representation
-from codegen.settings import Settings
-from sil.verify.reasons import Reason
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.verify.reasons import Reason
 
 
 def _steps_stay_short(settings: Settings) -> bool:

@@ -5,7 +5,7 @@ from typing import Any
 
 from pycparser import c_ast
 
-from sil.verify.loops import Reading, place, walk
+from mambo_nmpc.sil.verify.loops import Reading, place, walk
 
 Count = Counter[str]
 """How often loops, by place (file:line), and functions, by name, run."""

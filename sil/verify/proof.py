@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
-from codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
-from codegen.render import with_prefix
-from sil.doctor import command_version
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.tools import PATIENCE_S, missing, run
+from mambo_nmpc.codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
+from mambo_nmpc.codegen.render import with_prefix
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 
 _SHOWN: Final = 5
 """Alarms that the evidence names; all are in the reports."""

@@ -10,13 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from codegen.errors import BuildError
-from codegen.render import with_prefix
-from codegen.settings import Settings
-from codegen.toolchain import Toolchain
-from sil.verify.calls import Function, Outcomes, Tape, calls, outcome_type
-from sil.verify.check import Subject
-from sil.verify.tools import missing as missing_tool
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.render import with_prefix
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.verify.calls import Function, Outcomes, Tape, calls, outcome_type
+from mambo_nmpc.sil.verify.check import Subject
+from mambo_nmpc.sil.verify.tools import missing as missing_tool
 
 LIMIT_S: Final = 600
 """Processor time that a program gets, in seconds."""
@@ -87,7 +87,7 @@ def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Pa
 
 def write_program(prefix: str, folder: Path) -> Path:
     """Write the C that replays tapes into `folder`."""
-    text = resources.files("sil.verify").joinpath("replay.c").read_text("utf-8")
+    text = resources.files("mambo_nmpc.sil.verify").joinpath("replay.c").read_text("utf-8")
     program = folder / "replay.c"
     program.write_text(with_prefix(text, prefix), "utf-8")
     return program

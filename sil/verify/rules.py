@@ -7,11 +7,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
-from codegen.flags import RULE_FLAGS
-from codegen.render import DEVIATIONS
-from sil.doctor import command_version
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.tools import PATIENCE_S, missing, run
+from mambo_nmpc.codegen.flags import RULE_FLAGS
+from mambo_nmpc.codegen.render import DEVIATIONS
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 
 _TEMPLATE: Final = "{file}\t{line}\t{id}\t{message}"
 _MISRA: Final = "misra-c2012-"

@@ -2,11 +2,11 @@
 
 from typing import Final, NamedTuple
 
-from codegen.errors import BuildError
-from sil.doctor import command_version
-from sil.verify import replay
-from sil.verify.cases import cases
-from sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 
 
 class Watch(NamedTuple):

@@ -6,13 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from codegen.representation import Representation
-from codegen.settings import Settings
-from codegen.toolchain import host_toolchain
-from sil.compiled import CompiledController
-from sil.fault_flights import STRAY_M
-from sil.results import finite
-from sil.sign_decisions import (
+from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.fault_flights import STRAY_M
+from mambo_nmpc.sil.results import finite
+from mambo_nmpc.sil.sign_decisions import (
     MANY,
     Disagreement,
     Flown,
@@ -23,9 +23,9 @@ from sil.sign_decisions import (
     with_few,
     with_random_memory,
 )
-from sil.verify.bundle import controller
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.inputs import random_inputs
+from mambo_nmpc.sil.verify.bundle import controller
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.inputs import random_inputs
 
 RANDOM_STEPS: Final = 100_000
 EDGE_SEEDS: Final = 10_000

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pycparser.c_parser import ParseError
 
-from codegen.settings import Settings
-from codegen.toolchain import host_toolchain
-from sil.verify.bundle import controller, library
-from sil.verify.check import Outcome, Result, Subject
-from sil.verify.counting import TOGETHER, count, counting_program, places
-from sil.verify.inputs import random_inputs
-from sil.verify.loops import Reading, read_loops, read_unit
-from sil.verify.passes import Count, runs
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.verify.bundle import controller, library
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.counting import TOGETHER, count, counting_program, places
+from mambo_nmpc.sil.verify.inputs import random_inputs
+from mambo_nmpc.sil.verify.loops import Reading, read_loops, read_unit
+from mambo_nmpc.sil.verify.passes import Count, runs
 
 STEPS: Final = 20_000
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from codegen import bundle
+from mambo_nmpc.codegen import bundle
 
 FILES = {
     "README.md": "What.\n",

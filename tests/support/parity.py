@@ -5,9 +5,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from codegen.reference import Step
-from codegen.settings import Settings
-from sil.verify.inputs import Inputs, random_inputs
+from mambo_nmpc.codegen.reference import Step
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.verify.inputs import Inputs, random_inputs
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
 

@@ -10,24 +10,24 @@ from typing import Any, Final
 
 import numpy as np
 
-from codegen import boards
-from codegen.footprint.sizes import Added, Memory, Parts
-from codegen.reference import Status
-from codegen.settings import Settings
-from sil import fault_report, footprint_report, report, verify_report
-from sil.baseline import PdController
-from sil.cli_replay import COMMAND
-from sil.fault_flights import End, Verdict
-from sil.footprint import Footprint
-from sil.loop import Flight, fly
-from sil.results import SUMMARY, summary_text
-from sil.scenario import Scenario
-from sil.sweep import Point, budgets
-from sil.table2 import CASES, PD, Claim, Row
-from sil.table2_sensed import SensedRow
-from sil.traces import Trace, write_npz
-from sil.verify.check import Outcome, Result
-from sil.verify.checks import CHECKS
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.footprint.sizes import Added, Memory, Parts
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil import fault_report, footprint_report, report, verify_report
+from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.sil.cli_replay import COMMAND
+from mambo_nmpc.sil.fault_flights import End, Verdict
+from mambo_nmpc.sil.footprint import Footprint
+from mambo_nmpc.sil.loop import Flight, fly
+from mambo_nmpc.sil.results import SUMMARY, summary_text
+from mambo_nmpc.sil.scenario import Scenario
+from mambo_nmpc.sil.sweep import Point, budgets
+from mambo_nmpc.sil.table2 import CASES, PD, Claim, Row
+from mambo_nmpc.sil.table2_sensed import SensedRow
+from mambo_nmpc.sil.traces import Trace, write_npz
+from mambo_nmpc.sil.verify.check import Outcome, Result
+from mambo_nmpc.sil.verify.checks import CHECKS
 
 HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
 """A name of a file that is markup, the end of a script, and quotes."""

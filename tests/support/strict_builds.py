@@ -9,10 +9,10 @@ from typing import Any, Final
 
 import cffi
 
-from codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from codegen.literals import C_TYPES, SUM_TYPES
-from codegen.render import render, with_prefix
-from codegen.settings import Settings
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
+from mambo_nmpc.codegen.render import render, with_prefix
+from mambo_nmpc.codegen.settings import Settings
 from tests.support.tools import require
 
 _FUNCTIONS: Final = {
@@ -47,7 +47,7 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
     failed assertion.
     """
     prefix, scalar = settings.code.prefix, settings.code.scalar
-    batch = _QUIET + resources.files("sil").joinpath("batch.c").read_text("utf-8")
+    batch = _QUIET + resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
     files = render(settings, amalgamate=amalgamate, with_digest=False) | {
         "batch.c": with_prefix(batch, prefix)
     }

@@ -4,9 +4,9 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from codegen.render import render
-from codegen.settings import Settings
-from sil.verify.check import Subject
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.verify.check import Subject
 
 
 class Harm(NamedTuple):

@@ -8,9 +8,9 @@ from typing import NoReturn
 
 import pytest
 
-from codegen import boards
-from codegen.footprint.build import Builder, builder
-from codegen.toolchain import Toolchain
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.footprint.build import Builder, builder
+from mambo_nmpc.codegen.toolchain import Toolchain
 
 
 def require(tool: str, package: str) -> str:
