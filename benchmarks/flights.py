@@ -11,10 +11,10 @@ from collections.abc import Callable
 from rotorpy.vehicles.crazyflie_params import quad_params
 from rotorpy.vehicles.multirotor import Multirotor
 
-from mambo_nmpc.codegen import presets
-from mambo_nmpc.sil.compiled import CompiledController
-from mambo_nmpc.sil.loop import Flight, fly
-from mambo_nmpc.sil.trajectories import Bernoulli
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
 
 DURATION_S = 100.0
 ROUNDS = 5

@@ -11,11 +11,10 @@ from typing import Final
 
 from benchmarks import peers_setups as problem
 from benchmarks.peers_programs import HEAD, Program
-from mambo_nmpc.codegen import presets
 from mambo_nmpc.codegen.literals import real
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings import Settings, presets
 
 _GLUE: Final = (
     '#include "nmpc.h"\n\nstatic nmpc_t controller;\nstatic float given[2];\nstatic int is_set;\n\n'

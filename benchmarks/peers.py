@@ -31,16 +31,16 @@ from benchmarks import peers_setups as problem
 from benchmarks.ours import bundle_program, peers_model
 from benchmarks.peers_c import NotHereError, definitions, generate, run_tool, sources
 from benchmarks.peers_programs import Program, programs
-from mambo_nmpc.codegen import boards, presets
+from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_nmpc.codegen.footprint.build import ENTRY, PREFIX, Builder, builder
-from mambo_nmpc.codegen.footprint.elf import FootprintError, Image, load
-from mambo_nmpc.codegen.footprint.gate import forbidden
-from mambo_nmpc.codegen.footprint.sizes import added, sections
-from mambo_nmpc.codegen.footprint.stack import worst_case
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
+from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
+from mambo_nmpc.sil.firmware.gate import forbidden
+from mambo_nmpc.sil.firmware.sizes import added, sections
+from mambo_nmpc.sil.firmware.stack import worst_case
 
 _BOARD: Final = "crazyflie"
 _VEHICLE: Final = "mambo"
@@ -239,7 +239,13 @@ def _ours(title: str, settings: Settings, found: Builder, work: Path) -> _Row:
     first, folder = work / "first", work / "c"
     settings_file = work / "controller.toml"
     settings_file.write_text(files["controller.toml"], "utf-8")
-    line = [sys.executable, "-c", "from mambo_nmpc.sil.cli import main; main()", "generate", str(settings_file)]
+    line = [
+        sys.executable,
+        "-c",
+        "from mambo_nmpc.sil.cli.app import main; main()",
+        "generate",
+        str(settings_file),
+    ]
     run_tool([*line, "-o", str(folder)])
     folder.rename(first)
     time.sleep(_CLOCK_S)

@@ -15,17 +15,17 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.searches import Searching, SearchingController, best_iterate, from_level, optimum
-from mambo_nmpc.codegen import boards, presets
-from mambo_nmpc.codegen.settings import Settings
-from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.settings import Settings, presets
 from mambo_nmpc.sil.campaign.flights import crashed
-from mambo_nmpc.sil.compiled import CompiledController
-from mambo_nmpc.sil.footprint import measure_footprint
-from mambo_nmpc.sil.gusts import LIGHT_M_S
-from mambo_nmpc.sil.loop import PositionController, fly
-from mambo_nmpc.sil.metrics import Metrics, measure
-from mambo_nmpc.sil.scenario import Scenario, flight_of
-from mambo_nmpc.sil.traces import SensedTrace
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.flight.loop import PositionController, fly
+from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
+from mambo_nmpc.sil.flight.traces import SensedTrace
+from mambo_nmpc.sil.footprint.measure import measure_footprint
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
 
 PRESETS: Final = ("table1", "mambo")
 EFFORT_WEIGHTS: Final = (1.0, 100.0, 200.0, 300.0, 1000.0)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from benchmarks.host_builds import Sizes
-from mambo_nmpc.sil.plots import style
+from mambo_nmpc.sil.show.plots import style
 
 FLAGS: Final = {
     "portable": "-O2",

@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
-from mambo_nmpc.codegen.toml_file import parse_document, read_text
+from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 
 _FOLDER = resources.files("mambo_nmpc.codegen") / "data" / "boards"
 _PYDANTIC_SUBJECTS: Final = ("Input should", "String should", "Tuple should")

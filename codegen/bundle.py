@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-import mambo_nmpc.codegen
-from mambo_nmpc.codegen import exchange
+from mambo_nmpc.codegen import __version__, exchange
 from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, UnwritableError, echo
 from mambo_nmpc.codegen.exchange import JOURNAL, MANIFEST, STAND_IN
 
@@ -284,7 +283,7 @@ def _content(path: Path) -> bytes | None:
 
 def _listing(sha256s: Mapping[str, object]) -> str:
     """Return {path: SHA-256s} as the JSON text of a manifest or journal."""
-    return json.dumps({"generator": f"{GENERATOR} {codegen.__version__}", "files": sha256s}, indent=2) + "\n"
+    return json.dumps({"generator": f"{GENERATOR} {__version__}", "files": sha256s}, indent=2) + "\n"
 
 
 def _sha256(content: bytes) -> str:

@@ -16,8 +16,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-import mambo_nmpc.codegen
-from mambo_nmpc.codegen import bundle, exchange, presets
+from mambo_nmpc.codegen import __version__, bundle, exchange
 from mambo_nmpc.codegen.errors import (
     BAD_INPUT,
     INTERRUPTED,
@@ -29,7 +28,7 @@ from mambo_nmpc.codegen.errors import (
     echo,
 )
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.settings import Settings, controller_toml, presets
 
 EXIT_CODES = (
     "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "
@@ -231,7 +230,7 @@ def generate(
 
 def _print_version(asked: bool) -> None:
     if asked:
-        typer.echo(f"mambo-nmpc {codegen.__version__}")
+        typer.echo(f"mambo-nmpc {__version__}")
         raise typer.Exit
 
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import jinja2
 
-import mambo_nmpc.codegen
-from mambo_nmpc.codegen import boards, literals
+from mambo_nmpc.codegen import __version__, boards, literals
+from mambo_nmpc.codegen.digest import HELD, TICKS, episodes, frozen_digest, spread
 from mambo_nmpc.codegen.fixed_point import SINE_BITS
 from mambo_nmpc.codegen.flags import (
     COMPILE_FLAGS,
@@ -19,7 +19,6 @@ from mambo_nmpc.codegen.flags import (
     WARNING_FLAGS,
     proofs,
 )
-from mambo_nmpc.codegen.frozen import HELD, TICKS, episodes, frozen_digest, spread
 from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.representation import STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.self_test import hover_thrust, self_test
@@ -133,7 +132,7 @@ def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
             for key, value in values.items()
             if key != "prefix"  # the one text of the user's; the names show it
         ],
-        "version": codegen.__version__,
+        "version": __version__,
         "digest": settings.digest[:16],
         "fixed": numbers.formats is not None,
         "formats": numbers.formats,

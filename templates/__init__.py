@@ -1,1 +1,1 @@
-"""The Jinja templates of a bundle, as text; `codegen.render` is their only reader."""
+"""The Jinja templates of a bundle, as text; `mambo_nmpc.codegen.render` is their only reader."""

@@ -54,7 +54,7 @@ def test_no_module_is_too_long() -> None:
 
 def test_a_command_that_draws_nothing_loads_no_plotting_library() -> None:
     """Help and generation stay quick, and work where matplotlib does not."""
-    script = "import sys; from mambo_nmpc.sil.cli import main; print('matplotlib' in sys.modules)"
+    script = "import sys; from mambo_nmpc.sil.cli.app import main; print('matplotlib' in sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
     )

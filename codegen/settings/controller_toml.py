@@ -7,10 +7,10 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
-from mambo_nmpc.codegen.settings.faults import faults
 from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, spelled
+from mambo_nmpc.codegen.settings.messages import faults
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.toml_file import parse_document, read_text
+from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 
 COLUMNS = 88
 

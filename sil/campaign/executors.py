@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Final
 
-import mambo_nmpc.codegen
+from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.errors import MamboNmpcError, echo
 from mambo_nmpc.sil.errors import WorkerError
 
@@ -121,7 +121,7 @@ def cluster(address: str) -> Iterator[Pool]:
             return f"{option}: the scheduler is gone"
         return (
             f"{option}: a worker has failed, {type(error).__name__}: {echo(str(error))}; mambo-nmpc "
-            f"{codegen.__version__} must be installed where scheduler and workers run"
+            f"{__version__} must be installed where scheduler and workers run"
         )
 
     with client:

@@ -24,14 +24,13 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from mambo_nmpc.codegen import presets
 from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
-from mambo_nmpc.codegen.settings import Settings
-from mambo_nmpc.codegen.toml_file import parse_document, read_text
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.scenario import Scenario, flight_of
+from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 
 PD: Final = "pd"
 

@@ -10,19 +10,19 @@ from typing import Any, Final
 
 import numpy as np
 
-import mambo_nmpc.codegen
-from mambo_nmpc.sil.arrays import FloatArray
-from mambo_nmpc.sil.baseline import PdController
+from mambo_nmpc.codegen import __version__
 from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
-from mambo_nmpc.sil.compiled import CompiledController
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.errors import WorkerError
-from mambo_nmpc.sil.fault_flights import CRASH_TILT_RAD
-from mambo_nmpc.sil.link import NOT_CALLED
-from mambo_nmpc.sil.loop import PositionController, fly
-from mambo_nmpc.sil.metrics import Metrics, measure
-from mambo_nmpc.sil.scenario import flight_of
-from mambo_nmpc.sil.traces import SensedTrace, Trace
+from mambo_nmpc.sil.faults.flights import CRASH_TILT_RAD
+from mambo_nmpc.sil.flight.loop import PositionController, fly
+from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.scenario import flight_of
+from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
 """Of the true flight."""
@@ -54,9 +54,9 @@ def fly_batch(
     `flight` is the section [flight], `version` that of the program that asks. Raises WorkerError if this is
     another version, BuildError if there is no compiler here.
     """
-    if version != codegen.__version__:
+    if version != __version__:
         raise WorkerError(
-            f"a worker has mambo-nmpc {codegen.__version__} and this is {version}; install the same there"
+            f"a worker has mambo-nmpc {__version__} and this is {version}; install the same there"
         )
     scenarios = [scenario(flight, one) for one in drawn]
     rows: list[Row] = [{} for _ in drawn]

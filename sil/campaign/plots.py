@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from mambo_nmpc.sil.arrays import FloatArray
-from mambo_nmpc.sil.board_plots import save
 from mambo_nmpc.sil.campaign.statistics import COMPARED, Table, judged
-from mambo_nmpc.sil.plots import style
+from mambo_nmpc.sil.footprint.plots import save
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.show.plots import style
 
 _LABELS: Final = ("IAE, m s", "ISE, m² s", "ITSE, m² s²", "ITAE, m s²")
 

@@ -10,7 +10,7 @@ from mambo_nmpc.sil.campaign.file import Campaign, scenario
 from mambo_nmpc.sil.campaign.flights import CRASHED, DIGEST
 from mambo_nmpc.sil.campaign.statistics import Table, summarise, worst
 from mambo_nmpc.sil.campaign.store import FLIGHT, Store, refusals
-from mambo_nmpc.sil.scenario import Record, write_record
+from mambo_nmpc.sil.flight.scenario import Record, write_record
 
 RECORDS: Final = "flights"
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}

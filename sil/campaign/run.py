@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Final
 
-import mambo_nmpc.codegen
+from mambo_nmpc.codegen import __version__
 from mambo_nmpc.sil.campaign.executors import Pool
 from mambo_nmpc.sil.campaign.file import Campaign
 from mambo_nmpc.sil.campaign.flights import columns, fly_batch
@@ -56,9 +56,7 @@ def fly_missing(
     entrants = [entrant.document() for entrant in campaign.entrants]
     section = campaign.file.flight.model_dump()
     batches = [left[first : first + size] for first in range(0, len(left), size)]
-    tasks = [
-        (codegen.__version__, entrants, section, [drawn[flight] for flight in numbers]) for numbers in batches
-    ]
+    tasks = [(__version__, entrants, section, [drawn[flight] for flight in numbers]) for numbers in batches]
     progress(len(store.lines))
     for number, rows in pool.run(fly_batch, tasks):
         store.add({flight: drawn[flight] | row for flight, row in zip(batches[number], rows, strict=True)})

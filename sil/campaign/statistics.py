@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.sil.arrays import FloatArray
 from mambo_nmpc.sil.campaign.flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
+from mambo_nmpc.sil.plant.arrays import FloatArray
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 COMPARED: Final = ("iae_m_s", "ise_m2_s", "itse_m2_s2", "itae_m_s2")

@@ -15,10 +15,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-import mambo_nmpc.codegen
+from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
 from mambo_nmpc.codegen.exchange import put
-from mambo_nmpc.sil.results import GENERATOR, locked
+from mambo_nmpc.sil.files.folders import GENERATOR, locked
 
 TABLE: Final = "flights.csv"
 FLIGHT: Final = "flight"
@@ -139,7 +139,7 @@ def refusals(place: Path, advice: str = "") -> Iterator[None]:
 def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
     """Mark an empty folder with `identity` in `<kind>.json`; refuse one that holds anything else."""
     name, path = echo(str(folder)), folder / f"{kind}.json"
-    identity = {"generator": f"{GENERATOR}{codegen.__version__}", **identity}
+    identity = {"generator": f"{GENERATOR}{__version__}", **identity}
     try:
         held = json.loads(path.read_text("utf-8")) if path.is_file() and not path.is_symlink() else None
     except (ValueError, RecursionError):

@@ -6,9 +6,9 @@ import sys
 def main() -> None:
     """Run the command line; Ctrl-C exits with 130, also while modules are still being imported."""
     try:
-        from mambo_nmpc.sil import cli  # noqa: PLC0415 - importing takes long enough to be interrupted
+        from mambo_nmpc.sil.cli import app  # noqa: PLC0415 - importing takes long enough to be interrupted
 
-        cli.main()
+        app.main()
     except KeyboardInterrupt:
         sys.exit(130)
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from mambo_nmpc.sil.arrays import PerFlight
+from mambo_nmpc.sil.plant.arrays import PerFlight
 
 GRAVITY_M_S2 = 9.81
 

@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray
+from mambo_nmpc.sil.plant.arrays import FloatArray
 
 NODES = np.array([0.0, 0.5, 0.75])
 """Times of the three stages, as fractions of the step."""

@@ -6,8 +6,8 @@ R2020a. Gains of two axes stand in the order roll, pitch, as in every command of
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO
+from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 
 PERIOD_S = 0.005
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 
 POSITION = slice(0, 3)
 VELOCITY = slice(3, 6)

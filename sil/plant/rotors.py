@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.airframe import Airframe
+from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 
 WRENCH_SIGNS = np.array(
     [

@@ -5,9 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant import loops
 from mambo_nmpc.sil.plant.airframe import MAMBO, Airframe
+from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
 from mambo_nmpc.sil.plant.rigid_body import (
     EULER,

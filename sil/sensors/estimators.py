@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.rigid_body import to_body, to_world
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
 from mambo_nmpc.sil.sensors.instruments import PA_PER_M, SONAR_LEAST_M, Readings

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.sil.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.randomness import Draws, Purpose
 from mambo_nmpc.sil.plant.rigid_body import to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
-from mambo_nmpc.sil.randomness import Draws, Purpose
 
 Three = tuple[PerFlight, PerFlight, PerFlight]
 

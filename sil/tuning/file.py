@@ -8,15 +8,14 @@ from typing import Any, Final
 
 from pydantic import Field
 
-from mambo_nmpc.codegen import presets
 from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
-from mambo_nmpc.codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.settings import Settings, controller_toml, presets
 from mambo_nmpc.codegen.settings.keys import KEYS
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
 from mambo_nmpc.sil.campaign.file import Draws, FlightSection, Section, read_as, scenario, spelled
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.scenario import flight_of
+from mambo_nmpc.sil.flight.scenario import flight_of
 
 DEFAULT_SEARCH: Final[dict[str, dict[str, Any]]] = {
     "horizon": {

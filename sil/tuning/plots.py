@@ -5,8 +5,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mambo_nmpc.sil.board_plots import save
-from mambo_nmpc.sil.plots import style
+from mambo_nmpc.sil.footprint.plots import save
+from mambo_nmpc.sil.show.plots import style
 from mambo_nmpc.sil.tuning.front import chosen, pareto_front
 from mambo_nmpc.sil.tuning.study import Judged
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-import mambo_nmpc.codegen
+from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.distributions import Distribution
 from mambo_nmpc.sil.campaign.executors import Pool
@@ -91,7 +91,7 @@ def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["S
 
 def study_name(tuning: Tuning) -> str:
     """Return the name of a study in its storage."""
-    document = {"version": codegen.__version__, **tuning.document()}
+    document = {"version": __version__, **tuning.document()}
     return f"mambo-nmpc-{hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:16]}"
 
 
@@ -113,7 +113,7 @@ def search(
         count = min(ROUND - _begun(study) % ROUND, trials - finished - len(proposed))
         proposed |= dict(_ask(tuning, study, owner) for _ in range(max(count, 0)))
         tasks = [
-            (codegen.__version__, [Entrant(_NAME, "nmpc", tuning.settings(values)).document()], flight, drawn)
+            (__version__, [Entrant(_NAME, "nmpc", tuning.settings(values)).document()], flight, drawn)
             for values in proposed.values()
         ]
         numbers = list(proposed)

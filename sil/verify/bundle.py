@@ -3,8 +3,8 @@
 import re
 
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.compiled import CompiledController, compiled
-from mambo_nmpc.sil.extension import load_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.extension import load_extension
 from mambo_nmpc.sil.verify.check import Subject
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject

@@ -8,10 +8,10 @@ import numpy as np
 from mambo_nmpc.codegen.representation import Representation
 from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.fault_flights import STRAY_M, End, Verdict, fly_faults
-from mambo_nmpc.sil.fault_report import records, table, write_csv
-from mambo_nmpc.sil.fault_scenarios import TO_THE_END, scenarios
-from mambo_nmpc.sil.results import finite
+from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
+from mambo_nmpc.sil.faults.report import records, table, write_csv
+from mambo_nmpc.sil.faults.scenarios import TO_THE_END, scenarios
+from mambo_nmpc.sil.files.folders import finite
 from mambo_nmpc.sil.verify.bundle import controller
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 

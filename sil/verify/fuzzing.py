@@ -9,7 +9,7 @@ from typing import Final
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import Tape, answers, call_type, tape_from
 from mambo_nmpc.sil.verify.cases import random_tapes

@@ -11,7 +11,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
 from mambo_nmpc.codegen.render import with_prefix
-from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import RULE_FLAGS
 from mambo_nmpc.codegen.render import DEVIATIONS
-from mambo_nmpc.sil.doctor import command_version
+from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 

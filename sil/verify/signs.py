@@ -9,10 +9,13 @@ import numpy as np
 from mambo_nmpc.codegen.representation import Representation
 from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.compiled import CompiledController
-from mambo_nmpc.sil.fault_flights import STRAY_M
-from mambo_nmpc.sil.results import finite
-from mambo_nmpc.sil.sign_decisions import (
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.faults.flights import STRAY_M
+from mambo_nmpc.sil.files.folders import finite
+from mambo_nmpc.sil.verify.bundle import controller
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.inputs import random_inputs
+from mambo_nmpc.sil.verify.sign_decisions import (
     MANY,
     Disagreement,
     Flown,
@@ -23,9 +26,6 @@ from mambo_nmpc.sil.sign_decisions import (
     with_few,
     with_random_memory,
 )
-from mambo_nmpc.sil.verify.bundle import controller
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
-from mambo_nmpc.sil.verify.inputs import random_inputs
 
 RANDOM_STEPS: Final = 100_000
 EDGE_SEEDS: Final = 10_000

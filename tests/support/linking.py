@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from mambo_nmpc.codegen import presets
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import presets
 from tests.support.tools import require
 
 GUEST = """

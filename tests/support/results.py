@@ -11,21 +11,24 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.footprint.sizes import Added, Memory, Parts
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings import Settings
-from mambo_nmpc.sil import fault_report, footprint_report, report, verify_report
-from mambo_nmpc.sil.baseline import PdController
-from mambo_nmpc.sil.cli_replay import COMMAND
-from mambo_nmpc.sil.fault_flights import End, Verdict
-from mambo_nmpc.sil.footprint import Footprint
-from mambo_nmpc.sil.loop import Flight, fly
-from mambo_nmpc.sil.results import SUMMARY, summary_text
-from mambo_nmpc.sil.scenario import Scenario
-from mambo_nmpc.sil.sweep import Point, budgets
-from mambo_nmpc.sil.table2 import CASES, PD, Claim, Row
-from mambo_nmpc.sil.table2_sensed import SensedRow
-from mambo_nmpc.sil.traces import Trace, write_npz
+from mambo_nmpc.sil.cli.replay import COMMAND
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.faults import report as fault_report
+from mambo_nmpc.sil.faults.flights import End, Verdict
+from mambo_nmpc.sil.files.folders import SUMMARY, summary_text
+from mambo_nmpc.sil.firmware.sizes import Added, Memory, Parts
+from mambo_nmpc.sil.flight import report
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.scenario import Scenario
+from mambo_nmpc.sil.flight.traces import Trace, write_npz
+from mambo_nmpc.sil.footprint import report as footprint_report
+from mambo_nmpc.sil.footprint.measure import Footprint
+from mambo_nmpc.sil.footprint.sweep import Point, budgets
+from mambo_nmpc.sil.paper.sensed import SensedRow
+from mambo_nmpc.sil.paper.table2 import CASES, PD, Claim, Row
+from mambo_nmpc.sil.verify import report as verify_report
 from mambo_nmpc.sil.verify.check import Outcome, Result
 from mambo_nmpc.sil.verify.checks import CHECKS
 

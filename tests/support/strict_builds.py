@@ -47,7 +47,7 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
     failed assertion.
     """
     prefix, scalar = settings.code.prefix, settings.code.scalar
-    batch = _QUIET + resources.files("mambo_nmpc.sil").joinpath("batch.c").read_text("utf-8")
+    batch = _QUIET + resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
     files = render(settings, amalgamate=amalgamate, with_digest=False) | {
         "batch.c": with_prefix(batch, prefix)
     }

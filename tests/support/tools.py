@@ -9,8 +9,8 @@ from typing import NoReturn
 import pytest
 
 from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.footprint.build import Builder, builder
 from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.firmware.build import Builder, builder
 
 
 def require(tool: str, package: str) -> str:

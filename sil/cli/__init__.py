@@ -1,0 +1,1 @@
+"""The commands of `mambo-nmpc`: one file a command, their shared options, and progress."""

@@ -1,0 +1,46 @@
+"""The command `report`: one page of whatever has been run."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_nmpc.codegen.exchange import put
+
+MARK = '<meta name="generator" content="mambo-nmpc">'
+"""What marks a page as ours, which may be written anew."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command of this module to `app`."""
+    app.command(
+        epilog=generating.examples(
+            "mambo-nmpc report flight",
+            "mambo-nmpc report table2 footprint faults verification -o controller.html",
+        )
+    )(report)
+
+
+def report(
+    folders: Annotated[
+        list[Path], typer.Argument(help="Result folders, as the other commands write them.", metavar="DIR...")
+    ],
+    *,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="HTML file; an earlier report there is overwritten.")
+    ] = Path("report.html"),
+) -> None:
+    """Show results on one HTML page that needs no network and no other file."""
+    from mambo_nmpc.sil.report.page import report_page  # noqa: PLC0415 - it loads the plotting library
+
+    name = echo(str(output))
+    try:
+        if output.is_file() and MARK.encode() not in output.read_bytes()[:1000]:
+            raise FileExistsRefusedError(f"{name}: is not a report of ours; name another file with -o")
+        page = report_page(folders).encode("utf-8", "replace")  # a folder's name need not be text
+        put(output, page)
+    except OSError as error:
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}") from error
+    typer.echo(f"{name}: {len(page) / 1000:.0f} kB")

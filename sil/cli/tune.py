@@ -1,0 +1,110 @@
+"""The command `tune`: search settings on drawn flights."""
+
+import contextlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.exchange import put
+from mambo_nmpc.sil.campaign.executors import processes
+from mambo_nmpc.sil.campaign.store import claim, refusals
+from mambo_nmpc.sil.cli.progress import counting_bar
+from mambo_nmpc.sil.files.folders import locked
+from mambo_nmpc.sil.tuning import file
+from mambo_nmpc.sil.tuning.file import Tuning
+from mambo_nmpc.sil.tuning.front import RULE, chosen, controller_text, front_csv, pareto_front
+from mambo_nmpc.sil.tuning.study import Judged, judged, open_study, search
+
+if TYPE_CHECKING:
+    from optuna import Study
+
+CONTROLLER, FRONT = "controller.toml", "front"
+_MOST_TRIALS = 100_000
+_MOST_WORKERS = 1024
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command of this module to `app`."""
+    app.command(
+        epilog=generating.examples(
+            "mambo-nmpc tune -o tuned",
+            "mambo-nmpc tune tune.toml --trials 300 -o tuned",
+            "mambo-nmpc tune --storage postgresql://db/studies -o tuned",
+        )
+    )(tune)
+
+
+def tune(
+    source: Annotated[
+        Path | None, typer.Argument(help="A tune.toml; without one the default study is searched.")
+    ] = None,
+    *,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder for the results; a study begun there goes on.")
+    ] = Path("tune"),
+    trials: Annotated[int, typer.Option(help="Trials in all.", min=1, max=_MOST_TRIALS)] = 100,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            help="Processes on this machine; one for each processor by default.", min=1, max=_MOST_WORKERS
+        ),
+    ] = None,
+    storage: Annotated[
+        str | None,
+        typer.Option(help="URL of a database that machines share, instead of a file in the folder."),
+    ] = None,
+) -> None:
+    """Search settings that track well with calm commands, on drawn flights; goes on where it stopped."""
+    tuning = file.default() if source is None else file.read(source)
+    with refusals(output):
+        output.mkdir(parents=True, exist_ok=True)
+    with locked(output):
+        claim(output, "study", {"command": "tune", **tuning.document()})
+        with open_study(tuning, output, storage) as study:
+            _search(tuning, study, output, trials, workers or os.cpu_count() or 1)
+            found = judged(study)
+        _finish(tuning, found, output)
+    best = chosen(pareto_front(found))
+    for name, one in (*(("base", one) for one in _base(tuning, found)), ("chosen", best)):
+        typer.echo(
+            f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
+            f"{one.command_variation_rad:9.4g} rad an update   {one.crashed} of {tuning.file.flights} crashed"
+        )
+    typer.echo(f"chosen by the rule: {RULE}")
+    typer.echo(f"{echo(str(output))}: {CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg", err=True)
+
+
+def _search(tuning: Tuning, study: "Study", folder: Path, trials: int, workers: int) -> None:
+    """Search until there are enough trials; say on Ctrl-C what is kept."""
+    if len(judged(study)) >= trials:
+        return
+    try:
+        with counting_bar("tuning", "trials", trials) as progress, processes(workers) as pool:
+            search(tuning, study, folder, trials, pool=pool, progress=progress)
+    except KeyboardInterrupt:
+        with contextlib.suppress(OSError):
+            typer.echo(
+                f"{echo(str(folder))}: stopped with {len(judged(study))} of {trials} trials finished; "
+                "the same command goes on from there",
+                err=True,
+            )
+        raise
+
+
+def _base(tuning: Tuning, found: list[Judged]) -> list[Judged]:
+    """Return the trial of the base: the first, unless a kill has cost it."""
+    return [one for one in found if one.values == tuning.start][:1]
+
+
+def _finish(tuning: Tuning, found: list[Judged], folder: Path) -> None:
+    """Write what follows from the trials, the controller last."""
+    from mambo_nmpc.sil.tuning.plots import draw_front  # noqa: PLC0415 - loaded when drawing
+
+    with refusals(folder):
+        put(folder / f"{FRONT}.csv", front_csv(pareto_front(found)).encode())
+        draw_front(found, _base(tuning, found), folder / FRONT)
+        put(folder / CONTROLLER, controller_text(tuning, found).encode())

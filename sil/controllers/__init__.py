@@ -1,0 +1,1 @@
+"""Position controllers: whatever has `step()`."""

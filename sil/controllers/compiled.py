@@ -1,0 +1,136 @@
+"""The compiled controller: the generated C behind the interface of the reference."""
+
+from collections.abc import Sequence
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mambo_nmpc.codegen.reference import Step
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
+from mambo_nmpc.sil.controllers.extension import load_extension
+
+
+def plainly_named(settings: Settings) -> Settings:
+    """Return `settings` with the default prefix: names do not change what is computed."""
+    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "nmpc"})})
+
+
+def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
+    """Generate and build the C of `settings` for this machine."""
+    return load_extension(render(plainly_named(settings), with_digest=False), settings.code.scalar, toolchain)
+
+
+def compiled_digest(extension: ModuleType, episodes: int) -> int:
+    """Return the digest of the frozen steps on this machine."""
+    scratch = extension.ffi.new("nmpc_t *")
+    digest = 0
+    for episode in range(episodes):
+        digest = extension.lib.nmpc_self_test_episode(scratch, episode, digest)
+    return digest
+
+
+def as_arrays(
+    numbers: Representation, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
+) -> list[NDArray[Any]]:
+    """Return inputs of n controllers as they read them; raises ValueError if a shape is another."""
+    return [
+        as_array(numbers, values, quantities, shape)
+        for values, quantities, shape in (
+            (state, STATE, (n, 7)),
+            (target, TARGET, (n, 4)),
+            (thrust, THRUST, (n,)),
+        )
+    ]
+
+
+def as_array(
+    numbers: Representation, values: ArrayLike, quantities: Sequence[str], shape: tuple[int, ...]
+) -> NDArray[Any]:
+    """Return `values` as the C reads them, contiguous; raises ValueError if the shape is another."""
+    given = np.asarray(values)
+    if given.shape != shape:
+        raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
+    return np.ascontiguousarray(numbers.taken(given.reshape(-1, len(quantities)), quantities).reshape(shape))
+
+
+DIRT = b"\xa5"
+"""What fills the memory of a controller before nmpc_init, as memory of a board is not zero either."""
+
+
+class CompiledController:
+    """n controllers in generated C, behind the interface of `codegen.reference.ReferenceController`."""
+
+    def __init__(self, settings: Settings, n: int = 1, extension: ModuleType | None = None) -> None:
+        self.settings = settings
+        self._numbers = Representation(settings)
+        self.scalar = self._numbers.scalar
+        self._n = n
+        self._moves = (settings.horizon.control, 2)
+        extension = extension or compiled(settings, host_toolchain())
+        self._ffi, self._lib = extension.ffi, extension.lib
+        self._controllers = self._ffi.new("nmpc_t[]", n)
+        self._ffi.buffer(self._controllers)[:] = DIRT * self._ffi.sizeof(self._controllers)
+        self._lib.nmpc_batch_init(self._controllers, n)
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Start all controllers over from `command_rad` (n, 2), clamped; returns a status (n,)."""
+        return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad, COMMAND)
+
+    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
+        """Replace tracking and effort weight by `weights` (n, 2); returns a status (n,)."""
+        return self._set_each(self._lib.nmpc_set_weights, "nmpc_weights_t", weights, WEIGHTS)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
+        n = self._n
+        status, iterations, converged = (np.empty(n, np.intc) for _ in range(3))
+        scalar, wide, told = self.scalar, self._numbers.wide, self._numbers.told
+        command, plan = np.empty((n, 2), scalar), np.empty((n, *self._moves), scalar)
+        cost, gradient = np.empty(n, wide), np.empty((n, *self._moves), wide)
+        inputs = as_arrays(self._numbers, n, state, target, thrust_acceleration_m_s2)
+        outcome = self._ffi.new("nmpc_outcome_t *")
+        for name, kind, values in (
+            ("status", "int", status),
+            ("command", "nmpc_command_t", command),
+            ("cost", "nmpc_sum_t", cost),
+            ("gradient", "nmpc_sum_t", gradient),
+            ("plan_rad", "nmpc_real_t", plan),
+            ("iterations", "int", iterations),
+            ("converged", "int", converged),
+        ):
+            setattr(outcome, name, self._pointer(kind, values))
+        self._lib.nmpc_batch_step(
+            self._controllers,
+            n,
+            self._pointer("nmpc_state_t", inputs[0]),
+            self._pointer("nmpc_target_t", inputs[1]),
+            self._pointer("nmpc_real_t", inputs[2]),
+            outcome,
+        )
+        return Step(
+            status=status.astype(np.int64),
+            command_rad=told(command, "angle"),
+            cost=told(cost, "cost"),
+            gradient=told(gradient, "gradient"),
+            plan_rad=told(plan, "angle"),
+            iterations=iterations.astype(np.int64),
+            converged=converged.astype(np.bool_),
+        )
+
+    def _pointer(self, kind: str, array: NDArray[Any]) -> Any:
+        return self._ffi.cast(f"{kind} *", self._ffi.from_buffer(array))
+
+    def _set_each(
+        self, function: Any, kind: str, values: ArrayLike, quantities: Sequence[str]
+    ) -> NDArray[np.int64]:
+        array = as_array(self._numbers, values, quantities, (self._n, 2))
+        pointer = self._pointer(kind, array)
+        return np.array(
+            [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)],
+            np.int64,
+        )

@@ -1,0 +1,57 @@
+"""The stock position controller of the Mambo: the PD that the paper compares against.
+
+Source: block "XY to angles" of the MathWorks asbQuadcopter example; Kp = 0.24, Kd = 0.1 as in the paper
+(section III), after Pounds et al.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_nmpc.sil.plant.arrays import FloatArray
+
+POSITION_P_RAD_M = 0.24
+POSITION_D_RAD_S_M = 0.1
+ERROR_LIMIT_M = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class PdOutcome:
+    """Result of one step."""
+
+    command_rad: FloatArray
+    """Roll and pitch (n, 2)."""
+    status: NDArray[np.int64]
+    """Always 0: there is nothing that a PD could report (n,)."""
+
+
+class PdController:
+    """Angles in proportion to the position error, damped by the velocity.
+
+    It knows no reference velocity and no limit on the angles; only the error is clamped, per axis.
+    """
+
+    def step(
+        self,
+        state: FloatArray,
+        target: FloatArray,
+        thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
+    ) -> PdOutcome:
+        """Return the command for states (n, 7) and targets (n, 4).
+
+        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy], in the world frame.
+        """
+        sine, cosine = np.sin(state[:, 6]), np.cos(state[:, 6])
+        error_x, error_y = target[:, 0] - state[:, 0], target[:, 1] - state[:, 1]
+        velocity_x, velocity_y = state[:, 2], state[:, 3]
+        forward = np.clip(cosine * error_x + sine * error_y, -ERROR_LIMIT_M, ERROR_LIMIT_M)
+        right = np.clip(cosine * error_y - sine * error_x, -ERROR_LIMIT_M, ERROR_LIMIT_M)
+        command_rad = np.empty((len(state), 2))
+        command_rad[:, 0] = POSITION_P_RAD_M * right - POSITION_D_RAD_S_M * (
+            cosine * velocity_y - sine * velocity_x
+        )
+        command_rad[:, 1] = POSITION_D_RAD_S_M * (cosine * velocity_x + sine * velocity_y) - (
+            POSITION_P_RAD_M * forward
+        )
+        return PdOutcome(command_rad, np.zeros(len(state), dtype=np.int64))

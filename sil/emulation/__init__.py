@@ -1,0 +1,1 @@
+"""Emulated processor cores that run the C as built for a board."""

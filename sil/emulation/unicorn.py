@@ -1,0 +1,179 @@
+"""ARM and RISC-V cores inside this process: Unicorn, QEMU's core, does the work."""
+
+import bisect
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import unicorn
+from elftools.elf.elffile import ELFFile
+from unicorn import arm_const, riscv_const
+
+from mambo_nmpc.sil.errors import EmulationError
+from mambo_nmpc.sil.firmware.disassembly import disassemble
+from mambo_nmpc.sil.firmware.elf import load
+
+_WATCHED_SLOWDOWN: Final = 30
+"""How much longer a call may take when every run of instructions is reported to Python."""
+
+_DATA_BYTES: Final = 0x100000
+
+_CODE_BYTES: Final = 0x100000
+_RETURN_ADDRESS: Final = _CODE_BYTES - 0x1000
+_RAM_ADDRESS: Final = 0x20000000
+_STACK_BYTES: Final = 0x10000
+_STACK_TOP: Final = _RAM_ADDRESS + _STACK_BYTES
+_ALIGNMENT: Final = 16
+
+
+@dataclass(frozen=True)
+class Model:
+    """How one kind of core is made and called."""
+
+    architecture: int
+    mode: int
+    model: int
+    arguments: tuple[int, ...]
+    stack_pointer: int
+    return_address: int
+    result: int
+    program_counter: int
+    thumb: bool = False
+
+
+def _arm(model: int, *, thumb: bool) -> Model:
+    return Model(
+        architecture=unicorn.UC_ARCH_ARM,
+        mode=unicorn.UC_MODE_THUMB if thumb else unicorn.UC_MODE_ARM,
+        model=model,
+        arguments=tuple(arm_const.UC_ARM_REG_R0 + index for index in range(4)),
+        stack_pointer=arm_const.UC_ARM_REG_SP,
+        return_address=arm_const.UC_ARM_REG_LR,
+        result=arm_const.UC_ARM_REG_R0,
+        program_counter=arm_const.UC_ARM_REG_PC,
+        thumb=thumb,
+    )
+
+
+MODELS: Final = {
+    "arm926": _arm(arm_const.UC_CPU_ARM_926, thumb=False),
+    "cortex-m0": _arm(arm_const.UC_CPU_ARM_CORTEX_M0, thumb=True),
+    "cortex-m4": _arm(arm_const.UC_CPU_ARM_CORTEX_M4, thumb=True),
+    "cortex-m7": _arm(arm_const.UC_CPU_ARM_CORTEX_M7, thumb=True),
+    "rv32": Model(
+        architecture=unicorn.UC_ARCH_RISCV,
+        mode=unicorn.UC_MODE_RISCV32,
+        model=riscv_const.UC_CPU_RISCV32_ANY,
+        arguments=tuple(riscv_const.UC_RISCV_REG_A0 + index for index in range(8)),
+        stack_pointer=riscv_const.UC_RISCV_REG_SP,
+        return_address=riscv_const.UC_RISCV_REG_RA,
+        result=riscv_const.UC_RISCV_REG_A0,
+        program_counter=riscv_const.UC_RISCV_REG_PC,
+    ),
+}
+"""Little-endian cores with pointers and int of 32 bits."""
+
+
+class UnicornMachine:
+    """A core with the program of an ELF file, a stack, and room for data."""
+
+    word_bytes: Final = 4
+
+    def __init__(self, elf: Path, core: str, time_limit_s: float, *, counting: bool = False) -> None:
+        self._core = MODELS[core]
+        self._time_limit_s = time_limit_s
+        with elf.open("rb") as file:
+            program = ELFFile(file)
+            self._symbols = {symbol.name: symbol["st_value"] for symbol in _symbols(program)}
+            segments = [(segment["p_vaddr"], segment.data()) for segment in program.iter_segments("PT_LOAD")]
+        self._engine = unicorn.Uc(self._core.architecture, self._core.mode)
+        self._engine.ctl_set_cpu_model(self._core.model)
+        self._engine.mem_map(0, _CODE_BYTES)
+        self._engine.mem_map(_RAM_ADDRESS, _STACK_BYTES + _DATA_BYTES)
+        for address, content in segments:
+            self._engine.mem_write(address, content)
+        if "__global_pointer$" in self._symbols:
+            self._engine.reg_write(riscv_const.UC_RISCV_REG_GP, self._symbols["__global_pointer$"])
+        self._next = _STACK_TOP
+        self._runs: Counter[tuple[int, int]] = Counter()
+        if counting:
+            self._starts = sorted(disassemble(load(elf)).instructions)
+            self._time_limit_s *= _WATCHED_SLOWDOWN
+            self._engine.hook_add(unicorn.UC_HOOK_BLOCK, self._ran)
+
+    @property
+    def free_bytes(self) -> int:
+        """Return how much can still be allocated."""
+        return _STACK_TOP + _DATA_BYTES - self._next
+
+    @property
+    def stack(self) -> range:
+        """Return the addresses that a call can use."""
+        return range(_RAM_ADDRESS, _STACK_TOP - _ALIGNMENT)
+
+    def allocate(self, size: int) -> int:
+        """Return the address of `size` bytes of data."""
+        address = self._next
+        self._next += -(-size // _ALIGNMENT) * _ALIGNMENT
+        assert self.free_bytes >= 0
+        return address
+
+    def write(self, address: int, content: bytes) -> None:
+        """Write memory."""
+        self._engine.mem_write(address, content)
+
+    def read(self, address: int, size: int) -> bytes:
+        """Read memory."""
+        return bytes(self._engine.mem_read(address, size))
+
+    def counted(self) -> Counter[int]:
+        """Return the instructions run since the last time, by the address at which a run of them begins."""
+        counts: Counter[int] = Counter()
+        for (address, size), times in self._runs.items():
+            first, end = (bisect.bisect_left(self._starts, place) for place in (address, address + size))
+            counts[address] += times * (end - first)
+        self._runs.clear()
+        return counts
+
+    def _ran(self, _engine: Any, address: int, size: int, _data: Any) -> None:
+        self._runs[address, size] += 1
+
+    def call(self, function: str, *arguments: int) -> int:
+        """Call `function` with what words fit in registers, the others on the stack; returns its result."""
+        core, engine = self._core, self._engine
+        in_registers, on_stack = arguments[: len(core.arguments)], arguments[len(core.arguments) :]
+        words = b"".join(word.to_bytes(4, "little") for word in on_stack)
+        stack_top = _STACK_TOP - _ALIGNMENT - -(-len(words) // _ALIGNMENT) * _ALIGNMENT
+        engine.mem_write(stack_top, words)
+        for register, word in zip(core.arguments, in_registers, strict=False):
+            engine.reg_write(register, word)
+        engine.reg_write(core.stack_pointer, stack_top)
+        engine.reg_write(core.return_address, _RETURN_ADDRESS | core.thumb)
+        self._run(function)
+        return int(engine.reg_read(core.result))
+
+    def _run(self, function: str) -> None:
+        """Run until `function` returns; the limit is of processor time, which other processes do not take."""
+        engine, program_counter = self._engine, self._core.program_counter
+        began_s, place = time.thread_time(), self._symbols[function]
+        while place != _RETURN_ADDRESS:
+            if time.thread_time() - began_s >= self._time_limit_s:
+                raise EmulationError(
+                    f"{function} did not return within {self._time_limit_s:g} s, at {self._where()}"
+                )
+            try:
+                engine.emu_start(
+                    place | self._core.thumb, _RETURN_ADDRESS, timeout=round(self._time_limit_s * 1e6)
+                )
+            except unicorn.UcError as error:
+                raise EmulationError(f"{function} died at {self._where()}: {error}") from error
+            place = engine.reg_read(program_counter)
+
+    def _where(self) -> str:
+        return f"address {self._engine.reg_read(self._core.program_counter):#x}"
+
+
+def _symbols(program: Any) -> Any:
+    return program.get_section_by_name(".symtab").iter_symbols()

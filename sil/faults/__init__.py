@@ -1,0 +1,1 @@
+"""Flights with faults: what is injected, which faults are flown, and what became of each."""

@@ -1,0 +1,60 @@
+"""What flights with faults found: as a table, as CSV, as a picture."""
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, Final
+
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.sil.faults.flights import COURSES, ORDER, Verdict
+from mambo_nmpc.sil.plant.link import NOT_CALLED
+
+_NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
+
+
+def table(verdicts: Sequence[Verdict]) -> str:
+    """Spell the verdicts as a Markdown table, a fault a row, both courses side by side."""
+    head = ["fault", "status", "command, rad", "tilt, rad"]
+    head += [f"{course}: {what}" for course in COURSES for what in ("error, m", "back after, s")]
+    rows = [[*head, "end"], ["---"] * (len(head) + 1)]
+    for fault in dict.fromkeys(verdict.fault for verdict in verdicts):
+        pair = [verdict for verdict in verdicts if verdict.fault == fault]
+        row = [fault, _answers(pair)]
+        row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
+        for verdict in pair:
+            never = math.isnan(verdict.recovery_s)
+            row += [f"{verdict.largest_error_m:.2f}", "-" if never else f"{verdict.recovery_s:.1f}"]
+        rows.append([*row, max((verdict.end for verdict in pair), key=ORDER.index)])
+    bands = ", ".join(
+        f"{course} {next(v.band_m for v in verdicts if v.course == course and not v.turning):.3f} m"
+        for course in COURSES
+    )
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + f"\n\nBack means within: {bands}."
+
+
+_LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
+
+
+def _answers(verdicts: Sequence[Verdict]) -> str:
+    seen = sorted({status for verdict in verdicts for status in verdict.statuses})
+    return ", ".join(_NAMES.get(status, str(status)) for status in seen)
+
+
+def records(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """Return the verdicts for JSON, statuses by name."""
+    return [
+        asdict(verdict)
+        | {"end": verdict.end.value, "statuses": [_NAMES.get(s, str(s)) for s in verdict.statuses]}
+        for verdict in verdicts
+    ]
+
+
+def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:
+    """Write a CSV file, a course and fault a line."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Verdict)], lineterminator="\n")
+        writer.writeheader()
+        for record in records(verdicts):
+            writer.writerow(record | {"statuses": " ".join(record["statuses"])})

@@ -1,0 +1,114 @@
+"""The faults that are flown: each by name, how long it lasts, and the statuses that it must bring about."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.faults.injection import (
+    Alter,
+    Drop,
+    always,
+    every,
+    frozen_state,
+    never,
+    state_scaled,
+    state_set_to,
+    target_moved,
+    thrust_reported,
+    untouched,
+    yaw_shifted,
+    yaw_wrapped,
+)
+from mambo_nmpc.sil.plant.link import NOT_CALLED
+
+TO_THE_END: Final = math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A fault by name, without its moment.
+
+    answers: the statuses that it must bring about, each of them and no other; None where that is open.
+    weights: tracking and effort weight set when it begins; the right ones come back when it ends.
+    moved_m: how far along x the target has truly moved, once it has begun.
+    turning: whether the drone turns its heading throughout.
+    levelled: whether the caller levels out at `sil.fault_flights.PATIENCE` refused steps.
+    """
+
+    name: str
+    duration_s: float
+    alter: Alter = untouched
+    drop: Drop = never
+    late_updates: int = 0
+    weights: tuple[float, float] | None = None
+    answers: frozenset[int] | None = None
+    moved_m: float = 0.0
+    turning: bool = False
+    levelled: bool = False
+
+
+_NAN: Final = math.nan
+_FEET_PER_M: Final = 1.0 / 0.3048
+_DEGREES_PER_RAD: Final = 180.0 / math.pi
+
+
+def scenarios(settings: Settings) -> tuple[Scenario, ...]:
+    """Return the faults for a controller: its ranges say what is beyond them."""
+    jump_m = min(100.0, settings.ranges.position_m / 2.0)
+    beyond_m = 3.0 * settings.ranges.position_m
+    right = settings.cost
+    outage = state_set_to(slice(0, 7), _NAN)
+    bursts = state_set_to(slice(0, 7), _NAN, on=3, of=10)
+    jump = target_moved(jump_m)
+    bad_state, bad_target = _only(Status.BAD_STATE), _only(Status.BAD_TARGET)
+    bad_thrust, bad_weight = _only(Status.BAD_THRUST), _only(Status.OK, Status.BAD_WEIGHT)
+    levels_out = "caller levels out"
+    return (
+        Scenario("state NaN in 3 of 10 steps, 5 s", 5.0, bursts, answers=_only(Status.OK, Status.BAD_STATE)),
+        Scenario("state NaN, 0.2 s", 0.2, outage, answers=bad_state),
+        Scenario("state NaN, 1 s", 1.0, outage, answers=bad_state),
+        Scenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
+        Scenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
+        Scenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
+        Scenario("state NaN to the end", TO_THE_END, outage, answers=bad_state),
+        Scenario(f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True),
+        Scenario("x infinite, 1 s", 1.0, state_set_to(0, math.inf), answers=bad_state),
+        Scenario("vy minus infinite, 1 s", 1.0, state_set_to(3, -math.inf), answers=bad_state),
+        Scenario("state frozen, 0.2 s", 0.2, frozen_state),
+        Scenario("state frozen, 1 s", 1.0, frozen_state),
+        Scenario("state frozen, 5 s", 5.0, frozen_state),
+        Scenario("every 2nd tick dropped, 5 s", 5.0, drop=every(2), answers=_only(Status.OK, NOT_CALLED)),
+        Scenario("all ticks dropped, 0.2 s", 0.2, drop=always, answers=_only(NOT_CALLED)),
+        Scenario("all ticks dropped, 1 s", 1.0, drop=always, answers=_only(NOT_CALLED)),
+        Scenario("commands 2 ticks late, 5 s", 5.0, late_updates=2),
+        Scenario("commands 5 ticks late, 5 s", 5.0, late_updates=5),
+        Scenario("commands 20 ticks late, 5 s", 5.0, late_updates=20),
+        Scenario(f"target {jump_m:g} m off, 0.2 s", 0.2, jump),
+        Scenario(f"target {jump_m:g} m off, 1 s", 1.0, jump),
+        Scenario(f"target {jump_m:g} m off, 5 s", 5.0, jump),
+        Scenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
+        Scenario("target beyond the range, 1 s", 1.0, target_moved(beyond_m), answers=bad_target),
+        Scenario("thrust reported as zero, 1 s", 1.0, thrust_reported(0.0), answers=bad_thrust),
+        Scenario("thrust NaN, 1 s", 1.0, thrust_reported(_NAN), answers=bad_thrust),
+        Scenario("yaw a turn off, to the end", TO_THE_END, yaw_shifted(2.0 * math.pi)),
+        Scenario("yaw wrapped at pi, turning, to the end", TO_THE_END, yaw_wrapped, turning=True),
+        Scenario("yaw half a turn off, 1 s", 1.0, yaw_shifted(math.pi)),
+        Scenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
+        Scenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
+        Scenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
+        Scenario("weights NaN, 5 s", 5.0, weights=(_NAN, _NAN), answers=bad_weight),
+        Scenario("tracking weight -1, 5 s", 5.0, weights=(-1.0, right.effort_weight), answers=bad_weight),
+        Scenario("both weights zero, 5 s", 5.0, weights=(0.0, 0.0)),
+        Scenario("effort weight 1e6, 5 s", 5.0, weights=(right.tracking_weight, 1e6)),
+    )
+
+
+def _only(*statuses: int) -> frozenset[int]:
+    return frozenset(int(status) for status in statuses)
+
+
+def _scaled(position: float, attitude: float) -> Alter:
+    """Scale position and velocity, roll, pitch and yaw."""
+    return state_scaled([position] * 4 + [attitude] * 3)

@@ -1,0 +1,165 @@
+"""Result folders: made for one run, replaced as a whole, and never on top of somebody's work.
+
+A result is a plain file or, if its name ends in a slash, a folder, whose files the summary lists in "files".
+
+A run writes into a hidden folder inside its result folder. When it is complete its files are moved into
+place, the summary last; until then earlier results stay as they were. A run that is killed, or stopped while
+it moves, leaves the hidden folder, which the next run clears.
+"""
+
+import contextlib
+import fcntl
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
+from mambo_nmpc.sil.errors import BusyError
+
+SUMMARY: Final = "summary.json"
+"""The file that marks a folder as ours: removed first, written last."""
+
+_NEW: Final = ".mambo-nmpc-new-"
+GENERATOR: Final = "mambo-nmpc "
+
+
+@contextlib.contextmanager
+def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[Path]:
+    """Hold `folder` for one run of `command`; yield a folder for the files `names` and the summary.
+
+    On leaving they replace those of an earlier run; if the run fails, the earlier ones stay. Raises
+    ForeignFilesError for a folder that holds other work, BusyError if another run holds it, and
+    UnwritableError for what the file system refuses: as far as can be told, before the run.
+    """
+    try:
+        with _made(folder), locked(folder):
+            _refuse_other_work(folder, command, (*names, SUMMARY))
+            for left_over in folder.glob(f"{_NEW}*"):
+                shutil.rmtree(left_over)
+            fresh = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder))
+            try:
+                yield fresh
+            except BaseException:
+                shutil.rmtree(fresh)
+                raise
+            (folder / SUMMARY).unlink(missing_ok=True)
+            for name in (*names, SUMMARY):
+                if name.endswith("/") and (folder / name).exists():
+                    shutil.rmtree(folder / name)
+                (fresh / name).replace(folder / name)
+            shutil.rmtree(fresh)
+    except OSError as error:
+        raise UnwritableError(f"{echo(str(folder))}: cannot be written: {error.strerror or error}") from error
+
+
+def summary_text(command: str, summary: dict[str, Any]) -> str:
+    """Return what a run of `command` found as JSON, after the version that found it; no number is NaN."""
+    whole = {"generator": f"{GENERATOR}{__version__}", "command": command, **summary}
+    return json.dumps(finite(whole), indent=2, allow_nan=False) + "\n"
+
+
+def finite(value: Any) -> Any:
+    """Return `value` with None for every number that JSON cannot spell."""
+    match value:
+        case float() if not math.isfinite(value):
+            return None
+        case dict():
+            return {key: finite(item) for key, item in value.items()}
+        case list() | tuple():
+            return [finite(item) for item in value]
+        case _:
+            return value
+
+
+@contextlib.contextmanager
+def _made(folder: Path) -> Iterator[None]:
+    """Make `folder` and its parents; those made here are removed again if the run fails."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for path in missing:
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        raise
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Lock `folder` against other runs; a file system without locks goes without."""
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BusyError(
+                f"{echo(str(folder))}: another run writes its results there; wait for it, "
+                "or name another folder with -o"
+            ) from None
+        except OSError:
+            pass
+        yield
+    finally:
+        os.close(handle)
+
+
+def _refuse_other_work(folder: Path, command: str, names: Collection[str]) -> None:
+    """Raise ForeignFilesError unless `folder` is empty or holds results of `command`, in plain files."""
+    name = echo(str(folder))
+    if all(path.name.startswith(_NEW) for path in folder.iterdir()):
+        return
+    # A run killed while it moved its files into place has its summary still in the hidden folder.
+    summaries = [_summary(path) for path in (folder / SUMMARY, *folder.glob(f"{_NEW}*/{SUMMARY}"))]
+    ours = next((summary for summary in summaries if summary is not None), None)
+    if ours is None:
+        raise ForeignFilesError(
+            f"{name}: holds files that are not our results; name another folder with -o", ()
+        )
+    if ours.get("command") != command:
+        raise ForeignFilesError(
+            f"{name}: holds results of {echo(str(ours.get('command', 'another version')))}, not of "
+            f"{command}; name another folder with -o",
+            (),
+        )
+    for each in names:
+        path = folder / each
+        if each.endswith("/"):
+            _refuse_unlisted_files(path, folder, ours.get("files"))
+        elif path.is_symlink() or (path.exists() and not path.is_file()):
+            raise ForeignFilesError(
+                f"{echo(str(path))}: is not a plain file, and a result belongs there; "
+                "move it away, or name another folder with -o",
+                (str(path),),
+            )
+
+
+def _refuse_unlisted_files(place: Path, folder: Path, listed: object) -> None:
+    """Raise ForeignFilesError if `place` is no folder, or holds a file that no run of ours left there."""
+    known = listed if isinstance(listed, dict) else {}
+    found = [place] if place.is_symlink() or place.is_file() else sorted(place.rglob("*"))
+    for path in found:
+        if path.is_symlink() or (not path.is_dir() and path.relative_to(folder).as_posix() not in known):
+            raise ForeignFilesError(
+                f"{echo(str(path))}: is not a result of ours, and would be lost; "
+                "move it away, or name another folder with -o",
+                (str(path),),
+            )
+
+
+def _summary(path: Path) -> dict[str, Any] | None:
+    """Return the summary at `path` if we wrote it, else None."""
+    if path.is_symlink() or not path.is_file():
+        return None
+    try:
+        summary = json.loads(path.read_text("utf-8"))
+    except (ValueError, RecursionError):
+        return None
+    ours = isinstance(summary, dict) and str(summary.get("generator")).startswith(GENERATOR)
+    return summary if ours else None

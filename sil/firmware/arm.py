@@ -1,0 +1,168 @@
+"""A32 and Thumb instructions, as capstone decodes them, by their effects (ARM DDI 0406C, A8; AAPCS, 6.1)."""
+
+from typing import Any, Final
+
+import capstone
+from capstone import arm_const as arm
+
+from mambo_nmpc.sil.firmware.instructions import (
+    PC,
+    SP,
+    WORD_BYTES,
+    Convention,
+    Effect,
+    Flow,
+    Forget,
+    Instruction,
+    Load,
+    Put,
+    Store,
+    Sum,
+)
+
+CONVENTION: Final = Convention("lr", frozenset({"r4", "r5", "r6", "r7", "r8", "sb", "sl", "fp"}))
+_MULTIPLE: Final = {
+    arm.ARM_INS_LDM: ("load", 1, False),
+    arm.ARM_INS_LDMIB: ("load", 1, True),
+    arm.ARM_INS_LDMDB: ("load", -1, True),
+    arm.ARM_INS_LDMDA: ("load", -1, False),
+    arm.ARM_INS_STM: ("store", 1, False),
+    arm.ARM_INS_STMIB: ("store", 1, True),
+    arm.ARM_INS_STMDB: ("store", -1, True),
+    arm.ARM_INS_STMDA: ("store", -1, False),
+    arm.ARM_INS_POP: ("load", 1, False),
+    arm.ARM_INS_PUSH: ("store", -1, True),
+}
+"""Of each move of several registers: direction, sign of the address's steps, whether they come first."""
+_ALWAYS: Final = {arm.ARM_CC_AL, arm.ARM_CC_INVALID}
+_CALLS: Final = {arm.ARM_INS_BL, arm.ARM_INS_BLX}
+_ENDS: Final = {arm.ARM_INS_UDF, arm.ARM_INS_BKPT}
+
+
+def instruction(insn: Any, *, thumb: bool) -> Instruction:
+    """Return what capstone's `insn` does; an effect that is not modelled makes its registers anything."""
+    effects = _effects(insn, ahead=4 if thumb else 8)
+    written = {effect.register for effect in effects if not isinstance(effect, Store)}
+    unknown = {insn.reg_name(register) for register in insn.regs_access()[1]} - written
+    effects = (*effects, *(Forget(register) for register in sorted(unknown)))
+    jumps = PC in written | unknown or insn.group(capstone.CS_GRP_JUMP)
+    flow: Flow = "jump" if jumps else "next"
+    if insn.id in _CALLS:
+        flow = "call"
+    elif insn.id in _ENDS:
+        flow = "stop"
+    return Instruction(
+        address=insn.address,
+        size_bytes=insn.size,
+        text=f"{insn.mnemonic} {insn.op_str}".strip(),
+        effects=effects,
+        flow=flow,
+        conditional=insn.cc not in _ALWAYS or insn.id in {arm.ARM_INS_CBZ, arm.ARM_INS_CBNZ},
+    )
+
+
+def _effects(insn: Any, ahead: int) -> tuple[Effect, ...]:
+    """Model what can move the stack pointer, save a register on the stack, or name a place in the program."""
+    here = insn.address + ahead
+    if insn.id in _MULTIPLE:
+        return _multiple(insn)
+    if insn.mnemonic.startswith(("vpush", "vpop", "vldm", "vstm")):
+        return _vector(insn)
+    if any(operand.type == arm.ARM_OP_MEM for operand in insn.operands):
+        return _transfer(insn, here)
+    if insn.group(capstone.CS_GRP_JUMP):
+        target = insn.operands[-1]
+        if target.type == arm.ARM_OP_IMM:
+            return (Put(PC, None, target.imm),)
+        register = insn.reg_name(target.reg)
+        return (Put(PC, None, here & ~3) if register == PC else Put(PC, register, 0),)
+    return _arithmetic(insn, here)
+
+
+def _arithmetic(insn: Any, here: int) -> tuple[Effect, ...]:  # noqa: PLR0911 - one table
+    operands = [
+        operand.imm
+        if operand.type == arm.ARM_OP_IMM
+        else insn.reg_name(operand.reg)
+        if operand.type == arm.ARM_OP_REG and operand.shift.type == arm.ARM_SFT_INVALID
+        else None
+        for operand in insn.operands
+    ]
+    sign: Any = {arm.ARM_INS_ADD: 1, arm.ARM_INS_SUB: -1}.get(insn.id)
+    match operands:
+        case [str(register), int(value)] if insn.id == arm.ARM_INS_MOV:
+            return (Put(register, None, value),)
+        case [str(register), str(base)] if insn.id == arm.ARM_INS_MOV and base != PC:
+            return (Put(register, base, 0),)
+        case [str(register), int(offset)] if insn.id == arm.ARM_INS_ADR:
+            return (Put(register, None, (here & ~3) + offset),)
+        case [str(register), int(offset)] if sign:
+            return (Put(register, register, sign * offset),)
+        case [str(register), str(base), int(offset)] if sign and base != PC:
+            return (Put(register, base, sign * offset),)
+        case [str(register), str(right)] if sign and PC not in {register, right}:
+            return (Sum(register, register, right, sign),)
+        case [str(register), str(left), str(right)] if sign and PC not in {left, right}:
+            return (Sum(register, left, right, sign),)
+    return ()
+
+
+def _transfer(insn: Any, here: int) -> tuple[Effect, ...]:
+    """Move one register, or two, from or to memory, with the base moved before or after."""
+    place = next(index for index, operand in enumerate(insn.operands) if operand.type == arm.ARM_OP_MEM)
+    memory, step = insn.operands[place].mem, insn.operands[place + 1 :]
+    if memory.index or (step and step[0].type != arm.ARM_OP_IMM):
+        return ()
+    base, offset = insn.reg_name(memory.base), memory.disp
+    before: tuple[Effect, ...] = ()
+    after: tuple[Effect, ...] = ()
+    if step:
+        after = (Put(base, base, -step[0].imm if step[0].subtracted else step[0].imm),)
+    elif insn.writeback:
+        before, offset = (Put(base, base, offset),), 0
+    registers = [insn.reg_name(operand.reg) for operand in insn.operands[:place]]
+    if insn.id in {arm.ARM_INS_LDR, arm.ARM_INS_LDRD}:
+        moved: tuple[Effect, ...] = tuple(
+            Load(register, None, (here & ~3) + offset + WORD_BYTES * index)
+            if base == PC
+            else Load(register, base, offset + WORD_BYTES * index)
+            for index, register in enumerate(registers)
+        )
+    elif insn.id in {arm.ARM_INS_STR, arm.ARM_INS_STRD}:
+        moved = tuple(Store(name, base, offset + WORD_BYTES * i) for i, name in enumerate(registers))
+    elif insn.mnemonic.startswith(("str", "vstr")):
+        words = 2 if registers[0].startswith("d") else 1
+        moved = tuple(Store(None, base, offset + WORD_BYTES * index) for index in range(words))
+    else:
+        moved = ()
+    return (*before, *moved, *after)
+
+
+def _multiple(insn: Any) -> tuple[Effect, ...]:
+    """Move several registers: push, pop and their general forms."""
+    direction, growth, first = _MULTIPLE[insn.id]
+    names = [insn.reg_name(operand.reg) for operand in insn.operands]
+    stack = insn.id in {arm.ARM_INS_PUSH, arm.ARM_INS_POP}
+    base, registers = (SP, names) if stack else (names[0], names[1:])
+    size = WORD_BYTES * len(registers)
+    low = (WORD_BYTES if first else 0) if growth > 0 else -size + (0 if first else WORD_BYTES)
+    start = "base of the move"
+    moved: tuple[Effect, ...] = tuple(
+        Load(register, start, low + WORD_BYTES * index)
+        if direction == "load"
+        else Store(register, start, low + WORD_BYTES * index)
+        for index, register in enumerate(registers)
+    )
+    moves_base = stack or insn.writeback
+    return (Put(start, base, 0), *([Put(base, base, growth * size)] if moves_base else []), *moved)
+
+
+def _vector(insn: Any) -> tuple[Effect, ...]:
+    """Move floating-point registers; what they hold is of no interest here, where the base goes is.
+
+    capstone lists no base among the registers that these write.
+    """
+    if insn.id not in {arm.ARM_INS_VPUSH, arm.ARM_INS_VPOP}:
+        return (Forget(insn.reg_name(insn.operands[0].reg)),) if "!" in insn.op_str else ()
+    size = sum(8 if insn.reg_name(operand.reg).startswith("d") else 4 for operand in insn.operands)
+    return (Put(SP, SP, -size if insn.id == arm.ARM_INS_VPUSH else size),)

@@ -1,0 +1,1 @@
+"""One simulated flight: closed loop, trajectories, traces, metrics and its record."""

@@ -1,0 +1,285 @@
+"""The closed loop: trajectory, position controller and vehicle, for n flights at once.
+
+    target -> position controller --roll, pitch--> link -> stock loops -> rotors -> rigid body <- world
+              every update period                          every 5 ms                    |
+                      ^------------------------------------------^---- sensors, if any --'
+
+The simulation is pure: the same flight with the same controller gives the same trace, and a flight
+among many is the same, bit for bit, as the flight alone.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.flight.trajectories import Trajectory
+from mambo_nmpc.sil.plant import loops
+from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray, PerFlight
+from mambo_nmpc.sil.plant.disturbances import Disturbances, World
+from mambo_nmpc.sil.plant.link import NOT_CALLED, Drops, Link, Wire
+from mambo_nmpc.sil.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
+from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.sensors.suite import Suite
+
+HEIGHT_REFERENCE_M = -1.1
+"""z of every flight, up being negative."""
+
+TAKE_OFF_PHASE_S = 5.0
+"""Time that a take-off has before the trajectory's clock starts."""
+
+LOST_M = 1e4
+"""Distance from the origin, along any axis, at which a flight counts as lost."""
+
+
+class Outcome(Protocol):
+    """What a position controller returns for n flights."""
+
+    @property
+    def command_rad(self) -> NDArray[np.floating[Any]]:
+        """Roll and pitch (n, 2)."""
+        ...
+
+    @property
+    def status(self) -> IntArray:
+        """0 where all went well (n,)."""
+        ...
+
+
+class PositionController(Protocol):
+    """What the closed loop asks of a position controller."""
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
+        """Return the command for states (n, 7), targets (n, 4) and thrust accelerations (n,).
+
+        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy], in the world frame (NED).
+        The thrust acceleration is positive along -z of the body.
+        """
+        ...
+
+
+class Start(Enum):
+    """How a flight begins, always above or at the first point of its trajectory."""
+
+    HOVER = "hover"
+    """At `HEIGHT_REFERENCE_M`, level and at rest, at t = 0."""
+    TAKE_OFF = "take-off"
+    """On the ground, `TAKE_OFF_PHASE_S` before t = 0."""
+
+
+Three = tuple[PerFlight, PerFlight, PerFlight]
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """How a start differs from the one described by `Start`."""
+
+    position_m: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    velocity_m_s: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    tilt_rad: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    """Roll and pitch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One simulation of n flights; what differs between them comes as an array (n,)."""
+
+    trajectory: Trajectory
+    duration_s: float = 100.0
+    flights: int = 1
+    start: Start = Start.HOVER
+    yaw_rad: PerFlight = 0.0
+    """Heading at the start, which the yaw loop holds."""
+    yaw_rate_rad_s: PerFlight = 0.0
+    """Rate at which the heading held turns, from t = 0 on."""
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    update_period_s: float = 0.01
+    """Period of the position controller: a whole number of ticks of 5 ms."""
+    seeds: tuple[int, ...] | None = None
+    """One for each flight, of all that is random in it; None is 0 for all."""
+    offset: Offset | None = None
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    link: Link = field(default_factory=Link)
+    sensors: Sensors | None = None
+    """What controllers and stock loops see the state through; None shows them the truth."""
+
+    def __post_init__(self) -> None:
+        if not self.update_period_s <= self.duration_s < math.inf:
+            raise FlightError(
+                f"duration_s = {self.duration_s:g} must be finite and at least "
+                f"update_period_s = {self.update_period_s:g}"
+            )
+        if self.update_period_s <= 0.0 or abs(math.remainder(self.update_period_s, STEP_S)) > 1e-9:
+            raise FlightError(
+                f"update_period_s = {self.update_period_s:g} must be a whole multiple of {STEP_S:g}"
+            )
+        if self.seeds is not None and len(self.seeds) != self.flights:
+            raise FlightError(f"seeds: there are {len(self.seeds)} for {self.flights} flights")
+
+    @property
+    def ticks_per_update(self) -> int:
+        """Ticks of the stock loops for each step of the position controller."""
+        return round(self.update_period_s / STEP_S)
+
+    def times_s(self) -> FloatArray:
+        """Return the instants (k,) at which the position controller runs; t = 0 is one of them."""
+        before = round(TAKE_OFF_PHASE_S / self.update_period_s) if self.start is Start.TAKE_OFF else 0
+        after = round(self.duration_s / self.update_period_s)
+        return self.update_period_s * np.arange(-before, after + 1, dtype=np.float64)
+
+    def targets(self) -> FloatArray:
+        """Return the targets (k, n, 4) at these instants; raises `FlightError`."""
+        target = self.trajectory.target(self.times_s())
+        if target.ndim == 2:
+            return np.broadcast_to(target[:, np.newaxis, :], (len(target), self.flights, 4))
+        if target.shape[1] != self.flights:
+            raise FlightError(f"flights = {self.flights} must be {target.shape[1]}, one for each trajectory")
+        return target
+
+
+def fly(
+    flight: Flight, controller: PositionController, progress: Callable[[float], None] | None = None
+) -> Trace:
+    """Simulate and return the trace; `progress` hears the share flown (0 to 1) after every update.
+
+    Raises `FlightError`.
+    """
+    times_s, targets = flight.times_s(), flight.targets()
+    open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start is Start.TAKE_OFF else 0.0)
+    seeds = flight.seeds or (0,) * flight.flights
+    vehicle, state = flight.vehicle, _start(flight, targets[0])
+    world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
+    suite = None if flight.sensors is None else Suite(flight.sensors, seeds, truth(state))
+    wire = Wire(flight.link, flight.flights)
+    caller = _Caller(
+        controller, Drops(flight.link, seeds), _blank(times_s, targets, sensed=suite is not None)
+    )
+    for update, time_s in enumerate(times_s):
+        state = _without_lost(state)
+        lifting = time_s < open_loop_until_s - STEP_S / 2.0
+        heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
+        for tick in range(flight.ticks_per_update):
+            with np.errstate(all="ignore"):
+                state, moment = world.tick(state, time_s + STEP_S * tick)
+                true = truth(state)
+                seen = true if suite is None else suite.look(true)
+                thrust_n = _thrust_n(seen, lifting)
+            if tick == 0:
+                caller.call(update, true, seen, thrust_n)
+            command_rad = wire.carry(caller.command_rad)
+            with np.errstate(all="ignore"):
+                state = vehicle.step(state, command_rad, thrust_n, heading_rad, seen=seen, moment=moment)
+        if progress is not None:
+            progress((update + 1) / len(times_s))
+    return caller.trace
+
+
+def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
+    """Return the state in which n flights begin above or at their first targets (n, 4)."""
+    position_m = np.zeros((3, flight.flights))
+    position_m[:2] = first_target[:, :2].T
+    command: PerFlight = MAMBO.command_min
+    if flight.start is Start.HOVER:
+        position_m[2] = HEIGHT_REFERENCE_M
+        command = MAMBO.hover_command
+    state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
+    if flight.offset is None:
+        return state
+    offset, body = flight.offset, state.body
+    for row in range(3):
+        body[POSITION][row] += offset.position_m[row]
+    body[EULER][:2] = [np.broadcast_to(angle, flight.flights) for angle in offset.tilt_rad]
+    velocity_m_s = np.stack([np.broadcast_to(part, flight.flights) for part in offset.velocity_m_s])
+    body[VELOCITY] = to_body(body[EULER], velocity_m_s)
+    return state
+
+
+def _thrust_n(seen: Seen, lifting: bool) -> FloatArray:
+    """Return the total thrust (n,) asked for: open loop while lifting off, then the altitude loop."""
+    if lifting:
+        return np.full(seen.position_m.shape[1], loops.take_off_thrust())
+    return loops.altitude_thrust(HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
+
+
+def _without_lost(state: VehicleState) -> VehicleState:
+    """Return the state with NaN in the flights that are lost."""
+    lost = ~(np.abs(state.body[POSITION]).max(axis=0) < LOST_M) | ~np.isfinite(state.body).all(axis=0)
+    if not lost.any():
+        return state
+    return VehicleState(
+        np.where(lost, np.nan, state.body), state.rotor_speed_rad_s, state.attitude_integral_rad_s
+    )
+
+
+def _blank(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
+    """Return a trace to be filled in."""
+    shape = targets.shape[:2]
+    arrays: dict[str, Any] = {
+        "time_s": times_s,
+        "position_m": np.empty((*shape, 3)),
+        "velocity_m_s": np.empty((*shape, 3)),
+        "euler_rad": np.empty((*shape, 3)),
+        "target": targets,
+        "command_rad": np.empty((*shape, 2)),
+        "thrust_acceleration_m_s2": np.empty(shape),
+        "status": np.empty(shape, dtype=np.int64),
+    }
+    if not sensed:
+        return Trace(**arrays)
+    return SensedTrace(
+        **arrays,
+        seen_position_m=np.empty((*shape, 3)),
+        seen_velocity_m_s=np.empty((*shape, 3)),
+        seen_euler_rad=np.empty((*shape, 3)),
+    )
+
+
+class _Caller:
+    """Calls the position controller of n flights, fills in the trace, and holds the command (2, n)."""
+
+    def __init__(self, controller: PositionController, drops: Drops, trace: Trace) -> None:
+        self._controller, self._drops = controller, drops
+        self.trace = trace
+        self.command_rad: FloatArray = np.zeros((2, trace.flights))
+
+    def call(self, update: int, true: Seen, seen: Seen, thrust_n: FloatArray) -> None:
+        """Let the controller take one step on what it sees.
+
+        Where the update is dropped it is handed a state that is not a number: it refuses that, and
+        remembers nothing of it.
+        """
+        trace = self.trace
+        measured = np.ascontiguousarray(
+            np.concatenate([seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]).T
+        )
+        dropped = self._drops.next()
+        if dropped is not None:
+            measured[dropped] = np.nan
+        thrust_acceleration_m_s2 = thrust_n / MAMBO.mass_kg
+        outcome = self._controller.step(
+            measured, np.ascontiguousarray(trace.target[update]), thrust_acceleration_m_s2
+        )
+        trace.position_m[update] = true.position_m.T
+        trace.velocity_m_s[update] = true.velocity_m_s.T
+        trace.euler_rad[update] = true.euler_rad.T
+        if isinstance(trace, SensedTrace):
+            trace.seen_position_m[update] = seen.position_m.T
+            trace.seen_velocity_m_s[update] = seen.velocity_m_s.T
+            trace.seen_euler_rad[update] = seen.euler_rad.T
+        trace.command_rad[update] = outcome.command_rad
+        trace.thrust_acceleration_m_s2[update] = thrust_acceleration_m_s2
+        trace.status[update] = outcome.status
+        if dropped is not None:
+            trace.command_rad[update, dropped] = self.command_rad.T[dropped]
+            trace.status[update, dropped] = NOT_CALLED
+        self.command_rad = trace.command_rad[update].T

@@ -1,0 +1,211 @@
+"""One flight as a record: every number that decides it, written to a file and flown again from it.
+
+A `Scenario` says what is flown, and in which world; a `Record` adds which controller flies it. Many scenarios
+make one `Flight` of many.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.errors import FlightError, ScenarioError
+from mambo_nmpc.sil.flight.loop import Flight, Offset, Start
+from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectories
+from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.disturbances import Disturbances
+from mambo_nmpc.sil.plant.link import Link
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.sensors.instruments import Sensors
+
+FORMAT: Final = 1
+LARGEST_FILE_BYTES: Final = 1_000_000
+
+Two = tuple[float, float]
+Three = tuple[float, float, float]
+
+INERTIA_KG_M2: Final[Three] = (
+    float(MAMBO.inertia_kg_m2[0]),
+    float(MAMBO.inertia_kg_m2[1]),
+    float(MAMBO.inertia_kg_m2[2]),
+)
+
+
+class _Record(BaseModel):
+    """Frozen, no unknown keys, finite numbers only."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+
+
+class Scenario(_Record):
+    """One flight; by default the Table II case of a nominal Mambo, undisturbed, that sees the truth."""
+
+    seed: int = Field(0, ge=0, lt=2**63)
+    """Of all that is random in this flight."""
+
+    trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
+    size_m: float = Field(2.0, ge=-1000.0, le=1000.0)
+    rate_rad_s: float = Field(0.5, ge=-100.0, le=100.0)
+    duration_s: float = Field(100.0, gt=0.0, le=3600.0)
+
+    start: Start = Start.HOVER
+    start_offset_m: Three = (0.0, 0.0, 0.0)
+    """From where the flight would start otherwise, in the world frame (NED)."""
+    start_velocity_m_s: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    start_tilt_rad: Two = (0.0, 0.0)
+    """Roll and pitch."""
+    yaw_rad: float = Field(0.0, ge=-1000.0, le=1000.0)
+    yaw_rate_rad_s: float = 0.0
+
+    mass_kg: float = Field(float(MAMBO.mass_kg), gt=0.0)
+    inertia_kg_m2: Three = INERTIA_KG_M2
+    thrust_factor_n_s2: float = Field(float(MAMBO.thrust_factor_n_s2), gt=0.0)
+    torque_factor_n_m_s2: float = Field(float(MAMBO.torque_factor_n_m_s2), gt=0.0)
+    motor_lag_s: float = Field(0.0, ge=0.0, le=1.0)
+    drag_1_s: float = Field(float(Vehicle.drag_1_s), ge=0.0)
+
+    wind_m_s2: Two = (0.0, 0.0)
+    """Steady push of the wind along x and y of the world."""
+    wind_speed_m_s: float = Field(0.0, ge=0.0, le=50.0)
+    """Mean wind 20 ft above the ground, with gusts; 0 is still air."""
+    wind_direction_rad: float = 0.0
+    """Heading towards which the air moves."""
+    battery_sag_1_s: float = Field(0.0, ge=0.0, le=1.0)
+    payload_kg: float = 0.0
+    payload_time_s: float = 0.0
+    push_n_s: Three = (0.0, 0.0, 0.0)
+    push_time_s: float = 0.0
+
+    command_delay_ticks: int = Field(0, ge=0, le=200)
+    """Ticks of 5 ms by which the roll and pitch commands come late."""
+    dropped_share: float = Field(0.0, ge=0.0, le=1.0)
+    """Probability that an update of the position controller is left out, its command held."""
+
+    sensors: Literal["none", "mambo", "mambo-derotated"] = "none"
+    """`mambo-derotated` takes the turning of the camera out of the optical flow."""
+    noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
+    """Factor on the standard deviation of every sensor's noise."""
+    accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
+    """What the calibration before take-off leaves of the bias."""
+    gyro_bias_rad_s: Three = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _can_fly(self) -> Self:
+        if min(self.inertia_kg_m2) <= 0.0:
+            raise ValueError("inertia_kg_m2 must be three positive numbers")
+        if self.mass_kg + self.payload_kg <= 0.0:
+            raise ValueError("payload_kg must leave a positive mass")
+        return self
+
+
+ALIKE: Final = ("duration_s", "start", "sensors")
+"""What all flights of one simulation have in common."""
+
+
+def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
+    """Return the simulation of all scenarios at once, one flight each, in order; raises FlightError.
+
+    Those of `ALIKE` must be the same in all.
+    """
+    if not scenarios:
+        raise FlightError("flights = 0 must be 1 or more")
+    first = scenarios[0]
+    for key in ALIKE:
+        if any(getattr(scenario, key) != getattr(first, key) for scenario in scenarios):
+            raise FlightError(f"{key} must be the same in all flights of one simulation")
+
+    def each(key: str) -> FloatArray:
+        return np.array([getattr(scenario, key) for scenario in scenarios], np.float64)
+
+    def parts(key: str) -> tuple[Any, ...]:
+        return tuple(np.ascontiguousarray(each(key).T))
+
+    return Flight(
+        Trajectories(tuple(CURVES[s.trajectory](s.size_m, s.rate_rad_s) for s in scenarios)),
+        duration_s=first.duration_s,
+        flights=len(scenarios),
+        start=first.start,
+        yaw_rad=each("yaw_rad"),
+        yaw_rate_rad_s=each("yaw_rate_rad_s"),
+        vehicle=Vehicle(
+            replace(
+                MAMBO,
+                mass_kg=each("mass_kg"),
+                inertia_kg_m2=parts("inertia_kg_m2"),
+                thrust_factor_n_s2=each("thrust_factor_n_s2"),
+                torque_factor_n_m_s2=each("torque_factor_n_m_s2"),
+            ),
+            motor_lag_s=each("motor_lag_s"),
+            drag_1_s=each("drag_1_s"),
+            wind_m_s2=parts("wind_m_s2"),
+        ),
+        update_period_s=update_period_s,
+        seeds=tuple(scenario.seed for scenario in scenarios),
+        offset=Offset(parts("start_offset_m"), parts("start_velocity_m_s"), parts("start_tilt_rad")),
+        disturbances=Disturbances(
+            wind_speed_m_s=each("wind_speed_m_s"),
+            wind_direction_rad=each("wind_direction_rad"),
+            battery_sag_1_s=each("battery_sag_1_s"),
+            payload_kg=each("payload_kg"),
+            payload_time_s=each("payload_time_s"),
+            push_n_s=parts("push_n_s"),
+            push_time_s=each("push_time_s"),
+        ),
+        link=Link(
+            delay_ticks=np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64),
+            dropped_share=each("dropped_share"),
+        ),
+        sensors=None
+        if first.sensors == "none"
+        else Sensors(
+            each("noise_scale"),
+            parts("accelerometer_bias_m_s2"),
+            parts("gyro_bias_rad_s"),
+            derotated=first.sensors == "mambo-derotated",
+        ),
+    )
+
+
+class Record(_Record):
+    """A flight that can be flown again: the scenario, who flew it, and the digest of what came of it."""
+
+    format: Literal[1] = FORMAT
+    scenario: Scenario
+    controller: Literal["nmpc", "pd", "reference"] = "nmpc"
+    settings: Settings
+    """Of the controller; the PD has but the update period of them."""
+    trace_sha256: str | None = None
+    """`Trace.digest` of the flight when it was first flown, if known."""
+
+
+def write_record(record: Record, path: Path) -> None:
+    """Write a record as JSON."""
+    path.write_text(json.dumps(record.model_dump(mode="json"), indent=2) + "\n", "utf-8")
+
+
+def read_record(path: Path) -> Record:
+    """Read what `write_record` wrote; raises ScenarioError, naming file, key and rule."""
+    name = echo(str(path))
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE_BYTES + 1)
+    except OSError as error:
+        raise ScenarioError(f"{name}: cannot be read: {error.strerror}") from error
+    if len(content) > LARGEST_FILE_BYTES:
+        raise ScenarioError(f"{name}: is larger than 1 MB; the record of a flight takes a few kB")
+    try:
+        return Record.model_validate_json(content)
+    except ValidationError as error:
+        faults = [
+            f"{name}: {'.'.join(map(str, fault['loc'])) or 'file'}: {fault['msg']}"
+            for fault in error.errors(include_url=False, include_context=False, include_input=False)
+        ]
+        raise ScenarioError("\n".join(faults)) from None

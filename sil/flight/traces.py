@@ -1,0 +1,167 @@
+"""What a closed-loop run leaves behind, and how it is written down."""
+
+import csv
+import hashlib
+import zipfile
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_nmpc.sil.errors import TraceError
+from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+
+CSV_COLUMNS = (
+    *("time_s", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"),
+    *("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s"),
+    *("roll_command_rad", "pitch_command_rad", "thrust_acceleration_m_s2", "status"),
+)
+SEEN_COLUMNS = (
+    *("seen_x_m", "seen_y_m", "seen_z_m", "seen_vx_m_s", "seen_vy_m_s", "seen_vz_m_s"),
+    *("seen_roll_rad", "seen_pitch_rad", "seen_yaw_rad"),
+)
+"""After the others, where there are sensors."""
+
+
+_AXES: Final[dict[str, tuple[int, ...]]] = {
+    "position_m": (3,),
+    "velocity_m_s": (3,),
+    "euler_rad": (3,),
+    "target": (4,),
+    "command_rad": (2,),
+    "thrust_acceleration_m_s2": (),
+}
+"""Axes of the arrays behind instant and flight; each seen one has those of the true one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """The record of n flights at k instants, one for each step of the position controller.
+
+    Instants before t = 0 belong to the take-off. A flight that diverged is NaN from there on.
+    """
+
+    time_s: FloatArray
+    """Time on the trajectory's clock (k,)."""
+    position_m: FloatArray
+    """Position in the world frame (k, n, 3), z down."""
+    velocity_m_s: FloatArray
+    """Velocity in the world frame (k, n, 3)."""
+    euler_rad: FloatArray
+    """Roll, pitch, yaw (k, n, 3)."""
+    target: FloatArray
+    """Target [x, y, vx, vy] in m and m/s (k, n, 4)."""
+    command_rad: FloatArray
+    """Roll and pitch commanded from this instant to the next (k, n, 2)."""
+    thrust_acceleration_m_s2: FloatArray
+    """Thrust that the altitude loop asks for, over the nominal mass (k, n)."""
+    status: IntArray
+    """Status of the position controller (k, n)."""
+
+    def same_bits(self, other: "Trace") -> bool:
+        """Tell whether every array equals that of another trace, bit for bit."""
+        return type(self) is type(other) and all(
+            getattr(self, f.name).tobytes() == getattr(other, f.name).tobytes() for f in fields(self)
+        )
+
+    def digest(self, flight: int = 0) -> str:
+        """Return the SHA-256 of every number of one flight."""
+        hasher = hashlib.sha256(self.time_s.tobytes())
+        for column in fields(self):
+            if column.name != "time_s":
+                hasher.update(getattr(self, column.name)[:, flight].tobytes())
+        return hasher.hexdigest()
+
+    @property
+    def flights(self) -> int:
+        """Number of flights n."""
+        return int(self.status.shape[1])
+
+    @property
+    def diverged(self) -> NDArray[np.bool_]:
+        """Whether each flight was lost before its end (n,)."""
+        return np.asarray(np.isnan(self.position_m[-1]).any(axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class SensedTrace(Trace):
+    """A trace with sensors: the fields of `Trace` are the truth, these what the controllers saw instead."""
+
+    seen_position_m: FloatArray
+    """Estimated position in the world frame (k, n, 3)."""
+    seen_velocity_m_s: FloatArray
+    """Estimated velocity in the world frame (k, n, 3)."""
+    seen_euler_rad: FloatArray
+    """Estimated roll, pitch, yaw (k, n, 3)."""
+
+    def as_seen(self) -> Trace:
+        """Return the flight as the controllers saw it, to be measured like the truth."""
+        return replace(
+            self,
+            position_m=self.seen_position_m,
+            velocity_m_s=self.seen_velocity_m_s,
+            euler_rad=self.seen_euler_rad,
+        )
+
+
+def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
+    """Write one flight of a trace with the columns `CSV_COLUMNS` (and `SEEN_COLUMNS`).
+
+    Numbers read back to the same bits.
+    """
+    seen = (
+        [trace.seen_position_m, trace.seen_velocity_m_s, trace.seen_euler_rad]
+        if isinstance(trace, SensedTrace)
+        else []
+    )
+    numbers = np.column_stack(
+        [
+            trace.time_s,
+            trace.position_m[:, flight],
+            trace.velocity_m_s[:, flight],
+            trace.euler_rad[:, flight],
+            trace.target[:, flight],
+            trace.command_rad[:, flight],
+            trace.thrust_acceleration_m_s2[:, flight],
+        ]
+    )
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow((*CSV_COLUMNS, *(SEEN_COLUMNS if seen else ())))
+        estimates = np.column_stack([trace.time_s, *(values[:, flight] for values in seen)])[:, 1:]
+        writer.writerows(
+            [*row, status, *estimate]
+            for row, status, estimate in zip(
+                numbers.tolist(), trace.status[:, flight].tolist(), estimates.tolist(), strict=True
+            )
+        )
+
+
+def write_npz(trace: Trace, path: Path) -> None:
+    """Write all flights of a trace, one array for each field."""
+    with path.open("wb") as file:
+        np.savez_compressed(file, **{field.name: getattr(trace, field.name) for field in fields(trace)})
+
+
+def read_npz(path: Path) -> Trace:
+    """Read what `write_npz` wrote; raises `TraceError`."""
+    try:
+        with path.open("rb") as file, np.load(file) as arrays:
+            kind = SensedTrace if "seen_position_m" in arrays else Trace
+            trace = kind(**{field.name: arrays[field.name] for field in fields(kind)})
+    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise TraceError(f"{path}: is no trace: {error}") from error
+    steps = trace.status.shape
+    if len(steps) != 2 or 0 in steps or trace.time_s.shape != steps[:1]:
+        raise TraceError(f"{path}: is no trace: time_s {trace.time_s.shape} and status {steps} disagree")
+    for name in (field.name for field in fields(trace) if field.name not in ("time_s", "status")):
+        array, axes = getattr(trace, name), _AXES[name.removeprefix("seen_")]
+        if array.shape != (*steps, *axes) or array.dtype.kind not in "fi":
+            raise TraceError(f"{path}: is no trace: {name} has the shape {array.shape}")
+    if not (np.isfinite(trace.target).all() and np.isfinite(trace.time_s).all()):
+        raise TraceError(f"{path}: is no trace: time and target must be finite")
+    if not (np.diff(trace.time_s) > 0.0).all():
+        raise TraceError(f"{path}: is no trace: time must rise")
+    return trace

@@ -1,0 +1,284 @@
+"""Trajectories: target position and velocity in the world frame as pure functions of time.
+
+Every curve has its centre at the origin, and starts on its first point: before t = 0 the target waits
+there at rest. Half-width and radius are in metres, angular rate in rad/s.
+"""
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.errors import TrajectoryError
+from mambo_nmpc.sil.plant.arrays import FloatArray
+
+STEP_TIME_S = 1.0
+COLUMNS = ("time_s", "x_m", "y_m")
+LARGEST = (1e6, 1e4, 1e4)
+"""Largest magnitude of a waypoint's time in s and position in m, column by column."""
+
+LARGEST_FILE_BYTES = 10_000_000
+SHORTEST_LEG_S = 1e-6
+"""Least time from one waypoint to the next: no velocity is infinite."""
+
+Point = tuple[float, float, float]
+"""A waypoint: time in s, x and y in m."""
+
+
+class Trajectory(Protocol):
+    """What the closed loop asks of a trajectory, of one flight or of many."""
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] in m and m/s.
+
+        Times of shape (...) give (..., 4), or (..., n, 4) if n flights have a target of their own.
+        """
+        ...
+
+
+def _held_before_start(time_s: FloatArray, target: FloatArray) -> FloatArray:
+    """Take the velocity out of targets (..., 4) whose time (...) lies before the start."""
+    target[..., 2:] *= (time_s >= 0.0)[..., np.newaxis]
+    return target
+
+
+@dataclass(frozen=True)
+class Bernoulli:
+    """Lemniscate of Bernoulli from its centre, along x: the figure of eight of the paper."""
+
+    half_width_m: float
+    angular_rate_rad_s: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        times = np.asarray(time_s, dtype=np.float64)
+        phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
+        sine, cosine = np.sin(phase), np.cos(phase)
+        denominator = 1.0 + cosine * cosine
+        x = self.half_width_m * sine / denominator
+        speed = self.half_width_m * self.angular_rate_rad_s / (denominator * denominator)
+        return _held_before_start(
+            times,
+            np.stack(
+                [
+                    x,
+                    x * cosine,
+                    speed * cosine * (denominator + 2.0 * sine * sine),
+                    speed * (3.0 * cosine * cosine - 1.0),
+                ],
+                axis=-1,
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class Lissajous:
+    """x = a sin(w t), y = a h sin(2 w t) with a height h relative to the half-width a."""
+
+    half_width_m: float
+    angular_rate_rad_s: float
+    height: float = 1.0
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        times = np.asarray(time_s, dtype=np.float64)
+        phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
+        width, height = self.half_width_m, self.height * self.half_width_m
+        rate = self.angular_rate_rad_s
+        return _held_before_start(
+            times,
+            np.stack(
+                [
+                    width * np.sin(phase),
+                    height * np.sin(2.0 * phase),
+                    width * rate * np.cos(phase),
+                    2.0 * height * rate * np.cos(2.0 * phase),
+                ],
+                axis=-1,
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class Gerono:
+    """Lemniscate of Gerono, x = a sin(w t), y = a sin(w t) cos(w t): a Lissajous curve of half height."""
+
+    half_width_m: float
+    angular_rate_rad_s: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        return Lissajous(self.half_width_m, self.angular_rate_rad_s, height=0.5).target(time_s)
+
+
+@dataclass(frozen=True)
+class Circle:
+    """Circle about the origin from (radius, 0), towards +y."""
+
+    radius_m: float
+    angular_rate_rad_s: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        times = np.asarray(time_s, dtype=np.float64)
+        phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
+        x, y = self.radius_m * np.cos(phase), self.radius_m * np.sin(phase)
+        rate = self.angular_rate_rad_s
+        return _held_before_start(times, np.stack([x, y, -rate * y, rate * x], axis=-1))
+
+
+@dataclass(frozen=True)
+class Hover:
+    """The origin, for ever."""
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        return np.zeros((*np.shape(time_s), 4))
+
+
+@dataclass(frozen=True)
+class Step:
+    """The origin, and from `STEP_TIME_S` on another point at rest."""
+
+    x_m: float
+    y_m: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        stepped = np.asarray(time_s) >= STEP_TIME_S
+        return np.where(stepped[..., np.newaxis], [self.x_m, self.y_m, 0.0, 0.0], 0.0)
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Straight lines between points, each reached at its time; the first and the last point are held."""
+
+    points: tuple[Point, ...]
+    """Rows of (time s, x m, y m), times increasing."""
+
+    def __post_init__(self) -> None:
+        _check([f"point {number}" for number in range(1, len(self.points) + 1)], self.points)
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a CSV file with the columns time_s, x_m, y_m, in any order and beside others.
+
+        Raises `TrajectoryError`, naming file, line, column and rule.
+        """
+        name = echo(str(path))
+        try:
+            with path.open("rb") as file:
+                content = file.read(LARGEST_FILE_BYTES + 1)
+            if len(content) > LARGEST_FILE_BYTES:
+                raise TrajectoryError("is larger than 10 MB; some thousand waypoints take less")
+            text = io.StringIO(content.decode("utf-8-sig"), newline="")
+            lines, points = _read(csv.DictReader(text, strict=True))
+            _check(lines, points)
+        except OSError as error:
+            raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError:
+            raise TrajectoryError(f"{name}: is not UTF-8; save the file as UTF-8") from None
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{name}: {error}") from None
+        return cls(points)
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        times = np.asarray(time_s, dtype=np.float64)
+        knots, x, y = np.array(self.points).T
+        clock = np.maximum(times, 0.0)
+        leg = np.searchsorted(knots, clock, side="right")
+        velocity = np.zeros((len(knots) + 1, 2))
+        velocity[1:-1] = np.stack([np.diff(x), np.diff(y)], axis=-1) / np.diff(knots)[:, np.newaxis]
+        position = np.stack([np.interp(clock, knots, x), np.interp(clock, knots, y)], axis=-1)
+        return _held_before_start(times, np.concatenate([position, velocity[leg]], axis=-1))
+
+
+def _check(places: Sequence[str], points: Sequence[Point]) -> None:
+    """Raise `TrajectoryError` for points that cannot be flown; `places` says where each of them stands."""
+    if not points:
+        raise TrajectoryError("holds no waypoint; at least one is needed")
+    for place, point in zip(places, points, strict=True):
+        for column, value, largest in zip(COLUMNS, point, LARGEST, strict=True):
+            if not abs(value) <= largest:
+                raise TrajectoryError(
+                    f"{place}: {column} = {value} must be a finite number of magnitude {largest:g} or less"
+                )
+    for place, before, after in zip(places[1:], points, points[1:], strict=False):
+        if after[0] - before[0] < SHORTEST_LEG_S:
+            raise TrajectoryError(
+                f"{place}: time_s = {after[0]} must be later than the {before[0]} before it, "
+                f"by {SHORTEST_LEG_S:g} or more"
+            )
+
+
+def _read(rows: "csv.DictReader[str]") -> tuple[list[str], tuple[Point, ...]]:
+    """Return the points of a CSV file, and the line on which each stands."""
+    lines: list[str] = []
+    points: list[Point] = []
+    try:
+        header = [name.strip() for name in rows.fieldnames or ()]
+        rows.fieldnames = header
+        _check_header(header)
+        for row in rows:
+            lines.append(f"line {rows.line_num}")
+            points.append(_point(row, lines[-1], len(header)))
+    except csv.Error as error:
+        raise TrajectoryError(f"line {rows.reader.line_num}: is not CSV: {error}") from None
+    return lines, tuple(points)
+
+
+def _check_header(header: Sequence[str]) -> None:
+    """Raise `TrajectoryError` unless each column that we read stands there once."""
+    for column in COLUMNS:
+        if header.count(column) != 1:
+            fault = "stands there twice" if column in header else "is missing"
+            raise TrajectoryError(
+                f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
+            )
+
+
+def _point(row: dict[str, str], line: str, width: int) -> Point:
+    """Return the point in a row of a CSV file."""
+    if None in row:  # where DictReader puts what is beyond the header
+        raise TrajectoryError(f"{line}: has more than {width} fields, as many as the header")
+    time_s, x_m, y_m = (_number(row[column], line, column) for column in COLUMNS)
+    return time_s, x_m, y_m
+
+
+def _number(text: str | None, line: str, column: str) -> float:
+    """Return one field of a CSV row as a number; None is a field that the row does not have."""
+    if not (text or "").strip():
+        raise TrajectoryError(f"{line}: {column} is missing")
+    try:
+        return float(text or "")
+    except ValueError:
+        raise TrajectoryError(f"{line}: {column} = {echo(text or '')} must be a number") from None
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """One trajectory for each of n flights."""
+
+    each: tuple[Trajectory, ...]
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., n, 4)."""
+        return np.stack([trajectory.target(time_s) for trajectory in self.each], axis=-2)
+
+
+CURVES: Final[dict[str, Callable[[float, float], Trajectory]]] = {
+    "bernoulli": Bernoulli,
+    "gerono": Gerono,
+    "lissajous": Lissajous,
+    "circle": Circle,
+    "hover": lambda size_m, rate_rad_s: Hover(),  # noqa: ARG005 - has neither size nor rate
+    "step": lambda size_m, rate_rad_s: Step(size_m, 0.0),  # noqa: ARG005 - has no rate
+}
+"""Curves by name, made of a half-width, radius or step in m and an angular rate in rad/s."""

@@ -1,0 +1,107 @@
+"""Pictures of footprints and sweeps."""
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Final
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter, MaxNLocator
+
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.sil.footprint.measure import Footprint
+from mambo_nmpc.sil.footprint.sweep import Point, budgets
+from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, style
+
+SWEPT: Final = {
+    "flash_bytes": "flash, B",
+    "ram_bytes": "RAM, B",
+    "time_ms": "time of a step, ms (upper estimate)",
+    "iae_m_s": "IAE, m s",
+}
+"""What a sweep measures and its picture shows, with labels."""
+
+
+class PlainLogFormatter(LogFormatter):
+    """Labels the same ticks of a logarithmic axis, but writes 0.02 for 2e-02."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of the tick at `x`, empty for one that has none."""
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, Path]:
+    """Draw each limit as a bar per board, as a share of its budget; write stem.png and stem.svg."""
+    with style(), mpl.rc_context({"text.parse_math": False}):  # a board's name is no formula
+        figure = Figure(figsize=(7.2, 1.2 + 1.0 * len(footprints)), layout="constrained")
+        axes = figure.subplots()
+        labels, shares, colours, texts = [], [], [], []
+        for footprint in reversed(footprints):
+            for limit in reversed(footprint.limits):
+                labels.append(f"{footprint.board.name}  {limit.name}")
+                shares.append(100 * limit.share)
+                colours.append(FLOWN if limit.share <= 1 else COMMAND)
+                texts.append(f" {_spelled(limit.value)} of {_spelled(limit.budget)} {limit.unit}")
+        bars = axes.barh(labels, shares, color=colours, zorder=2)
+        axes.bar_label(bars, texts, fontsize=7)
+        axes.axvline(100, color="#444444", linewidth=0.8)
+        axes.set(
+            xlabel="share of the budget, %",
+            xlim=(0, 1.35 * max(100, *shares)),
+            ylim=(-0.8, len(labels) - 0.2),
+        )
+        return save(figure, stem)
+
+
+def _spelled(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    """Write a figure as PNG and SVG."""
+    png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
+    figure.savefig(png, dpi=160, metadata={"Software": None})
+    figure.savefig(svg, metadata={"Date": None, "Creator": None})
+    return png, svg
+
+
+def draw_sweep(
+    points: Sequence[Point], board: Board, update_period_s: float, stem: Path
+) -> tuple[Path, Path]:
+    """Draw flash, RAM, time and tracking against the prediction horizon; write stem.png and stem.svg.
+
+    A colour for each control horizon, a line style for each number of iterations; filled dots fit the budget,
+    which is the dashed line.
+    """
+    with style():
+        figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+        limits = budgets(board, update_period_s)
+        for axes, quantity in zip(figure.subplots(2, 2).flat, SWEPT, strict=True):
+            draw_swept(axes, points, quantity, limits.get(quantity))
+        handles, labels = axes.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
+        figure.suptitle(board.title, parse_math=False)
+        return save(figure, stem)
+
+
+def draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float | None) -> None:
+    """Draw one quantity of `SWEPT` against the prediction horizon, and its limit if that is near."""
+    controls = sorted({point.control for point in points})
+    iterations = sorted({point.iterations for point in points})
+    for (row, control), (column, count) in product(enumerate(controls), enumerate(iterations)):
+        line = [p for p in points if (p.control, p.iterations) == (control, count)]
+        x, y = [p.prediction for p in line], [getattr(p, quantity) for p in line]
+        colour, dashes = f"C{row}", ("-", "--", "-.", ":")[column % 4]
+        axes.plot(x, y, color=colour, linestyle=dashes, label=f"{control} moves, {count} iterations")
+        fits = [(p.prediction, getattr(p, quantity)) for p in line if p.fits]
+        axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour, markersize=3.5)
+    if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
+        axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
+    axes.set(xlabel="prediction horizon", ylabel=SWEPT[quantity])
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if quantity in ("iae_m_s", "time_ms"):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(PlainLogFormatter())
+        axes.yaxis.set_minor_formatter(PlainLogFormatter())

@@ -1,0 +1,151 @@
+"""A footprint as text, JSON and a page: the same figures, three times."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.footprint.measure import Footprint, Limit
+from mambo_nmpc.sil.show.page import render_page
+
+_HEAD = ("board", "flash B", "RAM B", "stack B", "instructions a step", "time ms", "period", "")
+
+
+def summary(footprints: Sequence[Footprint], source: str, settings: Settings) -> dict[str, Any]:
+    """Return everything that was measured, ready for JSON."""
+    first = footprints[0]
+    return {
+        "generator": f"mambo-nmpc {__version__}",
+        "command": "footprint",
+        "source": source,
+        "digest": settings.digest[:16],
+        "scalar": settings.code.scalar,
+        "optimisation": first.optimisation,
+        "boards": [_board(footprint) for footprint in footprints],
+    }
+
+
+def text(footprints: Sequence[Footprint]) -> str:
+    """Spell a table of all boards; of a single one also its functions; then what is over budget."""
+    rows = [_HEAD, *(_row(footprint) for footprint in footprints)]
+    lines = _columns(rows)
+    if len(footprints) == 1:
+        functions = _functions(footprints[0])
+        head = ("function", "size B", "own frame B", "deepest B", "instructions")
+        lines += ["", *_columns([head, *(tuple(str(value) for value in f.values()) for f in functions)])]
+    notes = [note for footprint in footprints for note in _notes(footprint)]
+    return "\n".join([*lines, *(["", *notes] if notes else [])])
+
+
+def page(summary_of_all: dict[str, Any]) -> str:
+    """Render the summary as one HTML page that needs no other file."""
+    return render_page("footprint.html.j2", summary_of_all)
+
+
+def _row(footprint: Footprint) -> tuple[str, ...]:
+    counts, time_s = footprint.counts, footprint.time_s
+    return (
+        footprint.board.name,
+        str(footprint.added.flash.total),
+        str(footprint.added.ram.total),
+        "-" if footprint.stack is None else str(footprint.stack.bytes),
+        "-" if counts is None else f"{counts.least} / {counts.mean:.0f} / {counts.most}",
+        "-" if time_s is None else f"{1000 * time_s[0]:.3g}..{1000 * time_s[1]:.3g}",
+        "-" if time_s is None else f"{100 * time_s[1] / footprint.update_period_s:.2g} %",
+        ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER",
+    )
+
+
+def _board(footprint: Footprint) -> dict[str, Any]:
+    counts = footprint.counts
+    return {
+        "name": footprint.board.name,
+        "title": footprint.board.title,
+        "core": footprint.board.core.value,
+        "compiler": footprint.compiler,
+        "fits": footprint.fits,
+        "complete": footprint.complete,
+        "limits": [_limit(limit) for limit in footprint.limits],
+        "flash_bytes": vars(footprint.added.flash),
+        "flash_sections": footprint.added.sections.flash,
+        "ram_bytes": vars(footprint.added.ram),
+        "instance_bytes": footprint.instance_bytes,
+        "stack_path": [] if footprint.stack is None else [vars(frame) for frame in footprint.stack.path],
+        "instructions": None
+        if counts is None
+        else {"steps": counts.steps, "least": counts.least, "mean": counts.mean, "most": counts.most},
+        "cycles_estimate": footprint.cycles,
+        "time_s_estimate": footprint.time_s,
+        "forbidden": [vars(found) for found in footprint.forbidden],
+        "functions": _functions(footprint),
+        "notes": _notes(footprint),
+    }
+
+
+def _limit(limit: Limit) -> dict[str, Any]:
+    return {
+        "name": limit.name,
+        "value": float(f"{limit.value:.4g}") if limit.unit == "ms" else limit.value,
+        "budget": limit.budget,
+        "unit": limit.unit,
+        "share": limit.share,
+        "percent": f"{100 * limit.share:.3g}",
+        "width": min(100, round(100 * limit.share, 1)),
+    }
+
+
+def _functions(footprint: Footprint) -> list[dict[str, Any]]:
+    """Return size, frame, depth and instructions of every symbol, most instructions first."""
+    counts = footprint.counts.by_function if footprint.counts else {}
+    frames, depths = (footprint.stack.frames, footprint.stack.depths) if footprint.stack else ({}, {})
+    sizes = footprint.added.own | footprint.added.helpers
+    names = dict.fromkeys([*counts, *sorted(sizes, key=lambda name: -sizes[name])])
+    return [
+        {
+            "name": name,
+            "size": sizes.get(name, "-"),
+            "frame": frames.get(name, "-"),
+            "depth": depths.get(name, "-"),
+            "instructions": round(counts[name]) if name in counts else "-",
+        }
+        for name in names
+    ]
+
+
+def _notes(footprint: Footprint) -> list[str]:
+    """Say what is over budget or must not be linked, and what was not measured."""
+    name, notes = footprint.board.name, []
+    for limit in footprint.limits:
+        if limit.share > 1:
+            value, budget, over = (
+                _spelled(number, limit.unit)
+                for number in (limit.value, limit.budget, limit.value - limit.budget)
+            )
+            notes.append(f"{name}: {limit.name} {value} is over its budget of {budget} by {over}")
+    if not footprint.fits:
+        largest = ", ".join(f"{symbol} {size} B" for symbol, size in footprint.largest(5))
+        notes.append(f"{name}: largest symbols: {largest}")
+    for found in footprint.forbidden:
+        callers = ", ".join(found.callers) or "an unknown function"
+        notes.append(f"{name}: {found.symbol} ({found.kind}) must not be linked; called by {callers}")
+    if footprint.stack is None:
+        core = footprint.board.core.value
+        notes.append(f"{name}: stack is not measured, there is no way yet for {core}")
+    if footprint.counts is None:
+        notes.append(f"{name}: instructions and time are not measured: {footprint.uncounted}")
+    return notes
+
+
+def _spelled(value: float, unit: str) -> str:
+    return f"{value:.0f} {unit}" if unit == "B" else f"{value:.4g} {unit}"
+
+
+def _columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  ".join(
+            f"{word:<{width}}" if column == 0 else f"{word:>{width}}"
+            for column, (word, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]

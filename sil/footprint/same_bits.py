@@ -1,0 +1,74 @@
+"""Same bits: the digest of the same frozen steps from every build at hand."""
+
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.digest import frozen_digest
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.controllers.compiled import compiled, compiled_digest
+from mambo_nmpc.sil.controllers.emulated import build_guest, emulated_digest
+from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, Builder, builder, clang_builder
+
+HOST_COMPILERS: Final = ("gcc", "clang")
+BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}
+REFERENCE: Final = "reference"
+
+
+@dataclass(frozen=True)
+class BuildDigest:
+    """The digest of one build, in C's spelling; None, and why, where there is none."""
+
+    where: str
+    compiler: str
+    optimisation: str
+    digest: str | None
+    reason: str = ""
+
+
+def same_bits(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
+    """Yield the digest of the reference first, then of every build on this machine and on `boards`."""
+    yield BuildDigest(REFERENCE, "NumPy", "", _spelled(frozen_digest(settings, episodes)))
+    for name in HOST_COMPILERS:
+        for optimisation in OPTIMISATIONS:
+            yield _on_host(settings, name, optimisation, episodes)
+    for board in boards:
+        for name in BOARD_COMPILERS:
+            for optimisation in OPTIMISATIONS:
+                yield _on_board(settings, board, name, optimisation, episodes)
+
+
+def builds(boards: Sequence[Board]) -> int:
+    """Count what `same_bits` yields."""
+    return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(BOARD_COMPILERS) * len(boards))
+
+
+def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int) -> BuildDigest:
+    if shutil.which(compiler) is None:
+        return BuildDigest("host", compiler, optimisation, None, f"{compiler} is not here")
+    extension = compiled(settings, Toolchain((compiler,), optimisation))
+    return BuildDigest("host", compiler, optimisation, _spelled(compiled_digest(extension, episodes)))
+
+
+def _on_board(
+    settings: Settings, board: Board, compiler: str, optimisation: str, episodes: int
+) -> BuildDigest:
+    try:
+        found = BOARD_COMPILERS[compiler](board, optimisation)
+        with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
+            elf = build_guest(settings, found, Path(work))
+            digest = emulated_digest(settings, elf, board.emulated_core.value, episodes)
+    except (BuildError, EmulatorError) as error:
+        return BuildDigest(board.name, compiler, optimisation, None, str(error))
+    return BuildDigest(board.name, found.toolchain.command[0], optimisation, _spelled(digest))
+
+
+def _spelled(digest: int) -> str:
+    return f"0x{digest:08X}"

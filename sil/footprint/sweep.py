@@ -1,0 +1,111 @@
+"""Sweep horizons and iterations: what each takes of a board, and how well it tracks the Table II case."""
+
+import csv
+import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, fields
+from itertools import product
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Final
+
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.footprint.measure import measure_footprint
+from mambo_nmpc.sil.paper.table2 import CASES
+
+COUNTED_STEPS: Final = 60
+
+
+@dataclass(frozen=True)
+class Grid:
+    """What is swept: prediction horizons, control horizons, iterations."""
+
+    prediction: tuple[int, ...]
+    control: tuple[int, ...]
+    iterations: tuple[int, ...]
+
+    def points(self) -> list[tuple[int, int, int]]:
+        """Return every combination with a control horizon within the prediction."""
+        return [
+            (prediction, control, iterations)
+            for prediction, control, iterations in product(self.prediction, self.control, self.iterations)
+            if control <= prediction
+        ]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One controller of the grid on the board; what is not measured is NaN, and then it does not fit."""
+
+    prediction: int
+    control: int
+    iterations: int
+    flash_bytes: int
+    ram_bytes: int
+    stack_bytes: float
+    instructions: float
+    time_ms: float
+    iae_m_s: float
+    fits: bool
+
+
+def sweep(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
+    """Yield the points of the grid in order, measured on all processors of this machine."""
+    jobs = [(settings.model_dump(), board.model_dump(), *point) for point in grid.points()]
+    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
+        yield from pool.map(_measured, jobs)
+
+
+def budgets(board: Board, update_period_s: float) -> dict[str, float]:
+    """Return what a controller may take of the board, by the names of `Point`."""
+    budget = board.budget
+    return {
+        "flash_bytes": budget.flash_bytes,
+        "ram_bytes": budget.ram_bytes,
+        "time_ms": 1000.0 * update_period_s * budget.period_share,
+    }
+
+
+def largest_fit(points: Sequence[Point]) -> Point | None:
+    """Return the largest horizon that fits and flies: longest prediction, most moves, then best tracking."""
+    fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
+    return max(fitting, key=lambda p: (p.prediction, p.control, -p.iae_m_s), default=None)
+
+
+def write_points(points: Sequence[Point], path: Path) -> None:
+    """Write a CSV file, a point a line."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(asdict(point) for point in points)
+
+
+def _measured(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Point:
+    """Measure one point, in a process of its own: plain values come in, for generic models do not pickle."""
+    document, board_document, prediction, control, iterations = job
+    board = Board.model_validate(board_document)
+    document["horizon"] |= {"prediction": prediction, "control": control}
+    document["optimizer"] |= {"iterations": iterations}
+    chosen = Settings.model_validate(document)
+    footprint = measure_footprint(chosen, board, counted_steps=COUNTED_STEPS)
+    case = next(iter(CASES.values()))
+    flight = Flight(case, update_period_s=chosen.horizon.update_period_s)
+    metrics = measure(fly(flight, CompiledController(chosen)))
+    return Point(
+        prediction=prediction,
+        control=control,
+        iterations=iterations,
+        flash_bytes=footprint.added.flash.total,
+        ram_bytes=footprint.added.ram.total,
+        stack_bytes=math.nan if footprint.stack is None else footprint.stack.bytes,
+        instructions=math.nan if footprint.counts is None else footprint.counts.most,
+        time_ms=math.nan if footprint.time_s is None else 1000 * footprint.time_s[1],
+        iae_m_s=float(metrics.iae_m_s[0]),
+        fits=footprint.fits and footprint.complete,
+    )

@@ -1,0 +1,1 @@
+"""Table II of the paper, flown again."""

@@ -1,0 +1,121 @@
+"""The Table II case with sensors: PD and NMPC on the truth, and through both estimators."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.traces import SensedTrace
+from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S, INDICES, PD, PRINTED_NMPC, PRINTED_PD, Four, digits
+from mambo_nmpc.sil.sensors.instruments import Sensors
+
+PRESETS: Final = ("mambo", "table1")
+"""Which fly beside the PD."""
+FLIGHTS: Final = 20
+"""Flights of a row with noise, seeds 0 and up."""
+
+VIEWS: Final[dict[str, Sensors | None]] = {
+    "the truth": None,
+    "mambo, noise-free": Sensors(noise_scale=0.0),
+    "mambo": Sensors(),
+    "mambo-derotated, noise-free": Sensors(noise_scale=0.0, derotated=True),
+    "mambo-derotated": Sensors(derotated=True),
+}
+
+
+@dataclass(frozen=True)
+class SensedRow:
+    """One controller with one view of the state: medians over its flights.
+
+    tracked: indices of the true error. seen: those of the error that the estimates suggest.
+    worst_iae_m_s: the largest of the true IAE. drift_m: horizontal error of the estimate at the end.
+    """
+
+    controller: str
+    view: str
+    flights: int
+    lost: int
+    tracked: Four
+    seen: Four
+    worst_iae_m_s: float
+    drift_m: float
+
+
+def fly_sensed(
+    settings: Mapping[str, Settings],
+    progress: Callable[[float], None] | None = None,
+    *,
+    duration_s: float = DURATION_S,
+    flights: int = FLIGHTS,
+) -> tuple[SensedRow, ...]:
+    """Fly the case with the PD and the compiled C of `settings` by name, each with every view."""
+    jobs = [(name, view) for name in (PD, *settings) for view in VIEWS]
+    rows = []
+    for index, (name, view) in enumerate(jobs):
+
+        def report(share: float, flown: int = index) -> None:
+            if progress is not None:
+                progress((flown + share) / len(jobs))
+
+        rows.append(_row(name, settings.get(name), view, report, duration_s=duration_s, flights=flights))
+    return tuple(rows)
+
+
+def _row(
+    name: str,
+    settings: Settings | None,
+    view: str,
+    progress: Callable[[float], None],
+    *,
+    duration_s: float,
+    flights: int,
+) -> SensedRow:
+    sensors = VIEWS[view]
+    n = flights if sensors is not None and sensors.noise_scale else 1
+    case = next(iter(CASES.values()))
+    flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
+    controller = PdController() if settings is None else CompiledController(settings, n)
+    trace = fly(flight, controller, progress)
+    tracked = measure(trace)
+    seen, drift_m = tracked, np.zeros(n)
+    if isinstance(trace, SensedTrace):
+        seen = measure(trace.as_seen())
+        drift_m = np.hypot(*(trace.seen_position_m - trace.position_m)[-1, :, :2].T)
+    return SensedRow(
+        controller=name,
+        view=view,
+        flights=n,
+        lost=int(trace.diverged.sum()),
+        tracked=_medians(tracked),
+        seen=_medians(seen),
+        worst_iae_m_s=float(tracked.iae_m_s.max()),
+        drift_m=float(np.median(drift_m)),
+    )
+
+
+def _medians(metrics: Metrics) -> Four:
+    iae, ise, itse, itae = (
+        float(np.median(values))
+        for values in (metrics.iae_m_s, metrics.ise_m2_s, metrics.itse_m2_s2, metrics.itae_m_s2)
+    )
+    return iae, ise, itse, itae
+
+
+def text(rows: Sequence[SensedRow]) -> str:
+    """Spell the rows as a Markdown table, after the printed ones."""
+    heads = ("controller", "sees", "flights", *INDICES, "worst IAE", "IAE as seen", "drift, m")
+    lines = [" | ".join(heads), " | ".join(["---"] * 3 + ["---:"] * 7)]
+    for name, printed in (("PD, printed", PRINTED_PD), ("NMPC, printed", PRINTED_NMPC)):
+        lines.append(" | ".join([name, "", "", *map(digits, printed), "", "", ""]))
+    for row in rows:
+        flights = f"{row.flights}" + (f", {row.lost} lost" if row.lost else "")
+        ends = (row.worst_iae_m_s, row.seen[0], row.drift_m)
+        cells = [row.controller, row.view, flights, *map(digits, row.tracked), *map(digits, ends)]
+        lines.append(" | ".join(cells))
+    return "\n".join(f"| {line} |" for line in lines)

@@ -1,0 +1,76 @@
+"""What the benchmarks compare: one controller written twice, one problem stated three times."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import optimum, peers_setups
+from benchmarks.host_builds import build, plans
+from benchmarks.ours import bundle_program, peers_model, place_bundle, place_rollout, rollout_program
+from benchmarks.peers_programs import Cost, Program
+from benchmarks.searches import Array
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from tests.support.tools import require
+
+
+def random_inputs(n: int) -> Array:
+    """Return errors and last commands (n, 6), a third each far, near and very near."""
+    scale = np.array([0.5, 1.0, 0.5, 1.0, 0.1, 0.1]) * 10.0 ** -(np.arange(n) % 3)[:, None]
+    inputs: Array = np.random.default_rng(0).uniform(-1, 1, (n, 6)) * scale
+    return inputs
+
+
+def planned(
+    settings: Settings,
+    place: Callable[[Settings, Path], None],
+    program: Callable[[str, Settings], Program],
+    folder: Path,
+) -> list[Array]:
+    """Return the plans (n, 4) of a build, started over for each input, and flying on."""
+    place(settings, folder)
+    library = build(program("", settings), folder, ("-O0",), folder / "library.so")
+    return [plans(library, random_inputs(600), follows=follows)[1] for follows in (False, True)]
+
+
+@pytest.mark.parametrize("preset", ["table1", "mambo"])
+def test_plain_roll_out_plans_what_the_generated_c_plans(preset: str, tmp_path: Path) -> None:
+    """Without tables, with and without lag, cold and warm: in double, no sign falls otherwise."""
+    require("gcc", "gcc")
+    settings = with_option(presets.load(preset), "code.scalar", "float64", "test")
+    ours = planned(settings, place_bundle, bundle_program, tmp_path / "ours")
+    plain = planned(settings, place_rollout, rollout_program, tmp_path / "plain")
+    for mine, theirs in zip(ours, plain, strict=True):
+        np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-6)
+        assert np.ptp(mine, axis=0).min() > 0.1
+
+
+def test_optimum_is_of_the_problem_of_the_peers() -> None:
+    """The errors and changes that it weighs are those that the peers condense."""
+    inputs = random_inputs(30)
+    found = optimum.problems(peers_model(), inputs)
+    from_state, from_moves = peers_setups.condensed()
+    before = np.hstack([inputs[:, 4:], np.zeros((30, 2))])
+    weights = np.repeat([peers_setups.TRACKING, peers_setups.EFFORT], [20, 4])
+    rows = np.vstack([from_moves, peers_setups.changes()])
+    offset = np.hstack([inputs[:, :4] @ from_state.T, -before])
+    np.testing.assert_allclose(
+        found.slope, np.tile(weights[:, None] * rows, (30, 1, 1)), rtol=1e-12, atol=1e-12
+    )
+    np.testing.assert_allclose(found.offset, weights * offset, rtol=1e-12, atol=1e-9)
+    assert found.limit_rad == peers_setups.TILT_RAD
+
+
+@pytest.mark.parametrize("kind", ["1-norm", "quadratic"])
+@pytest.mark.parametrize("settings", [peers_model(), presets.load("mambo")], ids=["no lag", "lag"])
+def test_no_neighbour_of_the_optimum_costs_less(kind: Cost, settings: Settings) -> None:
+    """Both costs are convex: what no step improves, near the limit too, is the least there is."""
+    inputs = random_inputs(30)
+    best = optimum.best(kind, settings, inputs)
+    least = optimum.costs(kind, settings, inputs, best)
+    steps = np.random.default_rng(1).choice([-1e-3, 0.0, 1e-3], (100, *best.shape))
+    for step in steps:
+        moved = np.clip(best + step, -peers_setups.TILT_RAD, peers_setups.TILT_RAD)
+        assert np.all(optimum.costs(kind, settings, inputs, moved) >= least * (1 - 1e-9))

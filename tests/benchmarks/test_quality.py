@@ -1,0 +1,98 @@
+"""The linear program of `benchmarks.quality` is the controller's own problem, and solved."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from benchmarks.quality import PRESETS, entrants
+from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.reference.optimizer import minimize
+from mambo_nmpc.codegen.settings import Settings, presets
+from tests.support.cases import settings_case
+
+Inputs = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
+
+N = 16
+DRAWN = [index for index in range(30) if settings_case(index, "float64").model.position_update == "exact"]
+
+
+def inputs(rng: np.random.Generator, farthest_m: float = 1.0) -> Inputs:
+    """Draw states, targets and thrusts, a thousandth of the way to all of it apart, at any heading."""
+    target = rng.normal(0, 1, (N, 4))
+    apart = farthest_m * 10.0 ** rng.uniform(-3, 0, (N, 1)) * rng.normal(0, 1, (N, 4))
+    attitude = rng.uniform(-1, 1, (N, 3)) * [0.4, 0.4, 3.0]
+    state = np.concatenate([target + apart, attitude], axis=1)
+    return state, target, rng.uniform(5, 15, N)
+
+
+@pytest.mark.parametrize("index", DRAWN)
+def test_rows_have_the_cost_and_slope_of_the_reference(index: int) -> None:
+    """Eq 12 written out in rows is eq 12 of the reference, for any settings, plan and last command."""
+    rng = np.random.default_rng(index)
+    seen: list[Problems] = []
+
+    def anywhere(settings: Settings, problems: Problems, start_rad: NDArray[Any]) -> NDArray[Any]:
+        seen.append(problems)
+        limit = settings.limits.tilt_rad
+        return rng.uniform(-limit, limit, start_rad.shape)
+
+    controller = SearchingController(settings_case(index, "float64"), N, anywhere)
+    for _ in range(2):
+        step = controller.step(*inputs(rng))
+        cost, gradient = seen[-1].evaluate(step.plan_rad)
+        good = step.status == 0  # the others are out of these settings' ranges
+        assert np.any(good)
+        least = 1e-9 * np.abs(gradient).max()
+        np.testing.assert_allclose(cost[good], step.cost[good], rtol=1e-9)
+        np.testing.assert_allclose(gradient[good], step.gradient[good], rtol=1e-9, atol=least)
+        np.testing.assert_array_equal(seen[-1].cost(step.plan_rad), cost)
+
+
+@pytest.mark.parametrize("name", ["table1", "mambo", "mambo-robust"])
+def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
+    """The program's optimum keeps the limit, and beats the controller's plan and any other."""
+    settings, rng = presets.load(name), np.random.default_rng(1)
+    controller, model, limit = ReferenceController(settings, N), Model(settings), settings.limits.tilt_rad
+    last = np.zeros((N, 2))
+    for _ in range(3):
+        known = inputs(rng)
+        problems, step = model.problems(*known, last), controller.step(*known)
+        last = step.command_rad
+        best = problems.optima()
+        least = problems.cost(best) * (1 - 1e-8)
+        assert np.all(np.abs(best) <= limit * (1 + 1e-9))
+        assert np.all(least <= problems.cost(step.plan_rad))
+        for size in (1e-3, 1e-1):
+            beside = np.clip(best + size * rng.normal(0, 1, best.shape), -limit, limit)
+            assert np.all(least <= problems.cost(beside))
+
+
+def test_searches_are_ordered_by_what_they_find() -> None:
+    """The best iterate is never dearer than start or last iterate, and the optimum never dearer than it."""
+    settings, rng = presets.load("mambo"), np.random.default_rng(2)
+    problems = Model(settings).problems(*inputs(rng), rng.uniform(-0.2, 0.2, (N, 2)))
+    level = np.zeros((N, settings.horizon.control, 2))
+    best_rad = optimum(settings, problems, level)
+    for start in (level, best_rad):
+        last = problems.cost(minimize(settings, problems.evaluate, start).moves_rad)
+        best = problems.cost(best_iterate(settings, problems, start))
+        assert np.all(best <= np.minimum(last, problems.cost(start)))
+        assert np.all(problems.cost(best_rad) <= best * (1 + 1e-8))
+        assert np.any(best < last) == (start is best_rad)
+    from_best = from_level(settings, problems, best_rad)
+    np.testing.assert_array_equal(from_best, minimize(settings, problems.evaluate, level).moves_rad)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_first_row_is_the_preset_as_it_is(name: str) -> None:
+    """Everything is compared with the preset itself; of the rest only the search differs."""
+    first, *others = entrants(name).values()
+    assert first.settings == presets.load(name)
+    assert first.searching is None
+    for other in others:
+        kept = {"optimizer": first.settings.optimizer}
+        assert other.settings.model_copy(update=kept) == first.settings
+        assert other not in (first, *(one for one in others if one is not other))

@@ -1,0 +1,283 @@
+"""Campaigns on paper: what is drawn, what campaign.toml may say, and statistics against values by hand."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.errors import MamboNmpcError, UnreadableFileError
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
+from mambo_nmpc.sil.campaign.flights import INDICES
+from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
+from mambo_nmpc.sil.campaign.statistics import improvement, proportion, quantiles, summarise, worst
+from mambo_nmpc.sil.plant.airframe import MAMBO
+
+ROOT = Path(__file__).parents[2]
+DEFAULTS = {name: parameter.default for name, parameter in PARAMETERS.items()}
+WIDE = Domain(-1e3, 1e3)
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write a campaign.toml."""
+    path = folder / "campaign.toml"
+    path.write_text(text)
+    return path
+
+
+def faults(folder: Path, text: str) -> list[str]:
+    """Return what is said of a campaign.toml, without its name."""
+    path = written(folder, text)
+    with pytest.raises(MamboNmpcError) as caught:
+        file.read(path)
+    parts = [line.partition("campaign.toml: ") for line in str(caught.value).splitlines()]
+    assert all(found for _, found, _ in parts)
+    return [fault for _, _, fault in parts]
+
+
+@pytest.mark.parametrize(
+    ("value", "share", "expected"),
+    [
+        (3.5, 0.9, 3.5),
+        ({"uniform": [2.0, 4.0]}, 0.25, 2.5),
+        ({"log_uniform": [0.5, 2.0]}, 0.5, 1.0),
+        ({"normal": [1.0, 2.0]}, 0.5, 1.0),
+        ({"normal": [1.0, 2.0]}, NormalDist().cdf(1.0), 3.0),
+        ({"normal": [1.0, 0.0]}, 0.3, 1.0),
+        ({"choice": [7, 8, 9]}, 0.0, 7.0),
+        ({"choice": [7, 8, 9]}, 0.34, 8.0),
+        ({"choice": [7, 8, 9]}, 0.999, 9.0),
+    ],
+)
+def test_quantiles_of_the_distributions(value: object, share: float, expected: float) -> None:
+    """The value below which a share of the draws lie."""
+    assert parse(value, WIDE).quantile(share) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.999999, 1.0 - 2.0**-53])
+def test_a_normal_draw_stays_in_the_domain(share: float) -> None:
+    """Cut off, not piled up: the quantiles in between are those of the truncated distribution."""
+    domain = Domain(0.0, 1.0)
+    cut = parse({"normal": [0.5, 10.0]}, domain)
+    assert 0.0 <= cut.quantile(share) <= 1.0
+    assert cut.quantile(0.5) == pytest.approx(0.5)
+    assert cut.quantile(0.1) == pytest.approx(0.1, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "value", [3.5, {"uniform": [2.0, 4.0]}, {"normal": [1.0, 2.0]}, {"choice": [1.0, 2.0]}]
+)
+def test_a_distribution_is_spelled_as_it_is_read(value: object) -> None:
+    """What campaign.json keeps is what campaign.toml says."""
+    assert parse(value, WIDE).document() == value
+
+
+def test_a_flight_depends_on_seed_and_number_alone() -> None:
+    """Neither on other flights, nor on the distributions of other parameters."""
+    assert draw(5, 17, DEFAULTS) == draw(5, 17, DEFAULTS)
+    assert draw(5, 17, DEFAULTS) != draw(5, 18, DEFAULTS)
+    assert draw(5, 17, DEFAULTS) != draw(6, 17, DEFAULTS)
+    fixed = DEFAULTS | {"mass_kg": parse(0.07, PARAMETERS["mass_kg"].domain)}
+    assert draw(5, 17, fixed) == draw(5, 17, DEFAULTS) | {"mass_kg": 0.07}
+
+
+def test_seeds_of_flights_differ() -> None:
+    """Noise of one flight is not that of another."""
+    assert len({draw(0, flight, DEFAULTS)["seed"] for flight in range(2000)}) == 2000
+
+
+def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
+    """A thousand flights: mean and limits of a uniform parameter, shares of a choice, no correlation."""
+    flights = [draw(0, flight, DEFAULTS) for flight in range(1000)]
+    mass_kg = np.array([flight["mass_kg"] for flight in flights])
+    assert 0.063 <= mass_kg.min() < 0.0632
+    assert 0.0798 < mass_kg.max() <= 0.08
+    assert mass_kg.mean() == pytest.approx(0.0715, abs=0.0005)
+    ticks = [flight["command_delay_ticks"] for flight in flights]
+    assert all(280 < ticks.count(delay) < 390 for delay in (0, 1, 2))
+    yaw_rad = np.array([flight["yaw_rad"] for flight in flights])
+    assert abs(np.corrcoef(mass_kg, yaw_rad)[0, 1]) < 0.1
+
+
+def test_every_draw_can_fly() -> None:
+    """All parameters reach the scenario: at its limits every one makes another scenario, and a valid one."""
+    nominal = {name: replace(parameter.default, kind="constant") for name, parameter in PARAMETERS.items()}
+    section = file.FlightSection().model_dump()
+    plain = file.scenario(section, draw(0, 0, nominal))
+    for name, parameter in PARAMETERS.items():
+        for limit in (parameter.domain.low, parameter.domain.high):
+            extreme = nominal | {name: Distribution("constant", (limit,), parameter.domain)}
+            changed = file.scenario(section, draw(0, 0, extreme))
+            assert (changed != plain) == (limit != nominal[name].numbers[0]), name
+
+
+def test_scales_apply_to_the_nominal_mambo() -> None:
+    """Thrust and torque of the rotors alike, inertia axis by axis."""
+    drawn = draw(0, 0, DEFAULTS) | {"thrust_scale": 0.5, "inertia_scale_y": 2.0}
+    flown = file.scenario(file.FlightSection().model_dump(), drawn)
+    assert flown.thrust_factor_n_s2 == 0.5 * MAMBO.thrust_factor_n_s2
+    assert flown.torque_factor_n_m_s2 == 0.5 * MAMBO.torque_factor_n_m_s2
+    assert flown.inertia_kg_m2[1] == 2.0 * MAMBO.inertia_kg_m2[1]
+
+
+def test_an_empty_file_is_the_default_campaign(tmp_path: Path) -> None:
+    """Every key has a default: PD and preset mambo, 100 s of the figure of eight, with sensors."""
+    read = file.read(written(tmp_path, ""))
+    assert read == file.default()
+    assert [(entrant.name, entrant.kind) for entrant in read.entrants] == [("pd", "pd"), ("mambo", "nmpc")]
+    assert read.file.flight.duration_s == 100.0
+    assert read.file.flight.sensors == "mambo-derotated"
+
+
+def test_a_controller_may_be_a_file_beside_the_campaign(tmp_path: Path) -> None:
+    """Named by its stem, wherever the command runs."""
+    (tmp_path / "calm.toml").write_text("[cost]\neffort_weight = 1000\n")
+    read = file.read(written(tmp_path, 'controllers = ["table1", "calm.toml"]'))
+    assert [entrant.name for entrant in read.entrants] == ["table1", "calm"]
+    assert read.entrants[1].settings.cost.effort_weight == 1000.0
+
+
+def test_the_campaign_is_its_values(tmp_path: Path) -> None:
+    """A key written with its default changes nothing; a drawn parameter does."""
+    same = file.read(written(tmp_path, "seed = 0\n[draws]\nmass_kg = { uniform = [0.063, 0.08] }\n"))
+    assert same.document() == file.default().document()
+    other = file.read(written(tmp_path, "[draws]\nmass_kg = 0.063\n"))
+    assert other.document()["draws"]["mass_kg"] == 0.063
+
+
+BAD = {
+    "seed = -1": "seed = -1 must lie in 0..9223372036854775807",
+    'seed = "x"': 'seed = "x" must be a valid integer',
+    "sed = 1": "sed is not a key of this file; did you mean seed?",
+    "draws = 3": "draws = 3 must be a section; write [draws] and its keys below",
+    "[draws]\nmas_kg = 1": "draws.mas_kg is not a parameter; did you mean mass_kg?",
+    "[draws]\nwind = 3": "draws.wind is not a parameter; did you mean wind_x_m_s2, wind_y_m_s2",
+    "[draws]\nmass_kg = 60": "draws.mass_kg = 60 must lie in 0.01..1",
+    "[draws]\nmass_kg = nan": "draws.mass_kg = NaN must lie in 0.01..1",
+    "[draws]\nmass_kg = { uniform = [0.08, 0.06] }": "[0.08, 0.06] } must have the lower limit first",
+    "[draws]\nmass_kg = { uniform = [0.08] }": "must have two numbers",
+    "[draws]\nmass_kg = { uniform = [0.05, 9] }": "must lie in 0.01..1",
+    "[draws]\nmass_kg = { gamma = [1, 2] }": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = [0.06, 0.08]": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = true": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = { choice = [] }": "must have 1 to 1000 values",
+    "[draws]\nwind_x_m_s2 = { normal = [0, -1] }": "must have a standard deviation of 0 or more",
+    "[draws]\nnoise_scale = { log_uniform = [0, 1] }": "must have limits above 0",
+    "[draws]\ncommand_delay_ticks = 1.5": "must be whole numbers",
+    "[draws]\ncommand_delay_ticks = { uniform = [0, 2] }": "must be a whole number or { choice",
+    "[flight]\nduration_s = 0": "flight.duration_s = 0 must lie in 1..3600",
+    '[flight]\ntrajectory = "spiral"': "flight.trajectory = \"spiral\" must be 'bernoulli', 'gerono'",
+    "controllers = []": "controllers = [] must name 1 to 10 controllers",
+    'controllers = ["mamba"]': "controllers: mamba is neither a preset nor a file (did you mean mambo?)",
+    'controllers = ["pd", "pd"]': "controllers: two are called pd",
+    'controllers = ["odd.toml"]': "controllers: odd.toml: horizon.update_period_s = 0.007 must be a whole",
+    'controllers = ["wrong.toml"]': "wrong.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)",
+    'controllers = ["a b.toml"]': "controllers: a b.toml must have a name of at most 40 letters",
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_file_is_told_key_value_and_rule(text: str, tmp_path: Path) -> None:
+    """One line for one fault, no traceback."""
+    (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.007\n")
+    (tmp_path / "wrong.toml").write_text("[horizon]\ncontrol = 11\n")
+    (tmp_path / "a b.toml").write_text("")
+    (fault,) = faults(tmp_path, text)
+    assert BAD[text] in fault
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+    """Not one after the other."""
+    assert len(faults(tmp_path, "seed = -1\n[draws]\nmass_kg = 0\nyaw = 1\n")) == 3
+
+
+def test_a_missing_campaign_is_named(tmp_path: Path) -> None:
+    """As every file is."""
+    with pytest.raises(UnreadableFileError, match="no such file"):
+        file.read(tmp_path / "absent.toml")
+
+
+def table(**columns: list[float]) -> dict[str, np.ndarray]:
+    """Return a table of controllers a and b without crashes, but for the columns given."""
+    n = len(next(iter(columns.values())))
+    healthy = {f"{name}_crashed": [0.0] * n for name in "ab"}
+    return {name: np.array(values, np.float64) for name, values in (healthy | columns).items()}
+
+
+def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
+    """None of ten: the upper limit solves (1 - p)^10 = 2.5 %; all of them: the mirror image."""
+    none, every = proportion(0, 10), proportion(10, 10)
+    limit = 1.0 - 0.025 ** (1 / 10)
+    assert [none.low, none.high] == pytest.approx([0.0, limit])
+    assert [every.low, every.high] == pytest.approx([1.0 - limit, 1.0])
+    assert proportion(3, 12).share == 0.25
+
+
+def test_quantiles_are_values_of_the_sample() -> None:
+    """And infinite ones among them do no harm to the others."""
+    values = np.array([4.0, math.inf, 1.0, 3.0, 2.0])
+    found = quantiles(values)
+    assert (found["0"], found["0.25"], found["0.5"], found["0.75"]) == (1.0, 2.0, 3.0, 4.0)
+    assert (found["0.95"], found["1"]) == (math.inf, math.inf)
+
+
+def test_improvement_is_the_median_of_the_ratios() -> None:
+    """Flight by flight, not of the medians; with the share of flights that are better."""
+    found = improvement(
+        table(a_iae_m_s=[2.0, 9.0, 4.0, 1.0, 8.0], b_iae_m_s=[1.0, 3.0, 1.0, 2.0, 8.0]), "a", "b", "iae_m_s"
+    )
+    assert found is not None
+    assert found.median == 2.0  # of 2, 3, 4, 0.5, 1
+    assert (found.better.count, found.better.flights) == (3, 5)
+    assert 0.5 <= found.low <= 2.0 <= found.high <= 4.0
+
+
+def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
+    """The median of a lognormal is exp(mu); its interval is near that of the asymptotic formula."""
+    ratios = np.exp(np.random.default_rng(1).normal(math.log(3.0), 0.5, 1000))
+    found = improvement(table(a_iae_m_s=ratios.tolist(), b_iae_m_s=[1.0] * 1000), "a", "b", "iae_m_s")
+    assert found is not None
+    assert found.low < 3.0 < found.high
+    width = 2.0 * 1.96 * 3.0 * 0.5 * math.sqrt(math.pi / 2.0 / 1000)
+    assert found.high - found.low == pytest.approx(width, rel=0.25)
+
+
+def test_a_crash_is_infinitely_bad() -> None:
+    """Whoever crashes loses the flight; where both crash there is nothing to compare."""
+    columns = table(
+        a_iae_m_s=[1.0, 1.0, 1.0, 1.0],
+        b_iae_m_s=[0.5, 0.5, 0.5, 0.5],
+        a_crashed=[0.0, 1.0, 0.0, 1.0],
+        b_crashed=[0.0, 0.0, 1.0, 1.0],
+    )
+    found = improvement(columns, "a", "b", "iae_m_s")
+    assert found is not None
+    assert found.flights == 3
+    assert found.median == 2.0  # of 2, infinite, 0
+    assert found.better.count == 2
+    hopeless = table(a_iae_m_s=[1.0], b_iae_m_s=[1.0], a_crashed=[1.0], b_crashed=[1.0])
+    assert improvement(hopeless, "a", "b", "iae_m_s") is None
+
+
+def test_the_worst_flights_are_crashes_then_the_largest_iae() -> None:
+    """At most five; a lost flight, whose IAE is no number, is among the crashes."""
+    columns = table(a_iae_m_s=[1.0, 7.0, math.nan, 3.0, 2.0, 9.0], a_crashed=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    assert worst(columns, "a") == [2, 3, 5, 1, 4]
+
+
+def test_statistics_are_reproducible() -> None:
+    """The same table gives the same intervals."""
+    rng = np.random.default_rng(2)
+    columns = {f"{name}_{index}": rng.uniform(1.0, 2.0, 20) for name in "ab" for index in INDICES}
+    columns |= {f"{name}_{key}": np.zeros(20) for name in "ab" for key in ("crashed", "refused_updates")}
+    assert summarise(columns, "ab", sensed=False) == summarise(columns, "ab", sensed=False)
+
+
+def test_every_parameter_is_documented() -> None:
+    """With its name and its default in docs/campaign.md."""
+    text = (ROOT / "docs" / "campaign.md").read_text("utf-8")
+    missing = [name for name in PARAMETERS if f"`{name}`" not in text]
+    assert missing == []

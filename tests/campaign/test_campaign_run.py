@@ -1,0 +1,326 @@
+"""Campaigns flown: the same bytes whoever flies in whatever order, and whatever stops them in between."""
+
+import csv
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.errors import INTERRUPTED, ForeignFilesError, UnwritableError
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes
+from mambo_nmpc.sil.campaign.flights import fly_batch
+from mambo_nmpc.sil.campaign.run import fly_missing, opened, table_columns
+from mambo_nmpc.sil.errors import BusyError, FlightError, WorkerError
+from mambo_nmpc.sil.flight.scenario import read_record
+from tests.support.tools import require_module
+
+FLIGHTS = 6
+CAMPAIGN = 'seed = 4\ncontrollers = ["pd", "mambo"]\n[flight]\nduration_s = 1.0\n'
+
+
+@pytest.fixture(scope="module", name="source")
+def _source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a campaign of short flights."""
+    path = tmp_path_factory.mktemp("source") / "campaign.toml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+@pytest.fixture(scope="module", name="whole")
+def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run that campaign without interruption on one process."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    done = command("campaign", source, "--flights", FLIGHTS, "--workers", 1, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def command(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run mambo-nmpc."""
+    line = [sys.executable, "-c", "from mambo_nmpc.sil.__main__ import main; main()", *map(str, arguments)]
+    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
+
+
+def run_script(text: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a script in a session of its own, and wait for all who hold its output: no worker may stay."""
+    line = [sys.executable, "-c", text, *map(str, arguments)]
+    return subprocess.run(
+        line, capture_output=True, text=True, check=False, timeout=120, start_new_session=True
+    )
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return name and bytes of every file below `folder`."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def fly_on_threads(
+    source: Path,
+    folder: Path,
+    flights: int = FLIGHTS,
+    *,
+    batch: int = 100,
+    progress: Callable[[int], None] = lambda _: None,
+) -> bytes:
+    """Fly on two threads of this process, and return the table."""
+    campaign = file.read(source)
+    with opened(campaign, folder) as store, ThreadPoolExecutor(2) as threads:
+        fly_missing(campaign, store, flights, Pool(threads, 2, lambda _: None), progress, batch=batch)
+        store.put_in_order()
+    return (folder / "flights.csv").read_bytes()
+
+
+@pytest.mark.parametrize("batch", [1, 2, 100])
+def test_the_table_depends_neither_on_batches_nor_on_workers(
+    batch: int, source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """One process or two threads, one flight for NumPy at a time or all: the same bytes."""
+    assert fly_on_threads(source, tmp_path, batch=batch) == (whole / "flights.csv").read_bytes()
+
+
+@pytest.mark.long
+def test_two_processes_fly_what_one_flies(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Every file of the folder, pictures and records included, to the byte."""
+    done = command("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
+    assert (done.returncode, "pd over another" in done.stdout) == (0, True), done.stderr
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Path) -> None:
+    """A line for each flight with what was drawn and what came of it; a record for each that replays."""
+    names = set(contents(whole))
+    records = {f"flights/{flight:06}-{name}.json" for flight in range(FLIGHTS) for name in ("pd", "mambo")}
+    assert names == {"campaign.json", "flights.csv", "summary.json", "campaign.png", "campaign.svg"} | records
+    rows = list(csv.DictReader((whole / "flights.csv").read_text().splitlines()))
+    assert [int(row["flight"]) for row in rows] == list(range(FLIGHTS))
+    assert tuple(rows[0])[1:] == table_columns(file.read(source))
+    assert 0.063 <= float(rows[0]["mass_kg"]) <= 0.08
+    record = read_record(whole / "flights" / "000002-mambo.json")
+    assert record.scenario.mass_kg == float(rows[2]["mass_kg"])
+    assert record.trace_sha256 == rows[2]["mambo_trace_sha256"]
+    summary = json.loads((whole / "summary.json").read_text())
+    assert summary["flights"] == FLIGHTS
+    assert summary["controllers"]["mambo"]["crashed"]["count"] == 0
+    assert len(summary["worst"]["pd"]) == 5
+
+
+@pytest.mark.long
+def test_a_worst_flight_replays_to_the_bit(whole: Path, tmp_path: Path) -> None:
+    """By the command that the campaign prints, in Python rather than C, and alone rather than in a batch."""
+    worst = json.loads((whole / "summary.json").read_text())["worst"]["mambo"][0]
+    done = command("fly", "--replay", whole / worst["record"], "--json", "-o", tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["same_bits_as_recorded"] is True
+    assert summary["metrics"]["iae_m_s"] == worst["iae_m_s"]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from mambo_nmpc.sil.campaign import file
+from mambo_nmpc.sil.campaign.executors import processes
+from mambo_nmpc.sil.campaign.flights import fly_batch
+from mambo_nmpc.sil.campaign.run import fly_missing, opened
+def progress(finished):
+    if finished >= 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+campaign = file.read(Path(sys.argv[1]))
+with opened(campaign, Path(sys.argv[2])) as store, processes(2) as pool:
+    fly_missing(campaign, store, 6, pool, progress, batch=1)
+"""
+
+
+@pytest.mark.long
+def test_a_killed_campaign_goes_on_to_the_same_bytes(source: Path, whole: Path, tmp_path: Path) -> None:
+    """SIGKILL in the middle: what was finished is there, no worker stays, and nothing differs in the end."""
+    done = run_script(KILLED, source, tmp_path)
+    assert done.returncode == -signal.SIGKILL
+    before = (tmp_path / "flights.csv").read_text().splitlines()
+    assert 2 <= len(before) - 1 < FLIGHTS
+    resumed = command("campaign", source, "--flights", FLIGHTS, "-o", tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    assert contents(tmp_path) == contents(whole)
+    assert set(before) <= set((tmp_path / "flights.csv").read_text().splitlines())
+
+
+STOPPED = """
+import os, signal
+from mambo_nmpc.sil.__main__ import main
+from mambo_nmpc.sil.campaign.store import Store
+add = Store.add
+def add_and_stop(self, rows):
+    add(self, rows)
+    os.killpg(0, signal.SIGINT)
+Store.add = add_and_stop
+main()
+"""
+
+
+@pytest.mark.long
+def test_ctrl_c_leaves_a_folder_that_goes_on(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Exit 130 and one line, though the terminal interrupts the workers too."""
+    arguments = ("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
+    done = run_script(STOPPED, *arguments)
+    assert done.returncode == INTERRUPTED
+    assert done.stdout == ""
+    assert done.stderr.endswith(
+        f"stopped with 3 of {FLIGHTS} flights finished; the same command goes on from there\n"
+    )
+    assert done.stderr.count("\n") == 1
+    assert command(*arguments).returncode == 0
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_a_full_disk_is_told_and_goes_on(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The table is cut short in the middle of a line; the next run drops that and flies the rest."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def fill(finished: int) -> None:
+        if finished == 2:
+            size = (tmp_path / "flights.csv").stat().st_size
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
+
+    try:
+        with pytest.raises(UnwritableError, match=r"flights\.csv.*: File too large; the flights finished"):
+            fly_on_threads(source, tmp_path, batch=1, progress=fill)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not (tmp_path / "flights.csv").read_bytes().endswith(b"\n")
+    assert fly_on_threads(source, tmp_path) == (whole / "flights.csv").read_bytes()
+
+
+def test_a_finished_campaign_grows(source: Path, whole: Path, tmp_path: Path) -> None:
+    """More flights later are the same as all at once; fewer would lose some, and are refused."""
+    fly_on_threads(source, tmp_path, 2)
+    assert fly_on_threads(source, tmp_path, FLIGHTS) == (whole / "flights.csv").read_bytes()
+    with pytest.raises(FlightError, match="has flight 5 already; --flights must be 6 or more"):
+        fly_on_threads(source, tmp_path, 4)
+
+
+def test_only_what_is_missing_is_flown(source: Path, tmp_path: Path) -> None:
+    """Flight by flight: none that is finished is flown again."""
+    fly_on_threads(source, tmp_path, 2)
+    finished: list[int] = []
+    fly_on_threads(source, tmp_path, FLIGHTS, batch=1, progress=finished.append)
+    assert finished == [2, 3, 4, 5, 6]
+
+
+def test_a_campaign_may_be_killed_again_and_again(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Half a line is cut off before anything follows it, so that the next run reads both."""
+    campaign, lines = file.read(source), (whole / "flights.csv").read_bytes().splitlines(keepends=True)
+    for flight in range(3):
+        with opened(campaign, tmp_path) as store:
+            assert set(store.lines) == set(range(flight))
+        with (tmp_path / "flights.csv").open("ab") as table:
+            table.write(lines[1 + flight][:-20])
+        with opened(campaign, tmp_path) as store:
+            cells = next(csv.reader([lines[1 + flight].decode()]))
+            store.add({flight: dict(zip(table_columns(campaign), cells[1:], strict=True))})
+    assert (tmp_path / "flights.csv").read_bytes() == b"".join(lines[:4])
+
+
+def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
+    """And told in what it differs; nothing is touched."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    (tmp_path / "other.toml").write_text(CAMPAIGN.replace("seed = 4", "seed = 5"))
+    (tmp_path / "third.toml").write_text(CAMPAIGN + "[draws]\nmass_kg = 0.07\n")
+    for name, difference in (("other", "seed = 4 where 5"), ("third", "draws.mass_kg = .* where 0.07")):
+        with pytest.raises(ForeignFilesError, match=f"holds another campaign, with {difference}"):
+            fly_on_threads(tmp_path / f"{name}.toml", folder)
+    assert contents(folder) == contents(whole)
+    assert fly_on_threads(source, folder) == (whole / "flights.csv").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["thesis.tex", "campaign.json", "flights.csv"])
+def test_work_of_others_is_refused(name: str, source: Path, tmp_path: Path) -> None:
+    """A file of one of our names does not make a folder ours."""
+    (tmp_path / name).write_text("{}")
+    with pytest.raises(ForeignFilesError, match="not a campaign of ours"):
+        fly_on_threads(source, tmp_path)
+    assert contents(tmp_path) == {name: b"{}"}
+
+
+@pytest.mark.parametrize("line", [b"x,1\n", b"0\n", b""])
+def test_an_edited_table_is_refused(line: bytes, source: Path, whole: Path, tmp_path: Path) -> None:
+    """A line of something else, half a line, a line twice: nothing is flown on top of that."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    table = folder / "flights.csv"
+    lines = table.read_bytes().splitlines(keepends=True)
+    table.write_bytes(b"".join([*lines[:3], line or lines[1]]))
+    with pytest.raises(ForeignFilesError, match="line 4 is not of this campaign"):
+        fly_on_threads(source, folder)
+
+
+def test_one_run_at_a_time(source: Path, tmp_path: Path) -> None:
+    """Two would fly everything twice."""
+    with opened(file.read(source), tmp_path), pytest.raises(BusyError, match="another run"):
+        fly_on_threads(source, tmp_path)
+
+
+def test_a_dead_worker_is_told(source: Path, tmp_path: Path) -> None:
+    """Killed for want of memory, say: what is finished stays."""
+    campaign = file.read(source)
+    with (
+        opened(campaign, tmp_path) as store,
+        pytest.raises(WorkerError, match="a worker process has died; the flights finished so far are kept"),
+        processes(1) as pool,
+    ):
+        list(pool.run(os._exit, [(1,)]))
+    assert store.lines == {}
+
+
+def test_workers_of_another_version_are_refused() -> None:
+    """Their flights might differ."""
+    with pytest.raises(WorkerError, match=r"a worker has mambo-nmpc .* and this is 0\.0\.0"):
+        fly_batch("0.0.0", [], {}, [])
+
+
+def test_a_scheduler_names_the_workers(tmp_path: Path) -> None:
+    """So --workers beside it is a mistake."""
+    done = command("campaign", "--scheduler", "tcp://127.0.0.1:1", "--workers", 2, "-o", tmp_path / "out")
+    assert done.returncode == 2
+    assert "leave out --workers" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bad_address_is_told() -> None:
+    """With what an address looks like."""
+    require_module("distributed")
+    with pytest.raises(WorkerError, match=r"missing port number.*as in tcp://host:8786"), cluster("garbage"):
+        pass
+
+
+@pytest.mark.long
+def test_a_dead_scheduler_is_told_within_seconds() -> None:
+    """Nobody listens at that port."""
+    require_module("distributed")
+    with pytest.raises(WorkerError, match="is no Dask scheduler that can be reached"), cluster("127.0.0.1:1"):
+        pass
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")  # of the cluster's own
+def test_a_dask_cluster_flies_what_one_process_flies(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The same bytes from the workers of a cluster."""
+    require_module("distributed")
+    from distributed import LocalCluster  # noqa: PLC0415 - an optional extra
+
+    campaign = file.read(source)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+        with opened(campaign, tmp_path) as store, cluster(local.scheduler_address) as pool:
+            assert pool.workers == 2
+            fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, batch=2)
+            store.put_in_order()
+        assert (tmp_path / "flights.csv").read_bytes() == (whole / "flights.csv").read_bytes()

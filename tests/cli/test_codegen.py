@@ -1,0 +1,338 @@
+"""The commands that generate: what they print where, what they write, and how they fail."""
+
+import fcntl
+import hashlib
+import json
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from mambo_nmpc.codegen import cli, errors
+from mambo_nmpc.codegen.settings import Settings, controller_toml, presets
+
+COMMAND = "from mambo_nmpc.codegen import cli; app = cli.root(); cli.register(app); app()"
+INTERRUPTED = """
+from mambo_nmpc.codegen import cli
+app = cli.root()
+cli.register(app)
+@app.command()
+def stop(): raise KeyboardInterrupt
+app()
+"""
+
+
+@pytest.fixture(scope="module")
+def app() -> typer.Typer:
+    """Build the command with the sub-commands of codegen."""
+    app = cli.root()
+    cli.register(app)
+    return app
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(app: typer.Typer, *arguments: str, code: int = 0) -> tuple[str, str]:
+    """Run the command, demand its exit code, and return stdout and stderr."""
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == code, result.output
+    return result.stdout, result.stderr
+
+
+def run_limited(*arguments: str) -> None:
+    """Run the command where no file may have more than 1 kB, and demand a message of one line."""
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); "
+    command = [sys.executable, "-c", limit + COMMAND, *arguments]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1), result.stderr
+    assert "cannot be written: File too large" in result.stderr
+
+
+def test_init_writes_the_commented_settings_of_a_preset(app: typer.Typer) -> None:
+    """The file that init writes reads back as the preset, mambo if none is named."""
+    run(app, "init")
+    run(app, "init", "table1", "-o", "paper.toml")
+    assert presets.load("controller.toml") == presets.preset("mambo")
+    assert presets.load("paper.toml") == presets.preset("table1")
+
+
+def test_init_overwrites_only_by_force(app: typer.Typer) -> None:
+    """A controller.toml somebody worked on stays until --force."""
+    Path("controller.toml").write_text("mine", encoding="utf-8")
+    _, talk = run(app, "init", code=2)
+    assert talk == "controller.toml: already exists; name another with -o, or overwrite it with --force\n"
+    assert Path("controller.toml").read_text(encoding="utf-8") == "mine"
+    run(app, "init", "--force")
+    assert presets.load("controller.toml") == presets.preset("mambo")
+
+
+def test_init_waits_for_another_run_and_keeps_what_that_wrote(tmp_path: Path) -> None:
+    """Two at once neither mix their files nor overwrite one another's."""
+    handle = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    command = [sys.executable, "-c", COMMAND, "init"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
+        assert second.stderr is not None
+        assert second.stderr.readline().startswith("waiting for another run in ")
+        Path("controller.toml").write_text("first", encoding="utf-8")
+        os.close(handle)
+        assert "already exists" in second.stderr.read()
+    assert second.returncode == 2
+    assert Path("controller.toml").read_text(encoding="utf-8") == "first"
+
+
+def test_init_to_stdout_prints_the_file_alone(app: typer.Typer) -> None:
+    """With -o - the settings are the whole of stdout."""
+    text, talk = run(app, "init", "-o", "-")
+    assert controller_toml.parse(text, "stdout") == presets.preset("mambo")
+    assert talk == ""
+    assert not Path("controller.toml").exists()
+
+
+def test_init_makes_the_folder_of_its_file(app: typer.Typer) -> None:
+    """A folder that is not there is made, as generate makes it."""
+    run(app, "init", "-o", "made/too/controller.toml")
+    assert [path.name for path in Path("made/too").iterdir()] == ["controller.toml"]
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_init_that_fails_leaves_everything_as_it_was(app: typer.Typer, force: list[str]) -> None:
+    """No half file, no folder made for it, and the old file whole; what is no file is not replaced."""
+    Path("file").touch()
+    talk = run(app, "init", "-o", "file/controller.toml", *force, code=2)[1]
+    assert talk == "file/controller.toml: cannot be written: Not a directory\n"
+    Path("folder").mkdir()
+    assert "is not a file" in run(app, "init", "-o", "folder", *force, code=2)[1]
+    Path("controller.toml").write_text("mine", encoding="utf-8")
+    run_limited("init", "-o", "new/controller.toml", *force)
+    run_limited("init", "-o", "controller.toml", "--force")
+    assert Path("controller.toml").read_text(encoding="utf-8") == "mine"
+    assert sorted(path.name for path in Path().iterdir()) == ["controller.toml", "file", "folder"]
+
+
+def test_init_writes_where_a_link_leads(app: typer.Typer) -> None:
+    """Settings kept elsewhere and linked to stay linked to."""
+    Path("kept.toml").touch()
+    Path("controller.toml").symlink_to("kept.toml")
+    run(app, "init", "--force")
+    assert Path("controller.toml").is_symlink()
+    assert presets.load("kept.toml") == presets.preset("mambo")
+
+
+def test_presets_lists_every_preset_with_its_use(app: typer.Typer) -> None:
+    """People get a line per preset, machines a JSON object."""
+    lines = run(app, "presets")[0].splitlines()
+    described = {name: presets.description(name) for name in presets.names()}
+    assert {line.split()[0]: line.split(maxsplit=1)[1] for line in lines} == described
+    assert json.loads(run(app, "presets", "--json")[0]) == described
+
+
+def test_schema_prints_the_json_schema(app: typer.Typer) -> None:
+    """What schema prints is a JSON schema that every preset fits."""
+    schema = json.loads(run(app, "schema")[0])
+    for name in presets.names():
+        jsonschema.validate(presets.preset(name).model_dump(), schema)
+
+
+def test_generate_reports_what_it_did(app: typer.Typer) -> None:
+    """The first run creates; a second, from the bundle's own controller.toml, finds nothing to do."""
+    created, talk = run(app, "generate", "-o", "out")
+    assert "created src/nmpc.c\n" in created
+    assert talk == f"out: written, settings {presets.preset('mambo').digest[:16]}\n"
+    assert {line.split()[1] for line in created.splitlines()} == {
+        path.relative_to("out").as_posix() for path in Path("out").rglob("*") if path.is_file()
+    }
+    assert run(app, "generate", "out/controller.toml", "-o", "out")[0] == ""
+
+
+def test_generate_as_json_tells_digest_and_files(app: typer.Typer) -> None:
+    """Machines get the outcome of a run, dry or not, as one JSON object."""
+    dry = json.loads(run(app, "generate", "-o", "out", "--dry-run", "--json")[0])
+    assert not Path("out").exists()
+    real = json.loads(run(app, "generate", "-o", "out", "--json")[0])
+    assert (dry.pop("dry_run"), real.pop("dry_run")) == (True, False)
+    assert dry == real
+    assert real["digest"] == presets.preset("mambo").digest
+    assert "manifest.json" in real["created"]
+
+
+def test_check_passes_on_an_up_to_date_folder(app: typer.Typer) -> None:
+    """No output and exit code 0 where nothing drifted."""
+    run(app, "generate", "table1", "-o", "out")
+    assert run(app, "generate", "table1", "-o", "out", "--check") == ("", "out: up to date\n")
+
+
+def test_check_shows_drift_and_exits_1(app: typer.Typer) -> None:
+    """A changed file is shown as a diff, to machines as JSON, and stays as it is."""
+    run(app, "generate", "-o", "out")
+    source = Path("out/src/nmpc.c")
+    source.write_text(source.read_text(encoding="utf-8") + "/* by hand */\n", encoding="utf-8")
+    diff, talk = run(app, "generate", "-o", "out", "--check", code=1)
+    assert "--- src/nmpc.c (on disk)\n+++ src/nmpc.c (generated)\n" in diff
+    assert "\n-/* by hand */\n" in diff
+    assert talk.startswith("out: not up to date")
+    (drift,) = json.loads(run(app, "generate", "-o", "out", "--check", "--json", code=1)[0])["drifts"]
+    assert (drift["path"], drift["kind"]) == ("src/nmpc.c", "changed")
+    assert "by hand" in source.read_text(encoding="utf-8")
+
+
+def test_generate_keeps_edited_files_until_forced(app: typer.Typer) -> None:
+    """An edited file is named and kept; --force takes it back."""
+    run(app, "generate", "-o", "out")
+    Path("out/Makefile").write_text("mine", encoding="utf-8")
+    assert "Makefile (edited by hand)" in run(app, "generate", "-o", "out", code=2)[1]
+    assert run(app, "generate", "-o", "out", "--force")[0] == "changed Makefile\n"
+
+
+def test_letters_that_the_terminal_has_not_are_shown_by_number() -> None:
+    """An edit in another script, on a terminal of another: the diff is shown, not a traceback."""
+    subprocess.run([sys.executable, "-c", COMMAND, "generate", "-o", "out"], capture_output=True, check=True)
+    with Path("out/README.md").open("a", encoding="utf-8") as file:
+        file.write("\N{EURO SIGN}\n")
+    command = [sys.executable, "-c", COMMAND, "generate", "-o", "out", "--check"]
+    latin = os.environ | {"PYTHONIOENCODING": "latin-1"}
+    result = subprocess.run(command, capture_output=True, env=latin, check=False)
+    assert result.returncode == 1, result.stderr
+    assert b"\n-\\u20ac\n" in result.stdout
+
+
+def test_name_of_a_removed_file_moves_no_cursor(app: typer.Typer) -> None:
+    """A manifest may have come from elsewhere, with any names in it."""
+    name = "a\x1b[31m\udcffb"
+    run(app, "generate", "-o", "out")
+    Path("out", name).write_bytes(b"")
+    listed = json.loads(Path("out/manifest.json").read_text("utf-8"))
+    listed["files"][name] = hashlib.sha256(b"").hexdigest()
+    Path("out/manifest.json").write_text(json.dumps(listed), "utf-8")
+    assert run(app, "generate", "-o", "out")[0] == "changed manifest.json\nremoved a\\x1b[31m\\udcffb\n"
+
+
+def test_check_refuses_options_that_write(app: typer.Typer) -> None:
+    """--check with --force would promise what it does not do."""
+    assert "--check" in run(app, "generate", "-o", "out", "--check", "--force", code=2)[1]
+
+
+@pytest.mark.parametrize("prefix", ["roll", "nmpc_left", "left_nmpc"])
+def test_options_override_the_settings_and_the_bundle_remembers(app: typer.Typer, prefix: str) -> None:
+    """--prefix and --scalar end up in the bundle's controller.toml, which generates the same bundle."""
+    run(app, "generate", "-o", "out", "--prefix", prefix, "--scalar", "float64")
+    written = presets.load("out/controller.toml")
+    assert (written.code.prefix, written.code.scalar) == (prefix, "float64")
+    assert written.cost == Settings().cost
+    assert Path(f"out/include/{prefix}.h").is_file()
+    run(app, "generate", "out/controller.toml", "-o", "out", "--check")
+
+
+def test_amalgamated_bundle_is_one_header_and_one_source(app: typer.Typer) -> None:
+    """--amalgamate puts the library into two files, and replaces a bundle of many only by force."""
+    run(app, "generate", "-o", "out")
+    assert "leave out --amalgamate" in run(app, "generate", "-o", "out", "--amalgamate", code=2)[1]
+    run(app, "generate", "-o", "out", "--amalgamate", "--force")
+    assert sorted(path.name for path in Path("out").glob("*.[ch]")) == ["nmpc.c", "nmpc.h"]
+    assert not Path("out/src").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--prefix", "int"], '--prefix: code.prefix = "int" must not be a keyword'),
+        (["--scalar", "float16"], '--scalar: code.scalar = "float16" must be "float32" or "float64"'),
+        (["nope"], "nope is neither a preset nor a file"),
+        (["slow.toml"], "slow.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)"),
+    ],
+)
+def test_bad_input_gets_a_message_and_exit_code_2(
+    app: typer.Typer, arguments: list[str], message: str
+) -> None:
+    """What the user got wrong is said on stderr without a traceback, and nothing is written."""
+    Path("slow.toml").write_text("horizon.control = 11", encoding="utf-8")
+    results, talk = run(app, "generate", "-o", "out", *arguments, code=2)
+    assert results == ""
+    assert talk.startswith(message)
+    assert "Traceback" not in talk
+    assert not Path("out").exists()
+
+
+def test_debug_shows_the_traceback() -> None:
+    """With --debug an error arrives whole."""
+    command = [sys.executable, "-c", COMMAND, "--debug", "generate", "nope", "-o", "out"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "Traceback" in result.stderr
+    assert "SourceNotFoundError: nope is neither" in result.stderr
+
+
+@pytest.mark.parametrize("arguments", ["schema", "--help", "generate --help", "--version", ""])
+def test_output_that_nobody_reads_ends_quietly(arguments: str) -> None:
+    """A closed pipe (| head) ends the command as the signal would, without a traceback, help included."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-c", COMMAND, *arguments.split()]
+    with os.fdopen(writer, "wb") as closed:
+        result = subprocess.run(command, stdout=closed, stderr=subprocess.PIPE, check=False)
+    assert (result.returncode, result.stderr) == (errors.NO_READER, b"")
+
+
+@pytest.mark.parametrize("arguments", [["schema"], ["--help"], ["generate", "-o", "out", "--json"]])
+def test_stdout_that_takes_nothing_gets_a_message(arguments: list[str]) -> None:
+    """A full disk or a closed stdout is said in one line, without a traceback."""
+    line = shlex.join([sys.executable, "-c", COMMAND, *arguments])
+    for redirection, reason in ((">/dev/full", "No space left on device"), (">&-", "is closed")):
+        result = subprocess.run(
+            f"{line} {redirection}", shell=True, capture_output=True, text=True, check=False
+        )
+        assert result.returncode == 2, result.stderr
+        assert result.stderr.endswith(f": {reason}\n")
+        assert result.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        ("MemoryError", "there is not enough memory\n"),
+        ("OSError(28, 'No space left on device', 'trace.csv')", "trace.csv: No space left on device\n"),
+    ],
+)
+def test_what_the_system_refuses_gets_a_message(error: str, message: str) -> None:
+    """An error that no command expects is one line, with --debug a traceback too."""
+    script = INTERRUPTED.replace("KeyboardInterrupt", error)
+    for debug in ([], ["--debug"]):
+        command = [sys.executable, "-c", script, *debug, "stop"]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert result.returncode == 2
+        assert result.stderr.endswith(message)
+        assert (result.stderr == message) is not bool(debug)
+
+
+def test_root_help_names_the_exit_codes(app: typer.Typer) -> None:
+    """Whoever writes a script finds them without the source."""
+    text = run(app, "--help")[0]
+    assert all(str(number) in text for number in (errors.BAD_INPUT, errors.INTERRUPTED, errors.NO_READER))
+
+
+def test_ctrl_c_exits_130() -> None:
+    """An interrupted command says so by its exit code, without a traceback."""
+    command = [sys.executable, "-c", INTERRUPTED, "stop"]
+    result = subprocess.run(command, capture_output=True, check=False)
+    assert (result.returncode, result.stderr) == (errors.INTERRUPTED, b"")
+
+
+@pytest.mark.parametrize("command", ["init", "presets", "schema", "generate"])
+def test_help_teaches_by_example(app: typer.Typer, command: str) -> None:
+    """Every command explains itself, and those with options show examples."""
+    text = run(app, command, "--help")[0]
+    assert command == "presets" or f"mambo-nmpc {command}" in text
+    assert "\x1b" not in text
+
+
+def test_version_is_printed(app: typer.Typer) -> None:
+    """--version prints name and version."""
+    assert run(app, "--version")[0].startswith("mambo-nmpc ")

@@ -1,0 +1,284 @@
+"""The commands that fly, used as a person would: what they print, write, and say when it goes wrong."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.errors import INTERRUPTED
+from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.report import table2_text
+from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
+from mambo_nmpc.sil.paper.table2 import Claim, Row, Table2
+
+
+def command(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run mambo-nmpc in `folder`."""
+    script = "from mambo_nmpc.sil.cli.app import main; main()"
+    line = [sys.executable, "-c", script, *map(str, arguments)]
+    return subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
+    """A signal in the middle of the imports: no traceback."""
+    (tmp_path / "typer.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    search = os.pathsep.join([str(tmp_path), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-m", "mambo_nmpc", "presets"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": search},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (INTERRUPTED, "", "")
+
+
+def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
+    """CSV and NPZ of the same length, a summary, PNG and SVG; the metrics on stdout."""
+    done = command("fly", "--duration-s", "2", "-o", "out", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "IAE" in done.stdout
+    out = tmp_path / "out"
+    assert {path.name for path in out.iterdir()} == {
+        "trace.csv",
+        "trace.npz",
+        "flight.png",
+        "flight.svg",
+        "summary.json",
+    }
+    trace = read_npz(out / "trace.npz")
+    rows = list(csv.DictReader((out / "trace.csv").read_text().splitlines()))
+    assert tuple(rows[0]) == CSV_COLUMNS
+    assert len(rows) == len(trace.time_s) == 201
+    assert (out / "flight.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (out / "flight.svg").read_text()
+
+
+def test_reference_and_compiled_flights_print_the_same(tmp_path: Path) -> None:
+    """--controller reference flies the very same flight as the C."""
+    flights = [
+        command("fly", "--duration-s", "1", "--controller", kind, "--json", "-o", kind, folder=tmp_path)
+        for kind in ("nmpc", "reference")
+    ]
+    metrics = [json.loads(flight.stdout)["metrics"] for flight in flights]
+    assert metrics[0] == metrics[1]
+
+
+@pytest.mark.parametrize("trajectory", ["gerono", "lissajous", "circle", "hover", "step"])
+def test_every_curve_flies(trajectory: str, tmp_path: Path) -> None:
+    """Each named trajectory, with wind, heading, motor lag and a start from the ground."""
+    options = ["--wind", "0.2,-0.1", "--yaw-rad", "0.5", "--motor-lag-s", "0.02", "--start", "take-off"]
+    done = command(
+        "fly", "--trajectory", trajectory, *options, "--duration-s", "1", "--json", folder=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["lost"] is False
+
+
+def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
+    """The same seed gives the same flight, another another; true and seen metrics are told apart."""
+    options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "1", "--json"]
+    flights = [
+        command("fly", *options, "--seed", seed, "-o", f"{number}", folder=tmp_path)
+        for number, seed in enumerate(("7", "7", "8"))
+    ]
+    assert flights[0].returncode == 0, flights[0].stderr
+    assert flights[0].stdout == flights[1].stdout
+    first, _, third = (json.loads(flight.stdout) for flight in flights)
+    assert first["metrics"] != first["metrics_as_seen"]
+    assert first["metrics"] != third["metrics"]
+    assert (first["seed"], first["sensors"], first["wind_m_s2"]) == (7, "mambo", [0, 0])
+    header = (tmp_path / "0" / "trace.csv").read_text().splitlines()[0]
+    assert header == ",".join((*CSV_COLUMNS, *SEEN_COLUMNS))
+
+
+def test_waypoints_fly(tmp_path: Path) -> None:
+    """A CSV file is a trajectory."""
+    (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,0,0\n1,0.2,0.1\n")
+    done = command("fly", "--trajectory", "way.csv", "--duration-s", "2", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["mamba"], "did you mean mambo"),
+        (["--trajectory", "triangle"], "--trajectory triangle must be bernoulli"),
+        (["--trajectory", "none.CSV"], "none.CSV: cannot be read: No such file or directory\n"),
+        (["--wind", "strong"], "--wind strong must be two numbers, as in 0.5,0, or gusts"),
+        (["--seed", "-1"], "--seed = -1 must lie in 0.."),
+        (["--replay", "none.json"], "none.json: cannot be read: No such file or directory"),
+        (["--wind", "nan,0"], "--wind = nan must be a finite number"),
+        (["--yaw-rad", "inf"], "--yaw-rad = inf must be a finite number"),
+        (["--motor-lag-s", "nan"], "--motor-lag-s = nan must be a finite number; it must lie in 0..1"),
+        (["--size-m", "1e4"], "--size-m = 10000.0 must lie in -1000..1000"),
+        (["--duration-s", "0"], "--duration-s = 0.0 must lie in 0.01..3600"),
+        (["--duration-s", "1e9"], "--duration-s = 1000000000.0 must lie in 0.01..3600"),
+        (["--size-m", "900"], "the target's speed along an axis, up to 450 m/s, exceeds ranges.velocity_m_s"),
+        (["odd.toml"], "odd.toml: horizon.update_period_s = 0.012 must be a whole multiple of 0.005; only"),
+        (["-o", "taken"], "taken: holds files that are not our results"),
+        (["-o", "a-file"], "a-file: cannot be written"),
+    ],
+)
+def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str, tmp_path: Path) -> None:
+    """One line, no traceback, nothing written."""
+    (tmp_path / "taken").mkdir()
+    (tmp_path / "taken" / "thesis.tex").write_text("years of work")
+    (tmp_path / "a-file").write_text("")
+    (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.012\n")
+    before = sorted(tmp_path.rglob("*"))
+    done = command("fly", *arguments, folder=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
+    """More than half of the inputs refused: exit 1, with the range that was exceeded."""
+    (tmp_path / "deaf.toml").write_text("[ranges]\nthrust_acceleration_min_m_s2 = 20.0\n")
+    done = command("fly", "deaf.toml", "--controller", "reference", "--duration-s", "1", folder=tmp_path)
+    assert done.returncode == 1
+    assert "101 steps: thrust out of range, 9.81..9.81 m/s^2 where ranges" in done.stdout
+    assert "thrust_acceleration_* = 20..50; the last command was kept" in done.stdout
+    assert "NOT CONTROLLED" in done.stdout
+
+
+def test_refusals_during_lift_off_are_explained(tmp_path: Path) -> None:
+    """They belong to every start from the ground, which does well."""
+    options = ["--controller", "reference", "--start", "take-off", "--duration-s", "0.1"]
+    done = command("fly", *options, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "77 steps during lift-off: thrust out of range" in done.stdout
+
+
+def test_a_flight_just_longer_than_the_transient_has_no_second_column(tmp_path: Path) -> None:
+    """10.001 s are flown as 10 s, of which nothing is left after 10 s."""
+    done = command("fly", "--controller", "pd", "--duration-s", "10.001", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "after 10 s" not in done.stdout
+
+
+def test_the_summary_repeats_the_flight(tmp_path: Path) -> None:
+    """Everything asked for is in it, what was not flown is null, and stdout has the same text."""
+    options = ["--controller", "pd", "--wind", "90,0", "--duration-s", "40", "--trajectory", "way.csv"]
+    (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,9000,0\n")
+    done = command("fly", *options, "--json", folder=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert done.stdout == (tmp_path / "flight" / "summary.json").read_text()
+    summary = json.loads(done.stdout, parse_constant=pytest.fail)
+    assert summary["lost"]
+    assert summary["metrics"]["iae_m_s"] is None
+    assert len(summary["trajectory_sha256"]) == 64
+    keys = "generator command controller source settings update_period_s trajectory size_m rate_rad_s yaw_rad"
+    assert set(keys.split()) < set(summary)
+    assert [summary[key] for key in ("wind_m_s2", "motor_lag_s", "start")] == [[90, 0], 0, "hover"]
+
+
+def test_pictures_heed_no_settings_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a backend that does not exist nor LaTeX, nor a name that reads like a formula."""
+    monkeypatch.setenv("MPLBACKEND", "no-such-backend")
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
+    (tmp_path / "$x_\u65e5$.toml").write_text("")
+    options = ["--controller", "reference", "--duration-s", "0.1"]
+    done = command("fly", "$x_\u65e5$.toml", *options, folder=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (0, 1), done.stderr
+    assert "$x_\u65e5$.toml" in (tmp_path / "flight" / "flight.svg").read_text("utf-8")
+
+
+def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
+    """A limit on the size of files stands for it: one line, exit 2, and the old flight is whole."""
+    first = command("fly", "--controller", "pd", "--duration-s", "0.1", folder=tmp_path)
+    assert first.returncode == 0, first.stderr
+    before = {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()}
+    script = (
+        "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
+        "from mambo_nmpc.sil.cli.app import main; main()"
+    )
+    line = [sys.executable, "-c", script, "fly", "--controller", "pd", "--duration-s", "1"]
+    done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "flight: cannot be written: File too large\n")
+    assert {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()} == before
+
+
+def test_a_missing_compiler_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Exit 2, and what to install."""
+    monkeypatch.setenv("CC", "no-such-compiler")
+    done = command("fly", "--duration-s", "1", folder=tmp_path)
+    assert done.returncode == 2
+    assert "no-such-compiler" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_flying_again_overwrites_our_own_results(tmp_path: Path) -> None:
+    """The second flight into a folder replaces the first."""
+    for duration in ("0.1", "0.2"):
+        done = command("fly", "--controller", "pd", "--duration-s", duration, folder=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert json.loads((tmp_path / "flight" / "summary.json").read_text())["duration_s"] == 0.2
+
+
+@pytest.mark.long
+def test_table2_judges_the_claims(tmp_path: Path) -> None:
+    """The PD row is reproduced, table1 and mambo beat the claim, the printed step does not fly."""
+    done = command("table2", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    verdicts = {
+        claim["text"].split(" improves")[0]: claim["holds"] for claim in json.loads(done.stdout)["claims"]
+    }
+    assert verdicts == {
+        "the PD of Table II flies Bernoulli 0.5 rad/s": True,
+        "the PD of Table II flies Bernoulli 0.25 rad/s": False,
+        "the PD of Table II flies Gerono 0.25 rad/s": False,
+        "mambo": True,
+        "mambo-robust": True,
+        "table1": True,
+        "table1-printed": False,
+    }
+    assert (tmp_path / "table2" / "figure3.png").is_file()
+    mixed = command("fly", "-o", "table2", folder=tmp_path)
+    assert (mixed.returncode, "holds results of table2, not of fly" in mixed.stderr) == (2, True)
+
+
+@pytest.mark.long
+def test_table2_flies_the_presets_in_another_scalar_type(tmp_path: Path) -> None:
+    """The row of a preset is what `fly` has of it with the same option."""
+    done = command("table2", "--scalar", "fixed", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["scalar"] == "fixed"
+    row = next(row for row in summary["rows"] if row["controller"] == "mambo")
+    flown = command("fly", "--scalar", "fixed", "--json", folder=tmp_path)
+    assert json.loads(flown.stdout)["metrics"]["iae_m_s"] == row["measured"][0]
+
+
+@pytest.mark.parametrize("sensors", [[], ["--sensors"]])
+def test_table2_refuses_an_unknown_scalar_type(sensors: list[str], tmp_path: Path) -> None:
+    """Before anything flies or is written, with what there is."""
+    done = command("table2", "--scalar", "flat", *sensors, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith('--scalar: code.scalar = "flat" must be "float32" or ')
+    assert not list(tmp_path.iterdir())
+
+
+def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
+    """Ratios are named, and a claim that does not hold is the paper's."""
+    row = Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
+    claims = (Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %"))
+    text = table2_text(Table2((row,), claims, {}))
+    above, header = text.splitlines()[:2]
+    assert above.index("PD over NMPC") > header.index("ITAE")
+    assert header.split()[3:] == ["IAE", "ISE", "ITSE", "ITAE"] * 2
+    assert text.endswith(
+        "the paper's claims, as flown here:\n  holds          it flies: 1 %\n  does not hold  it lands: 90 %"
+    )
+
+
+def test_the_default_flight_is_the_table_2_case() -> None:
+    """100 s, as in the paper."""
+    assert Flight.__dataclass_fields__["duration_s"].default == 100.0

@@ -1,0 +1,142 @@
+"""The command verify, used as a person would: lines, verdict, evidence, and what a missing tool does."""
+
+import json
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mambo_nmpc.codegen import cli
+from mambo_nmpc.sil.cli import verify
+from mambo_nmpc.sil.verify.check import Outcome, Result
+from mambo_nmpc.sil.verify.checks import CHECKS, Entry
+from mambo_nmpc.sil.verify.report import Verified, closing, verdict
+from tests.support.tools import require
+
+HOSTILE = '<img src=x onerror="alert(1)">&.toml'
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def _no_tool(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make a machine without any command."""
+    monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("bin")))
+
+
+def run(*arguments: str, code: int = 0) -> tuple[str, str]:
+    """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
+    app = cli.root()
+    cli.register(app)
+    verify.register(app)
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == code, (result.output, result.exception)
+    return result.stdout, result.stderr
+
+
+def ended(*outcomes: Outcome) -> list[Verified]:
+    """Return checks that ended so."""
+    return [Verified(entry, Result(one, "")) for entry, one in zip(CHECKS, outcomes, strict=False)]
+
+
+def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
+    """Settings, C, reports, page and summary; stdout repeats the summary, and a hostile name is text."""
+    require("cppcheck", "cppcheck")
+    (tmp_path / HOSTILE).write_text('[code]\nprefix = "drone"\n')
+    said, _ = run("verify", HOSTILE, "--scalar", "fixed", "--only", "rules", "--json", "-o", "evidence")
+    evidence = tmp_path / "evidence"
+    assert said == (evidence / "summary.json").read_text("utf-8")
+    summary = json.loads(said, parse_constant=pytest.fail)
+    assert (summary["source"], summary["verdict"]) == (HOSTILE, "passed")
+    assert summary["not_run"] == [entry.name for entry in CHECKS if entry.name != "rules"]
+    (rules,) = summary["checks"]
+    assert rules["tools"] == summary["tools"]
+    assert rules["tools"]["cppcheck"]
+
+    files = {path.relative_to(evidence).as_posix() for path in evidence.rglob("*") if path.is_file()}
+    assert files == {*summary["files"], "summary.json"}
+    for path, digest in summary["files"].items():
+        assert sha256((evidence / path).read_bytes()).hexdigest() == digest
+    for path in ("controller/controller.toml", "controller/src/drone.c", "checks/rules/cppcheck.txt"):
+        assert path in files
+    assert 'scalar = "fixed"' in (evidence / "controller" / "controller.toml").read_text("utf-8")
+
+    page = (evidence / "verify.html").read_text("utf-8")
+    assert "<img" not in page
+    assert "&lt;img src=x onerror=" in page
+    assert "href=" not in page
+    for word in ("passed", "deviations.txt", summary["digest"], "Not run: warnings", "prefix"):
+        assert word in page
+
+
+@pytest.mark.usefixtures("_no_tool")
+def test_without_tools_the_verdict_is_incomplete(tmp_path: Path) -> None:
+    """Exit 1, never "passed", and every package that is missing is named; the C is kept all the same."""
+    said, _ = run("verify", "--only", "warnings,rules,proof", code=1)
+    lines = said.splitlines()
+    assert [line.split()[:2] for line in lines[:3]] == [
+        ["warnings", "incomplete"],
+        ["rules", "incomplete"],
+        ["proof", "incomplete"],
+    ]
+    for package in ("gcc", "g++", "clang", "cppcheck", "frama-c-base"):
+        assert f"Debian's package {package} brings it" in said
+    assert lines[-1].startswith("verdict: incomplete (3 incomplete)")
+    assert (tmp_path / "verification" / "controller" / "src" / "nmpc.c").is_file()
+
+
+@pytest.mark.usefixtures("_no_tool")
+def test_an_earlier_run_is_replaced_and_nothing_else(tmp_path: Path) -> None:
+    """What somebody put between the reports is not lost."""
+    run("verify", "--only", "rules,proof", code=1)
+    run("verify", "--only", "rules", code=1)
+    assert [path.name for path in (tmp_path / "verification" / "checks").iterdir()] == ["rules"]
+    (tmp_path / "verification" / "checks" / "notes.txt").write_text("mine")
+    _, talk = run("verify", "--only", "rules", code=2)
+    assert "notes.txt: is not a result of ours" in talk
+    assert (tmp_path / "verification" / "checks" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("_no_tool")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--only", "rules,prove"],
+            "--only rules,prove: prove is no check; there are warnings, rules, proof",
+        ),
+        (["mamba"], "did you mean mambo?"),
+    ],
+)
+def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str, tmp_path: Path) -> None:
+    """Nothing is written."""
+    assert message in run("verify", *arguments, code=2)[1]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "whole"),
+    [
+        ((Outcome.PASSED, Outcome.PASSED), Outcome.PASSED),
+        ((Outcome.PASSED, Outcome.INCOMPLETE), Outcome.INCOMPLETE),
+        ((Outcome.INCOMPLETE, Outcome.FAILED), Outcome.FAILED),
+    ],
+)
+def test_the_verdict_is_the_worst_outcome(outcomes: tuple[Outcome, ...], whole: Outcome) -> None:
+    """A failure outweighs a gap, and a gap everything that passed."""
+    assert verdict(ended(*outcomes)) is whole
+    assert f"verdict: {whole} (" in closing(ended(*outcomes))
+    assert f"not run: {CHECKS[2].name}" in closing(ended(*outcomes))
+
+
+def test_checks_have_names_and_order() -> None:
+    """Each is named once, and what it is about fits a line."""
+    first = ["warnings", "rules", "proof", "sanitizers", "fuzzing", "coverage", "mutation"]
+    order = [*first, "work", "parity", "signs", "faults"]
+    names = [entry.name for entry in CHECKS]
+    assert names == [name for name in order if name in names]
+    assert all(isinstance(entry, Entry) and "\n" not in entry.about for entry in CHECKS)

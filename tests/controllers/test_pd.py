@@ -1,0 +1,62 @@
+"""The stock PD position controller."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_nmpc.sil.controllers.pd import PdController
+
+FloatArray = NDArray[np.float64]
+
+
+def command(state: list[float], target: list[float]) -> FloatArray:
+    """Return roll and pitch (2,) for one state [x, y, vx, vy, roll, pitch, yaw] and one target."""
+    outcome = PdController().step(np.array([state]), np.array([target]), np.array([9.81]))
+    return np.asarray(outcome.command_rad[0])
+
+
+def test_position_error_leans_towards_the_target() -> None:
+    """A target ahead lowers the nose, one to the right rolls right, both by 0.24 rad/m."""
+    np.testing.assert_allclose(command([0.0] * 7, [0.5, 1.0, 0.0, 0.0]), [0.24, -0.12], rtol=1e-15)
+
+
+def test_velocity_is_damped() -> None:
+    """Moving ahead raises the nose, moving right rolls left, both by 0.1 rad s/m."""
+    moving = [0.0, 0.0, 0.3, 0.4, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(command(moving, [0.0] * 4), [-0.04, 0.03], rtol=1e-15)
+
+
+def test_error_is_clamped_to_three_metres() -> None:
+    """Each axis stops at 3 m on its own; the angle itself has no limit."""
+    np.testing.assert_allclose(command([0.0] * 7, [9.0, 1.0, 0.0, 0.0]), [0.24, -0.72], rtol=1e-15)
+    np.testing.assert_allclose(command([0.0] * 7, [1.0, -9.0, 0.0, 0.0]), [-0.72, -0.24], rtol=1e-15)
+    fast = [0.0, 0.0, 20.0, 0.0, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(command(fast, [-9.0, 0.0, 0.0, 0.0]), [0.0, 2.72], rtol=1e-15)
+
+
+def test_target_velocity_is_unknown_to_the_pd() -> None:
+    """The stock block has no reference velocity, so a moving target changes nothing."""
+    state = [0.1, -0.2, 0.3, 0.4, 0.05, -0.05, 0.3]
+    np.testing.assert_array_equal(command(state, [1.0, 2.0, 0.0, 0.0]), command(state, [1.0, 2.0, 5.0, -5.0]))
+
+
+@pytest.mark.parametrize("yaw_rad", [0.8, -2.0, np.pi / 2])
+def test_heading_turns_error_and_velocity_into_the_body_frame(yaw_rad: float) -> None:
+    """A scene turned together with the vehicle gives the same command."""
+    cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    position, velocity, target = np.array([0.2, -0.4]), np.array([0.3, 0.1]), np.array([4.0, 0.7])
+    level = command([*position, *velocity, 0.0, 0.0, 0.0], [*target, 0.0, 0.0])
+    turned = command([*turn @ position, *turn @ velocity, 0.0, 0.0, yaw_rad], [*turn @ target, 0.0, 0.0])
+    np.testing.assert_allclose(turned, level, rtol=1e-12)
+
+
+def test_flights_of_a_batch_do_not_touch_each_other() -> None:
+    """Every row is answered as if it were alone, and reports status 0."""
+    rng = np.random.default_rng(4)
+    states, targets = rng.normal(0.0, 2.0, (30, 7)), rng.normal(0.0, 2.0, (30, 4))
+    outcome = PdController().step(states, targets, np.full(30, 9.81))
+    for flight in range(30):
+        alone = command(states[flight].tolist(), targets[flight].tolist())
+        np.testing.assert_array_equal(outcome.command_rad[flight], alone)
+    np.testing.assert_array_equal(outcome.status, np.zeros(30))

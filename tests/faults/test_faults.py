@@ -1,0 +1,368 @@
+"""Faults in flight: what reaches the controller, what reaches the vehicle, and how flights are judged."""
+
+import json
+import math
+import re
+import subprocess
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_nmpc.codegen import bundle
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.faults.flights import End, Verdict, fly_faults
+from mambo_nmpc.sil.faults.injection import (
+    Applied,
+    Fault,
+    FaultyController,
+    Inputs,
+    LevellingCaller,
+    ReweightedController,
+    WeightChange,
+    always,
+    every,
+    frozen_state,
+    state_scaled,
+    state_set_to,
+    target_moved,
+    thrust_reported,
+    yaw_shifted,
+    yaw_wrapped,
+)
+from mambo_nmpc.sil.faults.report import table
+from mambo_nmpc.sil.faults.scenarios import Scenario, scenarios
+from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly
+from mambo_nmpc.sil.flight.traces import Trace
+from mambo_nmpc.sil.flight.trajectories import Hover
+from mambo_nmpc.sil.paper.table2 import CASES
+from mambo_nmpc.sil.plant.link import NOT_CALLED
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.faults import check, judge
+from tests.support.subjects import subject
+from tests.support.tools import require
+
+MAMBO = presets.load("mambo")
+EIGHT = next(iter(CASES.values()))
+DOCS = Path(__file__).parents[2] / "docs" / "faults.md"
+NOW = Inputs(np.arange(1.0, 8.0), np.arange(4.0), 9.81)
+BEGAN = Inputs(-NOW.state, -NOW.target, 1.0)
+FLOWN_S = 1.5
+
+
+def flown(controller: PositionController, flights: int = 1) -> Trace:
+    """Fly the beginning of the Table II case."""
+    return fly(Flight(EIGHT, duration_s=FLOWN_S, flights=flights), controller)
+
+
+def with_fault(fault: Fault | None) -> Trace:
+    """Fly one flight of the C with a fault."""
+    return flown(FaultyController(CompiledController(MAMBO), [fault]))
+
+
+def test_a_fault_alters_what_it_names_and_nothing_else() -> None:
+    """Each fault on inputs whose every value differs."""
+    frozen = frozen_state(NOW, BEGAN, 3)
+    assert (frozen.state.tolist(), frozen.target.tolist()) == (BEGAN.state.tolist(), NOW.target.tolist())
+    burst = state_set_to(0, math.inf, on=2, of=5)
+    assert [burst(NOW, BEGAN, since).state[0] for since in range(6)] == [math.inf] * 2 + [1.0] * 3 + [
+        math.inf
+    ]
+    assert burst(NOW, BEGAN, 0).state[1:].tolist() == NOW.state[1:].tolist()
+    assert state_scaled([1, 1, 1, 1, 2, 2, 2])(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 10, 12, 14]
+    assert yaw_shifted(1.0)(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 5, 6, 8]
+    assert target_moved(100.0)(NOW, BEGAN, 0).target.tolist() == [100, 1, 2, 3]
+    assert thrust_reported(0.0)(NOW, BEGAN, 0).thrust_acceleration_m_s2 == 0.0
+    assert NOW.state.tolist() == [1, 2, 3, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize("yaw_rad", [-7.0, -3.2, -3.0, 0.0, 3.1, 3.2, 100.0])
+def test_a_wrapped_yaw_is_the_same_heading_within_half_a_turn(yaw_rad: float) -> None:
+    """It differs by whole turns."""
+    wrapped = yaw_wrapped(replace(NOW, state=np.array([0.0] * 6 + [yaw_rad])), BEGAN, 0).state[6]
+    assert -math.pi <= wrapped < math.pi
+    assert math.isclose(math.remainder(wrapped - yaw_rad, 2 * math.pi), 0.0, abs_tol=1e-12)
+
+
+def test_without_a_fault_the_wrapper_changes_no_bit() -> None:
+    """No fault, and a fault that alters nothing."""
+    plain = flown(CompiledController(MAMBO))
+    assert with_fault(None).same_bits(plain)
+    assert with_fault(Fault(20, 100)).same_bits(plain)
+
+
+def test_a_fault_begins_and_ends_on_time() -> None:
+    """The controller refuses exactly the updates that hold NaN."""
+    status = with_fault(Fault(20, 50, state_set_to(0, math.nan))).status[:, 0]
+    assert np.flatnonzero(status == Status.BAD_STATE).tolist() == list(range(20, 50))
+    assert np.unique(status).tolist() == [Status.OK, Status.BAD_STATE]
+
+
+def test_a_frozen_state_is_that_of_the_begin() -> None:
+    """The controller answers as if the drone had stayed where it was."""
+    shown: list[NDArray[np.float64]] = []
+    flown(FaultyController(Watched(CompiledController(MAMBO), shown), [Fault(30, 60, frozen_state)]))
+    assert all(np.array_equal(shown[update], shown[30]) for update in range(30, 60))
+    assert not np.array_equal(shown[60], shown[30])
+    assert not np.array_equal(shown[30], shown[29])
+
+
+@dataclass(frozen=True, eq=False)
+class Watched:
+    """A controller that writes down which states it is handed."""
+
+    controller: PositionController
+    shown: list[NDArray[np.float64]]
+
+    def step(self, state: Any, target: Any, thrust: Any) -> Any:
+        """Write down and step."""
+        self.shown.append(state.copy())
+        return self.controller.step(state, target, thrust)
+
+
+@dataclass(eq=False)
+class Skipping:
+    """A controller that is truly not called at some updates; its last command is held."""
+
+    controller: CompiledController
+    skipped: frozenset[int]
+    update: int = 0
+    command_rad: Any = None
+
+    def step(self, state: Any, target: Any, thrust: Any) -> Applied:
+        """Step, unless this update is skipped."""
+        self.update += 1
+        if self.update - 1 in self.skipped:
+            return Applied(self.command_rad, np.array([NOT_CALLED]))
+        outcome = self.controller.step(state, target, thrust)
+        self.command_rad = outcome.command_rad
+        return Applied(outcome.command_rad, outcome.status)
+
+
+@pytest.mark.parametrize(
+    ("drop", "skipped"), [(always, range(20, 60)), (every(3), range(20, 60, 3))], ids=["all", "every third"]
+)
+def test_a_dropped_tick_is_a_controller_that_was_not_called(drop: Any, skipped: range) -> None:
+    """The flight equals, bit for bit, that of a controller that is really left out."""
+    really = flown(Skipping(CompiledController(MAMBO), frozenset(skipped)))
+    assert with_fault(Fault(20, 60, drop=drop)).same_bits(really)
+
+
+def test_late_commands_are_those_computed_earlier() -> None:
+    """While they are late the vehicle gets what was computed k updates ago, and what it had at first."""
+    computed: list[NDArray[Any]] = []
+
+    class Noting:
+        """A controller that writes down what it computes."""
+
+        controller = CompiledController(MAMBO)
+
+        def step(self, state: Any, target: Any, thrust: Any) -> Any:
+            """Step and write down."""
+            outcome = self.controller.step(state, target, thrust)
+            computed.append(outcome.command_rad[0].astype(np.float64))
+            return outcome
+
+    applied = flown(FaultyController(Noting(), [Fault(20, 60, late_updates=5)])).command_rad[:, 0]
+    for update in range(len(applied)):
+        source = max(update - 5, 19) if 20 <= update < 60 else update
+        assert np.array_equal(applied[update], computed[source]), update
+
+
+def test_a_fault_of_one_flight_leaves_the_others_alone() -> None:
+    """Two healthy flights beside a faulty one, weights and levelling included."""
+    compiled = CompiledController(MAMBO, 3)
+    reweighted = ReweightedController(compiled, 3, [WeightChange(1, 10, (0.0, 0.0))])
+    caller = LevellingCaller(reweighted, compiled.reset, np.array([2, 2, 2]))
+    nan = Fault(30, 80, state_set_to(0, math.nan))
+    together = flown(FaultyController(caller, [None, nan, None]), flights=3)
+    alone = flown(CompiledController(MAMBO))
+    for row in (0, 2):
+        assert np.array_equal(together.command_rad[:, row], alone.command_rad[:, 0])
+        assert np.array_equal(together.position_m[:, row], alone.position_m[:, 0])
+    assert not np.array_equal(together.position_m[:, 1], alone.position_m[:, 0])
+
+
+def test_bad_weights_are_refused_and_good_ones_taken() -> None:
+    """The answers come with their flight; refused weights change no bit of the flight."""
+    alone = flown(CompiledController(MAMBO))
+    changes = [WeightChange(0, 30, (math.nan, 1.0)), WeightChange(1, 30, (0.0, 0.0))]
+    reweighted = ReweightedController(CompiledController(MAMBO, 2), 2, changes)
+    trace = flown(reweighted, flights=2)
+    assert reweighted.answers == [(0, Status.BAD_WEIGHT), (1, Status.OK)]
+    assert np.array_equal(trace.position_m[:, 0], alone.position_m[:, 0])
+    held = trace.command_rad[30:, 1]
+    assert (held == held[0]).all()  # without weights no slope: the plan stays
+
+
+def test_a_levelling_caller_levels_out_when_its_patience_ends() -> None:
+    """The last command is held for the patience, then level, then the controller flies on from level."""
+    compiled = CompiledController(MAMBO)
+    caller = LevellingCaller(compiled, compiled.reset, np.array([20]))
+    trace = flown(FaultyController(caller, [Fault(30, 80, state_set_to(0, math.nan))]))
+    command = trace.command_rad[:, 0]
+    assert (command[30:49] == command[29]).all()
+    assert command[29].any()
+    assert not command[49:80].any()
+    assert np.abs(command[80]).max() <= 5 * 0.0206  # five growing steps of RPROP from level
+
+
+CHOSEN = (
+    Scenario("outage", 1.0, state_set_to(0, math.nan), answers=frozenset({Status.BAD_STATE})),
+    Scenario("moved", math.inf, target_moved(3.0), moved_m=3.0),
+    Scenario("wrapped", math.inf, yaw_wrapped, turning=True),
+    Scenario("wrongly refused", 1.0, answers=frozenset({Status.BAD_STATE})),
+)
+
+
+@pytest.mark.long
+def test_verdicts_say_what_was_flown() -> None:
+    """Statuses, errors and recovery of faults whose outcome is known."""
+    verdicts = fly_faults(MAMBO, lambda n: CompiledController(MAMBO, n), chosen=CHOSEN)
+    assert [(v.course, v.fault) for v in verdicts] == [
+        (course, one.name) for course in ("eight", "hover") for one in CHOSEN
+    ]
+    outage, moved, wrapped, wrong = verdicts[:4]
+    assert outage.statuses == (Status.BAD_STATE,)
+    assert outage.expected
+    assert outage.end is End.BACK
+    assert outage.recovery_s > 0.5
+    assert outage.largest_error_m > outage.band_m
+    assert 2.9 < moved.largest_error_m < 3.1  # from the moment of the jump
+    assert moved.end is End.BACK
+    assert wrapped.recovery_s == 0.0  # the heading is the same
+    assert not wrong.expected
+
+
+VERDICT = Verdict(
+    course="eight",
+    fault="state NaN, 1 s",
+    turning=False,
+    statuses=(Status.BAD_STATE,),
+    expected=True,
+    largest_command_rad=0.3,
+    largest_tilt_rad=0.4,
+    largest_error_m=1.0,
+    band_m=0.1,
+    recovery_s=2.0,
+    end=End.BACK,
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "outcome", "word"),
+    [
+        ({}, Outcome.PASSED, "no crash"),
+        ({"largest_command_rad": 0.3501}, Outcome.FAILED, "a command of 0.3501 rad"),
+        ({"largest_command_rad": math.nan}, Outcome.FAILED, "a command of nan rad"),
+        ({"expected": False}, Outcome.FAILED, "statuses"),
+        ({"end": End.CRASHED}, Outcome.FAILED, "crashed"),
+        ({"end": End.AWAY, "recovery_s": math.nan}, Outcome.FAILED, "never came back"),
+        ({"band_m": 17.0, "end": End.AWAY}, Outcome.INCOMPLETE, "without a fault"),
+        ({"band_m": math.nan, "end": End.CRASHED}, Outcome.INCOMPLETE, "without a fault"),
+    ],
+)
+def test_a_check_fails_on_what_must_not_happen(change: dict[str, Any], outcome: Outcome, word: str) -> None:
+    """Each rule alone, beside a flight that went well; the figures are JSON."""
+    found = judge([VERDICT, replace(VERDICT, **change)], MAMBO)
+    assert found.outcome is outcome
+    assert word in found.evidence
+    json.dumps(found.figures, allow_nan=False)
+
+
+def test_a_fault_without_an_end_may_lead_away() -> None:
+    """Nobody comes back without a state."""
+    gone = replace(VERDICT, fault="state NaN to the end", end=End.AWAY, recovery_s=math.nan)
+    assert judge([VERDICT, gone], MAMBO).outcome is Outcome.PASSED
+
+
+@pytest.mark.long
+def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> None:
+    """Faults, statuses and ends are those of the documentation."""
+    chosen = subject(MAMBO, tmp_path)
+    found = check(chosen)
+    assert found.outcome is Outcome.PASSED, found.evidence
+    assert words((chosen.folder / "faults.md").read_text("utf-8")) == words(DOCS.read_text("utf-8"))
+
+
+def words(text: str) -> list[tuple[str, str, str]]:
+    """Return fault, status and end of every row of the fault table in `text`."""
+    rows = [
+        line.strip("| ").split(" | ") for line in text.splitlines() if line.endswith(("| back |", "| away |"))
+    ]
+    assert len(rows) == len(scenarios(MAMBO))
+    return [(row[0], row[1], row[-1]) for row in rows]
+
+
+@pytest.mark.long
+def test_the_check_fails_a_controller_that_does_not_refuse(tmp_path: Path) -> None:
+    """Without the test of the attitude's range a NaN reaches the plan."""
+    right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
+    chosen = subject(MAMBO, tmp_path, ("src/nmpc.c", right, "if (!((state != 0)"))
+    assert check(chosen).outcome is Outcome.FAILED
+
+
+def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:
+    """The lines in the documentation, in a program whose every state after the first is refused."""
+    compiler = require("gcc", "gcc")
+    lines = re.search(r"```c\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)
+    assert lines is not None
+    bundle.write(render(MAMBO), tmp_path / "bundle")
+    (tmp_path / "caller.c").write_text(CALLER.replace("LINES", lines[1]), "utf-8")
+    sources = sorted(map(str, (tmp_path / "bundle" / "src").glob("*.c")))
+    command = [compiler, *COMPILE_FLAGS, *WARNING_FLAGS, "-Werror", "-Ibundle/include", "caller.c", *sources]
+    built = subprocess.run(
+        [*command, "-o", "caller"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert built.returncode == 0, built.stderr
+    said = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True).stdout.split()
+    good, *refused = map(float, said)
+    assert good != 0
+    assert refused == [good] * 4 + [0.0] * 2
+
+
+CALLER = """
+#include <stdio.h>
+#include "nmpc.h"
+int main(void)
+{
+    nmpc_t controller;
+    nmpc_state_t state = { { 1.0f, 1.0f }, { 0.0f, 0.0f }, 0.0f, 0.0f, 0.0f };
+    const nmpc_target_t target = { { 0.0f, 0.0f }, { 0.0f, 0.0f } };
+    const nmpc_real_t thrust_acceleration_m_s2 = 9.81f;
+    nmpc_command_t command;
+    nmpc_status_t status;
+    int refused = 0;
+    int step;
+
+    nmpc_init(&controller);
+    for (step = 0; step < 7; step++) {
+LINES
+        printf("%.9g\\n", (double)command.pitch_rad);
+        state.yaw_rad = 2000.0f;
+    }
+    return 0;
+}
+"""
+
+
+def test_the_table_has_a_row_a_fault() -> None:
+    """Both courses side by side, the worse of both where there is one column."""
+    text = table([VERDICT, replace(VERDICT, course="hover", largest_command_rad=0.35, end=End.AWAY)])
+    assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
+    assert "eight 0.100 m, hover 0.100 m" in text
+
+
+def test_a_turning_heading_turns_at_its_rate() -> None:
+    """The vehicle follows the heading that the yaw loop holds."""
+    trace = fly(Flight(Hover(), duration_s=6.0, yaw_rate_rad_s=0.5), CompiledController(MAMBO))
+    assert trace.euler_rad[0, 0, 2] == 0.0
+    turned_rad = trace.euler_rad[-1, 0, 2] - trace.euler_rad[-101, 0, 2]
+    assert turned_rad == pytest.approx(0.5, rel=0.01)

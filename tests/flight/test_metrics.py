@@ -1,0 +1,135 @@
+"""Metrics of hand-made traces whose integrals are known."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, measure
+from mambo_nmpc.sil.flight.traces import Trace
+
+FloatArray = NDArray[np.float64]
+
+
+def trace_of(time_s: FloatArray, error_m: FloatArray, command_rad: FloatArray) -> Trace:
+    """Return a trace of horizontal errors (k, n, 2) and commands (k, n, 2)."""
+    shape = error_m.shape[:2]
+    target = np.full((*shape, 4), 7.0)
+    position_m = np.full((*shape, 3), 50.0)
+    position_m[..., :2] = target[..., :2] - error_m
+    return Trace(
+        time_s=time_s,
+        position_m=position_m,
+        velocity_m_s=np.zeros((*shape, 3)),
+        euler_rad=np.zeros((*shape, 3)),
+        target=target,
+        command_rad=command_rad,
+        thrust_acceleration_m_s2=np.full(shape, 9.81),
+        status=np.zeros(shape, dtype=np.int64),
+    )
+
+
+def steady(time_s: FloatArray) -> Trace:
+    """Return two flights: one 5 m off by 3 and 4 m and holding a command, one without error."""
+    error_m = np.zeros((len(time_s), 2, 2))
+    error_m[:, 0] = [3.0, -4.0]
+    command_rad = np.zeros((len(time_s), 2, 2))
+    command_rad[:, 0] = [0.1, -0.2]
+    return trace_of(time_s, error_m, command_rad)
+
+
+def test_steady_error_has_the_integrals_of_a_constant() -> None:
+    """IAE e T, ISE e^2 T, ITSE e^2 T^2/2, ITAE e T^2/2 with e the Euclidean norm in the plane."""
+    metrics = measure(steady(np.linspace(0.0, 20.0, 2001)))
+    np.testing.assert_allclose(metrics.iae_m_s, [100.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics.ise_m2_s, [500.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics.itse_m2_s2, [5000.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics.itae_m_s2, [1000.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics.rms_error_m, [5.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics.max_error_m, [5.0, 0.0], rtol=1e-12)
+
+
+def test_steady_command_has_effort_but_no_variation() -> None:
+    """Effort is the 1-norm times the time; a held command never changes."""
+    metrics = measure(steady(np.linspace(0.0, 20.0, 2001)))
+    np.testing.assert_allclose(metrics.effort_rad_s, [6.0, 0.0], rtol=1e-12)
+    np.testing.assert_array_equal(metrics.command_variation_rad, 0.0)
+
+
+def test_last_command_takes_no_effort() -> None:
+    """A command counts from its instant to the next, so that of the last instant is never flown."""
+    command_rad = np.zeros((3, 1, 2))
+    command_rad[:, 0, 0] = [0.1, -0.2, 7.0]
+    trace = trace_of(np.array([0.0, 1.0, 2.0]), np.zeros((3, 1, 2)), command_rad)
+    np.testing.assert_allclose(measure(trace).effort_rad_s, 0.3, rtol=1e-12)
+
+
+def test_command_variation_is_the_mean_change_per_step() -> None:
+    """A command that swings by 0.1 rad in roll and 0.2 rad in pitch changes by 0.3 rad a step."""
+    time_s = np.linspace(0.0, 1.0, 101)
+    command_rad = np.zeros((101, 1, 2))
+    command_rad[1::2, 0] = [0.1, -0.2]
+    metrics = measure(trace_of(time_s, np.zeros((101, 1, 2)), command_rad))
+    np.testing.assert_allclose(metrics.command_variation_rad, 0.3, rtol=1e-12)
+    np.testing.assert_allclose(metrics.effort_rad_s, 0.15, rtol=1e-12)
+
+
+def test_error_is_integrated_by_the_trapezoidal_rule() -> None:
+    """An error that grows in proportion to time has an exact IAE, and an ITAE of the trapezoids."""
+    time_s = np.array([0.0, 1.0, 2.0, 3.0])
+    error_m = np.zeros((4, 1, 2))
+    error_m[:, 0, 1] = time_s
+    metrics = measure(trace_of(time_s, error_m, np.zeros((4, 1, 2))))
+    np.testing.assert_allclose(metrics.iae_m_s, 4.5)
+    np.testing.assert_allclose(metrics.itae_m_s2, 0.5 + 2.5 + 6.5)
+    np.testing.assert_allclose(metrics.max_error_m, 3.0)
+
+
+def test_take_off_is_not_counted() -> None:
+    """What happens before t = 0 leaves every metric alone."""
+    late = steady(np.linspace(0.0, 20.0, 2001))
+    early = steady(0.01 * np.arange(-500.0, 2001.0))
+    early.position_m[:500] = 1e3
+    early.command_rad[:500] = 1.0
+    for name, value in vars(measure(late)).items():
+        np.testing.assert_allclose(getattr(measure(early), name), value, rtol=1e-10, atol=1e-12)
+
+
+def test_start_transient_can_be_left_out() -> None:
+    """From 10 s on only the rest of the flight counts, still weighted with the time since the start."""
+    trace = steady(0.01 * np.arange(2001.0))
+    trace.position_m[:900, 0] = 1e3
+    metrics = measure(trace, TRANSIENT_S)
+    assert TRANSIENT_S == 10.0
+    np.testing.assert_allclose(metrics.iae_m_s[0], 50.0, rtol=1e-12)
+    np.testing.assert_allclose(metrics.itae_m_s2[0], 5.0 * (20.0**2 - 10.0**2) / 2.0, rtol=1e-12)
+    np.testing.assert_allclose(metrics.rms_error_m[0], 5.0, rtol=1e-12)
+    np.testing.assert_allclose(metrics.effort_rad_s[0], 3.0, rtol=1e-12)
+
+
+def test_diverged_flight_has_no_metrics() -> None:
+    """NaN in one flight stays in that flight."""
+    trace = steady(np.linspace(0.0, 20.0, 2001))
+    trace.position_m[1500:, 1] = np.nan
+    trace.command_rad[1500:, 1] = np.nan
+    for value in vars(measure(trace)).values():
+        assert np.isfinite(value[0])
+        assert np.isnan(value[1])
+
+
+def test_flight_shorter_than_the_transient_is_refused() -> None:
+    """There is nothing to measure after the end."""
+    with pytest.raises(ValueError, match="start_s = 10 must lie before the end 8"):
+        measure(steady(np.linspace(0.0, 8.0, 801)), TRANSIENT_S)
+
+
+def test_a_flight_among_many_has_the_metrics_of_the_flight_alone() -> None:
+    """Bit for bit: sums over time run in the same order whatever else is measured."""
+    rng = np.random.default_rng(1)
+    error_m, command_rad = rng.normal(size=(1001, 3, 2)), rng.normal(size=(1001, 3, 2))
+    time_s = np.linspace(0.0, 10.0, 1001)
+    together = measure(trace_of(time_s, error_m, command_rad))
+    for flight in range(3):
+        one = slice(flight, flight + 1)
+        alone = measure(trace_of(time_s, error_m[:, one], command_rad[:, one]))
+        for name, values in vars(together).items():
+            np.testing.assert_array_equal(getattr(alone, name), values[one], err_msg=name)

@@ -1,0 +1,105 @@
+"""Whole flights: the compiled C flies the reference's trace, and better than the paper claims."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.flight.loop import Flight, Start, fly
+from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.traces import Trace
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.paper.table2 import PRINTED_IMPROVEMENT
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from tests.support.cases import SCALARS
+from tests.support.tools import toolchain
+
+CASE = Bernoulli(2.0, 0.5)
+CONDITIONS = {
+    "hover start": Flight(CASE, duration_s=20.0),
+    "take-off, turned, in wind": Flight(
+        CASE, duration_s=10.0, start=Start.TAKE_OFF, yaw_rad=0.8, vehicle=Vehicle(wind_m_s2=(0.5, -0.3))
+    ),
+}
+
+
+def with_scalar(settings: Settings, scalar: str) -> Settings:
+    """Return `settings` in another scalar type."""
+    return settings.model_copy(update={"code": settings.code.model_copy(update={"scalar": scalar})})
+
+
+def assert_same_bits(a: Trace, b: Trace) -> None:
+    """Every array of the traces is equal in every bit."""
+    for field in fields(Trace):
+        assert getattr(a, field.name).tobytes() == getattr(b, field.name).tobytes(), field.name
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("preset", ["mambo", pytest.param("table1", marks=pytest.mark.long)])
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str, scalar: str) -> None:
+    """The closed loop amplifies the least difference: there is none, in any array of the trace."""
+    settings = with_scalar(presets.load(preset), scalar)
+    flight = CONDITIONS[condition]
+    extension = compiled(settings, toolchain("gcc"))
+    ours, theirs = ReferenceController(settings), CompiledController(settings, extension=extension)
+    assert_same_bits(fly(flight, ours), fly(flight, theirs))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("preset", presets.names())
+def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) -> None:
+    """The same over the whole of Table II's flight, in other builds."""
+    settings = presets.load(preset)
+    flight = Flight(CASE)
+    expected = fly(flight, ReferenceController(settings))
+    for compiler in (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2")):
+        extension = compiled(settings, toolchain(*compiler))
+        assert_same_bits(expected, fly(flight, CompiledController(settings, extension=extension)))
+
+
+def indices(metrics: Metrics) -> np.ndarray:
+    """Return the four indices of Table II of one flight."""
+    return np.array([metrics.iae_m_s, metrics.ise_m2_s, metrics.itse_m2_s2, metrics.itae_m_s2])[:, 0]
+
+
+@pytest.mark.parametrize(
+    ("preset", "least"),
+    [pytest.param("table1", PRINTED_IMPROVEMENT, marks=pytest.mark.long), ("mambo", (20, 300, 300, 20))],
+)
+def test_the_presets_improve_on_the_pd(preset: str, least: tuple[float, ...]) -> None:
+    """On the Table II case: table1 by more than the paper prints, mambo by far more."""
+    flight = Flight(CASE)
+    pd = indices(measure(fly(flight, PdController())))
+    nmpc = indices(measure(fly(flight, CompiledController(presets.load(preset)))))
+    assert np.all(pd / nmpc >= least)
+
+
+def test_mambo_keeps_tracking_turned_in_wind_and_with_slow_motors() -> None:
+    """IAE below 5 m s at yaw 0.8 rad, in 0.5 m/s^2 of wind from either axis, with 0.03 s of motor lag."""
+    flight = Flight(
+        CASE,
+        flights=4,
+        yaw_rad=np.array([0.8, 0, 0, 0]),
+        vehicle=Vehicle(
+            motor_lag_s=np.array([0, 0, 0, 0.03]),
+            wind_m_s2=(np.array([0, 0.5, 0, 0]), np.array([0, 0, 0.5, 0])),
+        ),
+    )
+    metrics = measure(fly(flight, CompiledController(presets.load("mambo"), 4)))
+    assert np.all(metrics.iae_m_s < 5)
+
+
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_other_scalars_fly_like_float64(scalar: str) -> None:
+    """Other bits, same flight: the indices agree within a tenth."""
+    flight = Flight(CASE, duration_s=30.0)
+    ours, theirs = (
+        indices(measure(fly(flight, CompiledController(with_scalar(presets.load("mambo"), kind)))))
+        for kind in (scalar, "float64")
+    )
+    assert np.allclose(ours, theirs, rtol=0.1)

@@ -1,0 +1,183 @@
+"""A flight as a record: written, read, flown among others and again."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.inner_steps import WatchedController
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.errors import FlightError, ScenarioError
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.scenario import Record, Scenario, flight_of, read_record, write_record
+from mambo_nmpc.sil.flight.traces import SEEN_COLUMNS, SensedTrace, read_npz, write_npz
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+
+MAMBO = presets.load("mambo")
+HARD = Scenario(
+    seed=2**62 + 1,
+    trajectory="gerono",
+    size_m=1.0,
+    duration_s=2.0,
+    start_offset_m=(0.1, 0.2, -0.1),
+    start_velocity_m_s=(0.1, -0.1, 0.05),
+    start_tilt_rad=(0.02, -0.03),
+    yaw_rad=0.4,
+    mass_kg=0.068,
+    inertia_kg_m2=(6e-5, 7e-5, 1.1e-4),
+    thrust_factor_n_s2=4.8e-8,
+    motor_lag_s=0.02,
+    wind_m_s2=(0.1, -0.05),
+    wind_speed_m_s=4.0,
+    wind_direction_rad=1.0,
+    battery_sag_1_s=0.001,
+    payload_kg=0.003,
+    payload_time_s=0.7,
+    push_n_s=(0.01, 0.005, -0.002),
+    push_time_s=1.2,
+    command_delay_ticks=3,
+    dropped_share=0.1,
+    sensors="mambo-derotated",
+    noise_scale=0.7,
+    accelerometer_bias_m_s2=(0.01, -0.02, 0.03),
+    gyro_bias_rad_s=(1e-4, 2e-4, -1e-4),
+)
+CALM = Scenario(seed=5, duration_s=2.0, sensors="mambo-derotated")
+
+
+def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
+    """Every number with its bits, settings included."""
+    record = Record(scenario=HARD, settings=MAMBO, controller="reference", trace_sha256="ab" * 32)
+    write_record(record, tmp_path / "flight.json")
+    assert read_record(tmp_path / "flight.json") == record
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mass_kg": -1.0}, "scenario.mass_kg: Input should be greater than 0"),
+        ({"mas_kg": 1.0}, "scenario.mas_kg: Extra inputs are not permitted"),
+        ({"payload_kg": -0.07}, "payload_kg must leave a positive mass"),
+        ({"seed": -1}, "scenario.seed: Input should be greater than or equal to 0"),
+        ({"sensors": "radar"}, "scenario.sensors: Input should be 'none', 'mambo' or 'mambo-derotated'"),
+    ],
+)
+def test_a_bad_record_names_file_key_and_rule(
+    change: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    """One line for each fault."""
+    path = tmp_path / "bad.json"
+    write_record(Record(scenario=HARD, settings=MAMBO), path)
+    document = json.loads(path.read_text())
+    document["scenario"] |= change
+    path.write_text(json.dumps(document))
+    with pytest.raises(ScenarioError) as caught:
+        read_record(path)
+    assert "bad.json: " in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_what_is_no_record_is_refused(tmp_path: Path) -> None:
+    """Missing, not JSON, or far too large."""
+    (tmp_path / "text").write_text("hello")
+    (tmp_path / "large").write_bytes(b" " * 1_000_001)
+    for name, message in (
+        ("none", "cannot be read"),
+        ("text", "Invalid JSON"),
+        ("large", "larger than 1 MB"),
+    ):
+        with pytest.raises(ScenarioError, match=message):
+            read_record(tmp_path / name)
+
+
+def test_default_scenario_is_the_table_2_case() -> None:
+    """The very bits of a plain flight."""
+    plain = fly(Flight(Bernoulli(2.0, 0.5), 1.0), PdController())
+    assert fly(flight_of([Scenario(duration_s=1.0)], 0.01), PdController()).same_bits(plain)
+
+
+@pytest.mark.parametrize("controller", ["pd", pytest.param("nmpc", marks=pytest.mark.long)])
+def test_a_flight_among_many_is_the_flight_alone(controller: str) -> None:
+    """Sensors, gusts, drops, delays and the rest: the same bits whatever flies beside it, in any place."""
+
+    def flown(*scenarios: Scenario) -> list[str]:
+        n = len(scenarios)
+        trace = fly(
+            flight_of(scenarios, 0.01), PdController() if controller == "pd" else CompiledController(MAMBO, n)
+        )
+        return [trace.digest(flight) for flight in range(n)]
+
+    still = CALM.model_copy(update={"trajectory": "hover"})
+    noisy = HARD.model_copy(update={"seed": 9, "noise_scale": 2.0, "dropped_share": 0.4})
+    alone = [flown(scenario)[0] for scenario in (HARD, CALM, still, noisy)]
+    assert len(set(alone)) == 4
+    assert flown(HARD, CALM, still, noisy) == alone
+    assert flown(noisy, CALM, still, HARD, CALM) == [alone[3], alone[1], alone[2], alone[0], alone[1]]
+
+
+def test_flights_of_one_simulation_share_what_they_must() -> None:
+    """Duration, start and sensors."""
+    with pytest.raises(FlightError, match="sensors must be the same"):
+        flight_of([HARD, CALM.model_copy(update={"sensors": "none"})], 0.01)
+    with pytest.raises(FlightError, match="flights = 0"):
+        flight_of([], 0.01)
+
+
+def test_sensed_trace_survives_on_disk(tmp_path: Path) -> None:
+    """Truth and estimate, with their bits."""
+    trace = fly(flight_of([HARD, CALM], 0.01), PdController())
+    write_npz(trace, tmp_path / "trace.npz")
+    again = read_npz(tmp_path / "trace.npz")
+    assert isinstance(again, SensedTrace)
+    assert again.same_bits(trace)
+
+
+def test_step_sizes_are_those_by_which_the_plan_moves() -> None:
+    """Each iteration goes by its step size against its slope; one that shrank undoes the last."""
+    watched = WatchedController(MAMBO, 2)
+    brief = [scenario.model_copy(update={"duration_s": 0.5}) for scenario in (HARD, CALM)]
+    fly(flight_of(brief, 0.01), watched)
+    limit = np.float32(MAMBO.limits.tilt_rad)
+    undone = 0
+    for inner in watched.steps:
+        plan, size = inner.plan_rad, inner.step_sizes_rad(MAMBO)
+        forward = np.clip(plan - inner.decisions(MAMBO) * size, -limit, limit)
+        np.testing.assert_array_equal(plan[1], forward[0])
+        shrank = (np.diff(size, axis=0) < 0)[:-1]
+        np.testing.assert_array_equal(plan[2:], np.where(shrank, plan[:-2], forward[1:-1]))
+        undone += int(shrank.sum())
+    assert undone > 20
+
+
+@pytest.mark.long
+def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
+    """The same bits as among others in C; a record that says otherwise, or options beside it, fail."""
+    trace = fly(flight_of([CALM, HARD], 0.01), CompiledController(MAMBO, 2))
+    good = Record(scenario=HARD, settings=MAMBO, trace_sha256=trace.digest(1))
+    write_record(good, tmp_path / "good.json")
+    write_record(good.model_copy(update={"trace_sha256": "0" * 64}), tmp_path / "other.json")
+
+    def again(*arguments: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "mambo_nmpc", "fly", *arguments]
+        return subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
+
+    done = again("--replay", "good.json", "-o", "good")
+    assert done.returncode == 0, done.stderr
+    assert "the trace equals the recorded one, bit for bit" in done.stdout
+    inner = np.load(tmp_path / "good" / "inner-steps.npz")
+    k, iterations = len(trace.time_s), MAMBO.optimizer.iterations
+    assert inner["cost"].shape == (k, iterations, 1)
+    assert inner["plan_rad"].shape == inner["step_size_rad"].shape == (k, iterations, 1, 2, 2)
+    header = (tmp_path / "good" / "trace.csv").read_text().splitlines()[0]
+    assert header.endswith(",".join(SEEN_COLUMNS))
+    assert again("--replay", "other.json").returncode == 1
+    refused = again("--replay", "good.json", "--seed", "3")
+    assert (refused.returncode, refused.stderr) == (
+        2,
+        "--replay good.json says how to fly: leave out --seed\n",
+    )

@@ -1,0 +1,58 @@
+"""Traces on disk."""
+
+import csv
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.errors import TraceError
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, Trace, read_npz, write_csv, write_npz
+from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Trajectories
+
+
+@pytest.fixture(scope="module")
+def trace() -> Trace:
+    """Return half a second of two different flights."""
+    both = Trajectories((Bernoulli(2.0, 0.5), Circle(1.0, 0.5)))
+    flown = fly(Flight(both, duration_s=0.5, flights=2, yaw_rad=0.3), PdController())
+    return replace(flown, status=np.arange(flown.status.size).reshape(flown.status.shape))
+
+
+def test_npz_reads_back_as_it_was_written(trace: Trace, tmp_path: Path) -> None:
+    """Every array of the trace survives with its bits and its type."""
+    write_npz(trace, tmp_path / "trace.npz")
+    again = read_npz(tmp_path / "trace.npz")
+    for field in fields(Trace):
+        before, after = getattr(trace, field.name), getattr(again, field.name)
+        np.testing.assert_array_equal(after, before, strict=True)
+
+
+def test_csv_holds_the_flight_asked_for_bit_for_bit(trace: Trace, tmp_path: Path) -> None:
+    """One row for each instant, one named column for each number, nothing rounded."""
+    write_csv(trace, tmp_path / "trace.csv", flight=1)
+    with (tmp_path / "trace.csv").open(newline="", encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file))
+    assert tuple(header) == CSV_COLUMNS
+    columns = dict(zip(header, np.array(rows, dtype=np.float64).T, strict=True))
+    np.testing.assert_array_equal(columns["time_s"], trace.time_s)
+    np.testing.assert_array_equal(columns["x_m"], trace.position_m[:, 1, 0])
+    np.testing.assert_array_equal(columns["vz_m_s"], trace.velocity_m_s[:, 1, 2])
+    np.testing.assert_array_equal(columns["yaw_rad"], trace.euler_rad[:, 1, 2])
+    np.testing.assert_array_equal(columns["target_vy_m_s"], trace.target[:, 1, 3])
+    np.testing.assert_array_equal(columns["pitch_command_rad"], trace.command_rad[:, 1, 1])
+    np.testing.assert_array_equal(columns["thrust_acceleration_m_s2"], trace.thrust_acceleration_m_s2[:, 1])
+    np.testing.assert_array_equal(columns["status"], trace.status[:, 1])
+
+
+def test_file_that_holds_no_trace_is_refused(tmp_path: Path) -> None:
+    """Missing, foreign and incomplete files raise one error that names the file."""
+    (tmp_path / "text.npz").write_text("time_s,x_m\n", encoding="utf-8")
+    np.savez(tmp_path / "other.npz", time_s=np.zeros(3))
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    for name in ("absent.npz", "text.npz", "other.npz", "array.npy"):
+        with pytest.raises(TraceError, match=name):
+            read_npz(tmp_path / name)

@@ -1,0 +1,280 @@
+"""Instruction counts: exact, repeatable, and a search that never finds less than it was given."""
+
+import re
+from collections import Counter
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import unicorn
+
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.emulation.unicorn import UnicornMachine
+from mambo_nmpc.sil.firmware.disassembly import disassemble
+from mambo_nmpc.sil.firmware.elf import Image, load
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.footprint.counts import (
+    HARNESS,
+    CountingController,
+    Inputs,
+    count_instructions,
+    in_flight,
+    spread,
+)
+from tests.support.cases import settings_case
+from tests.support.tools import board_builder
+
+CORES = {
+    "mambo": "arm926",
+    "rp2040": "cortex-m0",
+    "crazyflie": "cortex-m4",
+    "teensy41": "cortex-m7",
+    "rv32": "rv32",
+    "mega": "avr",
+}
+IN_PROCESS = [name for name in CORES if name != "mega"]
+"""Boards whose emulator can be asked before every instruction."""
+MAMBO = presets.load("mambo")
+
+STRAIGHT = 700
+"""Instructions in a row, more than the emulator translates at once."""
+ARM = f"""
+    .syntax unified
+    .text
+    .balign 4
+    .global nmpc_known
+    .type nmpc_known, %function
+    {{mode}}
+nmpc_known:
+    movs r0, #10
+1:  subs r0, r0, #1
+    bne 1b
+    .rept {STRAIGHT}
+    mov r1, r1
+    .endr
+    {{skipped}}
+    b 2f
+    .word 0, 0, 0, 0
+2:  movs r0, #0
+    bx lr
+    .size nmpc_known, . - nmpc_known
+"""
+RISCV = f"""
+    .text
+    .global nmpc_known
+    .type nmpc_known, @function
+nmpc_known:
+    li a0, 10
+1:  addi a0, a0, -1
+    bnez a0, 1b
+    .rept {STRAIGHT}
+    mv a1, a1
+    .endr
+    j 2f
+    .word 0, 0, 0, 0
+2:  li a0, 0
+    ret
+    .size nmpc_known, . - nmpc_known
+"""
+AVR = f"""
+    .text
+    .global nmpc_known
+    .type nmpc_known, @function
+nmpc_known:
+    ldi r24, 10
+1:  subi r24, 1
+    brne 1b
+    .rept {STRAIGHT}
+    mov r26, r26
+    .endr
+    {{skipped}}
+    rjmp 2f
+    .word 0xFFFF, 0xFFFF
+2:  ldi r24, 0
+    ret
+    .size nmpc_known, . - nmpc_known
+"""
+KNOWN = 1 + 10 * 2 + STRAIGHT + 1 + 2
+"""Instructions of each: the loop ten times, and the data in their midst never."""
+SKIPPED = {
+    "mambo": ("addne r1, r1, #1",),
+    "crazyflie": ("it ne", "addne r1, r1, #1"),
+    "teensy41": ("ite ne", "addne r1, r1, #1", "moveq r1, #1"),
+    "mega": ("ldi r25, 0", "cpse r24, r1", "nop", "sbrc r1, 0", "call nmpc_step", "sbrs r1, 0", "rjmp ."),
+}
+"""What they have besides where instructions are conditional: one that is skipped is issued, and counts."""
+
+
+@pytest.fixture
+def crazyflie(tmp_path: Path) -> Path:
+    """Build the preset mambo for the Cortex-M4."""
+    return build_guest(MAMBO, board_builder("crazyflie"), tmp_path)
+
+
+def costs(elf: Path, inputs: Inputs) -> list[int]:
+    """Count consecutive steps of one controller on the Cortex-M4."""
+    controller = CountingController(MAMBO, elf, "cortex-m4")
+    rows = zip(inputs.state, inputs.target, inputs.thrust, strict=True)
+    return [controller.step(state, target, float(thrust))[1].total() for state, target, thrust in rows]
+
+
+@pytest.mark.parametrize("name", CORES)
+def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
+    """Instructions of all widths, a loop, a long run, a jump over data; nothing of what calls it."""
+    skipped = SKIPPED.get(name, ())
+    mode = ".arm" if name == "mambo" else ".thumb\n.thumb_func"
+    template = {"rv32": RISCV, "mega": AVR}.get(name, ARM)
+    assembly = template.format(mode=mode, skipped="\n".join(skipped))
+    declared = (
+        '#include "nmpc.h"\nnmpc_status_t nmpc_known(nmpc_t *self, const nmpc_state_t *state,'
+        "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
+        f"__asm({' '.join(_quoted(line) for line in assembly.splitlines())});\n"
+    )
+    glue = resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
+    assert glue.count("nmpc_step(") == 1
+    elf = board_builder(name).guest(
+        render(MAMBO, with_digest=False),
+        declared + glue.replace("nmpc_step(", "nmpc_known("),
+        GUEST,
+        tmp_path,
+    )
+    controller = CountingController(MAMBO, elf, CORES[name])
+    for _ in range(2):
+        assert controller.step(np.zeros(7), np.zeros(4), 9.81) == (
+            0,
+            Counter({"nmpc_known": KNOWN + len(skipped)}),
+        )
+
+
+def _quoted(line: str) -> str:
+    return f'"{line}\\n"'
+
+
+def it_blocks(image: Image) -> dict[int, list[int]]:
+    """Return each Thumb-2 `it`, and the instructions that it makes conditional.
+
+    The core issues those that it skips, and the emulator names them nowhere else: in A32 it does.
+    """
+    instructions = disassemble(image).instructions
+    blocks: dict[int, list[int]] = {}
+    for address, instruction in instructions.items():
+        mnemonic = instruction.text.split()[0]
+        if re.fullmatch("it[te]{0,3}", mnemonic):
+            after = [address + instruction.size_bytes]
+            for _ in mnemonic[2:]:
+                after.append(after[-1] + instructions[after[-1]].size_bytes)
+            blocks[address] = after
+    return blocks
+
+
+@pytest.mark.parametrize("name", IN_PROCESS)
+def test_counting_runs_agrees_with_counting_one_by_one(name: str, tmp_path: Path) -> None:
+    """The emulator, asked before every single instruction, arrives at the same functions and totals."""
+    elf, core = build_guest(MAMBO, board_builder(name), tmp_path), CORES[name]
+    image = load(elf)
+    blocks = it_blocks(image)
+    seen: Counter[int] = Counter()
+
+    def see(_engine: Any, address: int, _size: int, _data: Any) -> None:
+        seen[address] += 1
+
+    single = EmulatedController(MAMBO, elf, core)
+    assert isinstance(single.machine, UnicornMachine)
+    single.machine._engine.hook_add(unicorn.UC_HOOK_CODE, see)
+    runs = CountingController(MAMBO, elf, core)
+    inputs = spread(MAMBO, 2)
+    for state, target, thrust in zip(inputs.state, inputs.target, inputs.thrust, strict=True):
+        seen.clear()
+        single.step(state[None], target[None], [thrust])
+        for first, others in blocks.items():
+            seen.update({address: seen[first] - seen[address] for address in others})
+        by_function: Counter[str] = Counter()
+        for address, times in seen.items():
+            by_function[image.name_of(address).partition("+")[0]] += times
+        expected = sum(times for function, times in by_function.items() if function not in HARNESS)
+        status, counted = runs.step(state, target, float(thrust))
+        assert (status, counted.total()) == (0, expected)
+        assert counted.keys() <= by_function.keys() - set(HARNESS)
+        assert counted["nmpc_step"] == by_function["nmpc_step"] > 50
+
+
+def test_the_same_inputs_have_the_same_counts(crazyflie: Path) -> None:
+    """Neither the machine nor the order of anything shows."""
+    inputs = spread(MAMBO, 20)
+    first, second = (count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, 20) for _ in range(2))
+    assert first == second
+    assert first.least < first.most
+
+
+def test_the_figures_are_those_of_the_steps(crazyflie: Path) -> None:
+    """Number, least, mean and most of what was counted; the functions share the mean."""
+    inputs = spread(MAMBO, 20)
+    each = costs(crazyflie, inputs)
+    counts = count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, 0)
+    assert (counts.steps, counts.least, counts.most) == (20, min(each), max(each))
+    assert counts.mean == pytest.approx(sum(each) / 20)
+    assert sum(counts.by_function.values()) == pytest.approx(counts.mean)
+    assert list(counts.by_function.values()) == sorted(counts.by_function.values(), reverse=True)
+
+
+def test_the_search_never_returns_less_than_it_was_given(crazyflie: Path) -> None:
+    """A longer search finds as much or more, and from a calm start more."""
+    inputs = spread(MAMBO, 10)
+    given = max(costs(crazyflie, inputs))
+    found = [count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, steps).most for steps in (0, 10, 40)]
+    assert given == found[0] <= found[1] <= found[2]
+    calm = Inputs(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
+    before, after = (count_instructions(MAMBO, crazyflie, "cortex-m4", calm, steps).most for steps in (0, 60))
+    assert before < after
+
+
+def test_refused_inputs_are_not_counted(crazyflie: Path) -> None:
+    """They would pull the least and the mean towards nothing."""
+    inputs = spread(MAMBO, 12)
+    state = inputs.state.copy()
+    state[3::4, 0] = np.nan
+    refused = replace(inputs, state=state)
+    kept = np.isfinite(state[:, 0])
+    good = Inputs(inputs.state[kept], inputs.target[kept], inputs.thrust[kept])
+    alone, among = (count_instructions(MAMBO, crazyflie, "cortex-m4", i, 10) for i in (good, refused))
+    assert alone == among
+    assert alone.steps < 12 + 10
+
+
+@pytest.mark.parametrize("index", range(8))
+def test_spread_inputs_are_all_accepted(index: int) -> None:
+    """From millimetres off the target to the ends of the ranges, never beyond."""
+    settings = settings_case(index, "float32")
+    inputs = spread(settings, 200)
+    steps = ReferenceController(settings, 200).step(inputs.state, inputs.target, inputs.thrust)
+    assert not np.any(steps.status)
+    errors = np.abs(inputs.state[:, :4] - inputs.target).max(axis=1)
+    assert errors.min() < 0.02
+    assert errors.max() > settings.ranges.velocity_m_s / 2
+
+
+def test_flight_inputs_are_those_of_the_flight() -> None:
+    """Every so many-th: position, speed, attitude, target and thrust that the controller was given."""
+    trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), PdController())
+    given: list[tuple[Any, ...]] = []
+
+    class Spy(PdController):
+        def step(self, *arguments: Any) -> Any:
+            given.append(tuple(np.array(argument[0]) for argument in arguments))
+            return super().step(*arguments)
+
+    fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), Spy())
+    inputs = in_flight(trace, every=7)
+    assert len(inputs.thrust) == len(given[::7]) == 15
+    for row, (state, target, thrust) in enumerate(given[::7]):
+        np.testing.assert_array_equal(inputs.state[row], state)
+        np.testing.assert_array_equal(inputs.target[row], target)
+        assert inputs.thrust[row] == thrust

@@ -1,0 +1,276 @@
+"""Footprints: what the presets promise on the boards, and that nothing over budget stays unsaid."""
+
+import re
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.firmware.elf import load
+from mambo_nmpc.sil.firmware.gate import Forbidden, forbidden
+from mambo_nmpc.sil.footprint import report
+from mambo_nmpc.sil.footprint.measure import Footprint, measure_footprint
+from tests.support.tools import board_builder, only
+
+MAMBO = presets.load("mambo")
+TINY = {
+    "flash_bytes = 16_384": "flash_bytes = 2_000",
+    "ram_bytes = 1_024": "ram_bytes = 100",
+    "stack_bytes = 1_024": "stack_bytes = 100",
+    "period_share = 0.1": "period_share = 0.002",
+}
+"""A budget for the Crazyflie that preset mambo exceeds everywhere."""
+COST = "return nmpc_tracking_cost(weight.tracking, distance_m)"
+WIDENED = "return 1.0000001 * nmpc_tracking_cost(weight.tracking, distance_m)"
+DIVIDED = "return nmpc_tracking_cost(weight.tracking, distance_m) / weight.effort"
+
+
+@lru_cache
+def measured(board: str, preset: str = "mambo", steps: int = 300) -> Footprint:
+    """Measure a preset on a board, once."""
+    board_builder(board)
+    return measure_footprint(presets.load(preset), boards.load(board), counted_steps=steps)
+
+
+def tiny(folder: Path) -> Path:
+    """Write the Crazyflie with a tiny budget."""
+    text = (Path(boards.__file__).parent / "data" / "boards" / "crazyflie.toml").read_text("utf-8")
+    for old, new in TINY.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    path = folder / "tiny.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_the_crazyflie_keeps_its_promises() -> None:
+    """Preset mambo in 3.5 KiB of flash, 256 B of RAM, 256 B of stack and 4500 instructions."""
+    footprint = measured("crazyflie")
+    assert footprint.added.flash.total <= 3584
+    assert footprint.added.ram.total <= 256
+    assert footprint.added.ram.own == footprint.instance_bytes
+    assert footprint.stack is not None
+    assert footprint.stack.bytes <= 256
+    assert footprint.counts is not None
+    assert footprint.counts.most <= 4500
+    assert footprint.counts.steps > 250
+    assert footprint.fits
+
+
+def test_table_1_runs_on_the_mambo_in_75_000_instructions() -> None:
+    """Every step of the paper's controller, all floating point of the ARM926 in software."""
+    counts = measured("mambo", "table1").counts
+    assert counts is not None
+    assert counts.most <= 75_000
+    assert counts.by_function["__addsf3"] + counts.by_function["__mulsf3"] > counts.mean / 2
+
+
+@pytest.mark.parametrize("name", ["crazyflie", "mambo", "mega"])
+def test_the_parts_make_the_difference_of_the_sections(name: str) -> None:
+    """Own, helpers, growth and nameless bytes are all that the controller adds; the report says the same."""
+    footprint = measured(name, steps=6)
+    added = footprint.added
+    assert added.flash.total == sum(added.sections.flash.values()) > 0
+    assert added.ram.total == sum(added.sections.ram.values()) >= footprint.instance_bytes
+    assert sum(added.own.values()) + sum(added.helpers.values()) >= added.flash.own + added.flash.helpers
+    limits = {limit.name: limit.value for limit in footprint.limits}
+    assert (limits["flash"], limits["RAM"]) == (added.flash.total, added.ram.total)
+
+
+def test_time_follows_from_instructions_clock_and_band() -> None:
+    """Cycles an instruction times the most instructions, less and more by the error, over the clock."""
+    footprint = measured("crazyflie", steps=6)
+    board, counts, time_s = footprint.board, footprint.counts, footprint.time_s
+    assert counts is not None
+    assert time_s is not None
+    middle_s = counts.most * board.cycles.per_instruction / board.clock_hz.value
+    assert time_s == pytest.approx(
+        (middle_s * (1 - board.cycles.error_share), middle_s * (1 + board.cycles.error_share))
+    )
+    time = next(limit for limit in footprint.limits if limit.name == "time")
+    assert (time.value, time.budget) == pytest.approx((1000 * time_s[1], 1.0))
+
+
+def test_the_mega_is_measured_whole() -> None:
+    """Eight bits take as few bytes as others, and avr-libc's arithmetic most of the instructions."""
+    footprint = measured("mega", steps=6)
+    assert footprint.complete
+    assert footprint.stack is not None
+    assert footprint.counts is not None
+    assert footprint.stack.bytes <= footprint.board.budget.stack_bytes
+    assert footprint.counts.by_function["__addsf3x"] > footprint.counts.mean / 5
+
+
+@pytest.mark.parametrize(
+    ("here", "missing"),
+    [
+        (["avr-*"], "no qemu-system-avr found"),
+        (["avr-*", "qemu-system-avr", "setpriv"], "no C compiler found"),
+    ],
+    ids=["emulator", "compiler"],
+)
+def test_what_cannot_be_measured_is_said(
+    here: list[str], missing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its emulator the AVR has no instructions, and no limit on them is claimed to hold."""
+    board_builder("mega")
+    monkeypatch.setenv("PATH", only(tmp_path, *here))
+    monkeypatch.delenv("CC", raising=False)
+    footprint = measure_footprint(MAMBO, boards.load("mega"), counted_steps=6)
+    assert footprint.stack is not None
+    assert (footprint.counts, footprint.time_s) == (None, None)
+    assert [limit.name for limit in footprint.limits] == ["flash", "RAM", "stack"]
+    text = report.text([footprint])
+    assert re.search(f"^mega: instructions and time are not measured: .*{missing}", text, re.MULTILINE)
+    assert "incomplete" in text
+
+
+def test_a_tiny_budget_is_exceeded_everywhere(tmp_path: Path) -> None:
+    """Each limit is named with its excess, then the largest symbols, largest first."""
+    board_builder("crazyflie")
+    footprint = measure_footprint(MAMBO, boards.load(str(tiny(tmp_path))), counted_steps=6)
+    assert not footprint.fits
+    text = report.text([footprint])
+    assert re.search(r"^tiny .* OVER$", text, re.MULTILINE)
+    for limit, budget in (("flash", 2000), ("RAM", 100), ("stack", 100)):
+        found = re.search(rf"^tiny: {limit} (\d+) B is over its budget of {budget} B by (\d+) B$", text, re.M)
+        assert found, text
+        assert int(found[1]) == budget + int(found[2]) > budget
+    assert re.search(r"^tiny: time 0\.0\d+ ms is over its budget of 0\.02 ms by 0\.0\d+ ms$", text, re.M)
+    largest = re.search(r"^tiny: largest symbols: (.*)$", text, re.MULTILINE)
+    assert largest
+    sizes = [int(size) for size in re.findall(r" (\d+) B", largest[1])]
+    assert sizes == sorted(sizes, reverse=True)
+    assert "nmpc_cost_evaluate" in largest[1]
+
+
+@pytest.mark.parametrize("name", ["crazyflie", "mambo", "rp2040", "rv32"])
+def test_a_sneaked_in_double_is_reported_with_its_caller(name: str, tmp_path: Path) -> None:
+    """One literal without suffix in a float32 bundle: the symbols that it brings, and who calls them."""
+    files = render(MAMBO, with_digest=False)
+    source = files["src/nmpc_cost.c"]
+    assert source.count(COST) == 1
+    harmed = files | {"src/nmpc_cost.c": source.replace(COST, WIDENED)}
+    build = board_builder(name)
+    assert forbidden(load(build.firmware(files, tmp_path / "good")), "float32") == ()
+
+    image = load(build.firmware(harmed, tmp_path / "harmed"))
+    found = forbidden(image, "float32")
+    labels = {label for one in found for label in image.symbol(one.symbol).labels}
+    assert labels & {"__aeabi_dmul", "__muldf3"}
+    assert all(one.kind == "double precision" for one in found)
+    assert any("nmpc_cost_evaluate" in one.callers for one in found)
+    assert forbidden(image, "float64") == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "kind"),
+    [
+        ("mambo", WIDENED, "floating point"),
+        ("rp2040", WIDENED, "floating point"),
+        ("rp2040", DIVIDED, "division"),
+        ("rv32", DIVIDED, "division"),
+    ],
+)
+def test_fixed_point_links_neither_floats_nor_divisions(
+    name: str, wrong: str, kind: str, tmp_path: Path
+) -> None:
+    """Nothing of either as generated; one float or one division is reported."""
+    files = render(with_option(MAMBO, "code.scalar", "fixed", "test"), with_digest=False)
+    source = files["src/nmpc_cost.c"]
+    assert source.count(COST) == 1
+    harmed = files | {"src/nmpc_cost.c": source.replace(COST, wrong)}
+    build = board_builder(name)
+    assert forbidden(load(build.firmware(files, tmp_path / "good")), "fixed") == ()
+    found = forbidden(load(build.firmware(harmed, tmp_path / "harmed")), "fixed")
+    assert kind in {one.kind for one in found}
+
+
+@pytest.mark.parametrize(("board", "preset", "most"), [("mambo", "mambo", 6000), ("mambo", "table1", 4400)])
+def test_fixed_point_keeps_its_promises(board: str, preset: str, most: int) -> None:
+    """A step on the Mambo's processor: a tenth of what it takes in float32, within 400 B of stack."""
+    settings = with_option(presets.load(preset), "code.scalar", "fixed", "test")
+    board_builder(board)
+    footprint = measure_footprint(settings, boards.load(board), counted_steps=150)
+    assert footprint.counts is not None
+    assert footprint.counts.most <= most
+    assert footprint.stack is not None
+    assert footprint.stack.bytes <= 400
+    assert footprint.forbidden == ()
+
+
+def test_what_must_not_be_linked_is_over_whatever_the_sizes() -> None:
+    """The symbol, its kind and its callers are in the report."""
+    footprint = measured("crazyflie", steps=6)
+    assert footprint.fits
+    found = Forbidden("__aeabi_dmul", "double precision", ("nmpc_cost_evaluate",))
+    harmed = replace(footprint, forbidden=(found,))
+    assert not harmed.fits
+    text = report.text([harmed])
+    assert "__aeabi_dmul (double precision) must not be linked; called by nmpc_cost_evaluate" in text
+    assert "OVER" in text
+
+
+def test_sizes_of_five_digits_are_written_out() -> None:
+    """No power of ten in a number of bytes."""
+    footprint = measured("crazyflie", steps=6)
+    added = footprint.added
+    large = replace(added, flash=replace(added.flash, own=123_456, helpers=0, grown=0, unnamed=0))
+    text = report.text([replace(footprint, added=large)])
+    assert "crazyflie: flash 123456 B is over its budget of 16384 B by 107072 B" in text
+
+
+def test_doubles_may_be_linked_for_float64() -> None:
+    """On a core with single precision alone the double arithmetic is the compiler's, and counts as flash."""
+    settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": "float64"}})
+    board_builder("crazyflie")
+    footprint = measure_footprint(settings, boards.load("crazyflie"), counted_steps=6)
+    assert footprint.forbidden == ()
+    assert footprint.added.flash.helpers > 500
+    assert footprint.instance_bytes > measured("crazyflie", steps=6).instance_bytes
+
+
+def test_doubles_that_are_none_are_refused() -> None:
+    """The AVR's double has the width of its float: the C does not compile, rather than lose its bits."""
+    settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": "float64"}})
+    board_builder("mega")
+    with pytest.raises(BuildError, match="nmpc_assert_scalar_has_8_bytes"):
+        measure_footprint(settings, boards.load("mega"), counted_steps=6)
+
+
+@pytest.mark.parametrize("name", boards.names())
+def test_a_missing_compiler_is_named(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was looked for, and what brings it."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    board = boards.load(name)
+    with pytest.raises(BuildError) as caught:
+        measure_footprint(MAMBO, board)
+    for word in (board.title, *board.compiler.candidates, *board.compiler.packages):
+        assert word in str(caught.value)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("optimisation", ["-O0", "-O2", "-O3", "-Os"])
+@pytest.mark.parametrize(
+    ("name", "scalar"),
+    [
+        (name, scalar)
+        for name in boards.names()
+        for scalar in ("float32", "float64")
+        if (name, scalar) != ("mega", "float64")
+    ],
+)
+def test_every_build_can_be_measured(name: str, scalar: str, optimisation: str) -> None:
+    """No optimisation makes code whose stack has no provable bound."""
+    board_builder(name)
+    settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
+    footprint = measure_footprint(settings, boards.load(name), optimisation, counted_steps=6)
+    assert footprint.complete
+    assert footprint.added.flash.total == sum(footprint.added.sections.flash.values())
+    assert footprint.forbidden == ()

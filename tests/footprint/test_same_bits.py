@@ -1,0 +1,188 @@
+"""Same bits: every build has the digest of the reference, and nothing else has."""
+
+import re
+import shutil
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.digest import TICKS, episodes, frozen_digest, frozen_inputs
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings.controller_toml import read
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.compiled import compiled_digest
+from mambo_nmpc.sil.controllers.emulated import GUEST, emulated_digest
+from mambo_nmpc.sil.controllers.extension import load_extension
+from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, builder, clang_builder
+from mambo_nmpc.sil.footprint.same_bits import BOARD_COMPILERS, HOST_COMPILERS, REFERENCE, builds, same_bits
+from tests.support.cases import SCALARS, settings_case
+from tests.support.tools import require, toolchain
+
+MAMBO = presets.load("mambo")
+EMULATED = ("mambo", "rp2040", "crazyflie", "teensy41", "rv32")
+GENERATED = Path(__file__).parents[2] / "generated"
+
+HARM = {
+    "another order": (
+        "src/nmpc_predictor.h",
+        "walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m))",
+        "(walk->advance_m + walk->bend_m) + (walk->roll_to_come_m + walk->pitch_to_come_m)",
+    ),
+    "another sign": ("src/nmpc_cost.c", "effort = -nmpc_effort_slope", "effort = nmpc_effort_slope"),
+}
+"""Faults by name: file, the line, what it becomes."""
+
+
+def require_compiler(name: str) -> None:
+    """Skip without a compiler for a board."""
+    compiler = boards.load(name).compiler
+    if not any(shutil.which(command) for command in compiler.candidates):
+        require(compiler.candidates[0], compiler.packages[0])
+
+
+def check_every_build(names: tuple[str, ...], scalar: str) -> None:
+    """Compare the digests of all host compilers and of some boards, by all compilers at all optimisations."""
+    for compiler in HOST_COMPILERS:
+        require(compiler, compiler)
+    for name in names:
+        require_compiler(name)
+    settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
+    chosen = [boards.load(name) for name in names]
+    found = list(same_bits(settings, chosen, 3))
+    expected = [(REFERENCE, "NumPy", "")]
+    expected += [("host", compiler, flag) for compiler in HOST_COMPILERS for flag in OPTIMISATIONS]
+    for board in chosen:
+        for compiler in (builder(board).toolchain.command[0], "clang"):
+            expected += [(board.name, compiler, flag) for flag in OPTIMISATIONS]
+    assert [(one.where, one.compiler, one.optimisation) for one in found] == expected
+    assert len(found) == builds(chosen)
+    assert {one.digest for one in found} == {f"0x{frozen_digest(settings, 3):08X}"}
+
+
+def test_compilers_and_boards_share_one_digest() -> None:
+    """The compilers here and an FPU of single precision, at every optimisation."""
+    check_every_build(("crazyflie",), "float32")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_everything_shares_one_digest(scalar: str) -> None:
+    """All boards that are emulated, with and without an FPU."""
+    check_every_build(EMULATED, scalar)
+
+
+@pytest.mark.parametrize(("harm", "compiler"), list(zip(HARM, BOARD_COMPILERS, strict=True)))
+def test_a_harmed_bundle_has_another_digest(harm: str, compiler: str, tmp_path: Path) -> None:
+    """Even the order of an addition shows."""
+    require_compiler("crazyflie")
+    require(compiler, compiler)
+    path, line, instead = HARM[harm]
+    files = render(MAMBO, with_digest=False)
+    assert files[path].count(line) == 1
+    glue = resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
+    good, harmed = (
+        BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2").guest(bundle, glue, GUEST, tmp_path / name)
+        for name, bundle in {
+            "good": files,
+            "harmed": files | {path: files[path].replace(line, instead)},
+        }.items()
+    )
+    digests = [emulated_digest(MAMBO, elf, "cortex-m4", 2) for elf in (good, harmed)]
+    assert digests[0] == frozen_digest(MAMBO, 2) != digests[1]
+
+
+def test_other_settings_and_other_steps_have_other_digests() -> None:
+    """Whatever is changed, down to the last bit of a weight or a scalar type."""
+    document = MAMBO.model_dump()
+    weight = document["cost"]["tracking_weight"]
+    heavier = float(np.nextafter(np.float32(weight), np.float32(np.inf)))
+    changed = [
+        document | {"cost": document["cost"] | {"tracking_weight": heavier}},
+        document | {"optimizer": document["optimizer"] | {"variant": "irprop-"}},
+        document | {"code": {"scalar": "float64"}},
+    ]
+    digests = [frozen_digest(Settings.model_validate(one), 3) for one in (document, *changed)]
+    assert len({*digests, frozen_digest(MAMBO, 4)}) == len(digests) + 1
+    assert digests[0] == frozen_digest(MAMBO, 3)
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("index", [0, 3, 7, 9])
+def test_c_makes_the_frozen_steps_of_the_reference(index: int, scalar: str) -> None:
+    """Whatever the settings, the ends of the horizon and narrow ranges among them."""
+    settings = settings_case(index, scalar)
+    extension = load_extension(render(settings, with_digest=False), scalar, toolchain("gcc"))
+    assert compiled_digest(extension, 5) == frozen_digest(settings, 5)
+
+
+def test_frozen_steps_end_in_every_way() -> None:
+    """Near one in thirteen is refused, for each reason; searches rest early, commands reach their limit."""
+    episode = np.arange(50, dtype=np.uint32)
+    reference = ReferenceController(MAMBO, len(episode))
+    steps = [reference.step(*inputs) for inputs in frozen_inputs(MAMBO, episode)]
+    assert len(steps) == TICKS
+    status = np.array([step.status for step in steps])
+    assert set(status.flat) == {Status.OK, Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST}
+    assert 0.05 < np.mean(status != Status.OK) < 0.11
+    assert 0.005 < np.mean([step.converged for step in steps]) < 0.5
+    assert {int(count) for step in steps for count in step.iterations} == {0, 1, 2, 3, 4, 5}
+    limit = np.float32(MAMBO.limits.tilt_rad)
+    assert 0.05 < np.mean([np.abs(step.command_rad) == limit for step in steps]) < 0.5
+
+
+def test_frozen_inputs_are_spread_alike_and_never_twice() -> None:
+    """Every input of an episode fills its range evenly, and no two episodes share one."""
+    inputs = list(frozen_inputs(MAMBO, np.arange(400, dtype=np.uint32)))[::4]
+    yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
+    yaw = yaw[np.abs(yaw) <= 100]
+    shares = np.histogram(yaw, bins=10, range=(-100, 100))[0] / len(yaw)
+    assert np.all(np.abs(shares - 0.1) < 0.015)
+    targets = np.concatenate([target[:, 0] for _, target, _ in inputs])
+    assert len(np.unique(targets)) > 0.99 * len(targets)
+    assert np.all(np.abs(np.corrcoef(inputs[0][1], rowvar=False) - np.eye(4))[:3, :3] < 0.2)
+
+
+def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What did not run has no digest and says why; the reference always runs."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    found = list(same_bits(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
+    assert found[0].digest == f"0x{frozen_digest(MAMBO, 1):08X}"
+    reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
+    assert all(one.digest is None for one in found[1:])
+    assert ("host", "clang", "clang is not here") in reasons
+    for where, compiler, package in (
+        ("crazyflie", "gcc", "gcc-arm-none-eabi"),
+        ("crazyflie", "clang", "clang"),
+        ("mega", "gcc", "gcc-avr"),
+    ):
+        assert any((one[0], one[1]) == (where, compiler) and package in one[2] for one in reasons)
+
+
+def test_clang_needs_the_compiler_of_the_board_to_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clang alone brings no arithmetic for a board: the package that does is named."""
+    (tmp_path / "clang").symlink_to(require("clang", "clang"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BuildError, match="gcc-arm-none-eabi"):
+        clang_builder(boards.load("crazyflie"), "-O2")
+
+
+@pytest.mark.parametrize("name", ["mambo", "mambo-float64", "table1"])
+def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
+    """The C as it lies in generated/, over all steps of its digest; the reference has written that."""
+    settings = read(GENERATED / name / "controller.toml")
+    files = {
+        path.relative_to(GENERATED / name).as_posix(): path.read_text("utf-8")
+        for path in (GENERATED / name).rglob("*.[ch]")
+    }
+    stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
+    assert stated
+    extension = load_extension(files, settings.code.scalar, toolchain(host_toolchain().command[0]))
+    assert compiled_digest(extension, episodes(settings)) == int(stated[1], 16)

@@ -1,0 +1,202 @@
+"""Sweeps: every point of the grid in order, a table that reads back, and the largest that fits."""
+
+import csv
+import json
+import math
+import shutil
+from dataclasses import astuple, replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from mambo_nmpc.codegen import boards, cli
+from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.cli import boards as cli_boards
+from mambo_nmpc.sil.footprint.plots import draw_sweep
+from mambo_nmpc.sil.footprint.sweep import Grid, Point, largest_fit, sweep, write_points
+from tests.support.tools import board_builder, require
+
+POINT = Point(
+    prediction=10,
+    control=2,
+    iterations=5,
+    flash_bytes=2656,
+    ram_bytes=188,
+    stack_bytes=132,
+    instructions=4045,
+    time_ms=0.0407,
+    iae_m_s=1.91,
+    fits=True,
+)
+UNMEASURED = replace(POINT, stack_bytes=math.nan, instructions=math.nan, time_ms=math.nan)
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(*arguments: str, code: int = 0) -> tuple[str, str]:
+    """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
+    app = cli.root()
+    cli_boards.register(app)
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == code, (result.output, result.exception)
+    return result.stdout, result.stderr
+
+
+def require_compiler(name: str) -> None:
+    """Skip without a compiler for a board."""
+    compiler = boards.load(name).compiler
+    if not any(shutil.which(candidate) for candidate in compiler.candidates):
+        require(compiler.candidates[0], compiler.packages[0])
+
+
+def point(prediction: int, control: int, iae_m_s: float, *, fits: bool = True) -> Point:
+    """Return a point of a grid."""
+    return replace(POINT, prediction=prediction, control=control, iae_m_s=iae_m_s, fits=fits)
+
+
+def test_a_grid_has_every_combination_that_is_a_controller() -> None:
+    """In the order of its axes, without moves beyond the prediction."""
+    grid = Grid(prediction=(1, 3), control=(1, 2), iterations=(5, 3))
+    assert grid.points() == [(1, 1, 5), (1, 1, 3), (3, 1, 5), (3, 1, 3), (3, 2, 5), (3, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("points", "best"),
+    [
+        ([point(5, 1, 9.0), point(10, 1, 9.0), point(20, 1, 1.0, fits=False)], 1),
+        ([point(10, 1, 1.0), point(10, 3, 9.0), point(10, 2, 2.0)], 1),
+        ([point(10, 2, 3.0), point(10, 2, 2.0), point(10, 2, 4.0)], 1),
+        ([point(10, 1, 1.0), point(9, 9, 0.1), point(10, 2, 9.0)], 2),
+        ([point(10, 2, math.nan), point(10, 2, 50.0)], 1),
+        ([point(10, 2, 50.0), point(20, 2, math.nan)], 0),
+    ],
+    ids=[
+        "longest that fits",
+        "then most moves",
+        "then best tracking",
+        "in this order",
+        "lost",
+        "lost, but longer",
+    ],
+)
+def test_the_largest_fit_follows_its_rule(points: list[Point], best: int) -> None:
+    """Longest prediction within budget, then most moves, then best tracking; a lost flight is none."""
+    assert largest_fit(points) is points[best]
+
+
+def test_nothing_fits() -> None:
+    """No point, none within budget, or none that flies."""
+    assert largest_fit([]) is None
+    assert largest_fit([point(5, 1, math.nan)]) is None
+    assert largest_fit([point(5, 1, 1.0, fits=False), point(6, 1, 1.0, fits=False)]) is None
+
+
+def test_points_read_back(tmp_path: Path) -> None:
+    """A line a point, every digit of it, what was not measured as nan."""
+    points = [POINT, replace(UNMEASURED, iae_m_s=0.1 + 0.2, fits=False)]
+    write_points(points, tmp_path / "sweep.csv")
+    with (tmp_path / "sweep.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == list(Point.__dataclass_fields__)
+    for row, one in zip(rows, points, strict=True):
+        read = [text == "True" if text in {"True", "False"} else float(text) for text in row.values()]
+        assert all(
+            a == b or (math.isnan(a) and math.isnan(b)) for a, b in zip(read, astuple(one), strict=True)
+        )
+
+
+@pytest.mark.parametrize("points", [[POINT], [UNMEASURED], [POINT, point(20, 2, 1.0, fits=False)]])
+def test_any_points_can_be_drawn(points: list[Point], tmp_path: Path) -> None:
+    """A single one, one of a board without an emulated core, one over budget."""
+    draw_sweep(points, boards.load("crazyflie"), 0.01, tmp_path / "sweep")
+    assert (tmp_path / "sweep.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (tmp_path / "sweep.svg").read_text("utf-8")
+
+
+def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
+    """Dollar signs in the title of a board's file are drawn as they are."""
+    odd = boards.load("crazyflie").model_copy(update={"title": r"$\frac{$ <b>"})
+    draw_sweep([POINT], odd, 0.01, tmp_path / "sweep")
+    assert r"$\frac{$ &lt;b&gt;" in (tmp_path / "sweep.svg").read_text("utf-8")
+
+
+def test_the_command_writes_table_and_pictures_and_answers_with_the_largest(tmp_path: Path) -> None:
+    """A small controller on the Crazyflie, where it fits."""
+    require_compiler("crazyflie")
+    grid = ["--prediction", "2", "--control", "1", "--iterations", "1"]
+    said, _ = run("sweep", *grid, "--fit", "-o", "out")
+    assert said.startswith("prediction  2  control  1  iterations   1  ")
+    assert len(said.splitlines()) == 1
+    out = tmp_path / "out"
+    assert {path.name for path in out.iterdir()} == {"sweep.csv", "sweep.png", "sweep.svg", "summary.json"}
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    assert [one["prediction"] for one in summary["points"]] == [2]
+    assert summary["largest_fit"] == summary["points"][0]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--prediction", "x"], "--prediction x must be numbers in 1..50, as 5:30, 5:30:5 or 1,3,5"),
+        (["--prediction", "5:30:0"], "--prediction 5:30:0 must be numbers in 1..50"),
+        (["--prediction", "0:3"], "--prediction 0:3 must be numbers in 1..50"),
+        (["--prediction", "30:5"], "--prediction 30:5 must be numbers in 1..50"),
+        (["--prediction", f"1:{10**12}"], "--prediction 1:1000000000000 must be numbers in 1..50"),
+        (["--control", "51"], "--control 51 must be numbers in 1..50"),
+        (["--iterations", "3,101"], "--iterations 3,101 must be numbers in 1..100"),
+        (["--prediction", "2", "--control", "3"], "--control 3"),
+        (["--board", "all"], "all"),
+        (["--board", "teensy"], "did you mean teensy41?"),
+    ],
+)
+def test_a_bad_grid_gets_a_message_and_exit_2(options: list[str], message: str, tmp_path: Path) -> None:
+    """One line, no traceback, nothing written."""
+    said = run("sweep", *options, code=2)[1]
+    assert said.count("\n") == 1
+    assert message in said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.long
+def test_a_sweep_yields_the_points_in_order() -> None:
+    """Two by two: more of anything takes more flash and instructions, more moves more RAM too."""
+    require_compiler("crazyflie")
+    grid = Grid(prediction=(5, 8), control=(1, 2), iterations=(3,))
+    points = list(sweep(presets.load("mambo"), boards.load("crazyflie"), grid))
+    assert [(p.prediction, p.control, p.iterations) for p in points] == grid.points()
+    assert all(p.fits and math.isfinite(p.iae_m_s) for p in points)
+    for less, more in ((0, 1), (0, 2), (1, 3), (2, 3)):
+        assert points[less].flash_bytes < points[more].flash_bytes
+        assert points[less].ram_bytes <= points[more].ram_bytes
+        assert points[less].instructions < points[more].instructions
+    assert points[2].iae_m_s < points[0].iae_m_s
+
+
+@pytest.mark.long
+def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
+    """More tables than the emulated AVR has RAM: no time, and no fit, though the board be generous."""
+    board_builder("mega")
+    document = boards.load("mega").model_dump()
+    document["ram_bytes"]["value"] = 65_536
+    document["budget"] |= {"flash_bytes": 131_072, "ram_bytes": 32_768}
+    grid = Grid(prediction=(50,), control=(50,), iterations=(1,))
+    (found,) = sweep(presets.load("mambo"), Board.model_validate(document), grid)
+    assert found.ram_bytes <= 32_768
+    assert found.stack_bytes > 0
+    assert math.isnan(found.time_ms)
+    assert not found.fits
+
+
+@pytest.mark.long
+def test_a_small_controller_fits_the_mega() -> None:
+    """Five steps, one move, three iterations: half of the period is enough for them."""
+    board_builder("mega")
+    grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
+    (found,) = sweep(presets.load("mambo"), boards.load("mega"), grid)
+    assert found.time_ms < 5
+    assert found.fits

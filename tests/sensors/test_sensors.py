@@ -1,0 +1,288 @@
+"""Sensors and estimators: what each instrument says, what each gate passes, how well truth is followed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.signal
+
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.flight.loop import Flight, Start, fly
+from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
+from mambo_nmpc.sil.sensors import estimators, instruments
+from mambo_nmpc.sil.sensors.estimators import Altitude, Attitude, Velocity
+from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Instruments, Readings, Sensors
+from mambo_nmpc.sil.sensors.suite import Suite
+
+QUIET = Sensors(noise_scale=0.0)
+
+
+def hovering(n: int = 1, z_m: float = -1.1) -> Seen:
+    """Return n drones at rest."""
+    rest = np.zeros((3, n))
+    position_m = rest.copy()
+    position_m[2] = z_m
+    return Seen(position_m, rest.copy(), rest.copy(), rest.copy())
+
+
+def said(z_m: float = -1.1, flow_m_s: float = 0.0, rate_rad_s: float = 0.0) -> Readings:
+    """Return what the instruments of one level drone say."""
+    imu = np.zeros((6, 1))
+    imu[2], imu[3] = -GRAVITY_M_S2, rate_rad_s
+    return Readings(imu, np.array([-z_m]), np.array([12.01725 * z_m]), np.full((2, 1), flow_m_s))
+
+
+def eight(sensors: Sensors, duration_s: float = 6.0, start: Start = Start.HOVER) -> Trace:
+    """Fly the Table II case with the PD."""
+    return fly(Flight(Bernoulli(2.0, 0.5), duration_s, start=start, sensors=sensors), PdController())
+
+
+def errors(trace: Trace) -> dict[str, FloatArray]:
+    """Return how far the estimates stray, by axis."""
+    assert isinstance(trace, SensedTrace)
+    return {
+        "position": np.abs(trace.seen_position_m - trace.position_m).max(axis=(0, 1)),
+        "velocity": np.abs(trace.seen_velocity_m_s - trace.velocity_m_s).max(axis=(0, 1)),
+        "euler": np.abs(trace.seen_euler_rad - trace.euler_rad).max(axis=(0, 1)),
+    }
+
+
+def test_noise_free_estimates_follow_the_truth() -> None:
+    """The figure of eight: tilt within 0.01 rad, height within 2 mm, position 0.15 m, velocity 0.2 m/s."""
+    found = errors(eight(replace(QUIET, derotated=True)))
+    assert (found["euler"] < [0.01, 0.01, 0.001]).all(), found
+    assert (found["position"] < [0.15, 0.15, 0.002]).all(), found
+    assert (found["velocity"] < [0.2, 0.2, 0.01]).all(), found
+
+
+def test_rotation_left_in_the_flow_falsifies_the_velocity() -> None:
+    """Without derotation the velocity errs by up to twice as much, sideways as well as ahead."""
+    without, with_it = (errors(eight(replace(QUIET, derotated=yes)))["velocity"][:2] for yes in (False, True))
+    assert (without > 1.4 * with_it).all()
+
+
+def test_a_hovering_noise_free_drone_is_seen_exactly() -> None:
+    """Nothing moves, so nothing may creep: ten seconds within 1e-9."""
+    true = hovering(2)
+    suite = Suite(QUIET, (0, 1), true)
+    for _ in range(2000):
+        seen = suite.look(true)
+    for name in ("position_m", "velocity_m_s", "euler_rad", "rates_rad_s"):
+        np.testing.assert_allclose(getattr(seen, name), getattr(true, name), atol=1e-9)
+
+
+def test_take_off_is_seen_from_the_ground() -> None:
+    """The accelerometer carries the height through 4 m/s, noise-free within 0.15 m, and in the end 3 cm."""
+    trace = eight(QUIET, 1.0, start=Start.TAKE_OFF)
+    assert errors(trace)["position"][2] < 0.15
+    assert isinstance(trace, SensedTrace)
+    assert abs(trace.position_m[-1, 0, 2] + 1.1) < 0.03
+
+
+def noise(scale: float = 1.0) -> FloatArray:
+    """Return readings (k, 8) of the hovering drone less what it would read without noise."""
+    true = hovering()
+    noisy, quiet = (Instruments(Sensors(noise_scale=s), (5,), true) for s in (scale, 0.0))
+    rows = []
+    for _ in range(6000):
+        one, other = noisy.read(true), quiet.read(true)
+        rows.append([*(one.imu - other.imu)[:, 0], *(one.sonar_m - other.sonar_m)])
+        rows[-1] += list(one.pressure_pa - other.pressure_pa)
+    return np.array(rows[1:])
+
+
+def test_noise_has_the_variances_of_the_source() -> None:
+    """Each within 7 %, white, with zero mean, independent of each other, and scaled as asked."""
+    found = noise()
+    np.testing.assert_allclose(found.var(axis=0), NOISE_VARIANCES, rtol=0.07)
+    assert (np.abs(found.mean(axis=0)) < 4.0 * np.sqrt(np.array(NOISE_VARIANCES) / len(found))).all()
+    assert np.abs(np.corrcoef(np.hstack([found[1:], found[:-1]]).T) - np.eye(16)).max() < 0.06
+    np.testing.assert_allclose(noise(0.5), 0.5 * found, atol=1e-6)
+
+
+def test_bias_adds_to_the_imu() -> None:
+    """Of accelerometer and gyro, each axis its own."""
+    true = hovering()
+    biased = Instruments(Sensors(0.0, (0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), (0,), true)
+    np.testing.assert_allclose(
+        biased.read(true).imu[:, 0], [0.1, 0.2, 0.3 - GRAVITY_M_S2, 0.4, 0.5, 0.6], atol=1e-12
+    )
+
+
+def test_imu_responds_as_the_second_order_system_of_the_source() -> None:
+    """A step of the rates: what scipy finds for 190 rad/s and damping 0.707, from the tick after the mean."""
+    true = hovering()
+    imu = Instruments(QUIET, (0,), true)
+    turning = replace(true, rates_rad_s=np.full((3, 1), 2.0))
+    found = [float(imu.read(turning).imu[3, 0]) for _ in range(40)][1:]
+    times = STEP_S * np.arange(40)
+    w, d = instruments.IMU_RAD_S, instruments.IMU_DAMPING
+    fine = np.linspace(0.0, times[-1], 40 * 200 - 199)
+    pushed = np.where(fine <= STEP_S, 1.0, 2.0)  # the first tick has the mean of 0 and 2
+    _, expected, _ = scipy.signal.lsim(([w * w], [1.0, 2.0 * d * w, w * w]), pushed, fine)
+    np.testing.assert_allclose(found, expected[::200][1:40], atol=0.01)
+    assert max(found) > 2.05  # it overshoots
+
+
+def test_imu_stops_at_its_limits() -> None:
+    """50 m/s^2 and 10 rad/s, either way."""
+    true = hovering()
+    imu = Instruments(QUIET, (0,), true)
+    for sign in (1.0, -1.0):
+        hit = replace(true, velocity_m_s=np.full((3, 1), 99.0 * sign), rates_rad_s=np.full((3, 1), 40 * sign))
+        for _ in range(4):
+            imu.read(hit)
+        found = imu.read(true).imu[:, 0]
+        assert np.abs(found).max() <= 50.0
+        np.testing.assert_allclose(found[3:], 10.0 * sign)
+
+
+def test_sonar_reads_its_least_height_below_it() -> None:
+    """On the ground it says 0.44 m; at 1 m, 1 m. The pressure falls by 12.01725 Pa a metre."""
+    for z_m, height_m in ((0.0, 0.44), (-0.3, 0.44), (-1.0, 1.0)):
+        true = hovering(z_m=z_m)
+        readings = Instruments(QUIET, (0,), true).read(true)
+        assert readings.sonar_m[0] == pytest.approx(height_m)
+        assert readings.pressure_pa[0] == pytest.approx(12.01725 * z_m)
+
+
+def test_optical_flow_comes_at_60_hz_and_is_held_and_late() -> None:
+    """In 200 ticks 60 new values, three in ten, each a value that was true one tick before it is read."""
+    true = hovering()
+    eyes = Instruments(QUIET, (0,), true)
+    read = []
+    for tick in range(201):
+        moving = replace(true, velocity_m_s=np.array([[float(tick)], [0.0], [0.0]]))
+        read.append(float(eyes.read(moving).flow_m_s[0, 0]))
+    changes = np.flatnonzero(np.diff(read)) + 1
+    np.testing.assert_array_equal(np.array(read)[changes], changes - 1)
+    assert len(changes[changes > 1]) in (59, 60)
+    assert set(np.diff(changes)) == {3, 4}
+
+
+def test_turning_camera_adds_to_the_flow() -> None:
+    """Nose up at 1 m seems a flight ahead by 0.8 of the rate; rolling right, a flight to the left."""
+    true = replace(hovering(z_m=-1.0), rates_rad_s=np.array([[0.3], [0.5], [0.0]]))
+    flow = Instruments(QUIET, (0,), true).read(true).flow_m_s[:, 0]
+    np.testing.assert_allclose(flow, [0.4, -0.24])
+
+
+def test_kalman_gains_are_the_stationary_ones() -> None:
+    """What scipy's Riccati equation gives, and the velocity gain of the stock model, 0.1254656."""
+    a, c = np.array([[1.0, STEP_S], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    q, r = estimators.ALTITUDE_NOISE
+    p = scipy.linalg.solve_discrete_are(a.T, c.T, np.diag([0.0, q]), np.array([[r]]))
+    np.testing.assert_allclose(estimators.altitude_gains(), p[:, 0] / (p[0, 0] + r), rtol=1e-6)
+    assert estimators.velocity_gain() == pytest.approx(0.1254656, abs=5e-8)
+
+
+def test_low_pass_filters_are_those_of_the_source() -> None:
+    """Firwin of order 5 at 0.1, and a Butterworth of order 3 at 0.01, as scipy designs and runs them."""
+    np.testing.assert_allclose(estimators.ACCELEROMETER_TAPS, scipy.signal.firwin(6, 0.1), atol=1e-5)
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=500)
+    b, a = scipy.signal.butter(3, 0.01)
+    expected, _ = scipy.signal.lfilter(b, a, values, zi=scipy.signal.lfilter_zi(b, a) * values[0])
+    slow = estimators._Slow(np.array([values[0]]))
+    found = [float(slow.update(np.array([value]))[0]) for value in values]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize(("excess", "corrects"), [(0.0015, True), (-0.0015, True), (0.0025, False)])
+def test_accelerometer_has_a_say_on_the_tilt_only_near_g(excess: float, corrects: bool) -> None:
+    """Within 0.2 % of g a wrong roll fades by a thousandth a tick; beyond, it stays."""
+    attitude = Attitude(np.array([[0.1], [0.1], [0.0]]))
+    imu = np.zeros((6, 1))
+    imu[2] = -(1.0 + excess) * GRAVITY_M_S2
+    for _ in range(100):
+        attitude.update(imu)
+    kept = 0.999**100 if corrects else 1.0
+    np.testing.assert_allclose(attitude.euler_rad[:2, 0], 0.1 * kept, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("sonar_m", "pressure_m", "counts"),
+    [(1.35, 1.1, True), (1.45, 1.1, False), (0.44, 1.1, False), (1.35, 3.0, True)],
+)
+def test_sonar_counts_near_the_estimate_and_within_its_range(
+    sonar_m: float,
+    pressure_m: float,
+    counts: bool,
+) -> None:
+    """Beyond 0.3 m off, or at its least height, it is not heard; a sudden pressure alone does not gag it."""
+    altitude = Altitude(np.array([-1.1]), np.zeros(1))
+    readings = replace(said(), sonar_m=np.array([sonar_m]), pressure_pa=np.array([-12.01725 * pressure_m]))
+    altitude.update(readings, np.zeros(1))
+    assert (altitude.z_m[0] != -1.1) == counts
+
+
+def test_sonar_is_silenced_when_its_past_and_the_pressure_speak_against_the_estimate() -> None:
+    """The estimate stands 0.9 m from both slow courses; a sonar near it is an echo of something else."""
+    altitude = Altitude(np.array([-2.0]), np.zeros(1))
+    altitude.z_m = np.array([-1.1])
+    altitude._predicted = altitude.z_m, np.zeros(1)
+    altitude.update(said(z_m=-1.0), np.zeros(1))
+    assert altitude.z_m[0] == -1.1
+
+
+@pytest.mark.parametrize(
+    ("flow_m_s", "tilt_rad", "rate_rad_s", "z_m", "counts"),
+    [
+        (0.5, 0.0, 0.0, -1.1, True),
+        (0.5, 0.61, 0.6, -1.1, False),
+        (0.5, 0.61, 0.4, -1.1, True),
+        (0.5, 0.0, 6.9, -1.1, True),
+        (0.5, 0.0, 7.1, -1.1, False),
+        (5.1, 0.0, 0.0, -1.1, False),
+        (0.5, 0.0, 0.0, -0.39, False),
+    ],
+)
+def test_optical_flow_passes_its_gates(
+    flow_m_s: float,
+    tilt_rad: float,
+    rate_rad_s: float,
+    z_m: float,
+    counts: bool,
+) -> None:
+    """Tilt 0.6 rad and rate 7 rad/s, or rate 0.5 rad/s; jump 5 m/s; height 0.4 m."""
+    velocity = Velocity(np.zeros((2, 1)), derotated=False)
+    tilt = np.array([[tilt_rad], [0.0]])
+    velocity.update(said(flow_m_s=flow_m_s, rate_rad_s=rate_rad_s), tilt, np.array([z_m]), np.zeros((2, 1)))
+    expected = estimators.velocity_gain() * flow_m_s if counts else 0.0
+    np.testing.assert_allclose(velocity.velocity_m_s, expected)
+
+
+def test_yaw_drifts_as_a_random_walk_and_position_with_it() -> None:
+    """Yaw integrates the gyro's noise; x that of the velocity, which the accelerometer leaves behind.
+
+    Later the tilt, which walks as the yaw does, has x stray faster.
+    """
+    flights, ticks = 400, 800
+    true = hovering(flights)
+    suite = Suite(Sensors(), tuple(range(flights)), true)
+    yaw, x = np.empty((ticks, flights)), np.empty((ticks, flights))
+    for tick in range(ticks):
+        seen = suite.look(true)
+        yaw[tick], x[tick] = seen.euler_rad[2], seen.position_m[0]
+    for tick in (199, 399, 799):
+        assert yaw[tick].var() == pytest.approx(0.002 * STEP_S * STEP_S * (tick + 1), rel=0.25)
+    gain = estimators.velocity_gain()
+    left = (1.0 - gain) / gain * estimators.ACCELERATION_GAIN * STEP_S * STEP_S
+    for tick in (99, 199):
+        assert x[tick].var() == pytest.approx(0.3 * left * left * (tick + 1), rel=0.25)
+    assert x[799].var() > 4.0 * x[199].var()
+
+
+def test_seen_flight_can_be_measured_like_the_true_one() -> None:
+    """The same times and targets, with the estimates in the place of the truth."""
+    trace = eight(Sensors(), 1.0)
+    assert isinstance(trace, SensedTrace)
+    seen = trace.as_seen()
+    np.testing.assert_array_equal(seen.position_m, trace.seen_position_m)
+    np.testing.assert_array_equal(seen.target, trace.target)
+    assert not trace.same_bits(seen)

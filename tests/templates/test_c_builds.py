@@ -1,0 +1,259 @@
+"""The generated C as firmware people build it: dialects, warnings, symbols, two controllers in one image."""
+
+import contextlib
+import os
+import re
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.digest import frozen_digest
+from mambo_nmpc.codegen.errors import InvalidSettingsError
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.verify.dialects import DIALECTS
+from tests.support.cases import SCALARS, settings_case
+from tests.support.tools import require
+
+STRICT = [*WARNING_FLAGS, "-Werror"]
+GCC_STRICT = [*STRICT, "-Wunsuffixed-float-constants"]
+SETTINGS = {name: presets.load(name) for name in presets.names()} | {
+    f"case {index}": settings_case(index, "float32") for index in (0, 3, 9)
+}
+SETTINGS |= {f"fixed case {index}": settings_case(index, "fixed") for index in (0, 3, 9)} | {
+    "fixed mambo": with_option(SETTINGS["mambo"], "code.scalar", "fixed", "test")
+}
+SYSTEM_HEADERS = """
+    assert complex ctype dirent dlfcn errno fcntl fenv float fmtmsg glob iconv inttypes limits locale
+    math mqueue netinet/in poll pthread regex sched semaphore setjmp signal spawn stdarg stdatomic
+    stdbool stddef stdint stdio stdlib string strings sys/mman sys/resource sys/select sys/shm
+    sys/socket sys/stat sys/time sys/types sys/wait termios threads time uchar unistd wchar wctype
+    wordexp
+"""
+COMPILER_HELPERS = {"memcpy", "memset"}
+
+
+def placed(settings: Settings, folder: Path, *, amalgamate: bool = False) -> Path:
+    """Write the bundle of `settings` below `folder`, without ceremony."""
+    for path, text in render(settings, amalgamate=amalgamate).items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text)
+    return folder
+
+
+def renamed(settings: Settings, prefix: str) -> Settings:
+    """Return `settings` with another prefix."""
+    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": prefix})})
+
+
+def shell(*command: str | Path, folder: Path) -> str:
+    """Run a command that must succeed without a word on stderr; returns what it printed."""
+    done = subprocess.run(
+        [str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return done.stdout
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+@pytest.mark.parametrize("name", SETTINGS)
+def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
+    """All warnings on and fatal, library, self-test, example and proof."""
+    chosen = DIALECTS[dialect]
+    require(chosen.compiler, chosen.package)
+    placed(SETTINGS[name], tmp_path)
+    sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
+    shell(*chosen.command(SETTINGS[name]), "-Iinclude", "-c", *sources, folder=tmp_path)
+
+
+@pytest.mark.parametrize("amalgamate", [False, True])
+def test_float64_builds_without_a_word(tmp_path: Path, *, amalgamate: bool) -> None:
+    """The same for double, less the one warning of gcc that asks for a suffix C has not got."""
+    require("gcc", "gcc")
+    wide = Settings.model_validate(presets.load("mambo").model_dump() | {"code": {"scalar": "float64"}})
+    placed(wide, tmp_path, amalgamate=amalgamate)
+    sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
+    shell("gcc", "-std=c99", *STRICT, "-O2", "-Iinclude", "-I.", "-c", *sources, folder=tmp_path)
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_the_objects_need_nothing_from_outside(name: str, tmp_path: Path) -> None:
+    """Every undefined symbol is defined by another object of the bundle, or is a helper of the compiler."""
+    require("nm", "binutils")
+    placed(SETTINGS[name], tmp_path)
+    shell("gcc", "-std=c99", "-O2", "-Iinclude", "-c", *sorted(tmp_path.glob("src/*.c")), folder=tmp_path)
+    objects = sorted(tmp_path.glob("*.o"))
+    undefined = set(re.findall(r" U (\w+)", shell("nm", *objects, folder=tmp_path)))
+    defined = set(re.findall(r" [TRD] (\w+)", shell("nm", *objects, folder=tmp_path)))
+    assert undefined - defined <= COMPILER_HELPERS
+    assert all(symbol.startswith("nmpc_") for symbol in defined)
+    assert not re.findall(r" [bBdDC] \w+", shell("nm", *objects, folder=tmp_path)), "writable static memory"
+
+
+def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
+    """Two controllers of different settings link into one program, and both pass their self-test."""
+    require("gcc", "gcc")
+    for prefix, preset in (("left", "mambo"), ("right_wing", "table1")):
+        placed(renamed(presets.load(preset), prefix), tmp_path / prefix)
+    (tmp_path / "main.c").write_text(
+        '#include "left_self_test.h"\n#include "right_wing_self_test.h"\n'
+        "static left_t one;\nstatic right_wing_t two;\n"
+        "int main(void)\n{\n    return left_self_test(&one) + right_wing_self_test(&two);\n}\n"
+    )
+    includes = ["-Ileft/include", "-Iright_wing/include"]
+    sources = sorted(tmp_path.glob("*/src/*.c"))
+    shell(
+        "gcc",
+        "-std=c99",
+        *GCC_STRICT,
+        "-O2",
+        "-ffp-contract=off",
+        *includes,
+        *sources,
+        "main.c",
+        "-o",
+        "image",
+        folder=tmp_path,
+    )
+    shell("./image", folder=tmp_path)
+
+
+def test_no_prefix_that_is_admitted_takes_a_name_of_the_system(tmp_path: Path) -> None:
+    """pid_t, sem_init or R_OK would be declared twice wherever the system's headers are included too."""
+    require("gcc", "gcc")
+    headers = "".join(
+        f"#if __has_include(<{name}.h>)\n#include <{name}.h>\n#endif\n" for name in SYSTEM_HEADERS.split()
+    )
+    (tmp_path / "all.c").write_text(headers)
+    taken = set()
+    for mode in ("-P", "-dM"):
+        taken |= set(re.findall(r"\b[A-Za-z]\w*", shell("gcc", "-E", mode, "all.c", folder=tmp_path)))
+    library = "\n".join(text for path, text in render(Settings()).items() if path.endswith((".c", ".h")))
+    ours = set(re.findall(r"\b(?:nmpc|NMPC)(?:_(?!sign)\w+)", library))  # lconv has a member negative_sign
+    assert {"nmpc_t", "nmpc_init", "NMPC_OK"} <= ours
+    endings = {name[len("nmpc") :] for name in ours}
+    prefixes = {
+        name.removesuffix(ending).lower() for name in taken for ending in endings if name.endswith(ending)
+    }
+    admitted = []
+    for prefix in sorted(prefixes):
+        with contextlib.suppress(InvalidSettingsError):
+            with_option(Settings(), "code.prefix", prefix, "")
+            admitted.append(prefix)
+    assert admitted == []
+
+
+@pytest.mark.parametrize("amalgamate", [False, True])
+def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: bool) -> None:
+    """`make run`: the self-test passes and the point mass closes in on its target."""
+    require("make", "make")
+    placed(renamed(presets.load("mambo"), "drone"), tmp_path, amalgamate=amalgamate)
+    printed = shell("make", "-s", "run", folder=tmp_path)
+    assert "self-test: all steps equal the reference" in printed
+    digest = frozen_digest(presets.load("mambo"), 1000)
+    assert f"digest: 0x{digest:08X} after 100000 steps\n" in printed
+    last = [float(word) for word in printed.splitlines()[-1].split()]
+    assert abs(last[1] - last[3]) < 0.05
+    assert abs(last[2] - 1.0) < 0.05
+    shell("make", "-s", "clean", folder=tmp_path)
+    assert not (tmp_path / "build").exists()
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: str, tmp_path: Path) -> None:
+    """They lack operations that gcc and clang have, and loops written out."""
+    require("gcc", "gcc")
+    settings = with_option(presets.load("mambo"), "code.scalar", scalar, "test")
+    sources = sorted(placed(settings, tmp_path).glob("src/*.c"))
+    gcc = ("gcc", *COMPILE_FLAGS, "-Iinclude")
+    shell(*gcc, "-U__GNUC__", "-c", *sources, folder=tmp_path)
+    objects = sorted(tmp_path.glob("*.o"))
+    assert len(objects) == len(sources)
+    shell(*gcc, "example/main.c", *objects, "-o", "main", folder=tmp_path)
+    printed = shell(tmp_path / "main", folder=tmp_path)
+    assert f"digest: 0x{frozen_digest(settings, 1000):08X} after 100000 steps\n" in printed
+
+
+def test_another_digest_than_the_reference_s_fails_the_example(tmp_path: Path) -> None:
+    """Both digests are said, and the example goes no further."""
+    require("make", "make")
+    header = placed(presets.load("mambo"), tmp_path) / "include" / "nmpc_self_test.h"
+    text = header.read_text()
+    stated = re.findall(r"#define NMPC_SELF_TEST_DIGEST 0x(\w{8})UL\n", text)
+    assert len(stated) == 1
+    header.write_text(text.replace(stated[0], "0BADC0DE"))
+    done = subprocess.run(["make", "-s", "run"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert done.stdout.splitlines()[2:] == [
+        f"digest: 0x{stated[0]} after 100000 steps",
+        "digest: the reference has 0x0BADC0DE",
+    ]
+
+
+def test_a_changed_header_is_built_anew(tmp_path: Path) -> None:
+    """New settings over a built bundle: the objects follow the header, and the self-test passes."""
+    require("make", "make")
+    longer = presets.load("mambo")
+    longer = longer.model_copy(update={"horizon": longer.horizon.model_copy(update={"prediction": 20})})
+    for settings in (presets.load("mambo"), longer):
+        for path, text in render(settings).items():
+            if not (tmp_path / path).is_file() or (tmp_path / path).read_text() != text:
+                (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+                (tmp_path / path).write_text(text)
+                os.utime(tmp_path / path, ns=(time.time_ns() + 10**9,) * 2)
+        done = subprocess.run(
+            ["make", "-s", "run"], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert "self-test: all steps equal the reference" in done.stdout, done.stderr
+
+
+@pytest.mark.parametrize(
+    "ranges", [{"thrust_acceleration_min_m_s2": 49.0}, {"position_m": 1.0, "velocity_m_s": 0.1}]
+)
+def test_the_example_runs_whatever_the_ranges(ranges: dict[str, float], tmp_path: Path) -> None:
+    """Narrow ranges refuse inputs, and the example says so: they do not fail it."""
+    require("make", "make")
+    placed(Settings.model_validate({"ranges": ranges}), tmp_path)
+    assert "all steps equal the reference" in shell("make", "-s", "run", folder=tmp_path)
+
+
+def test_the_bundle_builds_by_cmake(tmp_path: Path) -> None:
+    """CMakeLists.txt configures, builds and runs the same example."""
+    require("cmake", "cmake")
+    placed(presets.load("mambo"), tmp_path)
+    shell("cmake", "-S", ".", "-B", "out", folder=tmp_path)
+    shell("cmake", "--build", "out", folder=tmp_path)
+    assert "all steps equal" in shell("out/nmpc_example", folder=tmp_path)
+
+
+@pytest.mark.parametrize(
+    "flag", ["-ffast-math", "-Ofast", "-ffinite-math-only", "-funsafe-math-optimizations"]
+)
+def test_flags_that_change_the_arithmetic_are_refused(flag: str, tmp_path: Path) -> None:
+    """They would remove the NaN checks or reorder sums: the build stops and says which flag."""
+    require("gcc", "gcc")
+    placed(presets.load("mambo"), tmp_path)
+    command = ["gcc", flag, "-Iinclude", "-c", "src/nmpc.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert "build without -f" in done.stderr
+
+
+@pytest.mark.parametrize("name", presets.names())
+def test_the_self_test_notices_a_build_that_contracts(name: str, tmp_path: Path) -> None:
+    """Fused multiply-adds, where the processor has them, change bits that the vectors see."""
+    require("gcc", "gcc")
+    if " fma " not in Path("/proc/cpuinfo").read_text():
+        pytest.skip("this processor has no fused multiply-add")
+    placed(SETTINGS[name], tmp_path)
+    sources = sorted(tmp_path.glob("src/*.c"))
+    for contract, message in (("off", "equal the reference"), ("fast", "differs from the reference")):
+        flags = ["-O2", "-mfma", f"-ffp-contract={contract}", "-Iinclude"]
+        shell("gcc", *flags, *sources, "example/main.c", "-o", "example/run", folder=tmp_path)
+        done = subprocess.run(["example/run"], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert message in done.stdout

@@ -1,0 +1,211 @@
+"""What a caller of the generated C may rely on, whatever it passes in."""
+
+from functools import cache
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import event, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mambo_nmpc.codegen.literals import SCALARS
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.extension import load_extension
+from tests.support.parity import Controller
+from tests.support.tools import toolchain
+
+MAMBO = presets.load("mambo")
+HOVER_STATE, HOVER_TARGET, HOVER_THRUST = np.zeros(7), np.array([0.5, -0.4, 0.0, 0.0]), 9.81
+
+
+@cache
+def built(settings: Settings) -> ModuleType:
+    """Build the C of `settings`, once for all tests."""
+    return compiled(settings, toolchain("gcc"))
+
+
+def controller(kind: str, n: int = 1) -> Controller:
+    """Make a controller of preset mambo."""
+    if kind == "reference":
+        return ReferenceController(MAMBO, n)
+    return CompiledController(MAMBO, n, built(MAMBO))
+
+
+def after_one_step(kind: str) -> tuple[Controller, NDArray[Any]]:
+    """Make a controller that has given one good command, and that command."""
+    used = controller(kind)
+    step = used.step([HOVER_STATE], [HOVER_TARGET], [HOVER_THRUST])
+    assert step.status[0] == Status.OK
+    assert np.all(step.command_rad != 0)
+    return used, step.command_rad
+
+
+def bad_inputs() -> list[tuple[str, int, float, Status]]:
+    """List every input by itself, not finite or out of its range, and the status it earns."""
+    ranges = MAMBO.ranges
+    bounds = {
+        "state": [ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0],
+        "target": [ranges.position_m] * 2 + [ranges.velocity_m_s] * 2,
+    }
+    earned = {"state": Status.BAD_STATE, "target": Status.BAD_TARGET}
+    cases = [
+        (name, axis, value, earned[name])
+        for name, limits in bounds.items()
+        for axis, limit in enumerate(limits)
+        for value in (np.nan, np.inf, -np.inf, 1.001 * limit, -1.001 * limit)
+    ]
+    thrusts = (np.nan, np.inf, -np.inf, 0.0, -9.81, 0.5, 51.0, 1e30)
+    return cases + [("thrust", 0, value, Status.BAD_THRUST) for value in thrusts]
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_bad_input_repeats_the_last_good_command_and_does_no_harm(kind: str) -> None:
+    """A status for each bad value, the last good command, and the next good step as if nothing had been."""
+    for name, axis, value, status in bad_inputs():
+        used, last = after_one_step(kind)
+        undisturbed, _ = after_one_step(kind)
+        inputs = {
+            "state": HOVER_STATE.copy(),
+            "target": HOVER_TARGET.copy(),
+            "thrust": np.array([HOVER_THRUST]),
+        }
+        inputs[name][axis] = value
+        refused = used.step([inputs["state"]], [inputs["target"]], inputs["thrust"])
+        assert refused.status[0] == status, (name, axis, value)
+        assert refused.command_rad.tobytes() == last.tobytes()
+        good = [HOVER_STATE], [HOVER_TARGET], [HOVER_THRUST]
+        assert used.step(*good).command_rad.tobytes() == undisturbed.step(*good).command_rad.tobytes()
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_before_the_first_good_step_the_command_is_level(kind: str) -> None:
+    """A fresh controller answers bad input with zero angles."""
+    step = controller(kind).step([HOVER_STATE * np.nan], [HOVER_TARGET], [HOVER_THRUST])
+    assert step.status[0] == Status.BAD_STATE
+    assert np.array_equal(step.command_rad, [[0, 0]])
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_any_turn_of_yaw_is_flown(kind: str) -> None:
+    """At +/-1000 rad the command is that of the same heading within one turn."""
+    turns = 159
+    for heading in (0.3, -0.3):
+        states = np.tile(HOVER_STATE, (2, 1))
+        states[:, 6] = heading, heading + np.sign(heading) * turns * 2 * np.pi
+        step = controller(kind, 2).step(states, np.tile(HOVER_TARGET, (2, 1)), [HOVER_THRUST] * 2)
+        assert np.array_equal(step.status, [Status.OK] * 2)
+        assert np.allclose(step.command_rad[0], step.command_rad[1], atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_reset_starts_from_the_given_command_within_the_limit(kind: str) -> None:
+    """A takeover from another controller: the command is its, clamped; a bad one changes nothing."""
+    used, last = after_one_step(kind)
+    assert used.reset([[0.1, -0.9]])[0] == Status.OK
+    held = used.step([HOVER_STATE * np.nan], [HOVER_TARGET], [HOVER_THRUST])
+    assert np.allclose(held.command_rad, [[0.1, -MAMBO.limits.tilt_rad]])
+
+    used, last = after_one_step(kind)
+    for bad in ([np.nan, 0.0], [0.0, np.inf], [3.3, 0.0]):
+        assert used.reset([bad])[0] == Status.BAD_COMMAND
+        held = used.step([HOVER_STATE * np.nan], [HOVER_TARGET], [HOVER_THRUST])
+        assert held.command_rad.tobytes() == last.tobytes()
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_weights_change_the_cost_and_bad_ones_nothing(kind: str) -> None:
+    """Doubled weights double the cost of the same step; negative, NaN or huge ones are refused."""
+
+    def cost(weights: list[float] | None, status: Status) -> float:
+        used = controller(kind)
+        if weights is not None:
+            assert used.set_weights([weights])[0] == status
+        return float(used.step([HOVER_STATE], [HOVER_TARGET], [HOVER_THRUST]).cost[0])
+
+    initial = cost(None, Status.OK)
+    assert cost([4500.0, 2.0], Status.OK) == 2 * initial
+    assert cost([0.0, 0.0], Status.OK) == 0
+    assert cost([1e6, 1e6], Status.OK) > initial
+    for bad in ([-1.0, 1.0], [2250.0, np.nan], [2e6, 1.0]):
+        assert cost(bad, Status.BAD_WEIGHT) == initial
+
+
+def test_null_pointers_get_a_status_and_a_safe_command() -> None:
+    """Each argument null by itself: a status, and the last good command where there is room for one."""
+    extension = built(MAMBO)
+    ffi, lib = extension.ffi, extension.lib
+    self = ffi.new("nmpc_t *")
+    state, target = ffi.new("nmpc_state_t *"), ffi.new("nmpc_target_t *", {"position_m": [0.5, 0.5]})
+    command = ffi.new("nmpc_command_t *")
+    lib.nmpc_init(ffi.NULL)
+    lib.nmpc_init(self)
+    assert lib.nmpc_step(self, state, target, 9.81, command) == Status.OK
+    last = command.roll_rad, command.pitch_rad
+    for arguments in ((self, ffi.NULL, target), (self, state, ffi.NULL)):
+        command.roll_rad = command.pitch_rad = 9.0
+        assert lib.nmpc_step(*arguments, 9.81, command) == Status.NULL_POINTER
+        assert (command.roll_rad, command.pitch_rad) == last
+    command.roll_rad = command.pitch_rad = 9.0
+    assert lib.nmpc_step(ffi.NULL, state, target, 9.81, command) == Status.NULL_POINTER
+    assert (command.roll_rad, command.pitch_rad) == (0, 0)
+    assert lib.nmpc_step(self, state, target, 9.81, ffi.NULL) == Status.NULL_POINTER
+    assert lib.nmpc_reset(self, ffi.NULL) == Status.NULL_POINTER
+    assert lib.nmpc_reset(ffi.NULL, command) == Status.NULL_POINTER
+    assert lib.nmpc_set_weights(self, ffi.NULL) == Status.NULL_POINTER
+    assert lib.nmpc_set_weights(ffi.NULL, ffi.new("nmpc_weights_t *")) == Status.NULL_POINTER
+
+
+WIDTHS: dict[str, Literal[32, 64]] = {"float32": 32, "float64": 64}
+
+
+def any_number(limit: float, width: Literal[32, 64]) -> st.SearchStrategy[float]:
+    """Draw a number: within +/- limit mostly, at its very end, too small for a normal number, or any bits."""
+    within = st.floats(-limit, limit, width=width)
+    return st.one_of(
+        within, within, st.sampled_from([limit, -limit, 0.0, -0.0, 1e-40]), st.floats(width=width)
+    )
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@settings(max_examples=300, deadline=None)
+@given(data=st.data())
+def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: st.DataObject) -> None:
+    """Whatever the input, among good ones: a documented status and |command| <= tilt limit."""
+    chosen = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
+    used = CompiledController(chosen, 1, built(chosen))
+    width = WIDTHS[scalar]
+    position, speed = any_number(1000, width), any_number(100, width)
+    angle, yaw = any_number(3.25, width), any_number(1024, width)
+    states = st.tuples(position, position, speed, speed, angle, angle, yaw)
+    targets = st.tuples(position, position, speed, speed)
+    thrusts = st.one_of(st.floats(1, 50, width=width), st.floats(1, 50, width=width), st.floats(width=width))
+    assert used.step([HOVER_STATE], [HOVER_TARGET], [HOVER_THRUST]).status[0] == Status.OK
+    for _ in range(data.draw(st.integers(1, 5))):
+        step = used.step([data.draw(states)], [data.draw(targets)], [data.draw(thrusts)])
+        event(Status(int(step.status[0])).name)
+        assert np.all(np.abs(step.command_rad) <= SCALARS[scalar](chosen.limits.tilt_rad))
+
+
+def test_the_self_test_passes_and_names_the_first_difference() -> None:
+    """Zero for the unharmed code; with an expectation changed, its number."""
+    files = render(MAMBO, with_digest=False)
+    vectors = files["src/nmpc_self_test.c"]
+    third = vectors.split("NMPC_OK,\n")[2]
+    harmed = vectors.replace(third, third.replace("{ ", "{ 0.001f + ", 1))
+    for text, expected in ((vectors, 0), (harmed, 2)):
+        extension = load_extension(files | {"src/nmpc_self_test.c": text}, "float32", toolchain("gcc"))
+        scratch = extension.ffi.new("nmpc_t *")
+        assert extension.lib.nmpc_self_test(scratch) == expected
+
+
+def test_the_version_traces_a_binary_to_its_settings() -> None:
+    """The string in the binary names the generator and the digest of the settings."""
+    extension = built(MAMBO)
+    text = extension.ffi.string(extension.lib.nmpc_version()).decode()
+    assert text.startswith("mambo-nmpc ")
+    assert text.endswith(f"settings {MAMBO.digest[:16]}")

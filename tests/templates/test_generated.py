@@ -1,0 +1,39 @@
+"""The committed bundles are what their settings generate today."""
+
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen import bundle
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import read
+
+GENERATED = Path(__file__).parents[2] / "generated"
+BUNDLES = {
+    "mambo": ("mambo", "float32"),
+    "mambo-float64": ("mambo", "float64"),
+    "mambo-fixed": ("mambo", "fixed"),
+    "table1": ("table1", "float32"),
+}
+
+
+@pytest.mark.parametrize("name", BUNDLES)
+def test_committed_bundle_is_up_to_date(name: str) -> None:
+    """Byte for byte; `make generated` writes them anew."""
+    preset, scalar = BUNDLES[name]
+    loaded = presets.load(preset)
+    settings = loaded.model_copy(update={"code": loaded.code.model_copy(update={"scalar": scalar})})
+    assert bundle.check(render(settings), GENERATED / name) == ()
+
+
+def test_nothing_else_is_committed_as_generated() -> None:
+    """Every folder in generated/ is one that the test above checks."""
+    assert {path.name for path in GENERATED.iterdir()} == BUNDLES.keys()
+
+
+@pytest.mark.parametrize("name", BUNDLES)
+def test_a_bundle_regenerates_from_its_own_settings(name: str) -> None:
+    """The controller.toml in the bundle is all that it takes."""
+    settings = read(GENERATED / name / "controller.toml")
+    assert bundle.check(render(settings), GENERATED / name) == ()

@@ -1,0 +1,113 @@
+"""The whole space of settings: what the rules admit goes the whole way, the rest is refused in words."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import typer
+from hypothesis import Phase, given, seed, settings
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from mambo_nmpc.codegen import cli
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from tests.support.cases import SCALARS
+from tests.support.parity import differences, inputs_of_steps, run
+from tests.support.strategies import Broken, any_settings, broken_settings, settings_in
+from tests.support.strict_builds import built
+
+SHARDS = range(20)
+VALID_EACH, BROKEN_EACH = 28, 56
+"""More than 25 and 50: some are drawn twice, such as the simplest settings, with which every shard begins."""
+
+STEPS = 4
+USUAL_WORK = 10_000
+"""Predicted steps times moves times iterations up to which a hundred controllers step side by side."""
+
+
+@pytest.fixture(scope="module")
+def app() -> typer.Typer:
+    """Build the command with the sub-commands of codegen."""
+    app = cli.root()
+    cli.register(app)
+    return app
+
+
+def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> None:
+    """Generate, compile without a word, run the self-test, and compare some hundred steps bit for bit."""
+    with tempfile.TemporaryDirectory() as folder:
+        extension = built(drawn, Path(folder), compiler, amalgamate=amalgamate)
+    assert extension.lib.nmpc_self_test(extension.ffi.new("nmpc_t *")) == 0
+    work = drawn.horizon.prediction * drawn.horizon.control * drawn.optimizer.iterations
+    n = 100 if work <= USUAL_WORK else 25
+    inputs = inputs_of_steps(drawn, n, STEPS, work)
+    expected = run(ReferenceController(drawn, n), inputs, work)
+    found = run(CompiledController(drawn, n, extension), inputs, work)
+    assert differences(expected, found) == {}
+
+
+def is_refused_in_words(app: typer.Typer, broken: Broken, folder: Path) -> None:
+    """Demand exit code 2, nothing written, and one line that names file, key, value and rule."""
+    (folder / "own.toml").write_text(broken.text, "utf-8")
+    result = CliRunner().invoke(app, ["generate", str(folder / "own.toml"), "-o", str(folder / "out")])
+    assert (result.exit_code, result.stdout) == (2, ""), result.output
+    (line,) = result.stderr.splitlines()
+    assert line.isprintable()
+    name, _, fault = line.partition(": ")
+    assert name.endswith("own.toml")
+    assert fault.startswith(broken.key)
+    assert broken.value in fault
+    assert broken.rule in fault
+    assert [path.name for path in folder.iterdir()] == ["own.toml"]
+
+
+def over_valid_settings(drawn: st.SearchStrategy[Settings], examples: int) -> Callable[[], None]:
+    """Return the test of `examples` drawn settings, with each compiler and layout."""
+
+    @settings(max_examples=examples, phases=[Phase.generate])  # to shrink takes minutes of compiling
+    @given(drawn, st.sampled_from(["gcc", "clang"]), st.booleans())
+    def test(drawn: Settings, compiler: str, amalgamate: bool) -> None:
+        goes_the_whole_way(drawn, compiler, amalgamate=amalgamate)
+
+    return test
+
+
+def over_broken_settings(app: typer.Typer, examples: int, folder: Path) -> Callable[[], None]:
+    """Return the test of `examples` settings with one broken rule each."""
+
+    @settings(max_examples=examples)
+    @given(broken_settings())
+    def test(broken: Broken) -> None:
+        is_refused_in_words(app, broken, folder)
+
+    return test
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_a_few_settings_go_the_whole_way(scalar: str) -> None:
+    """Any valid settings: no warning, the self-test passes, and C and reference differ in no bit."""
+    over_valid_settings(settings_in(scalar), 2)()
+
+
+def test_some_broken_settings_are_refused_in_words(app: typer.Typer, tmp_path: Path) -> None:
+    """Any one broken rule: a line that names file, key, value and rule, exit code 2, nothing written."""
+    over_broken_settings(app, 40, tmp_path)()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shard", SHARDS)
+def test_five_hundred_settings_go_the_whole_way(shard: int) -> None:
+    """All shards together: 500 different settings, gcc and clang, amalgamated or not."""
+    seed(shard)(over_valid_settings(any_settings(), VALID_EACH))()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shard", SHARDS)
+def test_a_thousand_broken_settings_are_refused_in_words(
+    app: typer.Typer, tmp_path: Path, shard: int
+) -> None:
+    """All shards together: 1000 different ways to break one rule."""
+    seed(shard)(over_broken_settings(app, BROKEN_EACH, tmp_path))()

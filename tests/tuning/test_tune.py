@@ -1,0 +1,290 @@
+"""Tuning: what is searched, how it is judged, studies that stop and go on, the controller they make."""
+
+import csv
+import math
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.errors import INTERRUPTED, ForeignFilesError, InvalidSettingsError
+from mambo_nmpc.codegen.settings import controller_toml, presets
+from mambo_nmpc.sil.campaign.executors import Pool
+from mambo_nmpc.sil.campaign.store import claim
+from mambo_nmpc.sil.cli.tune import tune
+from mambo_nmpc.sil.errors import StudyError
+from mambo_nmpc.sil.tuning import file
+from mambo_nmpc.sil.tuning.front import IAE_ALLOWANCE, chosen, pareto_front
+from mambo_nmpc.sil.tuning.study import CRASH_ERROR_M, Judged, judge, judged, open_study, search
+from tests.support.tools import require_module
+
+TRIALS = 3
+TUNE = """
+flights = 1
+flight.duration_s = 1.0
+[search]
+cost.effort_weight = { log_uniform = [0.1, 1000.0] }
+optimizer.initial_step_rad = { uniform = [0.001, 0.02] }
+optimizer.iterations = { choice = [4, 5] }
+"""
+
+
+@pytest.fixture(scope="module", name="source")
+def _source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a study of short flights."""
+    require_module("optuna")
+    path = tmp_path_factory.mktemp("source") / "tune.toml"
+    path.write_text(TUNE)
+    return path
+
+
+@pytest.fixture(scope="module", name="whole")
+def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Search that study without interruption."""
+    folder = tmp_path_factory.mktemp("whole")
+    claim(folder, "study", {"command": "tune", **file.read(source).document()})
+    search_on_threads(source, folder)
+    tune(source, output=folder, trials=TRIALS)
+    return folder
+
+
+def search_on_threads(
+    source: Path,
+    folder: Path,
+    trials: int = TRIALS,
+    *,
+    storage: str | None = None,
+    progress: Callable[[int], None] = lambda _: None,
+) -> list[Judged]:
+    """Search on two threads of this process, and return the finished trials."""
+    tuning = file.read(source)
+    with open_study(tuning, folder, storage) as study, ThreadPoolExecutor(2) as threads:
+        search(tuning, study, folder, trials, pool=Pool(threads, 2, lambda _: None), progress=progress)
+        return judged(study)
+
+
+def found_in(folder: Path, source: Path, storage: str | None = None) -> list[Judged]:
+    """Return the finished trials of a study."""
+    with open_study(file.read(source), folder, storage) as study:
+        return judged(study)
+
+
+def command(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run mambo-nmpc."""
+    line = [sys.executable, "-c", "from mambo_nmpc.sil.__main__ import main; main()", *map(str, arguments)]
+    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
+
+
+def one(number: int, iae_m_s: float, variation_rad: float) -> Judged:
+    """Return a trial."""
+    return Judged(number, {"cost.effort_weight": 1.0}, iae_m_s, variation_rad, 0)
+
+
+def row(iae_m_s: float, variation_rad: float, crashed: int = 0) -> dict[str, float | str]:
+    """Return what became of a flight."""
+    return {
+        "tuned_iae_m_s": iae_m_s,
+        "tuned_command_variation_rad": variation_rad,
+        "tuned_crashed": crashed,
+    }
+
+
+def test_the_search_begins_at_the_base_and_stays_in_its_ranges(source: Path, whole: Path) -> None:
+    """The first trial is the base; what is not searched is as in the base in all."""
+    tuning = file.read(source)
+    found = found_in(whole, source)
+    assert [trial.number for trial in found] == list(range(TRIALS))
+    assert tuning.settings(found[0].values) == tuning.base == presets.preset("mambo")
+    for trial in found:
+        settings = tuning.settings(trial.values)
+        assert 0.1 <= settings.cost.effort_weight <= 1000.0
+        assert settings.optimizer.iterations in (4, 5)
+        assert settings.model == tuning.base.model
+    assert len({trial.values["cost.effort_weight"] for trial in found}) == TRIALS
+
+
+def test_a_study_grows_to_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Some trials now and the others later are the same as all at once."""
+    assert len(search_on_threads(source, tmp_path, 2)) == 2
+    assert search_on_threads(source, tmp_path) == found_in(whole, source)
+
+
+def test_an_interrupted_study_goes_on_to_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Trials that were proposed and not flown are flown by the next run."""
+
+    def stop(finished: int) -> None:
+        if finished == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        search_on_threads(source, tmp_path, progress=stop)
+    assert len(found_in(tmp_path, source)) == 1
+    assert search_on_threads(source, tmp_path) == found_in(whole, source)
+
+
+def test_folders_share_a_storage(source: Path, whole: Path, tmp_path: Path) -> None:
+    """A second folder with the same URL has the trials of the first, and leaves no file of its own."""
+    url = f"sqlite:///{whole / 'study.db'}"
+    assert search_on_threads(source, tmp_path, storage=url) == found_in(whole, source)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, whole: Path) -> None:
+    """The controller is the chosen point of the front, and its head says where it comes from."""
+    rows = list(csv.DictReader((whole / "front.csv").read_text().splitlines()))
+    picked = [line for line in rows if line["chosen"] == "1"]
+    assert len(picked) == 1
+    settings = controller_toml.read(whole / "controller.toml")
+    assert settings.cost.effort_weight == float(picked[0]["cost.effort_weight"])
+    found = found_in(whole, source)
+    assert settings == file.read(source).settings(chosen(pareto_front(found)).values)
+    head = " ".join((whole / "controller.toml").read_text().split("[horizon]")[0].replace("#", "").split())
+    assert f"trial {picked[0]['trial']} of {TRIALS} in study mambo-nmpc-" in head
+    assert "seed 1:" in head
+    assert (whole / "front.png").read_bytes().startswith(b"\x89PNG")
+    assert (whole / "front.svg").is_file()
+
+
+def test_a_finished_study_says_what_it_found_and_is_quiet(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Base and chosen point on stdout; without a terminal no progress; nothing is flown again."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    done = command("tune", source, "--trials", TRIALS, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["base", "chosen", "chosen"]
+    assert done.stderr.count("\n") == 1
+    assert (folder / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
+
+
+def test_another_study_and_work_of_others_are_refused(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Nothing is touched in a folder that is not this study's."""
+    other = tmp_path / "tune.toml"
+    other.write_text(source.read_text().replace("flights = 1", "flights = 2"))
+    with pytest.raises(ForeignFilesError, match="holds another study, with flights = 1 where 2"):
+        tune(other, output=whole, trials=1)
+    with pytest.raises(ForeignFilesError, match="not a study of ours"):
+        tune(other, output=tmp_path, trials=1)
+
+
+def test_missing_optuna_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever has not installed the extra is told how to."""
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(StudyError, match=r'pip install "mambo-nmpc\[tune\]"'):
+        tune(output=tmp_path, trials=1)
+
+
+@pytest.mark.parametrize("url", ["nonsense", "nosuch://host/db", "sqlite:////no/such/folder/a.db"])
+def test_a_storage_that_refuses_is_told(url: str, source: Path, tmp_path: Path) -> None:
+    """One line that names the option and shows what a URL looks like."""
+    with pytest.raises(StudyError, match=r"^--storage: the storage refuses .*postgresql://") as caught:
+        tune(source, output=tmp_path, trials=1, storage=url)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_database_that_is_none_is_told(source: Path, tmp_path: Path) -> None:
+    """A file of that name that is something else is no reason for a traceback."""
+    (tmp_path / "study.db").write_text("no database at all, but long enough to be looked at as one" * 100)
+    with (
+        pytest.raises(StudyError, match=r"study\.db: the storage refuses"),
+        open_study(file.read(source), tmp_path, None),
+    ):
+        pass
+
+
+def test_a_crashed_flight_counts_as_worst() -> None:
+    """However well it tracked before; and no flight counts as worse than that."""
+    crashed, means = judge([row(1.0, 0.01), row(0.5, 0.001, crashed=1), row(1e9, 9.0)], 20.0, 0.35)
+    assert crashed == 1
+    worst = (CRASH_ERROR_M * 20.0, 4 * 0.35)
+    assert means == pytest.approx(((1.0 + 2 * worst[0]) / 3, (0.01 + 2 * worst[1]) / 3))
+    crashed, means = judge([row(math.nan, math.nan, crashed=1)], 20.0, 0.35)
+    assert (crashed, means) == (1, worst)
+
+
+def test_the_front_has_what_no_other_beats_and_the_calmest_near_the_best_is_chosen() -> None:
+    """Sorted by IAE; equal trials count once; the allowance decides."""
+    best, calm, calmest = one(3, 1.0, 0.5), one(1, IAE_ALLOWANCE, 0.2), one(0, 1.2, 0.1)
+    front = pareto_front([calmest, calm, one(2, 1.1, 0.3), best, one(4, 1.0, 0.5), one(5, 1.05, 0.6)])
+    assert front == [best, calm, calmest]
+    assert chosen(front) == calm
+    assert chosen(front[:1]) == best
+
+
+FAULTS = {
+    "fligths = 1": "fligths is not a key of this file; did you mean flights?",
+    "flights = 0": "flights = 0 must lie in 1..1000",
+    'base = "mamba"': "base: mamba is neither a preset nor a file",
+    "draws.mass_kg = -1": "draws.mass_kg = -1 must lie in 0.01..1",
+    "search.cost.effort = 1": "search.cost.effort = 1 must name a number of a controller.toml",
+    "search.code.prefix = 1": "search.code.prefix = 1 must name a number",
+    "search.horizon.update_period_s = 0.01": "update_period_s = 0.01 must name a number",
+    "search.cost.effort_weight = 3.0": "search.cost.effort_weight = 3.0 must be a range",
+    "search.cost.effort_weight = { uniform = [2, 3] }": "must include the base's 1: the search begins there",
+    "search.horizon.control = { uniform = [1, 3] }": "must be a whole number or { choice",
+    "search.horizon.control = { choice = [2, 60] }": "must lie in 1..50",
+    "search.horizon.control = { choice = [2, 20] }": "ends of its ranges do not go together",
+    "search = {}": "search must have 1 to 10 keys",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), FAULTS.items())
+def test_a_fault_names_file_key_value_and_rule(text: str, message: str, tmp_path: Path) -> None:
+    """What is wrong in a tune.toml is said before anything is flown."""
+    path = tmp_path / "tune.toml"
+    path.write_text(text)
+    with pytest.raises(InvalidSettingsError) as caught:
+        file.read(path)
+    assert str(caught.value).startswith("/")
+    assert message in str(caught.value)
+    assert "tune.toml: " in str(caught.value)
+
+
+def test_no_trial_of_the_default_study_costs_more_than_its_base() -> None:
+    """Horizons and iterations end at those of preset mambo."""
+    tuning = file.default()
+    for path in ("horizon.prediction", "horizon.control", "optimizer.iterations"):
+        assert max(tuning.search[path].numbers) == tuning.start[path]
+
+
+def test_the_documented_study_is_the_default_one(tmp_path: Path) -> None:
+    """What docs/tuning.md prints is what is searched without a file."""
+    text = (Path(__file__).parents[2] / "docs" / "tuning.md").read_text("utf-8")
+    path = tmp_path / "tune.toml"
+    path.write_text(text.split("```toml\n")[1].split("```")[0])
+    assert file.read(path) == file.default()
+
+
+STOPPED = """
+import os, signal
+from optuna import Study
+from mambo_nmpc.sil.__main__ import main
+tell = Study.tell
+def tell_and_stop(self, *arguments, **options):
+    tell(self, *arguments, **options)
+    os.killpg(0, signal.SIGINT)
+Study.tell = tell_and_stop
+main()
+"""
+
+
+@pytest.mark.long
+def test_ctrl_c_leaves_a_study_that_goes_on(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Exit 130 and one line, though the terminal interrupts the workers too."""
+    arguments = ("tune", source, "--trials", TRIALS, "--workers", 2, "-o", tmp_path)
+    line = [sys.executable, "-c", STOPPED, *map(str, arguments)]
+    done = subprocess.run(
+        line, capture_output=True, text=True, check=False, timeout=120, start_new_session=True
+    )
+    assert done.returncode == INTERRUPTED
+    assert done.stdout == ""
+    assert done.stderr.endswith(
+        f"stopped with 1 of {TRIALS} trials finished; the same command goes on from there\n"
+    )
+    assert done.stderr.count("\n") == 1
+    assert command(*arguments).returncode == 0
+    assert found_in(tmp_path, source) == found_in(whole, source)
+    assert (tmp_path / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()

@@ -1,0 +1,44 @@
+"""The check of warnings: silent C passes, a warning in any dialect fails by file and line."""
+
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.dialects import DIALECTS, check
+from tests.support.subjects import Harm, subject
+from tests.support.tools import require
+
+HARMS = {
+    "a conversion that loses digits": Harm(
+        "src/nmpc_math.c", r"count = \(nmpc_real_t\)quadrant", "count = quadrant"
+    ),
+    "a declaration inside for": Harm("src/nmpc.c", r"    for \(k = 0;", "    for (int k = 0;"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _compilers() -> None:
+    for dialect in DIALECTS.values():
+        require(dialect.compiler, dialect.package)
+
+
+@pytest.mark.long
+def test_silent_c_passes(tmp_path: Path) -> None:
+    """Every dialect is counted, and what each compiler said is kept."""
+    its = subject(presets.load("mambo"), tmp_path)
+    result = check(its)
+    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.figures["silent"] == list(DIALECTS)
+    log = (its.folder / "compilers.txt").read_text("utf-8")
+    assert log.count("exit code 0") == len(DIALECTS)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("harm", HARMS)
+def test_a_warning_fails(harm: str, tmp_path: Path) -> None:
+    """It is named by dialect, file and line."""
+    result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
+    assert result.outcome is Outcome.FAILED
+    assert f"{HARMS[harm].path}:" in result.evidence

@@ -1,0 +1,111 @@
+"""Tapes of calls: the generated C and the reference answer them alike, and what differs is named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.calls import (
+    NULL_COMMAND,
+    NULL_SELF,
+    UNWRITTEN_RAD,
+    Function,
+    answers,
+    calls,
+    tape_from,
+)
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Subject
+from tests.support.cases import settings_case
+from tests.support.subjects import subject
+from tests.support.tools import require
+
+MAMBO = presets.load("mambo")
+GOOD = np.array([[0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9.81]])
+REFUSED = np.full((1, 12), np.nan)
+
+
+def fault_of(made: Subject) -> str | None:
+    """Build, play all cases, and say what differs."""
+    require("gcc", "gcc")
+    tapes, expected = cases(made.settings)
+    replay.write_tapes(made.settings, tapes, made.folder / "tapes.bin")
+    program = replay.build(made, "gcc", ("-O2",), made.folder)
+    return replay.fault(replay.play(program, made.folder / "tapes.bin", made.settings, tapes), expected)
+
+
+def named(settings: Settings, prefix: str) -> Settings:
+    """Return `settings` with another prefix."""
+    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": prefix})})
+
+
+@pytest.mark.parametrize(
+    "settings", [MAMBO, named(settings_case(6, "float64"), "left_wing")], ids=["32", "64"]
+)
+def test_all_cases_have_the_bits_of_the_reference(settings: Settings, tmp_path: Path) -> None:
+    """In either scalar type, under any prefix; statuses of every kind are among them."""
+    assert fault_of(subject(settings, tmp_path)) is None
+    statuses = np.concatenate([outcome["status"] for outcome in cases(settings)[1]])
+    assert set(statuses) == {int(status) for status in Status}
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "what"),
+    [
+        (
+            "self->command_rad[1] = self->plan_rad[1];",
+            "self->command_rad[1] = self->plan_rad[0];",
+            "command_rad",
+        ),
+        ("    self->cost = (nmpc_sum_t)0;\n", "", "cost"),
+        ("        command->roll_rad = (nmpc_real_t)0;\n", "", "command_rad"),
+        ("        return NMPC_BAD_WEIGHT;", "        return NMPC_BAD_COMMAND;", "status"),
+    ],
+    ids=["pitch takes roll", "initialised in part", "unwritten without a controller", "another status"],
+)
+def test_what_differs_is_named(right: str, wrong: str, what: str, tmp_path: Path) -> None:
+    """Tape, call and field of the first difference, with both values."""
+    fault = fault_of(subject(MAMBO, tmp_path, ("src/nmpc.c", right, wrong)))
+    assert fault is not None
+    assert fault.startswith("tape ")
+    assert what in fault
+
+
+def test_the_reference_answers_as_the_interface_promises() -> None:
+    """Null pointers, refused steps and another initialisation, each call answered in its turn."""
+    tape = np.concatenate(
+        [
+            calls(MAMBO, Function.STEP, GOOD),
+            calls(MAMBO, Function.STEP, REFUSED),
+            calls(MAMBO, Function.STEP, GOOD, NULL_SELF),
+            calls(MAMBO, Function.STEP, GOOD, NULL_COMMAND),
+            calls(MAMBO, Function.INIT, GOOD),
+            calls(MAMBO, Function.STEP, REFUSED),
+            calls(MAMBO, Function.STEP, GOOD),
+        ]
+    )
+    (made,) = answers(MAMBO, [tape])
+    assert list(made["status"]) == [0, 2, 1, 1, 0, 2, 0]
+    assert made["command_rad"][0].tobytes() == made["command_rad"][1].tobytes()
+    assert np.all(made["command_rad"][2] == 0)
+    assert np.all(made["command_rad"][3:5] == UNWRITTEN_RAD)
+    assert np.all(made["command_rad"][5] == 0)
+    assert made[6].tobytes() == made[0].tobytes()
+
+
+def test_tapes_of_unequal_length_do_not_disturb_each_other() -> None:
+    """Answers are those of each tape alone; bytes that are no whole call are dropped."""
+    tapes = list(cases(MAMBO)[0][::97])
+    alone = [answers(MAMBO, [tape])[0] for tape in tapes]
+    assert [made.tobytes() for made in answers(MAMBO, tapes)] == [made.tobytes() for made in alone]
+    assert tape_from(MAMBO, tapes[0].tobytes() + b"rest").tobytes() == tapes[0].tobytes()
+
+
+def test_an_amalgamated_bundle_is_refused(tmp_path: Path) -> None:
+    """The message says which layout to generate."""
+    with pytest.raises(BuildError, match="generate the bundle in folders"):
+        replay.sources(Subject(MAMBO, tmp_path, tmp_path))

@@ -1,0 +1,107 @@
+"""The rules: nothing but the listed deviations, each of which occurs and has its reasons; a new one fails."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.render import DEVIATIONS, render
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.rules import check, deviations
+from mambo_nmpc.sil.verify.sign_decisions import in_scalar
+from tests.support.cases import settings_case
+from tests.support.subjects import Harm, subject
+from tests.support.tools import require
+
+SETTINGS = (
+    {name: presets.load(name) for name in presets.names()}
+    | {f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)}
+    | {"fixed": in_scalar(presets.load("mambo"), "fixed")}
+    | {
+        f"{steps} steps": with_option(presets.load("mambo"), "horizon.prediction", steps, "test")
+        for steps in (2, 33)
+    }
+)
+HARMS = {
+    "15.1 goto": Harm("src/nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
+    "17.7 a result thrown away": Harm(
+        "src/nmpc_self_test.c", r"    nmpc_init\(scratch\);\n", "    nmpc_last_cost(scratch);\n"
+    ),
+    "20.7 a parameter without brackets": Harm(
+        "include/nmpc_config.h", r"#define NMPC_AXES 2", r"#define NMPC_TWICE(a) (2 * a)\n\g<0>"
+    ),
+    "2.3 in a file that is not listed": Harm(
+        "src/nmpc_optimizer.c", r"\nvoid nmpc", r"\ntypedef int unused_t;\n\g<0>"
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def _cppcheck() -> None:
+    require("cppcheck", "cppcheck")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if name == "mambo" else [pytest.mark.long]) for name in SETTINGS]
+)
+def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> None:
+    """MISRA C:2012 and cppcheck's own findings, whatever the settings."""
+    its = subject(SETTINGS[name], tmp_path)
+    result = check(its)
+    assert result.outcome is Outcome.PASSED, result.evidence
+    rules = {rule.removeprefix("misra-c2012-") for rule, _ in deviations(its.bundle / DEVIATIONS)}
+    assert result.figures["deviations"].keys() == rules, "a deviation that never occurs is not listed"
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [pytest.param(harm, marks=[] if index == 0 else [pytest.mark.long]) for index, harm in enumerate(HARMS)],
+)
+def test_an_unlisted_finding_fails(harm: str, tmp_path: Path) -> None:
+    """It is named by rule, file and line."""
+    result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
+    assert result.outcome is Outcome.FAILED
+    assert f"rule {harm.split(maxsplit=1)[0]}" in result.evidence
+    assert HARMS[harm].path in result.evidence
+
+
+def test_every_deviation_is_in_the_manual() -> None:
+    """The table of docs/c-api.md has the rules and files of the list, no more and no less."""
+    text = (Path(__file__).parents[2] / "docs" / "c-api.md").read_text("utf-8")
+    table = text[text.index("## MISRA") :].partition("\n## ")[0]
+    rows = re.findall(r"^\| (\d+\.\d+) [^|]*\| ([^|]*) \|", table, re.MULTILINE)
+    documented = {
+        (f"misra-c2012-{rule}", file) for rule, files in rows for file in re.findall(r"`([^`]+)`", files)
+    }
+    mambo = presets.load("mambo")
+    bundles = [render(mambo), render(with_option(mambo, "code.scalar", "fixed", "test"))]
+    listed = {
+        row for files in bundles for row in re.findall(r"^([\w.-]+):(\S+)$", files[DEVIATIONS], re.MULTILINE)
+    }
+    assert documented == listed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("harm", [None, "15.1 goto"])
+def test_make_rules_comes_to_the_same_verdict(harm: str | None, tmp_path: Path) -> None:
+    """The list of deviations is one that cppcheck reads by itself."""
+    require("make", "make")
+    its = subject(presets.load("mambo"), tmp_path, *([HARMS[harm]] if harm else []))
+    done = subprocess.run(
+        ["make", "-s", "rules"], cwd=its.bundle, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode == 0) == (harm is None), done.stderr
+    assert ("misra-c2012-15.1" in done.stderr) == (harm is not None)
+
+
+def test_cppcheck_without_its_addon_is_no_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that knows nothing of MISRA C says so."""
+    (tmp_path / "cppcheck").write_text("#!/bin/sh\nexit 0\n")
+    (tmp_path / "cppcheck").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    result = check(subject(presets.load("mambo"), tmp_path))
+    assert result.outcome is Outcome.INCOMPLETE
+    assert "addon" in result.evidence

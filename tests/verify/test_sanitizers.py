@@ -1,0 +1,90 @@
+"""The generated C under sanitizers, called with inputs of every kind: nothing undefined, ever."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.verify import sanitizers
+from mambo_nmpc.sil.verify.check import Outcome
+from tests.support.cases import CORNER_HORIZONS, settings_case
+from tests.support.subjects import subject
+from tests.support.tools import require
+
+SETTINGS = {name: presets.load(name) for name in presets.names()} | {
+    f"case {index} {scalar}": settings_case(index, scalar)
+    for index in range(len(CORNER_HORIZONS))
+    for scalar in ("float32", "float64")
+}
+FAULTS = {
+    "a move too many": (
+        "src/nmpc.c",
+        "for (k = 0; k < NMPC_MOVES; k++) {\n        self->plan_rad[k] = self->command_rad",
+        "for (k = 0; k <= NMPC_MOVES; k++) {\n        self->plan_rad[k] = self->command_rad",
+    ),
+    "a wild heading converted": ("src/nmpc.c", "nmpc_within(state->yaw_rad, NMPC_YAW_RANGE_RAD)", "1"),
+}
+
+
+@pytest.fixture(autouse=True)
+def _compilers() -> None:
+    require("gcc", "gcc")
+    require("clang", "clang")
+
+
+def test_nothing_undefined_happens(tmp_path: Path) -> None:
+    """All cases under three watching builds: no report, and the bits of the reference."""
+    result = sanitizers.check(subject(presets.load("mambo"), tmp_path))
+    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.figures["calls"] > 15_000
+    assert json.loads(json.dumps(result.figures)) == result.figures
+    assert len(result.figures["builds"]) == len(sanitizers.WATCHES)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", SETTINGS)
+def test_nothing_undefined_happens_whatever_the_settings(name: str, tmp_path: Path) -> None:
+    """Every preset, and the corners of the horizon in both scalar types."""
+    result = sanitizers.check(subject(SETTINGS[name], tmp_path))
+    assert result.outcome is Outcome.PASSED, result.evidence
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_is_undefined_is_reported(fault: str, tmp_path: Path) -> None:
+    """Faults that parity may not see, for the memory beyond happens to be harmless."""
+    result = sanitizers.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]))
+    assert result.outcome is Outcome.FAILED
+    assert "runtime error" in result.evidence or "AddressSanitizer" in result.evidence
+
+
+@pytest.mark.long
+def test_memory_that_is_read_before_it_is_written_is_reported(tmp_path: Path) -> None:
+    """A weight that nmpc_init leaves out."""
+    fault = ("src/nmpc.c", "    self->weights.effort = NMPC_EFFORT_WEIGHT;\n", "")
+    result = sanitizers.check(subject(presets.load("mambo"), tmp_path, fault))
+    assert result.outcome is Outcome.FAILED
+    assert any("MemorySanitizer" in found for found in result.figures["faults"]), result.evidence
+
+
+@pytest.mark.long
+def test_other_bits_under_a_sanitizer_are_reported(tmp_path: Path) -> None:
+    """A build that watches and computes something else has not watched this controller."""
+    fault = (
+        "src/nmpc.c",
+        "self->command_rad[1] = self->plan_rad[1];",
+        "self->command_rad[1] = self->plan_rad[0];",
+    )
+    result = sanitizers.check(subject(presets.load("mambo"), tmp_path, fault))
+    assert result.outcome is Outcome.FAILED
+    assert "command_rad" in result.evidence
+
+
+def test_without_compilers_the_check_is_incomplete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It names what to install, and never passes."""
+    made = subject(presets.load("mambo"), tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    result = sanitizers.check(made)
+    assert result.outcome is Outcome.INCOMPLETE
+    assert "Debian's package clang" in result.evidence
