@@ -38,6 +38,7 @@ fly: $(SETUP)
 test: tools $(SETUP_TEST)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(TYPING)
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto $(MARKED)
 
@@ -93,6 +94,13 @@ $(SETUP_BENCH): pyproject.toml constraints.txt
 	$(SET_UP)
 	$(PIP_INSTALL) ".[bench]"
 	@touch $@ $(SETUP)
+
+# mypy finds the one installed package here: its folders, linked side by side.
+define TYPING
+@mkdir -p build/typing/mambo_nmpc
+@ln -sfn ../../../codegen ../../../sil ../../../templates ../../../sil/package/__init__.py \
+    ../../../sil/package/__main__.py ../../../sil/package/py.typed build/typing/mambo_nmpc/
+endef
 
 clean:
 	rm -rf build $(VENV)

@@ -46,7 +46,7 @@ def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc."""
-    line = [sys.executable, "-c", "from mambo_nmpc.sil.__main__ import main; main()", *map(str, arguments)]
+    line = [sys.executable, "-c", "from mambo_nmpc.__main__ import main; main()", *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
 
 
@@ -155,7 +155,7 @@ def test_a_killed_campaign_goes_on_to_the_same_bytes(source: Path, whole: Path, 
 
 STOPPED = """
 import os, signal
-from mambo_nmpc.sil.__main__ import main
+from mambo_nmpc.__main__ import main
 from mambo_nmpc.sil.campaign.store import Store
 add = Store.add
 def add_and_stop(self, rows):

@@ -75,7 +75,7 @@ def found_in(folder: Path, source: Path, storage: str | None = None) -> list[Jud
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc."""
-    line = [sys.executable, "-c", "from mambo_nmpc.sil.__main__ import main; main()", *map(str, arguments)]
+    line = [sys.executable, "-c", "from mambo_nmpc.__main__ import main; main()", *map(str, arguments)]
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
 
 
@@ -261,7 +261,7 @@ def test_the_documented_study_is_the_default_one(tmp_path: Path) -> None:
 STOPPED = """
 import os, signal
 from optuna import Study
-from mambo_nmpc.sil.__main__ import main
+from mambo_nmpc.__main__ import main
 tell = Study.tell
 def tell_and_stop(self, *arguments, **options):
     tell(self, *arguments, **options)
