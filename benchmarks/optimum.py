@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 from benchmarks.peers_programs import Cost
 from benchmarks.peers_setups import GRAVITY_M_S2
 from benchmarks.searches import Array, Model, Problems
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 
 def problems(settings: Settings, inputs: Array) -> Problems:

@@ -14,7 +14,8 @@ from benchmarks.peers_programs import HEAD, Program
 from mambo_nmpc.codegen.literals import real
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 
 _GLUE: Final = (
     '#include "nmpc.h"\n\nstatic nmpc_t controller;\nstatic float given[2];\nstatic int is_set;\n\n'

@@ -35,7 +35,8 @@ from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
 from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
 from mambo_nmpc.sil.firmware.gate import forbidden

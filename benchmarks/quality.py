@@ -16,7 +16,8 @@ import numpy as np
 
 from benchmarks.searches import Searching, SearchingController, best_iterate, from_level, optimum
 from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.flights import crashed
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.flight.loop import PositionController, fly

@@ -18,7 +18,7 @@ from scipy.sparse import block_diag
 
 from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
 from mambo_nmpc.codegen.reference.optimizer import Evaluate, Search, minimize
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
 

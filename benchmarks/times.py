@@ -34,8 +34,9 @@ from benchmarks.peers_programs import Program, host_programs
 from benchmarks.states import Inputs, state_sets
 from benchmarks.times_report import FLAGS, Row, Timing, write_report
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 
 Array = NDArray[np.float64]

@@ -28,7 +28,8 @@ from mambo_nmpc.codegen.errors import (
     echo,
 )
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, controller_toml, presets
+from mambo_nmpc.codegen.settings import controller_toml, presets
+from mambo_nmpc.codegen.settings.model import Settings
 
 EXIT_CODES = (
     "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "

@@ -17,7 +17,7 @@ from mambo_nmpc.codegen.fixed_point import LARGEST
 from mambo_nmpc.codegen.reference import ReferenceController, Step
 from mambo_nmpc.codegen.reference.math import Real, rounded
 from mambo_nmpc.codegen.representation import STATE, TARGET, Limits, Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 TICKS: Final = 100
 """Steps of an episode."""

@@ -16,8 +16,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.settings import Settings
-from mambo_nmpc.codegen.settings.model import Horizon
+from mambo_nmpc.codegen.settings.model import Horizon, Settings
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ from mambo_nmpc.codegen.flags import (
 from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.representation import STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.self_test import hover_thrust, self_test
-from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS, fixed_trigonometry, trigonometry
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")

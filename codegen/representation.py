@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, formats, raw
 from mambo_nmpc.codegen.literals import SCALARS
-from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.settings.model import Settings
 
 STATE: Final = (*["position"] * 2, *["velocity"] * 2, *["angle"] * 2, "yaw")
 TARGET: Final = (*["position"] * 2, *["velocity"] * 2)

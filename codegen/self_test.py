@@ -8,7 +8,7 @@ import numpy as np
 
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 STEPS: Final = 24
 _GOLDEN_RATIO: Final = 0.6180339887498949

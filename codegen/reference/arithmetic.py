@@ -15,7 +15,7 @@ from mambo_nmpc.codegen.fixed_point import SINE_BITS, Formats
 from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.reference.math import Real, fixed_sine_cosine, rounded, sine_cosine
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
 
 

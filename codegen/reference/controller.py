@@ -14,7 +14,7 @@ from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.math import Real
 from mambo_nmpc.codegen.reference.predictor import Predictor
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 
 class Status(IntEnum):

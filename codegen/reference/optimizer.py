@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.math import Real, sign
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 Evaluate = Callable[[Real], tuple[Real, Real]]
 """Moves (n, control, 2) -> cost (n,) and gradient (n, control, 2)."""

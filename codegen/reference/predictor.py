@@ -7,7 +7,7 @@ import numpy as np
 from mambo_nmpc.codegen.horizon import HorizonTables
 from mambo_nmpc.codegen.reference.arithmetic import Arithmetic
 from mambo_nmpc.codegen.reference.math import Real
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 
 @dataclass(frozen=True)

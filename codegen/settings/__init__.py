@@ -1,5 +1,1 @@
 """The settings of a controller: the validated model, and controller.toml as a way to write it down."""
-
-from mambo_nmpc.codegen.settings.model import Settings
-
-__all__ = ["Settings"]

@@ -5,7 +5,8 @@ from importlib import resources
 from pathlib import Path
 
 from mambo_nmpc.codegen.errors import SourceNotFoundError, echo
-from mambo_nmpc.codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.settings import controller_toml
+from mambo_nmpc.codegen.settings.model import Settings
 
 _FOLDER = resources.files("mambo_nmpc.codegen") / "data" / "presets"
 

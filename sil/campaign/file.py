@@ -25,7 +25,8 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values

@@ -18,7 +18,8 @@ from mambo_nmpc.codegen import cli as generating
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.representation import TARGET, Representation
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli import boards as cli_boards
 from mambo_nmpc.sil.cli import campaign, faults, tune, verify
 from mambo_nmpc.sil.cli import report as cli_report

@@ -14,7 +14,7 @@ from mambo_nmpc.codegen import cli as generating
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.digest import TICKS, episodes
 from mambo_nmpc.codegen.errors import BuildError, InvalidSettingsError, echo
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.files.folders import SUMMARY, new_results, summary_text
 from mambo_nmpc.sil.firmware.doctor import doctor_text, examine

@@ -10,7 +10,7 @@ from mambo_nmpc.codegen import bundle
 from mambo_nmpc.codegen import cli as generating
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.files.folders import SUMMARY, new_results, summary_text
 from mambo_nmpc.sil.verify import report

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
 from mambo_nmpc.sil.controllers.extension import load_extension
 

@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.digest import TICKS
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import OUTCOME, Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, plainly_named
 from mambo_nmpc.sil.emulation.avr import Long
 from mambo_nmpc.sil.emulation.machine import TIME_LIMIT_S, start

@@ -12,7 +12,7 @@ from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.math import Real, sign
 from mambo_nmpc.codegen.reference.optimizer import Evaluate, Search, minimize
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.faults.injection import (

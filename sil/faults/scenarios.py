@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.faults.injection import (
     Alter,
     Drop,

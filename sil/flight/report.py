@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, Metrics, measure
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.paper.table2 import (

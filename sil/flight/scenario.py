@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.errors import FlightError, ScenarioError
 from mambo_nmpc.sil.flight.loop import Flight, Offset, Start
 from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectories

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.emulated import EmulatedController
 from mambo_nmpc.sil.firmware.elf import load
 from mambo_nmpc.sil.flight.traces import Trace

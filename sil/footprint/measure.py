@@ -8,7 +8,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import plainly_named
 from mambo_nmpc.sil.controllers.emulated import build_guest
 from mambo_nmpc.sil.controllers.pd import PdController

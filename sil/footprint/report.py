@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from mambo_nmpc.codegen import __version__
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.footprint.measure import Footprint, Limit
 from mambo_nmpc.sil.show.page import render_page
 

@@ -10,7 +10,7 @@ from typing import Final
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.digest import frozen_digest
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import compiled, compiled_digest
 from mambo_nmpc.sil.controllers.emulated import build_guest, emulated_digest

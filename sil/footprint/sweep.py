@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from mambo_nmpc.codegen.boards import Board
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import measure

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly

@@ -9,8 +9,9 @@ from typing import Any, Final
 from pydantic import Field
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
-from mambo_nmpc.codegen.settings import Settings, controller_toml, presets
+from mambo_nmpc.codegen.settings import controller_toml, presets
 from mambo_nmpc.codegen.settings.keys import KEYS
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
 from mambo_nmpc.sil.campaign.file import Draws, FlightSection, Section, read_as, scenario, spelled
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw

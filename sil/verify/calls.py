@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.reference import Memory, ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 Tape = NDArray[Any]
 """Calls one after the other, an array of `call_type`."""

@@ -15,7 +15,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.render import with_prefix
 from mambo_nmpc.codegen.representation import STATE, TARGET, THRUST, Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.verify.loops import Unit, place, walk
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.reasons import Reason
 
 _SELF_TEST: Final = (

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_nmpc.codegen.flags import WARNING_FLAGS
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
 from mambo_nmpc.sil.verify.tools import missing, run

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.report import records, table, write_csv

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.reasons import Reason
 
 

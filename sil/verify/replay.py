@@ -12,7 +12,7 @@ import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import with_prefix
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.verify.calls import Function, Outcomes, Tape, calls, outcome_type
 from mambo_nmpc.sil.verify.check import Subject

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from mambo_nmpc.codegen import __version__
-from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.show.page import render_page
 from mambo_nmpc.sil.verify.check import Outcome, Result
 from mambo_nmpc.sil.verify.checks import CHECKS, Entry

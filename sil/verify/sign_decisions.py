@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, watched_step
 from mambo_nmpc.sil.flight.loop import Flight, Outcome, fly

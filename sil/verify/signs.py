@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.faults.flights import STRAY_M

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pycparser.c_parser import ParseError
 
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.verify.bundle import controller, library
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject

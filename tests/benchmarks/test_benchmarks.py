@@ -11,8 +11,9 @@ from benchmarks.host_builds import build, plans
 from benchmarks.ours import bundle_program, peers_model, place_bundle, place_rollout, rollout_program
 from benchmarks.peers_programs import Cost, Program
 from benchmarks.searches import Array
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.tools import require
 
 

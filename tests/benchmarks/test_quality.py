@@ -10,7 +10,8 @@ from benchmarks.quality import PRESETS, entrants
 from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.reference.optimizer import minimize
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.cases import settings_case
 
 Inputs = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]

@@ -10,7 +10,8 @@ import pytest
 
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.inner_steps import watched_step
 from mambo_nmpc.sil.verify.check import Outcome
 from mambo_nmpc.sil.verify.inputs import random_inputs

@@ -15,7 +15,8 @@ import typer
 from typer.testing import CliRunner
 
 from mambo_nmpc.codegen import cli, errors
-from mambo_nmpc.codegen.settings import Settings, controller_toml, presets
+from mambo_nmpc.codegen.settings import controller_toml, presets
+from mambo_nmpc.codegen.settings.model import Settings
 
 COMMAND = "from mambo_nmpc.codegen import cli; app = cli.root(); cli.register(app); app()"
 INTERRUPTED = """

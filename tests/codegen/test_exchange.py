@@ -14,7 +14,7 @@ from mambo_nmpc.codegen import bundle
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.exchange import JOURNAL, STAND_IN, is_left_over
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.bundles import FILES, NEXT, content, expected
 from tests.support.tools import toolchain
 

@@ -14,8 +14,9 @@ from mambo_nmpc.codegen.errors import InvalidSettingsError
 from mambo_nmpc.codegen.fixed_point import LARGEST, formats, raw
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import Function, Tape, answers, calls

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 
 
 def departures(settings: Settings) -> dict[str, Any]:

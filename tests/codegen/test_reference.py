@@ -11,7 +11,7 @@ from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.reference import ReferenceController, cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.predictor import Predictor
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.cases import settings_case
 
 Array = NDArray[np.float64]

@@ -16,8 +16,9 @@ from mambo_nmpc.codegen.errors import (
     UnreadableFileError,
     echo,
 )
-from mambo_nmpc.codegen.settings import Settings, controller_toml
+from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.keys import KEYS, Key, spelled
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.strategies import NUMBERS, RESERVED, any_settings, nested, toml
 
 COMPANIONS: dict[str, dict[str, float]] = {

@@ -9,7 +9,8 @@ import pytest
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
 from mambo_nmpc.sil.emulation.machine import CORES as KNOWN_CORES
 from mambo_nmpc.sil.emulation.machine import Machine, start

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import Flight, Start, fly

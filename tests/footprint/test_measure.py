@@ -10,8 +10,9 @@ import pytest
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.firmware.elf import load
 from mambo_nmpc.sil.firmware.gate import Forbidden, forbidden
 from mambo_nmpc.sil.footprint import report

@@ -13,8 +13,9 @@ from mambo_nmpc.codegen.digest import TICKS, episodes, frozen_digest, frozen_inp
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import read
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import compiled_digest
 from mambo_nmpc.sil.controllers.emulated import GUEST, emulated_digest

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.reference import Step
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.inputs import Inputs, random_inputs
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")

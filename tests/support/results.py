@@ -12,7 +12,7 @@ import numpy as np
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.replay import COMMAND
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.faults import report as fault_report

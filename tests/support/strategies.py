@@ -9,8 +9,8 @@ from typing import Any
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.settings.keys import KEYS, Key, spelled
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.reserved import DEVICES, KEYWORDS, STANDARD_NAMES
 from tests.support.cases import SCALARS
 

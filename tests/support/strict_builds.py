@@ -12,7 +12,7 @@ import cffi
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
 from mambo_nmpc.codegen.render import render, with_prefix
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.tools import require
 
 _FUNCTIONS: Final = {

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.check import Subject
 
 

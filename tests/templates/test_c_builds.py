@@ -13,8 +13,9 @@ from mambo_nmpc.codegen.digest import frozen_digest
 from mambo_nmpc.codegen.errors import InvalidSettingsError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.dialects import DIALECTS
 from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require

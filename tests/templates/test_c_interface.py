@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
 from mambo_nmpc.sil.controllers.extension import load_extension
 from tests.support.parity import Controller

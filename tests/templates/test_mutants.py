@@ -7,7 +7,7 @@ import pytest
 
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.extension import load_extension
 from mambo_nmpc.sil.verify.inputs import Inputs

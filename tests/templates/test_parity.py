@@ -12,8 +12,8 @@ from mambo_nmpc.codegen.reference import ReferenceController, cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.predictor import Predictor
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
-from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
 from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case

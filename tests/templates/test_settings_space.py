@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from mambo_nmpc.codegen import cli
 from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.flags import proofs
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.check import Outcome
 from mambo_nmpc.sil.verify.proof import check, read_properties
 from tests.support.cases import settings_case

@@ -7,7 +7,8 @@ import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import (
     NULL_COMMAND,

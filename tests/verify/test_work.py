@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.verify import work
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
