@@ -16,14 +16,13 @@ which they use no more than 53: a double holds them.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
 
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.settings.sections import Sections
 
 WORD_BITS: Final = 31
 """Bits of a number beside its sign."""
@@ -130,11 +129,9 @@ class Refusal:
     rule: str
 
 
-@lru_cache(maxsize=256)
-def formats(settings: Settings) -> Formats:
-    """Choose the formats of `settings`, which `refusals` finds nothing wrong with."""
+def formats(settings: Sections, tables: HorizonTables) -> Formats:
+    """Choose the formats of `settings`; where `refusals` finds faults, they are too coarse to use."""
     ranges, optimizer, tilt = settings.ranges, settings.optimizer, settings.limits.tilt_rad
-    tables = horizon_tables(settings)
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
     reach = _reach(settings, tables)
 
@@ -201,13 +198,14 @@ def raw(value: float, bits: int) -> int:
     return -size if value < 0 else size
 
 
-def refusals(settings: Settings) -> list[Refusal]:
-    """Tell what in `settings` fixed point cannot represent, with the nearest value that it can."""
-    found = formats(settings)
+def refusals(settings: Sections) -> list[Refusal]:
+    """Return what in `settings` fixed point cannot represent, with the nearest value that it can."""
+    tables = horizon_tables(settings)
+    found = formats(settings, tables)
     if not _fine_errors(found):
-        return [_too_wide(settings)]
+        return [_too_wide(settings, tables)]
     refused = [
-        Refusal("cost", name, _too_small(settings, name))
+        Refusal("cost", name, _too_small(settings, tables, name))
         for name in ("tracking_weight", "effort_weight")
         if not _fine_weight(settings, found, name)
     ]
@@ -233,20 +231,22 @@ def _fine_errors(found: Formats) -> bool:
     return found.error >= _COARSEST_ERROR_BITS
 
 
-def _fine_weight(settings: Settings, found: Formats, name: str) -> bool:
+def _fine_weight(settings: Sections, found: Formats, name: str) -> bool:
     weight: float = getattr(settings.cost, name)
     bits = found.tracking if name == "tracking_weight" else found.effort
     return weight == 0 or math.ldexp(weight, bits) >= _FEWEST_WEIGHT
 
 
-def _too_wide(settings: Settings) -> Refusal:
-    """Blame the range that adds most to the errors over the horizon."""
+def _too_wide(settings: Sections, tables: HorizonTables) -> Refusal:
+    """Refuse the range that adds most to the errors over the horizon."""
     horizon, ranges = settings.horizon, settings.ranges
-    reach = _reach(settings, horizon_tables(settings)).error
+    reach = _reach(settings, tables).error
     by_speed = 2 * ranges.velocity_m_s * horizon.prediction_step_s * horizon.prediction
-    name = "velocity_m_s" if by_speed > reach / 2 else "thrust_acceleration_max_m_s2"
-    fits = _nearest(settings, "ranges", name, 0.1, lambda changed: _fine_errors(formats(changed)))
-    least = ranges.thrust_acceleration_min_m_s2 if name == "thrust_acceleration_max_m_s2" else 0.0
+    name, least = "thrust_acceleration_max_m_s2", ranges.thrust_acceleration_min_m_s2
+    end = math.nextafter(least, math.inf)
+    if by_speed > reach / 2:
+        name, least, end = "velocity_m_s", 0.0, 0.1
+    fits = _nearest(settings, "ranges", name, end, lambda changed: _fine_errors(formats(changed, tables)))
     way_out = "write a smaller horizon.prediction_step_s"
     if fits and float(_down(fits)) > least:
         way_out = f"write at most {_down(fits)}"
@@ -257,9 +257,14 @@ def _too_wide(settings: Settings) -> Refusal:
     return Refusal("ranges", name, rule)
 
 
-def _too_small(settings: Settings, name: str) -> str:
+def _too_small(settings: Sections, tables: HorizonTables, name: str) -> str:
+    """Return the rule that a weight breaks which is too small beside the other one."""
     fits = _nearest(
-        settings, "cost", name, WEIGHT_LIMIT, lambda changed: _fine_weight(changed, formats(changed), name)
+        settings,
+        "cost",
+        name,
+        WEIGHT_LIMIT,
+        lambda changed: _fine_weight(changed, formats(changed, tables), name),
     )
     other = "effort_weight" if name == "tracking_weight" else "tracking_weight"
     return (
@@ -270,17 +275,17 @@ def _too_small(settings: Settings, name: str) -> str:
 
 
 def _nearest(
-    settings: Settings, section: str, name: str, end: float, fits: Callable[[Settings], bool]
+    settings: Sections, section: str, name: str, end: float, fits: Callable[[Sections], bool]
 ) -> float | None:
-    """Find the value of a key nearest to its own, on the way to `end`, that fits; None if none does."""
+    """Bisect from the value of a key, which does not fit, to `end`; None if `end` does not fit either."""
+    document = settings.model_dump()
+    bad, good = document[section][name], end
 
-    def changed(value: float) -> Settings:
-        part = getattr(settings, section).model_copy(update={name: value})
-        return settings.model_copy(update={section: part})
+    def changed(value: float) -> Sections:
+        return Sections.model_validate(document | {section: document[section] | {name: value}})
 
     if not fits(changed(end)):
         return None
-    bad, good = getattr(getattr(settings, section), name), end
     for _ in range(40):
         middle = math.sqrt(bad * good)
         bad, good = (bad, middle) if fits(changed(middle)) else (middle, good)
@@ -302,11 +307,11 @@ def _three_digits(value: float, rounded: Callable[[float], int]) -> float:
     return float(f"{rounded(value * 10.0**digits)}e{-digits}")
 
 
-def _largest_gain(settings: Settings, tables: HorizonTables) -> float:
+def _largest_gain(settings: Sections, tables: HorizonTables) -> float:
     return settings.ranges.thrust_acceleration_max_m_s2 * tables.step_squared_s2
 
 
-def _reach(settings: Settings, tables: HorizonTables) -> _Reach:
+def _reach(settings: Sections, tables: HorizonTables) -> _Reach:
     """Bound what a prediction computes, along one axis of the world, by walking with sizes for values."""
     tilt_rad, steps = settings.limits.tilt_rad, settings.horizon.prediction
     measured_rad = ATTITUDE_LIMIT_RAD if tables.has_lag else 0.0

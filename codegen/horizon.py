@@ -16,7 +16,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.settings.model import Horizon, Settings
+from mambo_nmpc.codegen.settings.sections import Horizon, Sections
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class HorizonTables:
         return not self.has_lag and self.held == 0.5
 
 
-def horizon_tables(settings: Settings) -> HorizonTables:
+def horizon_tables(settings: Sections) -> HorizonTables:
     """Derive the prediction constants from the horizon and the model of `settings`."""
     model, period_s = settings.model, settings.horizon.prediction_step_s
     step_squared_s2 = period_s * period_s

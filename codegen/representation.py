@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, formats, raw
+from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
@@ -54,7 +55,7 @@ class Representation:
 
     def __init__(self, settings: Settings) -> None:
         fixed = settings.code.scalar == "fixed"
-        self.formats: Formats | None = formats(settings) if fixed else None
+        self.formats: Formats | None = formats(settings, horizon_tables(settings)) if fixed else None
         self.scalar: Any = np.int32 if fixed else SCALARS[settings.code.scalar]
         self.wide: Any = np.int64 if fixed else self.scalar
         self.computed: Any = self.wide

@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,26 @@ def test_imports_run_one_way(package: str) -> None:
     for path in (ROOT / package).rglob("*.py"):
         beyond = imported(path) & OURS - ALLOWED[package] - {package}
         assert not beyond, f"{path} imports {beyond}"
+
+
+def module_name(path: Path) -> str:
+    """Return the name by which a module of ours is imported."""
+    return ".".join(("mambo_nmpc", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Nor inside functions: `TopologicalSorter` raises CycleError with the modules of a circle."""
+    paths = [path for package in ("codegen", "sil") for path in (ROOT / package).rglob("*.py")]
+    modules = {module_name(path): path for path in paths}
+    graph = {}
+    for module, path in modules.items():
+        graph[module] = {
+            name if (name := f"{node.module}.{alias.name}") in modules else node.module
+            for node in ast.walk(ast.parse(path.read_text("utf-8")))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        } - {module}
+    assert len(list(TopologicalSorter(graph).static_order())) >= len(modules)
 
 
 def test_generating_needs_neither_compiler_nor_plot() -> None:

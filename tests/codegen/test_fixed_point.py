@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError
 from mambo_nmpc.codegen.fixed_point import LARGEST, formats, raw
+from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.settings import presets
@@ -85,7 +86,7 @@ def test_nothing_overflows_at_the_ends_of_all_ranges(name: str, tmp_path: Path) 
 def test_intermediates_use_their_formats(name: str) -> None:
     """Bounds are not lavish: the position's difference, gains and angles leave at most two bits unused."""
     settings = SETTINGS[name]
-    found, ranges = formats(settings), settings.ranges
+    found, ranges = formats(settings, horizon_tables(settings)), settings.ranges
     gain = ranges.thrust_acceleration_max_m_s2 * settings.horizon.prediction_step_s**2
     for value, bits in (
         (2 * ranges.velocity_m_s, found.velocity),
@@ -161,7 +162,7 @@ def faults_of(values: Values) -> list[str]:
 def test_numbers_are_the_nearest_ties_away_from_zero() -> None:
     """Half a number up is the next one, down the one below; what no format holds is the largest."""
     numbers = Representation(MAMBO)
-    unit = 2.0 ** -asdict(formats(MAMBO))["position"]
+    unit = 2.0 ** -asdict(formats(MAMBO, horizon_tables(MAMBO)))["position"]
     given = np.array([0.0, 0.49, 0.5, 1.5, -0.5, -0.51, -1.5, 7.0])[:, None] * unit
     assert numbers.taken(given, ("position",))[:, 0].tolist() == [0, 0, 1, 2, -1, -1, -2, 7]
     for beyond in (np.nan, np.inf, -np.inf, 1e30, -1e30, 2.0**31 * unit, -(2.0**31) * unit):
@@ -219,7 +220,7 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
 
 def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
     """Clamping far errors changes the reported cost alone: command, gradient and convergence are the same."""
-    numbers, found = Representation(MAMBO), formats(MAMBO)
+    numbers, found = Representation(MAMBO), formats(MAMBO, horizon_tables(MAMBO))
     limit_m = float(numbers.told(np.array([found.error_limit]), "position")[0])
     assert limit_m < MAMBO.ranges.position_m
     state = np.zeros((2, 7))
