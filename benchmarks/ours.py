@@ -11,9 +11,9 @@ from typing import Final
 
 from benchmarks import peers_setups as problem
 from benchmarks.peers_programs import HEAD, Program
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import real
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.representation import Representation
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 
@@ -66,7 +66,7 @@ def peers_model() -> Settings:
 
 def bundle_program(title: str, settings: Settings) -> Program:
     """Return how the bundle of `settings` is built and called."""
-    bits = Representation(settings).bits or {}
+    bits = Design(settings).numbers.bits or {}
     quantities = ("position", "velocity", "angle", "thrust")
     factors = {name: real(math.ldexp(1, bits.get(name, 0)), "float32") for name in quantities}
     return Program(

@@ -16,8 +16,11 @@ from scipy.linalg import expm
 from scipy.optimize import linprog
 from scipy.sparse import block_diag
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
-from mambo_nmpc.codegen.reference.optimizer import Evaluate, Search, minimize
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.optimizer import Evaluate, Rprop, Search
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -145,9 +148,14 @@ def optimum(settings: Settings, problems: Problems, start_rad: Array) -> Array:
     return problems.optima()
 
 
+def rprop(settings: Settings) -> Rprop:
+    """Return the search of the reference controller."""
+    return Rprop(settings, arithmetic(Design(settings)))
+
+
 def from_level(settings: Settings, problems: Problems, start_rad: Array) -> Array:
     """Search with RPROP from level moves, forgetting the last plan."""
-    return minimize(settings, problems.evaluate, np.zeros_like(start_rad)).moves_rad
+    return rprop(settings).minimize(problems.evaluate, np.zeros_like(start_rad)).moves_rad
 
 
 def best_iterate(settings: Settings, problems: Problems, start_rad: Array) -> Array:
@@ -159,7 +167,7 @@ def best_iterate(settings: Settings, problems: Problems, start_rad: Array) -> Ar
         met.append((cost, moves_rad))
         return cost, gradient
 
-    evaluate(minimize(settings, evaluate, start_rad).moves_rad)
+    evaluate(rprop(settings).minimize(evaluate, start_rad).moves_rad)
     costs, plans = (np.stack(column) for column in zip(*met, strict=True))
     return np.asarray(plans[np.argmin(costs, axis=0), np.arange(len(start_rad))])
 
@@ -168,8 +176,8 @@ class SearchingController(ReferenceController):
     """n reference controllers in float64 whose moves are chosen by a search of another kind."""
 
     def __init__(self, settings: Settings, n: int, searching: Searching) -> None:
-        code = settings.code.model_copy(update={"scalar": "float64"})
-        super().__init__(settings.model_copy(update={"code": code}), n, self._chosen)
+        float64 = with_option(settings, "code.scalar", "float64", "benchmark")
+        super().__init__(Design(float64), n, self._chosen)
         self._searching = searching
         self._model = Model(settings)
 
@@ -184,8 +192,8 @@ class SearchingController(ReferenceController):
         assert np.allclose(step.cost[good], self._problems.cost(step.plan_rad)[good], rtol=1e-9, atol=1e-9)
         return step
 
-    def _chosen(self, settings: Settings, evaluate: Evaluate, start_rad: Array) -> Search:
-        moves = self._searching(settings, self._problems, start_rad)
+    def _chosen(self, _: Rprop, evaluate: Evaluate, start_rad: Array) -> Search:
+        moves = self._searching(self.settings, self._problems, start_rad)
         cost, gradient = evaluate(moves)
         n = len(moves)
         return Search(moves, cost, gradient, np.zeros(n, np.int64), np.zeros(n, np.bool_))

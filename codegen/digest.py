@@ -7,16 +7,16 @@ generated.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.fixed_point import LARGEST
 from mambo_nmpc.codegen.reference import ReferenceController, Step
 from mambo_nmpc.codegen.reference.math import Real, rounded
-from mambo_nmpc.codegen.representation import STATE, TARGET, Limits, Representation
+from mambo_nmpc.codegen.representation import STATE, TARGET, InputLimits, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 
 TICKS: Final = 100
@@ -91,21 +91,20 @@ def episodes(settings: Settings) -> int:
     return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
 
 
-@lru_cache(maxsize=64)
-def frozen_digest(settings: Settings, count: int) -> int:
+def frozen_digest(design: Design, count: int) -> int:
     """Return the digest of the first `count` episodes, 32 bits, as the reference computes it."""
     digest = 0
     for first in range(0, count, _TOGETHER):
-        for seen in _episodes(settings, np.arange(first, min(first + _TOGETHER, count), dtype=np.uint32)):
+        for seen in _episodes(design, np.arange(first, min(first + _TOGETHER, count), dtype=np.uint32)):
             digest = int(_fold(np.array([digest], np.uint32), np.array([seen], np.uint32))[0])
     return digest
 
 
-def frozen_inputs(settings: Settings, episode: Words) -> Iterator[Inputs]:
+def frozen_inputs(design: Design, episode: Words) -> Iterator[Inputs]:
     """Yield the inputs of each tick of n episodes: states (n, 7), targets (n, 4), thrusts (n,)."""
-    source = _Source(episode)
+    source, scales = _Source(episode), spread(design.settings)
     for _ in range(TICKS // HELD):
-        inputs = _next_inputs(settings, source)
+        inputs = _next_inputs(design, scales, source)
         for _ in range(HELD):
             yield inputs
 
@@ -132,10 +131,9 @@ class _Source:
         return drawn
 
 
-def _next_inputs(settings: Settings, source: _Source) -> Inputs:
+def _next_inputs(design: Design, scales: Spread, source: _Source) -> Inputs:
     """Draw states, targets and thrusts; five in 64 will be refused."""
-    numbers, scales = Representation(settings), spread(settings)
-    limits = numbers.limits(settings)
+    numbers, limits = design.numbers, design.limits
     choice = source.next()
     size = choice & 3
 
@@ -172,7 +170,7 @@ def _next_inputs(settings: Settings, source: _Source) -> Inputs:
     )
 
 
-def _refused(numbers: Representation, limits: Limits) -> tuple[Any, Any, Any, Any]:
+def _refused(numbers: Representation, limits: InputLimits) -> tuple[Any, Any, Any, Any]:
     """Return no number, an attitude, a yaw and a velocity out of range."""
     if numbers.formats is not None:
         return LARGEST, LARGEST, LARGEST, -LARGEST
@@ -180,12 +178,12 @@ def _refused(numbers: Representation, limits: Limits) -> tuple[Any, Any, Any, An
     return numbers.scalar(np.nan), two * limits.attitude, two * limits.yaw, -two * limits.velocity
 
 
-def _episodes(settings: Settings, episode: Words) -> Words:
+def _episodes(design: Design, episode: Words) -> Words:
     """Return the digests (n,) of n episodes, each by itself."""
-    controller, numbers = ReferenceController(settings, len(episode)), Representation(settings)
+    controller = ReferenceController(design, len(episode))
     seen = np.zeros_like(episode)
-    for inputs in frozen_inputs(settings, episode):
-        for word in _words(numbers, controller.step(*inputs)):
+    for inputs in frozen_inputs(design, episode):
+        for word in _words(design.numbers, controller.step(*inputs)):
             seen = _fold(seen, word)
     return seen
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 import jinja2
 
 from mambo_nmpc.codegen import __version__, boards, literals
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import HELD, TICKS, episodes, frozen_digest, spread
 from mambo_nmpc.codegen.fixed_point import SINE_BITS
 from mambo_nmpc.codegen.flags import (
@@ -19,13 +20,12 @@ from mambo_nmpc.codegen.flags import (
     WARNING_FLAGS,
     proofs,
 )
-from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.representation import STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.self_test import hover_thrust, self_test
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.trigonometry import SINE_ERRORS, fixed_trigonometry, trigonometry
+from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
 SUB_BLOCKS: Final = ("nmpc_math", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
@@ -53,11 +53,11 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     With `amalgamate` the library is one header and one source in the bundle's folder. Only `with_digest` does
     the header state the digest of the frozen steps: what is compiled to run at once need not wait for it.
     """
-    numbers = Representation(settings)
+    design = Design(settings)
     environment = _environment()
     public: tuple[str, ...] = PUBLIC_HEADERS
     code: tuple[str, ...] = SOURCES
-    if numbers.formats is not None:
+    if design.numbers.formats is not None:
         public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
     headers = {name: environment.get_template(f"include/{name}.j2") for name in public}
     privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in SUB_BLOCKS}
@@ -65,9 +65,9 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
 
-    context = _context(settings, numbers) | {
+    context = _context(design) | {
         "amalgamated": amalgamate,
-        "frozen_digest": frozen_digest(settings, episodes(settings)) if with_digest else None,
+        "frozen_digest": frozen_digest(design, episodes(settings)) if with_digest else None,
     }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if amalgamate:
@@ -119,9 +119,9 @@ def _spelled(name: str) -> Callable[..., str]:
     return spelled
 
 
-def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
+def _context(design: Design) -> dict[str, object]:
     """Decide everything that the templates only arrange."""
-    tables = horizon_tables(settings)
+    settings, numbers = design.settings, design.numbers
     scalar = settings.code.scalar
     return {
         "settings": settings,
@@ -143,17 +143,17 @@ def _context(settings: Settings, numbers: Representation) -> dict[str, object]:
         "shell": "nmpc_float_" if numbers.formats else "nmpc_",
         "sum_type": literals.SUM_TYPES[scalar],
         "scalar_bytes": _BYTES[scalar][0],
-        "instance_bytes": _instance_bytes(settings, has_lag=tables.has_lag),
+        "instance_bytes": _instance_bytes(settings, has_lag=design.tables.has_lag),
         "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
-        "tables": tables,
-        "trigonometry": fixed_trigonometry(numbers.formats) if numbers.formats else trigonometry(scalar),
+        "tables": design.tables,
+        "trigonometry": design.trigonometry,
         "sine_error": SINE_ERRORS[scalar],
         "tracking_limit": numbers.tracking_limit,
         "effort_limit": numbers.effort_limit,
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
-        "vectors": self_test(settings),
+        "vectors": self_test(design),
         "episodes": episodes(settings),
         "ticks": TICKS,
         "held": HELD,

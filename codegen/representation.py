@@ -12,11 +12,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, formats, raw
-from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, raw
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.settings.sections import Sections
 
 STATE: Final = (*["position"] * 2, *["velocity"] * 2, *["angle"] * 2, "yaw")
 TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
@@ -30,7 +29,7 @@ OUTCOME: Final = {"command_rad": "angle", "cost": "cost", "gradient": "gradient"
 
 
 @dataclass(frozen=True)
-class Limits:
+class InputLimits:
     """The ends of the ranges of inputs and commands, constants of one controller."""
 
     position: Any
@@ -53,27 +52,26 @@ class Representation:
     tracking_limit, effort_limit: largest weights.
     """
 
-    def __init__(self, settings: Settings) -> None:
-        fixed = settings.code.scalar == "fixed"
-        self.formats: Formats | None = formats(settings, horizon_tables(settings)) if fixed else None
-        self.scalar: Any = np.int32 if fixed else SCALARS[settings.code.scalar]
-        self.wide: Any = np.int64 if fixed else self.scalar
+    def __init__(self, scalar: str, formats: Formats | None) -> None:
+        self.formats = formats
+        self.scalar: Any = np.int32 if formats else SCALARS[scalar]
+        self.wide: Any = np.int64 if formats else self.scalar
         self.computed: Any = self.wide
-        found = self.formats
-        self.bits: Mapping[str, int] | None = (
-            asdict(found) | {"sine": SINE_BITS, "whole": 0} if found else None
-        )
-        self.tracking_limit = math.ldexp(found.tracking_limit, -found.tracking) if found else WEIGHT_LIMIT
-        self.effort_limit = math.ldexp(found.effort_limit, -found.effort) if found else WEIGHT_LIMIT
+        self.bits: Mapping[str, int] | None = None
+        self.tracking_limit = self.effort_limit = WEIGHT_LIMIT
+        if formats:
+            self.bits = asdict(formats) | {"sine": SINE_BITS, "whole": 0}
+            self.tracking_limit = math.ldexp(formats.tracking_limit, -formats.tracking)
+            self.effort_limit = math.ldexp(formats.effort_limit, -formats.effort)
 
     def constant(self, value: float, quantity: str) -> Any:
         """Return a constant of the settings, rounded once, in the type that the reference computes with."""
         return self.scalar(value) if self.bits is None else np.int64(raw(value, self.bits[quantity]))
 
-    def limits(self, settings: Settings) -> Limits:
+    def limits(self, settings: Sections) -> InputLimits:
         """Return the limits of all inputs."""
         ranges = settings.ranges
-        return Limits(
+        return InputLimits(
             position=self.constant(ranges.position_m, "position"),
             velocity=self.constant(ranges.velocity_m_s, "velocity"),
             attitude=self.constant(ATTITUDE_LIMIT_RAD, "angle"),

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.settings.model import Settings
@@ -27,14 +28,15 @@ class SelfTestStep:
     gradient: tuple[float, float]
 
 
-def self_test(settings: Settings) -> list[SelfTestStep]:
+def self_test(design: Design) -> list[SelfTestStep]:
     """Run the reference controller through STEPS inputs spread over those of a flight.
 
     The first is an error too small for a normal number: it shows a board that flushes those to zero. Of the
     others every seventh is out of range, in turn its state, its target and its thrust. The spread is a Weyl
     sequence rather than a random number generator, whose stream may change with a library's version.
     """
-    controller = ReferenceController(settings)
+    settings = design.settings
+    controller = ReferenceController(design)
     ranges = settings.ranges
     position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
     spread = _spread()

@@ -6,17 +6,15 @@ distance and of a step of the optimizer are rounded down. Sums, differences and 
 both. The arrays of a fixed point reference are int64, and none of their numbers needs more.
 """
 
-from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.fixed_point import SINE_BITS, Formats
-from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.reference.math import Real, fixed_sine_cosine, rounded, sine_cosine
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
+from mambo_nmpc.codegen.trigonometry import FixedTrigonometry, Trigonometry
 
 
 class Arithmetic(Protocol):
@@ -70,11 +68,11 @@ class Arithmetic(Protocol):
 class FloatArithmetic:
     """Products in float32 or float64."""
 
-    def __init__(self, settings: Settings, numbers: Representation) -> None:
-        self.numbers = numbers
-        self._trigonometry = trigonometry(settings.code.scalar)
-        self._step_s = numbers.scalar(settings.horizon.prediction_step_s)
-        self._step_squared_s2 = numbers.scalar(horizon_tables(settings).step_squared_s2)
+    def __init__(self, design: Design) -> None:
+        self.numbers = design.numbers
+        self._trigonometry: Trigonometry = design.trigonometry
+        self._step_s = self.numbers.scalar(design.settings.horizon.prediction_step_s)
+        self._step_squared_s2 = self.numbers.scalar(design.tables.step_squared_s2)
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return sine_cosine(yaw_rad, self._trigonometry)
@@ -123,12 +121,12 @@ class FloatArithmetic:
 class FixedArithmetic:
     """Products in fixed point."""
 
-    def __init__(self, settings: Settings, numbers: Representation, found: Formats) -> None:
-        self.numbers = numbers
-        self._formats = found
-        self._trigonometry = fixed_trigonometry(found)
-        self._step_s = numbers.constant(settings.horizon.prediction_step_s, "step")
-        self._step_squared_s2 = numbers.constant(horizon_tables(settings).step_squared_s2, "step_squared")
+    def __init__(self, design: Design, formats: Formats) -> None:
+        self.numbers = design.numbers
+        self._formats = formats
+        self._trigonometry: FixedTrigonometry = design.trigonometry
+        self._step_s = self.numbers.constant(design.settings.horizon.prediction_step_s, "step")
+        self._step_squared_s2 = self.numbers.constant(design.tables.step_squared_s2, "step_squared")
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return fixed_sine_cosine(yaw_rad, self._trigonometry)
@@ -182,10 +180,7 @@ class FixedArithmetic:
         return (step_rad * factor) >> self._formats.factor
 
 
-@lru_cache(maxsize=64)
-def arithmetic(settings: Settings) -> Arithmetic:
-    """Return the products of a controller with `settings`."""
-    numbers = Representation(settings)
-    if numbers.formats is not None:
-        return FixedArithmetic(settings, numbers, numbers.formats)
-    return FloatArithmetic(settings, numbers)
+def arithmetic(design: Design) -> Arithmetic:
+    """Return the products of a controller."""
+    formats = design.numbers.formats
+    return FloatArithmetic(design) if formats is None else FixedArithmetic(design, formats)

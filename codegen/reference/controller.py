@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_nmpc.codegen.horizon import horizon_tables
-from mambo_nmpc.codegen.reference import cost, optimizer
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.reference import cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.math import Real
+from mambo_nmpc.codegen.reference.optimizer import Minimize, Rprop, Search
 from mambo_nmpc.codegen.reference.predictor import Predictor
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
-from mambo_nmpc.codegen.settings.model import Settings
 
 
 class Status(IntEnum):
@@ -76,16 +76,14 @@ class ReferenceController:
     `minimize` may be wrapped, to watch the optimizer's inner steps.
     """
 
-    def __init__(
-        self, settings: Settings, n: int = 1, minimize: optimizer.Minimize = optimizer.minimize
-    ) -> None:
+    def __init__(self, design: Design, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
+        settings, products = design.settings, arithmetic(design)
         self.settings = settings
+        self._numbers, self._limits = design.numbers, design.limits
+        self._predictor = Predictor(design, products)
+        self._rprop = Rprop(settings, products)
         self._minimize = minimize
-        self._arithmetic = arithmetic(settings)
-        self._numbers = self._arithmetic.numbers
         self.scalar = self._numbers.scalar
-        self._predictor = Predictor(settings, horizon_tables(settings), self._arithmetic)
-        self._limits = self._numbers.limits(settings)
         control, computed = settings.horizon.control, self._numbers.computed
         weights = [settings.cost.tracking_weight, settings.cost.effort_weight]
         self.memory = Memory(
@@ -167,7 +165,7 @@ class ReferenceController:
     def _taken(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
         return self._numbers.taken(values, quantities).astype(self._numbers.computed)
 
-    def _search(self, state: Real, target: Real, thrust: Real) -> optimizer.Search:
+    def _search(self, state: Real, target: Real, thrust: Real) -> Search:
         memory = self.memory
         prediction = self._predictor.prepare(state, target, thrust)
 
@@ -177,7 +175,7 @@ class ReferenceController:
         start = memory.plan_rad
         if self.settings.optimizer.warm_start == "last_command":
             start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
-        return self._minimize(self.settings, evaluate, start)
+        return self._minimize(self._rprop, evaluate, start)
 
     def _check(self, state: Real, target: Real, thrust: Real) -> NDArray[np.int64]:
         limits = self._limits

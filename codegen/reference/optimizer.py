@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.arithmetic import Arithmetic
 from mambo_nmpc.codegen.reference.math import Real, sign
 from mambo_nmpc.codegen.settings.model import Settings
 
@@ -32,52 +32,66 @@ class Search:
     converged: NDArray[np.bool_]
 
 
-Minimize = Callable[[Settings, Evaluate, Real], Search]
-"""The interface of `minimize`."""
+class Rprop:
+    """The search of one controller: its constants, in the scalar type of the controller."""
+
+    def __init__(self, settings: Settings, arithmetic: Arithmetic) -> None:
+        optimizer, constant = settings.optimizer, arithmetic.numbers.constant
+        self._arithmetic = arithmetic
+        self._backtracking = optimizer.variant == "rprop+"
+        self._iterations = optimizer.iterations
+        self._increase, self._decrease = (
+            constant(factor, "factor") for factor in (optimizer.increase, optimizer.decrease)
+        )
+        self.initial_step, self._step_max, self._step_min = (
+            constant(step, "angle")
+            for step in (optimizer.initial_step_rad, optimizer.step_max_rad, optimizer.step_min_rad)
+        )
+        self.tolerance = constant(optimizer.tolerance, "cost")
+        self._limit = constant(settings.limits.tilt_rad, "angle")
+
+    def next_step(self, step: Real, agreement: Real) -> Real:
+        """Return the step sizes after a slope: larger where its sign is that of the last one, else smaller.
+
+        agreement is the product of both signs, of the shape of `step`; where it is 0 the size stays.
+        """
+        longer = np.minimum(self._arithmetic.scaled(step, self._increase), self._step_max)
+        shorter = np.maximum(self._arithmetic.scaled(step, self._decrease), self._step_min)
+        return np.where(agreement > 0, longer, np.where(agreement < 0, shorter, step))
+
+    def minimize(self, evaluate: Evaluate, moves_rad: Real) -> Search:
+        """Search from `moves_rad` for exactly `optimizer.iterations` evaluations.
+
+        After convergence, once the cost has changed by less than the tolerance, the slopes are taken as 0:
+        the plan is frozen, the iterations still run.
+        """
+        scalar = moves_rad.dtype.type
+        step = np.full_like(moves_rad, self.initial_step)
+        direction = np.zeros_like(moves_rad)
+        before = moves_rad
+        cost = np.zeros(len(moves_rad), dtype=scalar)
+        gradient = np.zeros_like(moves_rad)
+        iterations = np.zeros(len(moves_rad), dtype=np.int64)
+        converged = np.zeros(len(moves_rad), dtype=np.bool_)
+
+        for iteration in range(self._iterations):
+            previous_cost = cost
+            cost, gradient = evaluate(moves_rad)
+            if iteration > 0:
+                converged = converged | (np.abs(cost - previous_cost) < self.tolerance)
+            iterations = iterations + ~converged
+
+            slope = np.where(converged[:, None, None], scalar(0), sign(gradient))
+            agreement = slope * direction
+            step = self.next_step(step, agreement)
+            ahead = agreement >= 0
+            moved = np.minimum(np.maximum(moves_rad - (slope * step), -self._limit), self._limit)
+            stepped_back = before if self._backtracking else moves_rad
+            before = np.where(ahead, moves_rad, before)
+            moves_rad = np.where(ahead, moved, stepped_back)
+            direction = np.where(ahead, slope, scalar(0))
+        return Search(moves_rad, cost, gradient, iterations, converged)
 
 
-def minimize(settings: Settings, evaluate: Evaluate, moves_rad: Real) -> Search:
-    """Search from `moves_rad` for exactly `optimizer.iterations` evaluations.
-
-    Once the cost changes by less than the tolerance the plan is frozen; the evaluations go on.
-    """
-    scalar, products = moves_rad.dtype.type, arithmetic(settings)
-    optimizer, numbers = settings.optimizer, products.numbers
-    step_max, step_min = (
-        numbers.constant(step, "angle") for step in (optimizer.step_max_rad, optimizer.step_min_rad)
-    )
-    increase, decrease = (
-        numbers.constant(factor, "factor") for factor in (optimizer.increase, optimizer.decrease)
-    )
-    tolerance = numbers.constant(optimizer.tolerance, "cost")
-    limit = numbers.constant(settings.limits.tilt_rad, "angle")
-    step = np.full_like(moves_rad, numbers.constant(optimizer.initial_step_rad, "angle"))
-    direction = np.zeros_like(moves_rad)
-    before = moves_rad
-    cost = np.zeros(len(moves_rad), dtype=scalar)
-    gradient = np.zeros_like(moves_rad)
-    iterations = np.zeros(len(moves_rad), dtype=np.int64)
-    converged = np.zeros(len(moves_rad), dtype=np.bool_)
-
-    for iteration in range(optimizer.iterations):
-        previous_cost = cost
-        cost, gradient = evaluate(moves_rad)
-        if iteration > 0:
-            converged = converged | (np.abs(cost - previous_cost) < tolerance)
-        iterations = iterations + ~converged
-
-        slope = sign(gradient)
-        active = ~converged[:, None, None]
-        onward = active & ((slope * direction) > 0)
-        across = active & ((slope * direction) < 0)
-        ahead = active & ~across
-
-        longer = np.minimum(products.scaled(step, increase), step_max)
-        shorter = np.maximum(products.scaled(step, decrease), step_min)
-        step = np.where(onward, longer, np.where(across, shorter, step))
-        moved = np.minimum(np.maximum(moves_rad - (slope * step), -limit), limit)
-        stepped_back = before if optimizer.variant == "rprop+" else moves_rad
-        before = np.where(ahead, moves_rad, before)
-        moves_rad = np.where(ahead, moved, np.where(across, stepped_back, moves_rad))
-        direction = np.where(ahead, slope, np.where(across, scalar(0), direction))
-    return Search(moves_rad, cost, gradient, iterations, converged)
+Minimize = Callable[[Rprop, Evaluate, Real], Search]
+"""The interface of `Rprop.minimize`."""

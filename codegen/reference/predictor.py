@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mambo_nmpc.codegen.horizon import HorizonTables
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference.arithmetic import Arithmetic
 from mambo_nmpc.codegen.reference.math import Real
-from mambo_nmpc.codegen.settings.model import Settings
 
 
 @dataclass(frozen=True)
@@ -29,9 +28,10 @@ class Prediction:
 
 
 class Predictor:
-    """The prediction constants of one set of settings, in its scalar type."""
+    """The constants of the prediction, in the scalar type of the controller."""
 
-    def __init__(self, settings: Settings, tables: HorizonTables, arithmetic: Arithmetic) -> None:
+    def __init__(self, design: Design, arithmetic: Arithmetic) -> None:
+        settings, tables = design.settings, design.tables
         self._steps = settings.horizon.prediction
         self._moves = settings.horizon.control
         self._printed_yaw = settings.model.yaw_convention == "printed"

@@ -15,9 +15,10 @@ import typer
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.representation import TARGET, Representation
+from mambo_nmpc.codegen.representation import TARGET
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli import boards as cli_boards
@@ -301,7 +302,7 @@ def _controller(kind: ControllerKind, settings: Settings) -> PositionController:
         case ControllerKind.PD:
             return PdController()
         case ControllerKind.REFERENCE:
-            return ReferenceController(settings)
+            return ReferenceController(Design(settings))
         case ControllerKind.NMPC:
             return CompiledController(settings)
 
@@ -330,8 +331,8 @@ def _trajectory(name: str, size_m: float, rate_rad_s: float) -> Trajectory:
 
 def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
     """Raise FlightError if the controller would refuse a target, compared in its own scalar type."""
-    numbers, ranges = Representation(settings), settings.ranges
-    limits = numbers.limits(settings)
+    design, ranges = Design(settings), settings.ranges
+    numbers, limits = design.numbers, design.limits
     given = np.abs(flight.targets()[:, :1]).max(axis=0)
     x, y, vx, vy = numbers.taken(given, TARGET)[0]
     for what, refused, largest, unit, key, limit in (

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
@@ -67,7 +68,7 @@ class CompiledController:
 
     def __init__(self, settings: Settings, n: int = 1, extension: ModuleType | None = None) -> None:
         self.settings = settings
-        self._numbers = Representation(settings)
+        self._numbers = Design(settings).numbers
         self.scalar = self._numbers.scalar
         self._n = n
         self._moves = (settings.horizon.control, 2)

@@ -9,10 +9,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import TICKS
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.representation import OUTCOME, Representation
+from mambo_nmpc.codegen.representation import OUTCOME
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, plainly_named
 from mambo_nmpc.sil.emulation.avr import Long
@@ -49,7 +50,7 @@ class EmulatedController:
         self, settings: Settings, elf: Path, core: str, n: int = 1, *, counting: bool = False
     ) -> None:
         self.settings = settings
-        self._numbers = Representation(settings)
+        self._numbers = Design(settings).numbers
         self.scalar = self._numbers.scalar
         real, wide = np.dtype(self.scalar), np.dtype(self._numbers.wide)
         self._n = n

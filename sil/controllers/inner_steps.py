@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Memory, ReferenceController, Step
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.math import Real, sign
-from mambo_nmpc.codegen.reference.optimizer import Evaluate, Search, minimize
-from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.reference.optimizer import Evaluate, Rprop, Search
 from mambo_nmpc.codegen.settings.model import Settings
 
 
@@ -32,7 +32,7 @@ class InnerSteps:
 
     def decisions(self, settings: Settings) -> NDArray[np.int8]:
         """Return the sign (i, n, control, 2) by which RPROP updates each move: 0 once the cost is at rest."""
-        numbers = Representation(settings)
+        numbers = Design(settings).numbers
         tolerance = numbers.told(numbers.constant(settings.optimizer.tolerance, "cost"), "cost")
         at_rest = np.zeros(self.cost.shape, np.bool_)
         at_rest[1:] = np.logical_or.accumulate(np.abs(np.diff(self.cost, axis=0)) < tolerance)
@@ -40,26 +40,17 @@ class InnerSteps:
 
     def step_sizes_rad(self, settings: Settings) -> Real:
         """Return RPROP's step size (i, n, control, 2) after it has heard the sign of each iteration."""
-        optimizer, products = settings.optimizer, arithmetic(settings)
-        numbers = products.numbers
-        step_max, step_min, initial = (
-            numbers.constant(step, "angle")
-            for step in (optimizer.step_max_rad, optimizer.step_min_rad, optimizer.initial_step_rad)
-        )
-        increase, decrease = (
-            numbers.constant(factor, "factor") for factor in (optimizer.increase, optimizer.decrease)
-        )
-        size = np.full(self.plan_rad[0].shape, initial)
+        design = Design(settings)
+        rprop = Rprop(settings, arithmetic(design))
+        size = np.full(self.plan_rad[0].shape, rprop.initial_step)
         before = np.zeros_like(size)
         sizes = []
         for slope in self.decisions(settings).astype(size.dtype):
             agreement = slope * before
-            longer = np.minimum(products.scaled(size, increase), step_max)
-            shorter = np.maximum(products.scaled(size, decrease), step_min)
-            size = np.where(agreement > 0, longer, np.where(agreement < 0, shorter, size))
+            size = rprop.next_step(size, agreement)
             before = np.where(agreement < 0, np.zeros_like(slope), slope)
             sizes.append(size)
-        return numbers.told(np.stack(sizes), "angle")
+        return design.numbers.told(np.stack(sizes), "angle")
 
 
 class WatchedController:
@@ -67,8 +58,9 @@ class WatchedController:
 
     def __init__(self, settings: Settings, n: int = 1) -> None:
         self.settings = settings
-        self.controller = ReferenceController(settings, n, self._watch)
-        self._numbers = Representation(settings)
+        design = Design(settings)
+        self.controller = ReferenceController(design, n, self._watch)
+        self._numbers = design.numbers
         self.steps: list[InnerSteps] = []
         self._evaluated: list[tuple[Any, Any, Any]] = []
 
@@ -79,7 +71,7 @@ class WatchedController:
         self.steps.append(InnerSteps(*(np.stack(values) for values in zip(*self._evaluated, strict=True))))
         return step
 
-    def _watch(self, chosen: Settings, evaluate: Evaluate, start: Real) -> Search:
+    def _watch(self, rprop: Rprop, evaluate: Evaluate, start: Real) -> Search:
         def watch(moves_rad: Real) -> tuple[Real, Real]:
             cost, gradient = evaluate(moves_rad)
             told, numbers = self._numbers.told, (moves_rad.copy(), cost.copy(), gradient.copy())
@@ -88,7 +80,7 @@ class WatchedController:
             )
             return cost, gradient
 
-        return minimize(chosen, watch, start)
+        return rprop.minimize(watch, start)
 
 
 def watched_step(

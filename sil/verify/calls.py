@@ -12,8 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Memory, ReferenceController, Status
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_nmpc.codegen.settings.model import Settings
 
 Tape = NDArray[Any]
@@ -58,12 +59,12 @@ _QUANTITIES: Final = {
 
 def call_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of a call: function in bits 0 and 1 of the byte, null pointers in bits 2 to 5."""
-    return np.dtype([("call", np.uint8), ("values", Representation(settings).scalar, 12)])
+    return np.dtype([("call", np.uint8), ("values", Design(settings).numbers.scalar, 12)])
 
 
 def outcome_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of an outcome, as `replay.c` writes it."""
-    numbers, moves = Representation(settings), 2 * settings.horizon.control
+    numbers, moves = Design(settings).numbers, 2 * settings.horizon.control
     return np.dtype(
         [
             ("status", np.int32),
@@ -82,7 +83,7 @@ def calls(settings: Settings, function: Function, values: NDArray[Any], nulls: i
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
     quantities = _QUANTITIES[function][: values.shape[1]]
-    made["values"][:, : values.shape[1]] = Representation(settings).taken(values, quantities)
+    made["values"][:, : values.shape[1]] = Design(settings).numbers.taken(values, quantities)
     return made
 
 
@@ -112,8 +113,9 @@ class _Runs:
 
     def __init__(self, settings: Settings, n: int) -> None:
         self._settings = settings
-        self._numbers = Representation(settings)
-        self._controller = ReferenceController(settings, n)
+        design = Design(settings)
+        self._numbers = design.numbers
+        self._controller = ReferenceController(design, n)
         self._fresh = self._controller.memory
 
     def make(self, now: Tape) -> Outcomes:

@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import SCALARS, Scalar
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_nmpc.codegen.self_test import hover_thrust
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
@@ -100,7 +101,7 @@ def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
             good = _good(settings, rng, 4)
             good[1, index] = value
             yield calls(settings, Function.STEP, good)
-    numbers = Representation(settings)
+    numbers = Design(settings).numbers
     for function, quantities, lows, highs in (
         (Function.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit)),
         (Function.RESET, COMMAND, (-ATTITUDE_LIMIT_RAD,) * 2, (ATTITUDE_LIMIT_RAD,) * 2),
@@ -154,7 +155,7 @@ def _at_rest(settings: Settings) -> list[Tape]:
     are the cases. In fixed point a number of that weight is many of the cost: there the effort weight, whose
     numbers are finer than those of the cost, is found by bisection as well.
     """
-    n, scalar, numbers = 16, _floating(settings), Representation(settings)
+    n, scalar, numbers = 16, _floating(settings), Design(settings).numbers
     near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
     steps = np.zeros((n, 12))
     steps[:, 0:2] = near_m * np.linspace(1, 2, n)[:, None]
@@ -203,10 +204,10 @@ def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
     And start a number from the tilt limit, pulled there: a turn as small as they ever get.
     """
-    numbers = Representation(settings)
+    numbers = Design(settings).numbers
     if numbers.bits is None:
         return
-    limits = numbers.limits(settings)
+    limits = Design(settings).limits
     most = np.array(
         [
             *[limits.position] * 2,
@@ -252,7 +253,7 @@ def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
     """Return both ends of a range, their neighbours among the numbers, and what is no number or no size."""
-    scalar, numbers = _floating(settings), Representation(settings)
+    scalar, numbers = _floating(settings), Design(settings).numbers
     ends = np.array([low, high], scalar)
     beyond = np.array([-np.inf, np.inf], scalar)
     neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]

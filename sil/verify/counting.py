@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pycparser import c_ast, c_generator
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.render import with_prefix
-from mambo_nmpc.codegen.representation import STATE, TARGET, THRUST, Representation
+from mambo_nmpc.codegen.representation import STATE, TARGET, THRUST
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.verify.loops import Unit, place, walk
@@ -81,7 +82,7 @@ def count(
 
     Step k is one of controller k modulo TOGETHER. Raises BuildError if the program dies.
     """
-    numbers = Representation(settings)
+    numbers = Design(settings).numbers
     layout = np.dtype(
         [("status", np.int32), ("command", numbers.scalar, 2), ("counts", np.uint32, places_counted)],
         align=False,

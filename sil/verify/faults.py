@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
@@ -30,8 +30,8 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 
     A controller that strays without a fault cannot show that it comes back: INCOMPLETE, unless it failed.
     """
-    numbers = Representation(settings)
-    limit = float(numbers.told(np.array([numbers.limits(settings).tilt]), "angle")[0])
+    design = Design(settings)
+    limit = float(design.numbers.told(np.array([design.limits.tilt]), "angle")[0])
     ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
     strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
     wrong = []

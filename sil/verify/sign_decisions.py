@@ -12,8 +12,9 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, Representation
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, watched_step
@@ -45,7 +46,7 @@ class Moments:
 
     def exact(self, settings: Settings) -> "Moments":
         """Round every number to the nearest that a controller with `settings` can hold."""
-        numbers = Representation(settings)
+        numbers = Design(settings).numbers
 
         def exact(values: NDArray[Any], quantities: Sequence[str]) -> NDArray[Any]:
             return numbers.told(numbers.taken(values, quantities), *quantities)
@@ -133,8 +134,9 @@ def disagreement(settings: Settings, inputs: str, moments: Moments) -> Disagreem
 
 
 def _steps(settings: Settings, moments: Moments) -> tuple[Any, InnerSteps]:
-    numbers = Representation(settings)
-    fresh = ReferenceController(settings, len(moments.state)).memory
+    design = Design(settings)
+    numbers = design.numbers
+    fresh = ReferenceController(design, len(moments.state)).memory
     memory = replace(
         fresh,
         command_rad=numbers.taken(moments.command_rad, COMMAND).astype(numbers.computed),

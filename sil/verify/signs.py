@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.representation import Representation
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -104,7 +104,7 @@ def _rounding_rad(settings: Settings) -> float:
 
     That of the largest angle; in fixed point all have the same, and it grows with the steps of the search.
     """
-    optimizer, bits = settings.optimizer, Representation(with_few(settings)).bits
+    optimizer, bits = settings.optimizer, Design(with_few(settings)).numbers.bits
     if bits is None:
         largest_rad = max(settings.limits.tilt_rad, optimizer.step_max_rad)
         return 4 * optimizer.iterations * float(np.finfo(np.float32).eps) * largest_rad

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.quality import PRESETS, entrants
-from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum
+from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum, rprop
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.reference.optimizer import minimize
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.cases import settings_case
@@ -56,7 +56,8 @@ def test_rows_have_the_cost_and_slope_of_the_reference(index: int) -> None:
 def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
     """The program's optimum keeps the limit, and beats the controller's plan and any other."""
     settings, rng = presets.load(name), np.random.default_rng(1)
-    controller, model, limit = ReferenceController(settings, N), Model(settings), settings.limits.tilt_rad
+    controller, model = ReferenceController(Design(settings), N), Model(settings)
+    limit = settings.limits.tilt_rad
     last = np.zeros((N, 2))
     for _ in range(3):
         known = inputs(rng)
@@ -78,13 +79,13 @@ def test_searches_are_ordered_by_what_they_find() -> None:
     level = np.zeros((N, settings.horizon.control, 2))
     best_rad = optimum(settings, problems, level)
     for start in (level, best_rad):
-        last = problems.cost(minimize(settings, problems.evaluate, start).moves_rad)
+        last = problems.cost(rprop(settings).minimize(problems.evaluate, start).moves_rad)
         best = problems.cost(best_iterate(settings, problems, start))
         assert np.all(best <= np.minimum(last, problems.cost(start)))
         assert np.all(problems.cost(best_rad) <= best * (1 + 1e-8))
         assert np.any(best < last) == (start is best_rad)
     from_best = from_level(settings, problems, best_rad)
-    np.testing.assert_array_equal(from_best, minimize(settings, problems.evaluate, level).moves_rad)
+    np.testing.assert_array_equal(from_best, rprop(settings).minimize(problems.evaluate, level).moves_rad)
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.representation import Representation
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.inner_steps import watched_step
@@ -52,7 +52,7 @@ def moments(settings: Settings, n: int = N, seed: int = 0) -> Moments:
 def test_watching_changes_no_bit(settings: Settings) -> None:
     """The watched step is the step, and the last iteration it saw is the one that the step reports."""
     given = moments(settings)
-    plain = ReferenceController(settings, N)
+    plain = ReferenceController(Design(settings), N)
     for _ in range(2):
         memory = plain.memory
         expected = plain.step(given.state, given.target, given.thrust_acceleration_m_s2)
@@ -71,7 +71,7 @@ def test_watching_changes_no_bit(settings: Settings) -> None:
 def test_moves_go_where_the_decisions_say(settings: Settings) -> None:
     """A decision that agrees with the one before moves its move against the slope, unless at the limit."""
     given = moments(settings)
-    plain = ReferenceController(settings, N)
+    plain = ReferenceController(Design(settings), N)
     _, inner = watched_step(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
     decisions = inner.decisions(settings).astype(np.int64)
     moved = np.sign(np.diff(inner.plan_rad, axis=0))
@@ -87,7 +87,7 @@ def test_moves_go_where_the_decisions_say(settings: Settings) -> None:
 def test_steps_of_the_search_are_as_long_as_they_are_told(settings: Settings) -> None:
     """The first moves by the first step size, the next by that which the second decision left."""
     given = moments(settings)
-    plain = ReferenceController(settings, N)
+    plain = ReferenceController(Design(settings), N)
     _, inner = watched_step(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
     sizes, decisions = inner.step_sizes_rad(settings), inner.decisions(settings)
     assert sizes.dtype == inner.plan_rad.dtype
@@ -106,7 +106,7 @@ def test_a_cost_at_rest_decides_nothing(settings: Settings) -> None:
     given = moments(resting)
     step, inner = watched_step(
         resting,
-        ReferenceController(resting, N).memory,
+        ReferenceController(Design(resting), N).memory,
         given.state,
         given.target,
         given.thrust_acceleration_m_s2,
@@ -119,12 +119,12 @@ def test_a_cost_at_rest_decides_nothing(settings: Settings) -> None:
 @pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
 def test_an_edge_is_where_the_next_number_decides_otherwise(settings: Settings) -> None:
     """One float32, or one number of fixed point, further along x the decisions of float64 are others."""
-    many, bits = in_scalar(settings, MANY), Representation(settings).bits
+    many, bits = in_scalar(settings, MANY), Design(settings).numbers.bits
     edge = at_the_edge(settings, moments(settings))
     beside, x_m = edge.state.copy(), edge.state[:, 0]
     beside[:, 0] = x_m + 2.0 ** -bits["position"] if bits else np.nextafter(x_m, np.float32(np.inf))
     memory = replace(
-        ReferenceController(many, len(beside)).memory,
+        ReferenceController(Design(many), len(beside)).memory,
         command_rad=edge.command_rad.astype(np.float64),
         plan_rad=edge.plan_rad.astype(np.float64),
     )

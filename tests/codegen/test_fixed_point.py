@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import InvalidSettingsError
 from mambo_nmpc.codegen.fixed_point import LARGEST, formats, raw
 from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
 from mambo_nmpc.codegen.settings.model import Settings
@@ -43,7 +44,7 @@ WATCH = ("-O1", "-g", "-fsanitize=undefined", "-fno-sanitize-recover=all")
 
 def extremes(settings: Settings, n: int) -> list[Tape]:
     """Step n controllers through the ends of all ranges, from commands and with weights at theirs."""
-    rng, numbers, ranges = np.random.default_rng(0), Representation(settings), settings.ranges
+    rng, numbers, ranges = np.random.default_rng(0), Design(settings).numbers, settings.ranges
 
     def ends(count: int) -> NDArray[np.float64]:
         return rng.choice([-1.0, 1.0], (n, count))
@@ -161,7 +162,7 @@ def faults_of(values: Values) -> list[str]:
 
 def test_numbers_are_the_nearest_ties_away_from_zero() -> None:
     """Half a number up is the next one, down the one below; what no format holds is the largest."""
-    numbers = Representation(MAMBO)
+    numbers = Design(MAMBO).numbers
     unit = 2.0 ** -asdict(formats(MAMBO, horizon_tables(MAMBO)))["position"]
     given = np.array([0.0, 0.49, 0.5, 1.5, -0.5, -0.51, -1.5, 7.0])[:, None] * unit
     assert numbers.taken(given, ("position",))[:, 0].tolist() == [0, 0, 1, 2, -1, -1, -2, 7]
@@ -171,7 +172,7 @@ def test_numbers_are_the_nearest_ties_away_from_zero() -> None:
 
 def test_numbers_mean_what_was_given() -> None:
     """To and fro, every number is itself."""
-    numbers = Representation(MAMBO)
+    numbers = Design(MAMBO).numbers
     for quantities in (STATE, TARGET, THRUST, COMMAND, WEIGHTS):
         given = np.random.default_rng(0).integers(-LARGEST + 1, LARGEST, (1000, len(quantities)), np.int32)
         assert np.array_equal(numbers.taken(numbers.told(given, *quantities), quantities), given)
@@ -203,14 +204,14 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
         [tmp_path / "convert"], input=rows.tobytes(), capture_output=True, check=True
     ).stdout
 
-    numbers = Representation(MAMBO)
+    numbers = Design(MAMBO).numbers
     constants = [(-1.5, "position"), (0.1, "velocity"), (-0.3, "angle"), (3.14159, "yaw"), (9.81, "thrust")]
     constants += [(123.4, "tracking"), (0.7, "effort")]
     expected = [int(numbers.taken([[value]], (quantity,))[0, 0]) for value, quantity in constants]
     assert np.frombuffer(done[:28], np.int32).tolist() == expected
 
     found = np.frombuffer(done[28:], np.float32).reshape(-1, 4)
-    controller = ReferenceController(MAMBO)
+    controller = ReferenceController(Design(MAMBO))
     for row, (status, roll, pitch, cost) in zip(rows, found, strict=True):
         step = controller.step(row[None, :7], row[None, 7:11], row[11:])
         assert status == step.status[0]
@@ -220,7 +221,7 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
 
 def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
     """Clamping far errors changes the reported cost alone: command, gradient and convergence are the same."""
-    numbers, found = Representation(MAMBO), formats(MAMBO, horizon_tables(MAMBO))
+    numbers, found = Design(MAMBO).numbers, formats(MAMBO, horizon_tables(MAMBO))
     limit_m = float(numbers.told(np.array([found.error_limit]), "position")[0])
     assert limit_m < MAMBO.ranges.position_m
     state = np.zeros((2, 7))

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.predictor import Predictor
@@ -23,13 +23,13 @@ class Situation:
     """A random state, target and thrust, a last command, weights, and moves to judge."""
 
     def __init__(self, settings: Settings, rng: np.random.Generator, last: Array, scale: float = 1.0) -> None:
-        self.settings, self.last = settings, last
+        design, self.settings, self.last = Design(settings), settings, last
         self.state = scale * rng.normal(0, 1, 7) * [1, 1, 1, 1, 0.3, 0.3, 3]
         self.target = scale * rng.normal(0, 1, 4)
         self.thrust = rng.uniform(5, 15)
         self.moves = rng.uniform(-0.3, 0.3, (settings.horizon.control, 2))
         self.weights = np.array([settings.cost.tracking_weight, settings.cost.effort_weight])
-        self._predictor = Predictor(settings, horizon_tables(settings), arithmetic(settings))
+        self._predictor = Predictor(design, arithmetic(design))
         self._prediction = self._predictor.prepare(
             self.state[None], self.target[None], np.array([self.thrust])
         )
@@ -143,7 +143,7 @@ def test_the_search_is_rprop(index: int) -> None:
     """Five consecutive steps: plan, cost, updates and convergence equal those of the textbook."""
     settings = settings_case(index, "float64")
     rng = np.random.default_rng(index)
-    controller = ReferenceController(settings)
+    controller = ReferenceController(Design(settings))
     plan, last = np.zeros((settings.horizon.control, 2)), np.zeros(2)
     for _ in range(5):
         situation = Situation(settings, rng, last, scale=0.2)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
@@ -111,7 +112,7 @@ def test_every_core_has_the_bits_of_the_reference(name: str, scalar: str, index:
     n, steps = 30, 4
     inputs = inputs_of_steps(settings, n, steps, seed=index)
     inputs[2].state[::7, index % 7] = np.nan
-    controllers = emulated(name, settings, tmp_path, n), ReferenceController(settings, n)
+    controllers = emulated(name, settings, tmp_path, n), ReferenceController(Design(settings), n)
     ours, theirs = (
         Run([], [controller.step(case.state, case.target, case.thrust) for case in inputs])
         for controller in controllers

@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
@@ -47,7 +48,7 @@ def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str
     settings = with_scalar(presets.load(preset), scalar)
     flight = CONDITIONS[condition]
     extension = compiled(settings, toolchain("gcc"))
-    ours, theirs = ReferenceController(settings), CompiledController(settings, extension=extension)
+    ours, theirs = ReferenceController(Design(settings)), CompiledController(settings, extension=extension)
     assert_same_bits(fly(flight, ours), fly(flight, theirs))
 
 
@@ -57,7 +58,7 @@ def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) ->
     """The same over the whole of Table II's flight, in other builds."""
     settings = presets.load(preset)
     flight = Flight(CASE)
-    expected = fly(flight, ReferenceController(settings))
+    expected = fly(flight, ReferenceController(Design(settings)))
     for compiler in (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2")):
         extension = compiled(settings, toolchain(*compiler))
         assert_same_bits(expected, fly(flight, CompiledController(settings, extension=extension)))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import unicorn
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
@@ -254,7 +255,7 @@ def test_spread_inputs_are_all_accepted(index: int) -> None:
     """From millimetres off the target to the ends of the ranges, never beyond."""
     settings = settings_case(index, "float32")
     inputs = spread(settings, 200)
-    steps = ReferenceController(settings, 200).step(inputs.state, inputs.target, inputs.thrust)
+    steps = ReferenceController(Design(settings), 200).step(inputs.state, inputs.target, inputs.thrust)
     assert not np.any(steps.status)
     errors = np.abs(inputs.state[:, :4] - inputs.target).max(axis=1)
     assert errors.min() < 0.02

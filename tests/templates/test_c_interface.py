@@ -10,6 +10,7 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
@@ -33,7 +34,7 @@ def built(settings: Settings) -> ModuleType:
 def controller(kind: str, n: int = 1) -> Controller:
     """Make a controller of preset mambo."""
     if kind == "reference":
-        return ReferenceController(MAMBO, n)
+        return ReferenceController(Design(MAMBO), n)
     return CompiledController(MAMBO, n, built(MAMBO))
 
 

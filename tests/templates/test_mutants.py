@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import pytest
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
@@ -159,7 +160,7 @@ MUTANTS = [
 def expected(settings: Settings) -> tuple[list[Inputs], Run]:
     """Run the reference once for all mutants of `settings`."""
     inputs = inputs_of_steps(settings, CASES, steps=4, seed=0)
-    return inputs, run(ReferenceController(settings, CASES), inputs, seed=0)
+    return inputs, run(ReferenceController(Design(settings), CASES), inputs, seed=0)
 
 
 def found(settings: Settings, files: dict[str, str]) -> Run:

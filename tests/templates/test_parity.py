@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.horizon import horizon_tables
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.predictor import Predictor
@@ -35,7 +35,8 @@ class SubBlocks:
 
     def __init__(self, settings: Settings) -> None:
         extension: ModuleType = compiled(settings, toolchain("gcc"))
-        self.products = arithmetic(settings)
+        self.design = Design(settings)
+        self.products = arithmetic(self.design)
         self.numbers = self.products.numbers
         self.scalar = self.numbers.scalar
         self.ffi, self.lib = extension.ffi, extension.lib
@@ -92,8 +93,8 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
     blocks = SubBlocks(settings)
     ffi, lib = blocks.ffi, blocks.lib
     moves_count = 2 * settings.horizon.control
-    predictor = Predictor(settings, horizon_tables(settings), blocks.products)
-    limits, taken, computed = blocks.numbers.limits(settings), blocks.numbers.taken, blocks.computed
+    predictor = Predictor(blocks.design, blocks.products)
+    limits, taken, computed = blocks.design.limits, blocks.numbers.taken, blocks.computed
     rng = np.random.default_rng(index)
     prediction, controller = ffi.new("nmpc_prediction_t *"), ffi.new("nmpc_t *")
 
@@ -154,7 +155,7 @@ def test_steps_equal_the_reference(index: int, scalar: str) -> None:
     settings = settings_case(index, scalar)
     n = 250
     inputs = inputs_of_steps(settings, n, steps=4, seed=index)
-    expected = run(ReferenceController(settings, n), inputs, index)
+    expected = run(ReferenceController(Design(settings), n), inputs, index)
     for compiler in ("gcc", "clang"):
         extension = compiled(settings, toolchain(compiler))
         found = run(CompiledController(settings, n, extension), inputs, index)
@@ -171,7 +172,7 @@ def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int,
     extensions = [compiled(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
     for seed in range(5):
         inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
-        expected = run(ReferenceController(settings, chunk), inputs, seed)
+        expected = run(ReferenceController(Design(settings), chunk), inputs, seed)
         for (compiler, level), extension in zip(BUILDS, extensions, strict=True):
             found = run(CompiledController(settings, chunk, extension), inputs, seed)
             assert differences(expected, found) == {}, f"{compiler} {level} for {settings!r}"

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from mambo_nmpc.codegen import cli
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -44,7 +45,7 @@ def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> N
     work = drawn.horizon.prediction * drawn.horizon.control * drawn.optimizer.iterations
     n = 100 if work <= USUAL_WORK else 25
     inputs = inputs_of_steps(drawn, n, STEPS, work)
-    expected = run(ReferenceController(drawn, n), inputs, work)
+    expected = run(ReferenceController(Design(drawn), n), inputs, work)
     found = run(CompiledController(drawn, n, extension), inputs, work)
     assert differences(expected, found) == {}
 

@@ -1,0 +1,44 @@
+"""The design of one controller: everything that is derived from its settings, derived once.
+
+Rendering, self-test, digest and reference controller are handed the same design, so that none of them can
+compute with other numbers than the C.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from mambo_nmpc.codegen.fixed_point import formats
+from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
+from mambo_nmpc.codegen.representation import InputLimits, Representation
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
+
+
+@dataclass(frozen=True)
+class Design:
+    """The numbers of the controller with `settings`; each is derived when it is first read, and kept."""
+
+    settings: Settings
+
+    @cached_property
+    def tables(self) -> HorizonTables:
+        """The constants of the prediction, in float64."""
+        return horizon_tables(self.settings)
+
+    @cached_property
+    def numbers(self) -> Representation:
+        """The scalar type of the C, and with fixed point the format of each quantity."""
+        scalar = self.settings.code.scalar
+        return Representation(scalar, formats(self.settings, self.tables) if scalar == "fixed" else None)
+
+    @cached_property
+    def limits(self) -> InputLimits:
+        """The limits of inputs and commands, in the numbers of the C."""
+        return self.numbers.limits(self.settings)
+
+    @cached_property
+    def trigonometry(self) -> Any:
+        """The constants of sine and cosine: `Trigonometry`, or `FixedTrigonometry` with fixed point."""
+        found = self.numbers.formats
+        return trigonometry(self.settings.code.scalar) if found is None else fixed_trigonometry(found)
