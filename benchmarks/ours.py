@@ -15,6 +15,7 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import real
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 
 _GLUE: Final = (
@@ -59,9 +60,7 @@ _ROLLOUT: Final = """/* What benchmarks/rollout.c wants to know beyond nmpc_conf
 
 def peers_model() -> Settings:
     """Return the settings that are the problem of the peers: preset table1 with their prediction step."""
-    settings = presets.load("table1")
-    horizon = settings.horizon.model_copy(update={"prediction_step_s": problem.STEP_S})
-    return settings.model_copy(update={"horizon": horizon})
+    return with_option(presets.load("table1"), "horizon.prediction_step_s", problem.STEP_S)
 
 
 def bundle_program(title: str, settings: Settings) -> Program:

@@ -10,13 +10,14 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from benchmarks.searches import Searching, SearchingController, best_iterate, from_level, optimum
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.flights import crashed
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -90,8 +91,8 @@ def entrants(preset: str) -> dict[str, Entrant]:
     other = next(start for start in STARTS if start != kept)
 
     def tried(iterations: int, searching: Searching | None = None, start: str = kept) -> Entrant:
-        optimizer = {"iterations": iterations, "warm_start": start}
-        return Entrant(changed(settings, optimizer=optimizer), searching)
+        started = with_option(settings, "optimizer.warm_start", start)
+        return Entrant(with_option(started, "optimizer.iterations", iterations), searching)
 
     return {
         **{f"{k} iterations, from the {STARTS[kept]}": tried(k) for k in (5, 10, 20)},
@@ -106,21 +107,15 @@ def weighted() -> dict[tuple[str, str], Entrant]:
     """Return `mambo` with every effort weight, and `mambo-robust`, searched more and more, by two titles."""
     mambo = presets.load("mambo")
     several = {
-        f"mambo, {weight:g}": changed(mambo, cost={"effort_weight": weight}) for weight in EFFORT_WEIGHTS
+        f"mambo, {weight:g}": with_option(mambo, "cost.effort_weight", weight) for weight in EFFORT_WEIGHTS
     }
     several["mambo-robust"] = presets.load("mambo-robust")
     found = {}
     for title, settings in several.items():
         for k in (settings.optimizer.iterations, 20):
-            found[title, f"{k} iterations"] = Entrant(changed(settings, optimizer={"iterations": k}))
+            found[title, f"{k} iterations"] = Entrant(with_option(settings, "optimizer.iterations", k))
         found[title, EXACT] = Entrant(settings, optimum)
     return found
-
-
-def changed(settings: Settings, **sections: dict[str, Any]) -> Settings:
-    """Return settings with some keys of some sections changed."""
-    update = {name: getattr(settings, name).model_copy(update=keys) for name, keys in sections.items()}
-    return settings.model_copy(update=update)
 
 
 def fly_world(entrant: Entrant, world: Sequence[Scenario]) -> Flown:

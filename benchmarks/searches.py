@@ -176,7 +176,7 @@ class SearchingController(ReferenceController):
     """n reference controllers in float64 whose moves are chosen by a search of another kind."""
 
     def __init__(self, settings: Settings, n: int, searching: Searching) -> None:
-        float64 = with_option(settings, "code.scalar", "float64", "benchmark")
+        float64 = with_option(settings, "code.scalar", "float64")
         super().__init__(Design(float64), n, self._chosen)
         self._searching = searching
         self._model = Model(settings)

@@ -41,10 +41,10 @@ def validated(document: Mapping[str, object], source: str) -> Settings:
         raise _invalid(source, error, document) from None
 
 
-def with_option(settings: Settings, path: str, value: object, source: str) -> Settings:
+def with_option(settings: Settings, path: str, value: object, source: str = "settings") -> Settings:
     """Return `settings` with `value` at the dotted `path`, under the rules of the file.
 
-    `source` names in the message who asked for it, an option of the command line. Raises
+    `source` begins the message; for an option of the command line it is the option. Raises
     InvalidSettingsError.
     """
     section, name = path.split(".")

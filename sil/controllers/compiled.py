@@ -11,6 +11,7 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
 from mambo_nmpc.sil.controllers.extension import load_extension
@@ -18,7 +19,7 @@ from mambo_nmpc.sil.controllers.extension import load_extension
 
 def plainly_named(settings: Settings) -> Settings:
     """Return `settings` with the default prefix: names do not change what is computed."""
-    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "nmpc"})})
+    return with_option(settings, "code.prefix", "nmpc")
 
 
 def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, watched_step
@@ -100,7 +101,7 @@ class Flown:
 
 def in_scalar(settings: Settings, scalar: ScalarName) -> Settings:
     """Return `settings` with another scalar type."""
-    return settings.model_copy(update={"code": settings.code.model_copy(update={"scalar": scalar})})
+    return with_option(settings, "code.scalar", scalar)
 
 
 def with_few(settings: Settings) -> Settings:

@@ -11,6 +11,7 @@ import pytest
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.inner_steps import watched_step
 from mambo_nmpc.sil.verify.check import Outcome
@@ -101,8 +102,7 @@ def test_steps_of_the_search_are_as_long_as_they_are_told(settings: Settings) ->
 @pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
 def test_a_cost_at_rest_decides_nothing(settings: Settings) -> None:
     """With a huge tolerance all decisions after the first are 0."""
-    optimizer = settings.optimizer.model_copy(update={"tolerance": 1e6})
-    resting = settings.model_copy(update={"optimizer": optimizer})
+    resting = with_option(settings, "optimizer.tolerance", 1e6)
     given = moments(resting)
     step, inner = watched_step(
         resting,

@@ -8,6 +8,7 @@ import pytest
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
 from mambo_nmpc.sil.controllers.pd import PdController
@@ -31,7 +32,7 @@ CONDITIONS = {
 
 def with_scalar(settings: Settings, scalar: str) -> Settings:
     """Return `settings` in another scalar type."""
-    return settings.model_copy(update={"code": settings.code.model_copy(update={"scalar": scalar})})
+    return with_option(settings, "code.scalar", scalar)
 
 
 def assert_same_bits(a: Trace, b: Trace) -> None:

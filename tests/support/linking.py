@@ -8,6 +8,7 @@ from typing import Literal
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from tests.support.tools import require
 
 GUEST = """
@@ -119,9 +120,8 @@ def linked_controller(
     board: Board, folder: Path, *flags: str, scalar: Literal["float32", "float64", "fixed"] = "float32"
 ) -> Path:
     """Link the guest with the controller of preset mambo, and leave gcc's figures of the stack beside it."""
-    settings = presets.load("mambo")
-    code = settings.code.model_copy(update={"scalar": scalar})
-    for path, text in render(settings.model_copy(update={"code": code}), with_digest=False).items():
+    settings = with_option(presets.load("mambo"), "code.scalar", scalar)
+    for path, text in render(settings, with_digest=False).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)
     sources = sorted(str(path.relative_to(folder)) for path in folder.glob("src/*.c"))

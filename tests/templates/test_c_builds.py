@@ -49,7 +49,7 @@ def placed(settings: Settings, folder: Path, *, amalgamate: bool = False) -> Pat
 
 def renamed(settings: Settings, prefix: str) -> Settings:
     """Return `settings` with another prefix."""
-    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": prefix})})
+    return with_option(settings, "code.prefix", prefix)
 
 
 def shell(*command: str | Path, folder: Path) -> str:
@@ -200,8 +200,7 @@ def test_another_digest_than_the_reference_s_fails_the_example(tmp_path: Path) -
 def test_a_changed_header_is_built_anew(tmp_path: Path) -> None:
     """New settings over a built bundle: the objects follow the header, and the self-test passes."""
     require("make", "make")
-    longer = presets.load("mambo")
-    longer = longer.model_copy(update={"horizon": longer.horizon.model_copy(update={"prediction": 20})})
+    longer = with_option(presets.load("mambo"), "horizon.prediction", 20)
     for settings in (presets.load("mambo"), longer):
         for path, text in render(settings).items():
             if not (tmp_path / path).is_file() or (tmp_path / path).read_text() != text:

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify import coverage
 from mambo_nmpc.sil.verify.check import Outcome, Result
 from mambo_nmpc.sil.verify.sign_decisions import in_scalar
@@ -49,8 +50,7 @@ def test_every_line_is_run_whatever_the_settings(name: str, tmp_path: Path) -> N
     """Every preset; the reasons are found under another prefix too."""
     settings = presets.load(name) if name in presets.names() else settings_case(7, "float64")
     if name not in presets.names():
-        code = settings.code.model_copy(update={"prefix": "left_wing"})
-        settings = settings.model_copy(update={"code": code})
+        settings = with_option(settings, "code.prefix", "left_wing")
     result = coverage.check(subject(settings, tmp_path))
     assert result.outcome is Outcome.PASSED, result.evidence
 

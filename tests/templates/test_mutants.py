@@ -8,6 +8,7 @@ import pytest
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.extension import load_extension
@@ -30,16 +31,10 @@ BACKTRACKING = Settings.model_validate(
         "limits": {"tilt_rad": 0.25},
     }
 )
-STAYING = BACKTRACKING.model_copy(
-    update={
-        "optimizer": BACKTRACKING.optimizer.model_copy(
-            update={"variant": "irprop-", "warm_start": "last_command"}
-        )
-    }
+STAYING = with_option(
+    with_option(BACKTRACKING, "optimizer.variant", "irprop-"), "optimizer.warm_start", "last_command"
 )
-NEVER_CONVERGING = BACKTRACKING.model_copy(
-    update={"optimizer": BACKTRACKING.optimizer.model_copy(update={"tolerance": 0.0})}
-)
+NEVER_CONVERGING = with_option(BACKTRACKING, "optimizer.tolerance", 0.0)
 CASES = 400
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify import fuzzing, replay
 from mambo_nmpc.sil.verify.check import Outcome
 from tests.support.cases import settings_case
@@ -59,9 +60,8 @@ def test_no_call_breaks_a_promise(name: str, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
     """Format and names of the harness follow the settings."""
-    settings = settings_case(1, "float64")
-    code = settings.code.model_copy(update={"prefix": "left_wing"})
-    result = fuzzing.check(subject(settings.model_copy(update={"code": code}), tmp_path), runs=FEW_RUNS)
+    settings = with_option(settings_case(1, "float64"), "code.prefix", "left_wing")
+    result = fuzzing.check(subject(settings, tmp_path), runs=FEW_RUNS)
     assert result.outcome is Outcome.PASSED, result.evidence
     assert result.figures["corpus"] > 50
     assert json.loads(json.dumps(result.figures)) == result.figures

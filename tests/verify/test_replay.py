@@ -8,6 +8,7 @@ import pytest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import (
@@ -41,7 +42,7 @@ def fault_of(made: Subject) -> str | None:
 
 def named(settings: Settings, prefix: str) -> Settings:
     """Return `settings` with another prefix."""
-    return settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": prefix})})
+    return with_option(settings, "code.prefix", prefix)
 
 
 @pytest.mark.parametrize(
