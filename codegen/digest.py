@@ -21,7 +21,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 TICKS: Final = 100
 """Steps of an episode."""
-HELD: Final = 4
+TICKS_PER_INPUT: Final = 4
 """Ticks that see the same input: plans reach their limits, and costs come to rest."""
 HOVER_M_S2: Final = 9.81
 
@@ -43,7 +43,7 @@ Inputs = tuple[Real, Real, Real]
 
 
 @dataclass(frozen=True)
-class Spread:
+class InputScales:
     """How far the frozen inputs lie apart, for each unit of a draw; errors come in four sizes.
 
     In fixed point, which has no format for that, for each _UNIT of a draw.
@@ -59,7 +59,7 @@ class Spread:
     hover_m_s2: float
 
 
-def spread(settings: Settings) -> Spread:
+def input_scales(settings: Settings) -> InputScales:
     """Spread the inputs over what a flight meets, all within the ranges of `settings`."""
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
@@ -68,7 +68,7 @@ def spread(settings: Settings) -> Spread:
     hover_m_s2 = min(HOVER_M_S2, most_m_s2) if fixed else HOVER_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
     unit = 1 if fixed else _UNIT
-    return Spread(
+    return InputScales(
         target_position_m=position_m / unit,
         target_velocity_m_s=velocity_m_s / unit,
         error_position_m=tuple(
@@ -84,14 +84,14 @@ def spread(settings: Settings) -> Spread:
     )
 
 
-def episodes(settings: Settings) -> int:
+def episode_count(settings: Settings) -> int:
     """Return how many episodes the digest in a bundle covers: fewer where a step is much work."""
     horizon = settings.horizon
     work = max(horizon.prediction * horizon.control, _LEAST_WORK) * settings.optimizer.iterations
     return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
 
 
-def frozen_digest(design: Design, count: int) -> int:
+def self_test_digest(design: Design, count: int) -> int:
     """Return the digest of the first `count` episodes, 32 bits, as the reference computes it."""
     digest = 0
     for first in range(0, count, _TOGETHER):
@@ -100,12 +100,12 @@ def frozen_digest(design: Design, count: int) -> int:
     return digest
 
 
-def frozen_inputs(design: Design, episode: Words) -> Iterator[Inputs]:
+def episode_inputs(design: Design, episode: Words) -> Iterator[Inputs]:
     """Yield the inputs of each tick of n episodes: states (n, 7), targets (n, 4), thrusts (n,)."""
-    source, scales = _Source(episode), spread(design.settings)
-    for _ in range(TICKS // HELD):
+    source, scales = _Source(episode), input_scales(design.settings)
+    for _ in range(TICKS // TICKS_PER_INPUT):
         inputs = _next_inputs(design, scales, source)
-        for _ in range(HELD):
+        for _ in range(TICKS_PER_INPUT):
             yield inputs
 
 
@@ -131,7 +131,7 @@ class _Source:
         return drawn
 
 
-def _next_inputs(design: Design, scales: Spread, source: _Source) -> Inputs:
+def _next_inputs(design: Design, scales: InputScales, source: _Source) -> Inputs:
     """Draw states, targets and thrusts; five in 64 will be refused."""
     numbers, limits = design.numbers, design.limits
     choice = source.next()
@@ -161,12 +161,12 @@ def _next_inputs(design: Design, scales: Spread, source: _Source) -> Inputs:
     thrust = np.where(refusal == 4, numbers.computed(0), thrust)
     return (
         np.stack(
-            [numbers.told(value, quantity) for value, quantity in zip(state, STATE, strict=True)], axis=1
+            [numbers.to_si(value, quantity) for value, quantity in zip(state, STATE, strict=True)], axis=1
         ),
         np.stack(
-            [numbers.told(value, quantity) for value, quantity in zip(target, TARGET, strict=True)], axis=1
+            [numbers.to_si(value, quantity) for value, quantity in zip(target, TARGET, strict=True)], axis=1
         ),
-        numbers.told(thrust, "thrust"),
+        numbers.to_si(thrust, "thrust"),
     )
 
 
@@ -182,7 +182,7 @@ def _episodes(design: Design, episode: Words) -> Words:
     """Return the digests (n,) of n episodes, each by itself."""
     controller = ReferenceController(design, len(episode))
     seen = np.zeros_like(episode)
-    for inputs in frozen_inputs(design, episode):
+    for inputs in episode_inputs(design, episode):
         for word in _words(design.numbers, controller.step(*inputs)):
             seen = _fold(seen, word)
     return seen
@@ -193,7 +193,7 @@ def _words(numbers: Representation, step: Step) -> Iterator[Words]:
     for whole in (step.status, step.iterations, step.converged):
         yield whole.astype(np.uint32)
     for name in ("command_rad", "cost", "gradient", "plan_rad"):
-        real = numbers.behind(getattr(step, name), name)
+        real = numbers.from_si(getattr(step, name), name)
         rows = np.ascontiguousarray(real.reshape(len(real), -1))
         yield from rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T
 

@@ -10,7 +10,7 @@ import jinja2
 
 from mambo_nmpc.codegen import __version__, boards, literals
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.digest import HELD, TICKS, episodes, frozen_digest, spread
+from mambo_nmpc.codegen.digest import TICKS, TICKS_PER_INPUT, episode_count, input_scales, self_test_digest
 from mambo_nmpc.codegen.fixed_point import SINE_BITS
 from mambo_nmpc.codegen.flags import (
     COMPILE_FLAGS,
@@ -67,7 +67,7 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
 
     context = _context(design) | {
         "amalgamated": amalgamate,
-        "frozen_digest": frozen_digest(design, episodes(settings)) if with_digest else None,
+        "frozen_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
     }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if amalgamate:
@@ -154,11 +154,11 @@ def _context(design: Design) -> dict[str, object]:
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
         "vectors": self_test(design),
-        "episodes": episodes(settings),
+        "episodes": episode_count(settings),
         "ticks": TICKS,
-        "held": HELD,
-        "frozen_steps": TICKS * episodes(settings),
-        "spread": spread(settings),
+        "held": TICKS_PER_INPUT,
+        "frozen_steps": TICKS * episode_count(settings),
+        "spread": input_scales(settings),
         "boards": [
             {
                 "name": board.name,

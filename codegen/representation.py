@@ -84,7 +84,7 @@ class Representation:
             ),
         )
 
-    def taken(self, values: ArrayLike, quantities: Sequence[str]) -> NDArray[Any]:
+    def quantize(self, values: ArrayLike, quantities: Sequence[str]) -> NDArray[Any]:
         """Return what the C gets for `values`, whose last axis holds `quantities`.
 
         In fixed point that is the nearest number, ties away from zero; NaN and what no format holds become
@@ -100,7 +100,7 @@ class Representation:
         rounded = whole + np.trunc(2 * rest)
         return np.where(fits, rounded, LARGEST).astype(self.scalar)
 
-    def told(self, numbers: NDArray[Any], *quantities: str) -> NDArray[Any]:
+    def to_si(self, numbers: NDArray[Any], *quantities: str) -> NDArray[Any]:
         """Return what `numbers` of the C mean: as they are, or exactly in float64.
 
         They are of one quantity, or the last axis holds `quantities`.
@@ -110,7 +110,7 @@ class Representation:
         told: NDArray[Any] = np.ldexp(numbers.astype(np.float64), [-self.bits[name] for name in quantities])
         return told
 
-    def behind(self, values: NDArray[Any], name: str) -> NDArray[Any]:
+    def from_si(self, values: NDArray[Any], name: str) -> NDArray[Any]:
         """Return the numbers of the C that an outcome, by its name, was told from."""
         if self.bits is None:
             return values

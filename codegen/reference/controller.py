@@ -58,7 +58,7 @@ class Step:
     iterations:  (n,) updates made.
     converged:   (n,) whether the cost came to rest.
 
-    With fixed point the numbers are those of the C, told exactly in float64.
+    With fixed point the numbers are those of the C, converted exactly to SI units in float64.
     """
 
     status: NDArray[np.int64]
@@ -89,7 +89,7 @@ class ReferenceController:
         self.memory = Memory(
             command_rad=np.zeros((n, 2), computed),
             plan_rad=np.zeros((n, control, 2), computed),
-            weights=np.tile(self._taken([weights], WEIGHTS), (n, 1)),
+            weights=np.tile(self._quantize([weights], WEIGHTS), (n, 1)),
             cost=np.zeros(n, computed),
             gradient=np.zeros((n, control, 2), computed),
             iterations=np.zeros(n, np.int64),
@@ -101,7 +101,7 @@ class ReferenceController:
 
         Returns a status (n,); one that is not finite, or beyond the limit of attitudes, changes nothing.
         """
-        given = self._taken(command_rad, COMMAND)
+        given = self._quantize(command_rad, COMMAND)
         good = _within(given, self._limits.attitude)
         limit = self._limits.tilt
         command = np.where(
@@ -120,7 +120,7 @@ class ReferenceController:
 
         Returns a status (n,); bad weights change nothing.
         """
-        given = self._taken(weights, WEIGHTS)
+        given = self._quantize(weights, WEIGHTS)
         good = np.all((given >= 0) & (given <= self._limits.weights), axis=1)
         self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
         return np.where(good, Status.OK, Status.BAD_WEIGHT)
@@ -131,8 +131,8 @@ class ReferenceController:
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
         target (n, 4): x, y (m), vx, vy (m/s). thrust_acceleration_m_s2 (n,): thrust over mass, up.
         """
-        states, targets = self._taken(state, STATE), self._taken(target, TARGET)
-        thrusts = self._taken(np.asarray(thrust_acceleration_m_s2)[:, None], THRUST)[:, 0]
+        states, targets = self._quantize(state, STATE), self._quantize(target, TARGET)
+        thrusts = self._quantize(np.asarray(thrust_acceleration_m_s2)[:, None], THRUST)[:, 0]
         status = self._check(states, targets, thrusts)
         good = status == Status.OK
         searched = self._search(
@@ -151,19 +151,19 @@ class ReferenceController:
             converged=np.where(good, searched.converged, old.converged),
         )
         new = self.memory
-        told = self._numbers.told
+        to_si = self._numbers.to_si
         return Step(
             status=status,
-            command_rad=told(new.command_rad, "angle"),
-            cost=told(new.cost, "cost"),
-            gradient=told(new.gradient, "gradient"),
-            plan_rad=told(new.plan_rad, "angle"),
+            command_rad=to_si(new.command_rad, "angle"),
+            cost=to_si(new.cost, "cost"),
+            gradient=to_si(new.gradient, "gradient"),
+            plan_rad=to_si(new.plan_rad, "angle"),
             iterations=new.iterations,
             converged=new.converged,
         )
 
-    def _taken(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
-        return self._numbers.taken(values, quantities).astype(self._numbers.computed)
+    def _quantize(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
+        return self._numbers.quantize(values, quantities).astype(self._numbers.computed)
 
     def _search(self, state: Real, target: Real, thrust: Real) -> Search:
         memory = self.memory

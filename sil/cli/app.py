@@ -334,7 +334,7 @@ def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
     design, ranges = Design(settings), settings.ranges
     numbers, limits = design.numbers, design.limits
     given = np.abs(flight.targets()[:, :1]).max(axis=0)
-    x, y, vx, vy = numbers.taken(given, TARGET)[0]
+    x, y, vx, vy = numbers.quantize(given, TARGET)[0]
     for what, refused, largest, unit, key, limit in (
         ("position", max(x, y) > limits.position, given[0, :2].max(), "m", "position_m", ranges.position_m),
         (

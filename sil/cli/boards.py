@@ -12,7 +12,7 @@ import typer
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen import cli as generating
 from mambo_nmpc.codegen.boards import Board
-from mambo_nmpc.codegen.digest import TICKS, episodes
+from mambo_nmpc.codegen.digest import TICKS, episode_count
 from mambo_nmpc.codegen.errors import BuildError, InvalidSettingsError, echo
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.progress import progress_bar
@@ -106,7 +106,7 @@ def same_bits_command(
     """Run the same frozen steps in every build at hand; exit 1 unless all digests are one."""
     settings = generating.load(source, scalar)
     chosen = [one for name in board.split(",") for one in _boards(name)]
-    count = episodes(settings) if steps is None else steps // TICKS
+    count = episode_count(settings) if steps is None else steps // TICKS
     found: list[BuildDigest] = []
     with progress_bar("comparing builds") as progress:
         for result in same_bits(settings, chosen, count):

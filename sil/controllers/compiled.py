@@ -57,7 +57,8 @@ def as_array(
     given = np.asarray(values)
     if given.shape != shape:
         raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
-    return np.ascontiguousarray(numbers.taken(given.reshape(-1, len(quantities)), quantities).reshape(shape))
+    quantized = numbers.quantize(given.reshape(-1, len(quantities)), quantities)
+    return np.ascontiguousarray(quantized.reshape(shape))
 
 
 DIRT = b"\xa5"
@@ -91,7 +92,7 @@ class CompiledController:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
         n = self._n
         status, iterations, converged = (np.empty(n, np.intc) for _ in range(3))
-        scalar, wide, told = self.scalar, self._numbers.wide, self._numbers.told
+        scalar, wide, to_si = self.scalar, self._numbers.wide, self._numbers.to_si
         command, plan = np.empty((n, 2), scalar), np.empty((n, *self._moves), scalar)
         cost, gradient = np.empty(n, wide), np.empty((n, *self._moves), wide)
         inputs = as_arrays(self._numbers, n, state, target, thrust_acceleration_m_s2)
@@ -116,10 +117,10 @@ class CompiledController:
         )
         return Step(
             status=status.astype(np.int64),
-            command_rad=told(command, "angle"),
-            cost=told(cost, "cost"),
-            gradient=told(gradient, "gradient"),
-            plan_rad=told(plan, "angle"),
+            command_rad=to_si(command, "angle"),
+            cost=to_si(cost, "cost"),
+            gradient=to_si(gradient, "gradient"),
+            plan_rad=to_si(plan, "angle"),
             iterations=iterations.astype(np.int64),
             converged=converged.astype(np.bool_),
         )

@@ -98,7 +98,7 @@ class EmulatedController:
                 content = self.machine.read(self._outputs[name], values[few].nbytes)
                 values[few] = np.frombuffer(content, values.dtype).reshape(values[few].shape)
         for name, quantity in OUTCOME.items():
-            outcome[name] = self._numbers.told(outcome[name], quantity)
+            outcome[name] = self._numbers.to_si(outcome[name], quantity)
         return Step(
             **outcome
             | {

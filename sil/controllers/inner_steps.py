@@ -23,7 +23,7 @@ class InnerSteps:
     cost:     (i, n) its cost.
     gradient: (i, n, control, 2) its gradient, per rad.
 
-    With fixed point the numbers are those of the controller, told exactly in float64.
+    With fixed point the numbers are those of the controller, converted exactly to SI units in float64.
     """
 
     plan_rad: Real
@@ -33,7 +33,7 @@ class InnerSteps:
     def decisions(self, settings: Settings) -> NDArray[np.int8]:
         """Return the sign (i, n, control, 2) by which RPROP updates each move: 0 once the cost is at rest."""
         numbers = Design(settings).numbers
-        tolerance = numbers.told(numbers.constant(settings.optimizer.tolerance, "cost"), "cost")
+        tolerance = numbers.to_si(numbers.constant(settings.optimizer.tolerance, "cost"), "cost")
         at_rest = np.zeros(self.cost.shape, np.bool_)
         at_rest[1:] = np.logical_or.accumulate(np.abs(np.diff(self.cost, axis=0)) < tolerance)
         return np.where(at_rest[:, :, None, None], 0, sign(self.gradient)).astype(np.int8)
@@ -50,7 +50,7 @@ class InnerSteps:
             size = rprop.next_step(size, agreement)
             before = np.where(agreement < 0, np.zeros_like(slope), slope)
             sizes.append(size)
-        return design.numbers.told(np.stack(sizes), "angle")
+        return design.numbers.to_si(np.stack(sizes), "angle")
 
 
 class WatchedController:
@@ -74,9 +74,9 @@ class WatchedController:
     def _watch(self, rprop: Rprop, evaluate: Evaluate, start: Real) -> Search:
         def watch(moves_rad: Real) -> tuple[Real, Real]:
             cost, gradient = evaluate(moves_rad)
-            told, numbers = self._numbers.told, (moves_rad.copy(), cost.copy(), gradient.copy())
+            to_si, numbers = self._numbers.to_si, (moves_rad.copy(), cost.copy(), gradient.copy())
             self._evaluated.append(
-                (told(numbers[0], "angle"), told(numbers[1], "cost"), told(numbers[2], "gradient"))
+                (to_si(numbers[0], "angle"), to_si(numbers[1], "cost"), to_si(numbers[2], "gradient"))
             )
             return cost, gradient
 

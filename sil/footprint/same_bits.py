@@ -9,7 +9,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.digest import frozen_digest
+from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
@@ -36,7 +36,7 @@ class BuildDigest:
 
 def same_bits(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
     """Yield the digest of the reference first, then of every build on this machine and on `boards`."""
-    yield BuildDigest(REFERENCE, "NumPy", "", _spelled(frozen_digest(Design(settings), episodes)))
+    yield BuildDigest(REFERENCE, "NumPy", "", _spelled(self_test_digest(Design(settings), episodes)))
     for name in HOST_COMPILERS:
         for optimisation in OPTIMISATIONS:
             yield _on_host(settings, name, optimisation, episodes)

@@ -83,7 +83,7 @@ def calls(settings: Settings, function: Function, values: NDArray[Any], nulls: i
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
     quantities = _QUANTITIES[function][: values.shape[1]]
-    made["values"][:, : values.shape[1]] = Design(settings).numbers.taken(values, quantities)
+    made["values"][:, : values.shape[1]] = Design(settings).numbers.quantize(values, quantities)
     return made
 
 
@@ -127,8 +127,8 @@ class _Runs:
 
         def given(wanted: Function) -> NDArray[Any]:
             quantities = _QUANTITIES[wanted]
-            told = self._numbers.told(values[:, : len(quantities)], *quantities)
-            return np.where(((function == wanted) & ~null)[:, None], told, np.nan).astype(told.dtype)
+            si = self._numbers.to_si(values[:, : len(quantities)], *quantities)
+            return np.where(((function == wanted) & ~null)[:, None], si, np.nan).astype(si.dtype)
 
         outcome = np.zeros(len(now), outcome_type(self._settings))
         with np.errstate(all="ignore"):

@@ -219,7 +219,7 @@ def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
             limits.thrust_most,
         ]
     )
-    steps = numbers.told(most * rng.choice([-1, 1], (512, 12)), *STATE, *TARGET, *THRUST)
+    steps = numbers.to_si(most * rng.choice([-1, 1], (512, 12)), *STATE, *TARGET, *THRUST)
     steps[:, 11] = np.abs(steps[:, 11])
     steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
     yield from calls(settings, Function.STEP, steps).reshape(-1, 4)
@@ -258,7 +258,7 @@ def _around(settings: Settings, quantity: str, low: float, high: float) -> Array
     beyond = np.array([-np.inf, np.inf], scalar)
     neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
     if numbers.bits is not None:
-        ends = numbers.told(numbers.taken(ends[:, None], (quantity,)), quantity)[:, 0]
+        ends = numbers.to_si(numbers.quantize(ends[:, None], (quantity,)), quantity)[:, 0]
         unit = np.ldexp([-1.0, 1.0], -numbers.bits[quantity])
         neighbours = [ends + unit, ends - unit]
     tiny = np.finfo(scalar).smallest_subnormal

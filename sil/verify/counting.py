@@ -89,11 +89,11 @@ def count(
     )
     done = subprocess.run(
         [str(program.absolute())],
-        input=numbers.taken(inputs, (*STATE, *TARGET, *THRUST)).tobytes(),
+        input=numbers.quantize(inputs, (*STATE, *TARGET, *THRUST)).tobytes(),
         capture_output=True,
         check=False,
     )
     if done.returncode != 0 or len(done.stdout) != layout.itemsize * len(inputs):
         raise BuildError(f"{program.name}: the counting build ended with code {done.returncode}")
     found = np.frombuffer(done.stdout, layout)
-    return found["status"], numbers.told(found["command"], "angle"), found["counts"]
+    return found["status"], numbers.to_si(found["command"], "angle"), found["counts"]

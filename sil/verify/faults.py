@@ -31,7 +31,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
     A controller that strays without a fault cannot show that it comes back: INCOMPLETE, unless it failed.
     """
     design = Design(settings)
-    limit = float(design.numbers.told(np.array([design.limits.tilt]), "angle")[0])
+    limit = float(design.numbers.to_si(np.array([design.limits.tilt]), "angle")[0])
     ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
     strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
     wrong = []

@@ -50,7 +50,7 @@ class Moments:
         numbers = Design(settings).numbers
 
         def exact(values: NDArray[Any], quantities: Sequence[str]) -> NDArray[Any]:
-            return numbers.told(numbers.taken(values, quantities), *quantities)
+            return numbers.to_si(numbers.quantize(values, quantities), *quantities)
 
         return Moments(
             exact(self.state, STATE),
@@ -140,8 +140,8 @@ def _steps(settings: Settings, moments: Moments) -> tuple[Any, InnerSteps]:
     fresh = ReferenceController(design, len(moments.state)).memory
     memory = replace(
         fresh,
-        command_rad=numbers.taken(moments.command_rad, COMMAND).astype(numbers.computed),
-        plan_rad=numbers.taken(moments.plan_rad, COMMAND).astype(numbers.computed),
+        command_rad=numbers.quantize(moments.command_rad, COMMAND).astype(numbers.computed),
+        plan_rad=numbers.quantize(moments.plan_rad, COMMAND).astype(numbers.computed),
     )
     return watched_step(settings, memory, moments.state, moments.target, moments.thrust_acceleration_m_s2)
 

@@ -165,9 +165,9 @@ def test_numbers_are_the_nearest_ties_away_from_zero() -> None:
     numbers = Design(MAMBO).numbers
     unit = 2.0 ** -asdict(formats(MAMBO, horizon_tables(MAMBO)))["position"]
     given = np.array([0.0, 0.49, 0.5, 1.5, -0.5, -0.51, -1.5, 7.0])[:, None] * unit
-    assert numbers.taken(given, ("position",))[:, 0].tolist() == [0, 0, 1, 2, -1, -1, -2, 7]
+    assert numbers.quantize(given, ("position",))[:, 0].tolist() == [0, 0, 1, 2, -1, -1, -2, 7]
     for beyond in (np.nan, np.inf, -np.inf, 1e30, -1e30, 2.0**31 * unit, -(2.0**31) * unit):
-        assert numbers.taken([[beyond]], ("position",))[0, 0] == LARGEST
+        assert numbers.quantize([[beyond]], ("position",))[0, 0] == LARGEST
 
 
 def test_numbers_mean_what_was_given() -> None:
@@ -175,7 +175,7 @@ def test_numbers_mean_what_was_given() -> None:
     numbers = Design(MAMBO).numbers
     for quantities in (STATE, TARGET, THRUST, COMMAND, WEIGHTS):
         given = np.random.default_rng(0).integers(-LARGEST + 1, LARGEST, (1000, len(quantities)), np.int32)
-        assert np.array_equal(numbers.taken(numbers.told(given, *quantities), quantities), given)
+        assert np.array_equal(numbers.quantize(numbers.to_si(given, *quantities), quantities), given)
 
 
 def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) -> None:
@@ -207,7 +207,7 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
     numbers = Design(MAMBO).numbers
     constants = [(-1.5, "position"), (0.1, "velocity"), (-0.3, "angle"), (3.14159, "yaw"), (9.81, "thrust")]
     constants += [(123.4, "tracking"), (0.7, "effort")]
-    expected = [int(numbers.taken([[value]], (quantity,))[0, 0]) for value, quantity in constants]
+    expected = [int(numbers.quantize([[value]], (quantity,))[0, 0]) for value, quantity in constants]
     assert np.frombuffer(done[:28], np.int32).tolist() == expected
 
     found = np.frombuffer(done[28:], np.float32).reshape(-1, 4)
@@ -222,7 +222,7 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
 def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
     """Clamping far errors changes the reported cost alone: command, gradient and convergence are the same."""
     numbers, found = Design(MAMBO).numbers, formats(MAMBO, horizon_tables(MAMBO))
-    limit_m = float(numbers.told(np.array([found.error_limit]), "position")[0])
+    limit_m = float(numbers.to_si(np.array([found.error_limit]), "position")[0])
     assert limit_m < MAMBO.ranges.position_m
     state = np.zeros((2, 7))
     state[:, 2:7] = [30.0, -20.0, 0.3, -0.2, 1.0]

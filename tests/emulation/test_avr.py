@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.digest import frozen_digest
+from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
@@ -84,7 +84,7 @@ def test_frozen_steps_have_their_digest_on_eight_bits(
     """Two episodes of it, as the reference has them."""
     settings = with_option(presets.load(preset), "code.scalar", scalar, "test")
     elf = build_guest(settings, mega, tmp_path)
-    assert emulated_digest(settings, elf, "avr", 2) == frozen_digest(Design(settings), 2)
+    assert emulated_digest(settings, elf, "avr", 2) == self_test_digest(Design(settings), 2)
 
 
 def test_memory_holds_what_is_written(mega: Builder, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.digest import TICKS, episodes, frozen_digest, frozen_inputs
+from mambo_nmpc.codegen.digest import TICKS, episode_count, episode_inputs, self_test_digest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
@@ -64,7 +64,7 @@ def check_every_build(names: tuple[str, ...], scalar: str) -> None:
             expected += [(board.name, compiler, flag) for flag in OPTIMISATIONS]
     assert [(one.where, one.compiler, one.optimisation) for one in found] == expected
     assert len(found) == builds(chosen)
-    assert {one.digest for one in found} == {f"0x{frozen_digest(Design(settings), 3):08X}"}
+    assert {one.digest for one in found} == {f"0x{self_test_digest(Design(settings), 3):08X}"}
 
 
 def test_compilers_and_boards_share_one_digest() -> None:
@@ -96,7 +96,7 @@ def test_a_harmed_bundle_has_another_digest(harm: str, compiler: str, tmp_path: 
         }.items()
     )
     digests = [emulated_digest(MAMBO, elf, "cortex-m4", 2) for elf in (good, harmed)]
-    assert digests[0] == frozen_digest(Design(MAMBO), 2) != digests[1]
+    assert digests[0] == self_test_digest(Design(MAMBO), 2) != digests[1]
 
 
 def test_other_settings_and_other_steps_have_other_digests() -> None:
@@ -109,9 +109,9 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
         document | {"optimizer": document["optimizer"] | {"variant": "irprop-"}},
         document | {"code": {"scalar": "float64"}},
     ]
-    digests = [frozen_digest(Design(Settings.model_validate(one)), 3) for one in (document, *changed)]
-    assert len({*digests, frozen_digest(Design(MAMBO), 4)}) == len(digests) + 1
-    assert digests[0] == frozen_digest(Design(MAMBO), 3)
+    digests = [self_test_digest(Design(Settings.model_validate(one)), 3) for one in (document, *changed)]
+    assert len({*digests, self_test_digest(Design(MAMBO), 4)}) == len(digests) + 1
+    assert digests[0] == self_test_digest(Design(MAMBO), 3)
 
 
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
@@ -120,14 +120,14 @@ def test_c_makes_the_frozen_steps_of_the_reference(index: int, scalar: str) -> N
     """Whatever the settings, the ends of the horizon and narrow ranges among them."""
     settings = settings_case(index, scalar)
     extension = load_extension(render(settings, with_digest=False), scalar, toolchain("gcc"))
-    assert compiled_digest(extension, 5) == frozen_digest(Design(settings), 5)
+    assert compiled_digest(extension, 5) == self_test_digest(Design(settings), 5)
 
 
 def test_frozen_steps_end_in_every_way() -> None:
     """Near one in thirteen is refused, for each reason; searches rest early, commands reach their limit."""
     episode = np.arange(50, dtype=np.uint32)
     reference = ReferenceController(Design(MAMBO), len(episode))
-    steps = [reference.step(*inputs) for inputs in frozen_inputs(Design(MAMBO), episode)]
+    steps = [reference.step(*inputs) for inputs in episode_inputs(Design(MAMBO), episode)]
     assert len(steps) == TICKS
     status = np.array([step.status for step in steps])
     assert set(status.flat) == {Status.OK, Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST}
@@ -140,7 +140,7 @@ def test_frozen_steps_end_in_every_way() -> None:
 
 def test_frozen_inputs_are_spread_alike_and_never_twice() -> None:
     """Every input of an episode fills its range evenly, and no two episodes share one."""
-    inputs = list(frozen_inputs(Design(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
+    inputs = list(episode_inputs(Design(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
     yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
     yaw = yaw[np.abs(yaw) <= 100]
     shares = np.histogram(yaw, bins=10, range=(-100, 100))[0] / len(yaw)
@@ -154,7 +154,7 @@ def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.Monk
     """What did not run has no digest and says why; the reference always runs."""
     monkeypatch.setenv("PATH", str(tmp_path))
     found = list(same_bits(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
-    assert found[0].digest == f"0x{frozen_digest(Design(MAMBO), 1):08X}"
+    assert found[0].digest == f"0x{self_test_digest(Design(MAMBO), 1):08X}"
     reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
     assert all(one.digest is None for one in found[1:])
     assert ("host", "clang", "clang is not here") in reasons
@@ -187,4 +187,4 @@ def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
     stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
     assert stated
     extension = load_extension(files, settings.code.scalar, toolchain(host_toolchain().command[0]))
-    assert compiled_digest(extension, episodes(settings)) == int(stated[1], 16)
+    assert compiled_digest(extension, episode_count(settings)) == int(stated[1], 16)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.digest import frozen_digest
+from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.errors import InvalidSettingsError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.render import render
@@ -157,7 +157,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     placed(renamed(presets.load("mambo"), "drone"), tmp_path, amalgamate=amalgamate)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
-    digest = frozen_digest(Design(presets.load("mambo")), 1000)
+    digest = self_test_digest(Design(presets.load("mambo")), 1000)
     assert f"digest: 0x{digest:08X} after 100000 steps\n" in printed
     last = [float(word) for word in printed.splitlines()[-1].split()]
     assert abs(last[1] - last[3]) < 0.05
@@ -178,7 +178,7 @@ def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: s
     assert len(objects) == len(sources)
     shell(*gcc, "example/main.c", *objects, "-o", "main", folder=tmp_path)
     printed = shell(tmp_path / "main", folder=tmp_path)
-    assert f"digest: 0x{frozen_digest(Design(settings), 1000):08X} after 100000 steps\n" in printed
+    assert f"digest: 0x{self_test_digest(Design(settings), 1000):08X} after 100000 steps\n" in printed
 
 
 def test_another_digest_than_the_reference_s_fails_the_example(tmp_path: Path) -> None:

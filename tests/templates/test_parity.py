@@ -71,7 +71,7 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
             [0.0, -0.0, 1024.0, -1024.0],
         ]
     )
-    angles = blocks.numbers.taken(given[:, None], ("yaw",))[:, 0]
+    angles = blocks.numbers.quantize(given[:, None], ("yaw",))[:, 0]
     sine, cosine = blocks.products.sine_cosine(blocks.computed(angles))
     (c_sine, sine_pointer), (c_cosine, cosine_pointer) = blocks.reals(1), blocks.reals(1)
     for angle, expected_sine, expected_cosine in zip(angles, sine, cosine, strict=True):
@@ -79,8 +79,8 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
         assert bits(c_sine) == bits(expected_sine.astype(blocks.scalar))
         assert bits(c_cosine) == bits(expected_cosine.astype(blocks.scalar))
 
-    exact = blocks.numbers.told(angles, "yaw").astype(np.longdouble)
-    sine, cosine = (blocks.numbers.told(values, "sine") for values in (sine, cosine))
+    exact = blocks.numbers.to_si(angles, "yaw").astype(np.longdouble)
+    sine, cosine = (blocks.numbers.to_si(values, "sine") for values in (sine, cosine))
     assert float(np.max(np.abs(sine - np.sin(exact)))) < SINE_ERRORS[scalar]
     assert float(np.max(np.abs(cosine - np.cos(exact)))) < SINE_ERRORS[scalar]
 
@@ -94,17 +94,17 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
     ffi, lib = blocks.ffi, blocks.lib
     moves_count = 2 * settings.horizon.control
     predictor = Predictor(blocks.design, blocks.products)
-    limits, taken, computed = blocks.design.limits, blocks.numbers.taken, blocks.computed
+    limits, quantize, computed = blocks.design.limits, blocks.numbers.quantize, blocks.computed
     rng = np.random.default_rng(index)
     prediction, controller = ffi.new("nmpc_prediction_t *"), ffi.new("nmpc_t *")
 
     for _ in range(50):
-        state = taken(rng.normal(0, 1, (1, 7)) * [1, 1, 1, 1, 0.3, 0.3, 10], STATE)
-        target = taken(rng.normal(0, 1, (1, 4)), TARGET)
-        thrust = taken(rng.uniform(5, 15, (1, 1)), THRUST)[0]
+        state = quantize(rng.normal(0, 1, (1, 7)) * [1, 1, 1, 1, 0.3, 0.3, 10], STATE)
+        target = quantize(rng.normal(0, 1, (1, 4)), TARGET)
+        thrust = quantize(rng.uniform(5, 15, (1, 1)), THRUST)[0]
         reach = min(0.3, settings.limits.tilt_rad)
-        last = taken(rng.uniform(-reach, reach, (1, 2)), COMMAND)
-        moves = taken(rng.uniform(-reach, reach, (1, moves_count // 2, 2)), COMMAND)
+        last = quantize(rng.uniform(-reach, reach, (1, 2)), COMMAND)
+        moves = quantize(rng.uniform(-reach, reach, (1, moves_count // 2, 2)), COMMAND)
         moves[0, 0, int(rng.integers(2))] = last[0, 0]
         weights = (
             rng.uniform(0, 0.5, (1, 2)) * np.minimum(limits.weights, limits.weights.dtype.type(2**30))
