@@ -51,7 +51,7 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     """Render the bundle of `settings`: {relative POSIX path: text}.
 
     With `amalgamate` the library is one header and one source in the bundle's folder. Only `with_digest` does
-    the header state the digest of the frozen steps: what is compiled to run at once need not wait for it.
+    the header state the self-test digest, which takes a second: what is only compiled here does not need it.
     """
     design = Design(settings)
     environment = _environment()

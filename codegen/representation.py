@@ -1,7 +1,7 @@
-"""How a controller's C represents numbers, and what the world outside gives to it and reads from it.
+"""How a controller represents numbers, and how values in SI units become its numbers and back.
 
-Outside, numbers are floating point in SI units. A float32 or float64 controller takes them as they are,
-rounded to its type; a fixed point controller takes whole numbers, in a format for each quantity.
+Outside the controller, values are floating point in SI units. A float32 or float64 controller rounds them to
+its type; a fixed point controller takes whole numbers, in a format for each quantity.
 """
 
 import math
@@ -22,15 +22,15 @@ TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
 THRUST: Final = ("thrust",)
 COMMAND: Final = ("angle", "angle")
 WEIGHTS: Final = ("tracking", "effort")
-"""What the columns of inputs are."""
+"""The quantity of each column of an input."""
 
 OUTCOME: Final = {"command_rad": "angle", "cost": "cost", "gradient": "gradient", "plan_rad": "angle"}
-"""What the numbers of an outcome are."""
+"""The quantity of each result of a step."""
 
 
 @dataclass(frozen=True)
 class InputLimits:
-    """The ends of the ranges of inputs and commands, constants of one controller."""
+    """The largest magnitudes of inputs and commands, and both limits of thrust, as the C compares them."""
 
     position: Any
     velocity: Any
@@ -48,8 +48,9 @@ class Representation:
     scalar:   type of nmpc_real_t, the numbers of the interface.
     wide:     type of nmpc_sum_t, cost and gradient.
     computed: type that the reference computes with.
-    formats:  those of fixed point, None with floating point; `bits` has them by name.
-    tracking_limit, effort_limit: largest weights.
+    formats:  the formats of fixed point, None in floating point.
+    bits:     bits behind the point by quantity, None in floating point.
+    tracking_limit, effort_limit: largest weights, in SI units.
     """
 
     def __init__(self, scalar: str, formats: Formats | None) -> None:
@@ -65,11 +66,11 @@ class Representation:
             self.effort_limit = math.ldexp(formats.effort_limit, -formats.effort)
 
     def constant(self, value: float, quantity: str) -> Any:
-        """Return a constant of the settings, rounded once, in the type that the reference computes with."""
+        """Round a constant of the settings, in the type that the reference computes with."""
         return self.scalar(value) if self.bits is None else np.int64(raw(value, self.bits[quantity]))
 
     def limits(self, settings: Sections) -> InputLimits:
-        """Return the limits of all inputs."""
+        """Return the limits of inputs and commands."""
         ranges = settings.ranges
         return InputLimits(
             position=self.constant(ranges.position_m, "position"),
@@ -85,10 +86,10 @@ class Representation:
         )
 
     def quantize(self, values: ArrayLike, quantities: Sequence[str]) -> NDArray[Any]:
-        """Return what the C gets for `values`, whose last axis holds `quantities`.
+        """Convert `values` in SI units, whose last axis holds `quantities`, to numbers of the C.
 
-        In fixed point that is the nearest number, ties away from zero; NaN and what no format holds become
-        the largest number, which is out of every range.
+        In fixed point that is the nearest number, ties away from zero. NaN and values too large for their
+        format saturate at the largest number, which is outside every input range, so it is rejected.
         """
         if self.bits is None:
             return np.ascontiguousarray(values, self.scalar)
@@ -101,19 +102,19 @@ class Representation:
         return np.where(fits, rounded, LARGEST).astype(self.scalar)
 
     def to_si(self, numbers: NDArray[Any], *quantities: str) -> NDArray[Any]:
-        """Return what `numbers` of the C mean: as they are, or exactly in float64.
+        """Convert `numbers` of the C to SI units; with fixed point in float64, exactly.
 
-        They are of one quantity, or the last axis holds `quantities`.
+        The last axis holds `quantities`, or all numbers are of one quantity.
         """
         if self.bits is None:
             return numbers
-        told: NDArray[Any] = np.ldexp(numbers.astype(np.float64), [-self.bits[name] for name in quantities])
-        return told
+        values: NDArray[Any] = np.ldexp(numbers.astype(np.float64), [-self.bits[name] for name in quantities])
+        return values
 
     def from_si(self, values: NDArray[Any], name: str) -> NDArray[Any]:
-        """Return the numbers of the C that an outcome, by its name, was told from."""
+        """Convert a result of a step, by its name in OUTCOME, back to the numbers that `to_si` was given."""
         if self.bits is None:
             return values
         kind = self.wide if name in ("cost", "gradient") else self.scalar
-        behind: NDArray[Any] = np.ldexp(values, self.bits[OUTCOME[name]]).astype(kind)
-        return behind
+        numbers: NDArray[Any] = np.ldexp(values, self.bits[OUTCOME[name]]).astype(kind)
+        return numbers

@@ -28,7 +28,7 @@ def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
 
 
 def compiled_digest(extension: ModuleType, episodes: int) -> int:
-    """Return the digest of the frozen steps on this machine."""
+    """Return the self-test digest on this machine."""
     scratch = extension.ffi.new("nmpc_t *")
     digest = 0
     for episode in range(episodes):

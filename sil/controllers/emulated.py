@@ -129,7 +129,7 @@ class EmulatedController:
 
 
 def emulated_digest(settings: Settings, elf: Path, core: str, episodes: int) -> int:
-    """Return the digest of the frozen steps on an emulated core, from a program of `build_guest`."""
+    """Return the self-test digest on an emulated core, from a program of `build_guest`."""
     limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * _work(settings) * TICKS
     machine = start(elf, core, limit_s)
     scratch = machine.allocate(machine.call("nmpc_batch_instance_bytes"))

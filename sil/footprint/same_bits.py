@@ -1,4 +1,4 @@
-"""Same bits: the digest of the same frozen steps from every build at hand."""
+"""Same bits: the self-test digest from every build at hand."""
 
 import shutil
 import tempfile

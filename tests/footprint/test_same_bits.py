@@ -116,14 +116,14 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
 
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", [0, 3, 7, 9])
-def test_c_makes_the_frozen_steps_of_the_reference(index: int, scalar: str) -> None:
+def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:
     """Whatever the settings, the ends of the horizon and narrow ranges among them."""
     settings = settings_case(index, scalar)
     extension = load_extension(render(settings, with_digest=False), scalar, toolchain("gcc"))
     assert compiled_digest(extension, 5) == self_test_digest(Design(settings), 5)
 
 
-def test_frozen_steps_end_in_every_way() -> None:
+def test_self_test_steps_end_in_every_way() -> None:
     """Near one in thirteen is refused, for each reason; searches rest early, commands reach their limit."""
     episode = np.arange(50, dtype=np.uint32)
     reference = ReferenceController(Design(MAMBO), len(episode))
@@ -138,7 +138,7 @@ def test_frozen_steps_end_in_every_way() -> None:
     assert 0.05 < np.mean([np.abs(step.command_rad) == limit for step in steps]) < 0.5
 
 
-def test_frozen_inputs_are_spread_alike_and_never_twice() -> None:
+def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
     """Every input of an episode fills its range evenly, and no two episodes share one."""
     inputs = list(episode_inputs(Design(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
     yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
