@@ -172,7 +172,7 @@ def fly(
             with np.errstate(all="ignore"):
                 state, moment = world.tick(state, time_s + STEP_S * tick)
                 true = truth(state)
-                seen = true if suite is None else suite.look(true)
+                seen = true if suite is None else suite.estimate(true)
                 thrust_n = _thrust_n(seen, lifting)
             if tick == 0:
                 caller.call(update, true, seen, thrust_n)

@@ -1,1 +1,1 @@
-"""The simulated vehicle: rigid body, rotors, stock control loops and the integrator that moves them."""
+"""The simulated drone: rigid body, rotors, stock control loops, integrator, disturbances and command link."""

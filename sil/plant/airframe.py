@@ -21,17 +21,17 @@ class Airframe:
     arm_m: float
     """Distance from the centre to a rotor axis."""
     thrust_factor_n_s2: PerFlight
-    """b in thrust = b w^2."""
+    """b in thrust = b w^2, w the rotor speed."""
     torque_factor_n_m_s2: PerFlight
     """k in torque = k w^2."""
     speed_squared_per_command_rad2_s2: float
-    """w^2 that one unit of motor command asks for."""
+    """Increase of w^2 per unit of motor command in steady state."""
     command_min: float
     command_max: float
 
     @property
     def rotor_offset_m(self) -> float:
-        """Distance of every rotor axis from the body x and y axes: arm / sqrt(2)."""
+        """Lever arm of every rotor about body x and about body y: arm / sqrt(2)."""
         return self.arm_m / math.sqrt(2.0)
 
     @property
@@ -46,7 +46,7 @@ class Airframe:
 
     @property
     def hover_command(self) -> PerFlight:
-        """Motor command at which four level rotors carry the weight."""
+        """Motor command at which four rotors of a level drone carry its weight."""
         return self.mass_kg * GRAVITY_M_S2 / (4.0 * self.thrust_per_command_n)
 
 

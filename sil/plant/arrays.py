@@ -1,4 +1,4 @@
-"""Names for the arrays that pass between the modules of the simulation."""
+"""Array types that the modules of the simulation share; n is the number of flights."""
 
 from typing import TypeAlias
 
@@ -9,4 +9,4 @@ FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 
 PerFlight: TypeAlias = float | FloatArray
-"""One value for all flights, or one for each (n,)."""
+"""One value for all flights, or an array (n,) with one value for each."""

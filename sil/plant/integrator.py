@@ -1,4 +1,4 @@
-"""Fixed-step Bogacki-Shampine: third order, three stages (Bogacki and Shampine 1989)."""
+"""The Bogacki-Shampine method with fixed step: third order, three stages (Bogacki and Shampine 1989)."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -19,7 +19,7 @@ def bogacki_shampine(
     inputs: tuple[Input, Input, Input],
     step_s: float,
 ) -> FloatArray:
-    """Return the state one step later, given the input at each of the `NODES`."""
+    """Return the state one step later, with the input at each of the three `NODES`."""
     first = derivative(state, inputs[0])
     second = derivative(state + (step_s / 2.0) * first, inputs[1])
     third = derivative(state + (3.0 * step_s / 4.0) * second, inputs[2])

@@ -1,7 +1,7 @@
 """The stock control loops at 200 Hz: attitude, yaw and altitude, with the gains of the nominal Mambo.
 
 Source: `controllerVars` and the flight control system of the MathWorks asbQuadcopter example, R2018b to
-R2020a. Gains of two axes stand in the order roll, pitch, as in every command of this project.
+R2020a. Pairs are in the order roll, pitch.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ WEIGHT_N = float(MAMBO.mass_kg * GRAVITY_M_S2)
 def attitude_torque(
     command_rad: FloatArray, angle_rad: FloatArray, rate_rad_s: FloatArray, integral_rad_s: FloatArray
 ) -> FloatArray:
-    """Return the torques (2, n) about x and y; all arguments are (2, n), roll then pitch."""
+    """Return the torques (2, n) in N m about body x and y; all arguments are (2, n), roll then pitch."""
     return (
         ATTITUDE_P_N_M * (command_rad - angle_rad)
         + ATTITUDE_I_N_M_S * integral_rad_s
@@ -43,22 +43,22 @@ def attitude_torque(
 def attitude_integral(
     command_rad: FloatArray, angle_rad: FloatArray, integral_rad_s: FloatArray
 ) -> FloatArray:
-    """Return the leaky, limited integral (2, n) of the angle error one period later."""
+    """Return the integral (2, n) of the angle error one period later; it leaks and saturates."""
     growth = (command_rad - angle_rad) - INTEGRAL_LEAK_1_S * integral_rad_s
     return np.clip(integral_rad_s + PERIOD_S * growth, -INTEGRAL_LIMIT_RAD_S, INTEGRAL_LIMIT_RAD_S)
 
 
 def yaw_torque(reference_rad: PerFlight, yaw_rad: FloatArray, rate_rad_s: FloatArray) -> FloatArray:
-    """Return the torque (n,) about z."""
+    """Return the torque (n,) in N m about body z."""
     return YAW_P_N_M * (reference_rad - yaw_rad) - YAW_D_N_M_S * rate_rad_s
 
 
 def altitude_thrust(reference_m: float, z_m: FloatArray, velocity_z_m_s: FloatArray) -> FloatArray:
-    """Return the total thrust (n,), positive upwards; z points down."""
+    """Return the total thrust (n,) in N, positive upwards, that the altitude loop demands; z points down."""
     thrust = WEIGHT_N - ALTITUDE_P_N_M * (reference_m - z_m) + ALTITUDE_D_N_S_M * velocity_z_m_s
     return np.clip(thrust, -THRUST_LIMIT_N, THRUST_LIMIT_N)
 
 
 def take_off_thrust() -> float:
-    """Return the total thrust of the open loop that lifts the vehicle during the first second."""
+    """Return the constant total thrust in N, without feedback, of the first second of a take-off."""
     return WEIGHT_N * (1.0 + TAKE_OFF_GAIN)

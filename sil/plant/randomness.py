@@ -1,7 +1,7 @@
-"""Random numbers of n flights, each from its own seed: a flight draws the same alone and among others.
+"""Random numbers of n flights, each from its own seed: a flight draws the same numbers alone and in a batch.
 
-Every purpose has a stream of its own, so that sensors, gusts and dropped updates do not shift each other's
-numbers: Philox, keyed by NumPy's SeedSequence from the seed and the purpose.
+Each flight has one stream per purpose, so switching gusts on does not change the sensor noise. The generator
+is Philox; NumPy's SeedSequence derives its key from seed and purpose.
 """
 
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ import numpy as np
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 BLOCK = 64
-"""Rows drawn at a time; the numbers do not depend on it."""
+"""Rows drawn at once, for speed; the numbers do not depend on it."""
 
 
 class Purpose(IntEnum):
-    """What the numbers are for."""
+    """Purpose of a random stream."""
 
     SENSORS = 0
     GUSTS = 1
@@ -24,7 +24,7 @@ class Purpose(IntEnum):
 
 
 def generators(seeds: Sequence[int], purpose: Purpose) -> list[np.random.Generator]:
-    """Return the generator of each flight for a purpose."""
+    """Return one generator per flight for a purpose."""
     return [
         np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(purpose,))))
         for seed in seeds
@@ -32,7 +32,7 @@ def generators(seeds: Sequence[int], purpose: Purpose) -> list[np.random.Generat
 
 
 class Draws:
-    """Rows of independent numbers (width, n), drawn in blocks: column i comes from flight i's stream."""
+    """Draws rows (width, n) of independent numbers; column i comes from the stream of flight i."""
 
     def __init__(self, seeds: Sequence[int], purpose: Purpose, width: int, *, normal: bool = True) -> None:
         self._generators = generators(seeds, purpose)
@@ -41,7 +41,7 @@ class Draws:
         self._row = BLOCK
 
     def next(self) -> FloatArray:
-        """Return the next row: standard normal, or uniform in [0, 1)."""
+        """Return the next row (width, n): standard normal, or uniform in [0, 1)."""
         if self._row == BLOCK:
             shape = self._block.shape[:2]
             for flight, generator in enumerate(self._generators):

@@ -1,8 +1,8 @@
-"""Four rotors: mixer, motor command limits, motor lag, and the wrench they exert.
+"""Four rotors: mixer, motor command limits, motor lag and wrench.
 
-Rotors in body axes, seen from above: 1 front left, 2 front right, 3 rear right, 4 rear left. Rotors 1 and 3
-spin clockwise (positive about body z), 2 and 4 counter-clockwise. Thrust is positive upwards, along -z of
-the body (the stock code counts it negative upwards).
+Rotors seen from above: 1 front left, 2 front right, 3 rear right, 4 rear left. Rotors 1 and 3 spin clockwise
+(positive about body z), 2 and 4 counter-clockwise. Thrust is positive upwards, along -z of the body; in the
+stock code it is negative upwards.
 """
 
 from dataclasses import dataclass
@@ -15,19 +15,19 @@ from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 WRENCH_SIGNS = np.array(
     [
         [1.0, 1.0, 1.0, 1.0],  # thrust
-        [1.0, -1.0, -1.0, 1.0],  # roll: the left rotors push the left side up
-        [1.0, 1.0, -1.0, -1.0],  # pitch: the front rotors push the nose up
-        [-1.0, 1.0, -1.0, 1.0],  # yaw: the reaction to the spin
+        [1.0, -1.0, -1.0, 1.0],  # roll torque: positive from the left rotors
+        [1.0, 1.0, -1.0, -1.0],  # pitch torque: positive from the front rotors
+        [-1.0, 1.0, -1.0, 1.0],  # yaw torque: reaction opposite to the spin
     ]
 )
-"""Sign with which each rotor (column) enters thrust, roll, pitch and yaw torque (row).
+"""Sign of each rotor (column) in thrust, roll, pitch and yaw torque (row).
 
-The rows are orthogonal, so a quarter of the transpose is the inverse: the mixer.
+The rows are orthogonal, so the inverse, which the mixer applies, is a quarter of the transpose.
 """
 
 
 def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
-    """Return the motor commands (4, n) that ask for a wrench (4, n), clipped to the command limits."""
+    """Return the motor commands (4, n) that produce a wrench (4, n), clipped to the command limits."""
     offset = nominal.rotor_offset_m
     lever = np.array([[1.0], [offset], [offset], [nominal.torque_per_thrust_m]])
     shares = wrench / (4.0 * lever * nominal.thrust_per_command_n)
@@ -37,7 +37,7 @@ def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Rotors:
-    """The rotors of a real airframe: their speed follows the command with a first-order lag (0: at once)."""
+    """The rotors of an airframe; their speed follows the command with a first-order lag, 0 for none."""
 
     airframe: Airframe
     lag_s: PerFlight
@@ -47,7 +47,7 @@ class Rotors:
         return np.sqrt(self.airframe.speed_squared_per_command_rad2_s2 * command)
 
     def decay(self, time_s: FloatArray) -> FloatArray:
-        """Return the share (k, 1, n or 1) of a speed error that is left after each of k times."""
+        """Return the share (k, 1, n or 1) of a speed error that remains after each of k times (k,)."""
         lag_s = np.atleast_1d(self.lag_s)
         lagging = lag_s > 0.0
         exponent = time_s[:, np.newaxis] / np.where(lagging, lag_s, 1.0)

@@ -1,4 +1,4 @@
-"""The whole vehicle: stock loops, mixer, rotors and rigid body, one tick of 5 ms at a time."""
+"""The drone: stock loops, mixer, rotors and rigid body, advanced by one tick of 5 ms at a time."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,24 +22,27 @@ from mambo_nmpc.sil.plant.rigid_body import (
 from mambo_nmpc.sil.plant.rotors import Rotors, mix
 
 STEP_S = loops.PERIOD_S
-"""Integration step, and period of the stock loops: commands are held over it."""
+"""Integration step and period of the stock loops, called a tick; motor commands are held over it."""
 
 
 @dataclass(frozen=True, eq=False)
 class VehicleState:
-    """Everything that the vehicle remembers from one tick to the next, for n flights."""
+    """State of n drones."""
 
     body: FloatArray
-    """State of the rigid body (12, n), rows as in `sil.plant.rigid_body`."""
+    """State of the rigid body (12, n), rows as in `rigid_body`."""
     rotor_speed_rad_s: FloatArray
     """(4, n)."""
     attitude_integral_rad_s: FloatArray
-    """Integrators of the attitude loop (2, n), roll then pitch."""
+    """Integral states of the attitude loop (2, n), roll then pitch."""
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The state as the controllers see it: (3, n) each, position and velocity in the world frame."""
+    """The state as the controllers receive it, true or estimated.
+
+    Every field is (3, n); position and velocity are in the world frame.
+    """
 
     position_m: FloatArray
     velocity_m_s: FloatArray
@@ -48,49 +51,49 @@ class Seen:
 
 
 def truth(state: VehicleState) -> Seen:
-    """Return what a controller sees that knows the true state."""
+    """Return the true state in the form that controllers receive."""
     body = state.body
     return Seen(body[POSITION], world_velocity(body), body[EULER], body[RATES])
 
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What is special about the vehicle and the air for one tick; the default is nothing."""
+    """Battery, payload and wind during one tick; the default is undisturbed."""
 
     thrust_share: PerFlight = 1.0
-    """Thrust and torque of the rotors over those of a fresh battery."""
+    """Rotor thrust and torque, relative to a fresh battery."""
     payload_kg: PerFlight = 0.0
     air_m_s: tuple[PerFlight, PerFlight] | None = None
-    """Velocity of the air along x and y of the world; None is still air."""
+    """Air velocity along x and y of the world; None is still air."""
 
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """The vehicle that really flies; its stock loops and mixer believe in the nominal Mambo."""
+    """The simulated drone. Its stock loops and mixer always use the constants of the nominal Mambo."""
 
     airframe: Airframe = MAMBO
     motor_lag_s: PerFlight = 0.0
     drag_1_s: PerFlight = 0.067
-    """Blade flapping of the Mambo at hover, derived from the rotor model of asbQuadcopter."""
+    """Drag by blade flapping; the default is that of the Mambo at hover, from asbQuadcopter's rotor model."""
     wind_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
 
     @cached_property
     def rotors(self) -> Rotors:
-        """The rotors of this vehicle."""
+        """The rotors of this drone."""
         return Rotors(self.airframe, self.motor_lag_s)
 
     @cached_property
     def rigid_body(self) -> RigidBody:
-        """The rigid body of this vehicle."""
+        """The rigid body of this drone, without payload and in still air."""
         return RigidBody(self.airframe.mass_kg, self.airframe.inertia_kg_m2, self.drag_1_s, self.wind_m_s2)
 
     @cached_property
     def _rotor_decay(self) -> FloatArray:
-        """Share of a rotor speed error left at the nodes and at the end of a step (4, 1, n or 1)."""
+        """Share of a rotor speed error that remains at the nodes and at the end of a step (4, 1, n or 1)."""
         return self.rotors.decay(STEP_S * np.append(NODES, 1.0))
 
     def at_rest(self, position_m: FloatArray, yaw_rad: PerFlight, motor_command: PerFlight) -> VehicleState:
-        """Return n vehicles level and at rest at positions (3, n), rotors steady at a motor command."""
+        """Return n drones level and at rest at positions (3, n), their rotors steady at a motor command."""
         flights = position_m.shape[1]
         body = np.zeros((STATE_ROWS, flights))
         body[POSITION] = position_m
@@ -98,11 +101,11 @@ class Vehicle:
         commands = np.broadcast_to(motor_command, (4, flights))
         return VehicleState(body, self.rotors.commanded_speed_rad_s(commands), np.zeros((2, flights)))
 
-    def pushed(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
-        """Return the state right after a push (3, n) in the world frame."""
+    def apply_push(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
+        """Return the state right after an impulse (3, n) in the world frame."""
         body = state.body.copy()
-        kick = to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
-        body[VELOCITY] = np.where(impulse_n_s.any(axis=0), body[VELOCITY] + kick, body[VELOCITY])
+        change_m_s = to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
+        body[VELOCITY] = np.where(impulse_n_s.any(axis=0), body[VELOCITY] + change_m_s, body[VELOCITY])
         return replace(state, body=body)
 
     def step(
@@ -117,8 +120,8 @@ class Vehicle:
     ) -> VehicleState:
         """Return the state one tick later.
 
-        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the total thrust asked for, `seen` what the
-        stock loops see: the truth if None.
+        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the demanded total thrust. The stock loops
+        receive `seen`; None gives them the true state.
         """
         angles_rad = state.body[EULER] if seen is None else seen.euler_rad
         rates_rad_s = state.body[RATES] if seen is None else seen.rates_rad_s
@@ -129,16 +132,16 @@ class Vehicle:
         )
         wrench[3] = loops.yaw_torque(yaw_reference_rad, angles_rad[2], rates_rad_s[2])
         return VehicleState(
-            *self.coast(state, mix(MAMBO, wrench), moment),
+            *self.integrate(state, mix(MAMBO, wrench), moment),
             loops.attitude_integral(command_rad, angles_rad[:2], state.attitude_integral_rad_s),
         )
 
-    def coast(
+    def integrate(
         self, state: VehicleState, motor_command: FloatArray, moment: Moment | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return rigid body (12, n) and rotor speeds (4, n) after a tick of held motor commands (4, n)."""
-        goal = self.rotors.commanded_speed_rad_s(motor_command)
-        speeds = goal + (state.rotor_speed_rad_s - goal) * self._rotor_decay
+        """Return rigid-body state (12, n) and rotor speeds (4, n) after a tick of held commands (4, n)."""
+        steady = self.rotors.commanded_speed_rad_s(motor_command)
+        speeds = steady + (state.rotor_speed_rad_s - steady) * self._rotor_decay
         wrenches = self.rotors.wrench(speeds[:3])
         body = self.rigid_body
         if moment is not None:
@@ -150,5 +153,5 @@ class Vehicle:
 
 
 def thrust_demand(state: VehicleState, reference_m: float) -> FloatArray:
-    """Return the total thrust (n,) that the altitude loop asks for."""
+    """Return the total thrust (n,) in N that the altitude loop demands in the true state."""
     return loops.altitude_thrust(reference_m, state.body[2], world_velocity(state.body)[2])

@@ -1,1 +1,1 @@
-"""The sensors of the Mambo and its stock estimators, for n flights at once."""
+"""The sensors of the Mambo and its stock estimators, for n flights."""

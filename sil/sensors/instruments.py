@@ -1,7 +1,7 @@
-"""The instruments of the Mambo: IMU, sonar, pressure and optical flow, sampled at 200 Hz for n flights.
+"""The instruments of the Mambo: IMU, sonar, barometer and optical flow, sampled at 200 Hz for n flights.
 
 Sources: `sensorsVars` of the MathWorks asbQuadcopter example, R2018b to R2020a; noise variances of the MIT
-RollingSpiderEdu toolbox. Readings stand in the body frame (NED axes): an accelerometer at rest reads -g in z.
+RollingSpiderEdu toolbox. IMU readings are in the body frame: at rest the accelerometer reads -g in z.
 """
 
 import math
@@ -25,53 +25,54 @@ ACCELEROMETER_LIMIT_M_S2: Final = 50.0
 GYRO_LIMIT_RAD_S: Final = 10.0
 
 NOISE_VARIANCES: Final = (0.3, 0.3, 0.5, 0.002, 0.002, 0.002, 0.001, 50.0)
-"""Of accelerometer x y z in m^2/s^4, gyro x y z in rad^2/s^2, sonar in m^2, pressure in Pa^2."""
+"""Accelerometer x, y, z in m^2/s^4, gyro x, y, z in rad^2/s^2, sonar in m^2, pressure in Pa^2."""
 
-SONAR_LEAST_M: Final = 0.44
+SONAR_MIN_M: Final = 0.44
+"""Lower end of the sonar's range."""
 PA_PER_M: Final = 12.01725
-"""Fall of the pressure with the height: 9.81 m/s^2 times 1.225 kg/m^3."""
+"""Decrease of the pressure per metre of height: 9.81 m/s^2 times 1.225 kg/m^3."""
 
 FLOW_COUPLING: Final = 0.8
-"""Share of the rotation of the camera that the optical flow takes for motion."""
-FLOW_EVERY: Final = (3, 10)
-"""Images in so many ticks: 60 Hz beside 200 Hz."""
+"""Share of the camera's rotation that the optical flow misreads as translation."""
+FLOW_IMAGES_PER_TICKS: Final = (3, 10)
+"""3 images in 10 ticks: 60 Hz at 200 ticks a second."""
 
 DELAY_TICKS: Final = 1
-"""By which all readings come late."""
+"""Delay of all readings."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """What differs between the sensors of n flights, one value for all or one for each (n,).
+    """Parameters of the sensors of n flights, one value for all or an array (n,).
 
-    The stock code measures the biases of the IMU at rest before it takes off and subtracts them; the biases
-    here are what that leaves over.
+    The stock code measures the biases of the IMU at rest before take-off and subtracts them; the biases here
+    are the residual ones.
     """
 
     noise_scale: PerFlight = 1.0
-    """Factor on the standard deviation of every reading's noise; 0 is noise-free."""
+    """Factor on the standard deviation of all noise; 0 is noise-free."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
     gyro_bias_rad_s: Three = (0.0, 0.0, 0.0)
     derotated: bool = False
-    """Whether the estimator takes the rotation out of the optical flow; the same for all flights."""
+    """Whether the estimator subtracts the rotation from the optical flow; the same for all flights."""
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """What the instruments of n flights say at one tick."""
+    """Readings of the instruments of n flights at one tick."""
 
     imu: FloatArray
-    """Specific force in m/s^2 and rates in rad/s (6, n)."""
+    """Specific force in m/s^2 and body rates in rad/s (6, n)."""
     sonar_m: FloatArray
-    """Height (n,); `SONAR_LEAST_M` for what is below."""
+    """Height (n,), saturated at `SONAR_MIN_M` from below."""
     pressure_pa: FloatArray
-    """Pressure over that of the ground (n,)."""
+    """Pressure relative to that at the ground (n,)."""
     flow_m_s: FloatArray
-    """Velocity along body x and y that the optical flow suggests (2, n), held between images."""
+    """Velocity along body x and y from the optical flow (2, n), held between images."""
 
 
 class Instruments:
-    """The instruments of n flights, which remember a few ticks."""
+    """The instruments of n flights; call `read` once per tick."""
 
     def __init__(self, sensors: Sensors, seeds: Sequence[int], start: Seen) -> None:
         flights = len(seeds)
@@ -80,43 +81,41 @@ class Instruments:
         self._noise = deviations * np.broadcast_to(np.asarray(sensors.noise_scale, np.float64), flights)
         biases = (*sensors.accelerometer_bias_m_s2, *sensors.gyro_bias_rad_s)
         self._bias = np.stack([np.broadcast_to(np.asarray(bias, np.float64), flights) for bias in biases])
-        self._from_state, self._from_input = _second_order(STEP_S)
+        self._transition, self._input_gain = _discretize_imu(STEP_S)
         self._velocity_m_s = start.velocity_m_s
-        self._felt = self._feel(start)
-        self._imu = np.stack([self._felt, np.zeros_like(self._felt)])
-        self._flow_m_s = _flow(start)
+        self._motion = self._measure_motion(start)
+        self._imu = np.stack([self._motion, np.zeros_like(self._motion)])
+        self._flow_m_s = _measure_flow(start)
         self._tick = 0
-        self._late: list[Readings] = []
+        self._delayed: list[Readings] = []
 
     def read(self, true: Seen) -> Readings:
-        """Return the readings of this tick, which are `DELAY_TICKS` old."""
-        felt = self._feel(true)
-        mean = 0.5 * (self._felt + felt)
-        self._felt, self._velocity_m_s = felt, true.velocity_m_s
+        """Return the readings that reach the estimators at this tick, measured `DELAY_TICKS` earlier."""
+        motion = self._measure_motion(true)
+        mean = 0.5 * (self._motion + motion)
+        self._motion, self._velocity_m_s = motion, true.velocity_m_s
         value, rate = self._imu
-        ((stay, drift), (pull, keep)), (gain, push) = self._from_state, self._from_input
-        self._imu = np.stack(
-            [stay * value + drift * rate + gain * mean, pull * value + keep * rate + push * mean]
-        )
+        ((a00, a01), (a10, a11)), (b0, b1) = self._transition, self._input_gain
+        self._imu = np.stack([a00 * value + a01 * rate + b0 * mean, a10 * value + a11 * rate + b1 * mean])
         noise = self._noise * self._draws.next()
         imu = self._imu[0] + self._bias + noise[:6]
-        images, ticks = FLOW_EVERY
+        images, ticks = FLOW_IMAGES_PER_TICKS
         if images * self._tick // ticks != images * (self._tick - 1) // ticks:
-            self._flow_m_s = _flow(true)
+            self._flow_m_s = _measure_flow(true)
         self._tick += 1
         height_m = -true.position_m[2]
-        self._late.append(
+        self._delayed.append(
             Readings(
                 imu=np.clip(imu, -_LIMITS, _LIMITS),
-                sonar_m=np.maximum(height_m + noise[6], SONAR_LEAST_M),
+                sonar_m=np.maximum(height_m + noise[6], SONAR_MIN_M),
                 pressure_pa=noise[7] - PA_PER_M * height_m,
                 flow_m_s=self._flow_m_s,
             )
         )
-        return self._late.pop(0) if len(self._late) > DELAY_TICKS else self._late[0]
+        return self._delayed.pop(0) if len(self._delayed) > DELAY_TICKS else self._delayed[0]
 
-    def _feel(self, true: Seen) -> FloatArray:
-        """Return the mean specific force since the last tick, in the body axes of now, and the rates."""
+    def _measure_motion(self, true: Seen) -> FloatArray:
+        """Return (6, n): mean specific force since the last tick, in current body axes, and body rates."""
         force = (true.velocity_m_s - self._velocity_m_s) / STEP_S
         force[2] -= GRAVITY_M_S2
         return np.concatenate([to_body(true.euler_rad, force), true.rates_rad_s])
@@ -125,22 +124,22 @@ class Instruments:
 _LIMITS: Final = np.array([[ACCELEROMETER_LIMIT_M_S2]] * 3 + [[GYRO_LIMIT_RAD_S]] * 3)
 
 
-def _flow(true: Seen) -> FloatArray:
-    """Return the flow (2, n): body velocity, and what the turning camera adds in proportion to the height."""
+def _measure_flow(true: Seen) -> FloatArray:
+    """Return the optical flow (2, n): body velocity plus a share of camera rotation times height."""
     body_m_s = to_body(true.euler_rad, true.velocity_m_s)[:2]
     p, q, _ = true.rates_rad_s
     z = true.position_m[2]
-    turning = np.stack([-q, p])
-    return np.asarray(body_m_s + FLOW_COUPLING * z * turning)
+    rotation = np.stack([-q, p])
+    return np.asarray(body_m_s + FLOW_COUPLING * z * rotation)
 
 
-def _second_order(
+def _discretize_imu(
     step_s: float,
 ) -> tuple[tuple[tuple[float, float], tuple[float, float]], tuple[float, float]]:
-    """Return what value and rate of y'' = w^2 (u - y) - 2 d w y' a step later have of (y, y'), and of u."""
-    decay, turn = IMU_DAMPING * IMU_RAD_S, IMU_RAD_S * math.sqrt(1.0 - IMU_DAMPING**2)
-    fade = math.exp(-decay * step_s)
-    sine, cosine = fade * math.sin(turn * step_s), fade * math.cos(turn * step_s)
-    stay = cosine + decay / turn * sine
-    pull = -(IMU_RAD_S**2) / turn * sine
-    return ((stay, sine / turn), (pull, cosine - decay / turn * sine)), (1.0 - stay, -pull)
+    """Return transition matrix and input gain of y'' = w^2 (u - y) - 2 d w y', state (y, y'), u held."""
+    decay, frequency = IMU_DAMPING * IMU_RAD_S, IMU_RAD_S * math.sqrt(1.0 - IMU_DAMPING**2)
+    envelope = math.exp(-decay * step_s)
+    sine, cosine = envelope * math.sin(frequency * step_s), envelope * math.cos(frequency * step_s)
+    a00 = cosine + decay / frequency * sine
+    a10 = -(IMU_RAD_S**2) / frequency * sine
+    return ((a00, sine / frequency), (a10, cosine - decay / frequency * sine)), (1.0 - a00, -a10)

@@ -1,4 +1,4 @@
-"""The vehicle: airframe, mixer and rotors, rigid body, integrator, stock loops."""
+"""The drone: airframe, mixer and rotors, rigid body, integrator, stock loops."""
 
 from dataclasses import replace
 
@@ -75,25 +75,25 @@ def paper_derivative(state: FloatArray, wrench: FloatArray, body: RigidBody) -> 
 
 
 def body_of(vehicle: Vehicle) -> RigidBody:
-    """Return a Mambo with wind, for free motion."""
+    """Return the rigid body of a drone, with wind."""
     return replace(vehicle.rigid_body, wind_m_s2=(0.3, -0.2))
 
 
 TUMBLING = np.array([0.1, -0.2, -1.1, 0.5, -0.4, 0.3, 0.2, -0.1, 0.4, 3.0, 0.5, -0.4])
-"""State of a vehicle that rolls over and over, clear of the singularity at pitch 90 deg."""
+"""State of a drone that keeps rolling and stays away from the singularity at 90 degrees of pitch."""
 HELD_WRENCH = np.array([0.6, 2e-6, 0.0, 0.0])
 
 
-def coast(body: RigidBody, duration_s: float, step_s: float) -> FloatArray:
-    """Return the state (12,) after free motion from `TUMBLING` under `HELD_WRENCH`."""
+def tumble(body: RigidBody, duration_s: float, step_s: float) -> FloatArray:
+    """Return the state (12,) after `duration_s` from `TUMBLING` under `HELD_WRENCH`."""
     state, wrench = TUMBLING[:, np.newaxis], HELD_WRENCH[:, np.newaxis]
     for _ in range(round(duration_s / step_s)):
         state = bogacki_shampine(body.derivative, state, (wrench, wrench, wrench), step_s)
     return state[:, 0]
 
 
-def coast_exactly(body: RigidBody, duration_s: float) -> FloatArray:
-    """Return the same from the matrix form and an integrator of order eight."""
+def tumble_exactly(body: RigidBody, duration_s: float) -> FloatArray:
+    """Return the same state from the matrix form and an integrator of order eight."""
     solution = solve_ivp(
         lambda _, state: paper_derivative(state, HELD_WRENCH, body),
         (0.0, duration_s),
@@ -116,7 +116,7 @@ def fly_attitude(vehicle: Vehicle, command_rad: FloatArray, ticks: int) -> list[
 
 
 def test_derived_airframe_constants_match_the_stock_tables() -> None:
-    """Hover speed, motor command, thrust per command and thrust to weight are those of the stock model."""
+    """Hover speed, motor command, thrust per command and thrust-to-weight ratio match the stock model."""
     assert pytest.approx(6.532844e-4, rel=1e-6) == MAMBO.thrust_per_command_n
     assert pytest.approx(0.0441235, rel=1e-5) == MAMBO.rotor_offset_m
     assert pytest.approx(2.41374e-3, rel=1e-5) == MAMBO.torque_per_thrust_m
@@ -126,12 +126,12 @@ def test_derived_airframe_constants_match_the_stock_tables() -> None:
     assert MAMBO.command_max / MAMBO.hover_command == pytest.approx(2.11, rel=2e-3)
 
 
-@pytest.mark.parametrize("part", range(4))
-def test_mixer_matches_the_stock_table(part: int) -> None:
-    """Thrust, yaw, pitch and roll each reach the four motors with the stock factors."""
+@pytest.mark.parametrize("component", range(4))
+def test_mixer_matches_the_stock_table(component: int) -> None:
+    """Thrust, yaw, pitch and roll are distributed to the four motors with the stock factors."""
     demand = np.zeros(4)
     demand[0] = -0.618
-    demand[part] += (-0.01, 1e-4, 1e-3, 1e-3)[part]
+    demand[component] += (-0.01, 1e-4, 1e-3, 1e-3)[component]
     thrust, yaw, pitch, roll = demand
     expected = -1530.72683 * (STOCK_MIXER @ demand)
     commands = mix(MAMBO, np.array([[-thrust], [roll], [pitch], [yaw]]))
@@ -139,15 +139,15 @@ def test_mixer_matches_the_stock_table(part: int) -> None:
 
 
 def test_mixer_stays_within_the_command_limits() -> None:
-    """No demand, however large, asks a motor for less than 10 or more than 500."""
+    """Motor commands saturate at 10 and 500."""
     demands = np.array([[1e3, -1e3, 0.6], [0.0, 0.0, 10.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     commands = mix(MAMBO, demands)
     np.testing.assert_array_equal(commands[:, :2], [[500.0, 10.0]] * 4)
     np.testing.assert_array_equal(commands[:, 2], [500.0, 10.0, 10.0, 500.0])
 
 
-def test_rotors_exert_the_wrench_that_the_mixer_was_asked_for() -> None:
-    """Mixer and rotors are inverse to each other within the limits."""
+def test_rotors_exert_the_wrench_that_the_mixer_is_given() -> None:
+    """Within the command limits the mixer is the inverse of the rotors."""
     rng = np.random.default_rng(1)
     demand = np.array([[0.618], [1e-3], [1e-3], [1e-4]]) * (1.0 + rng.uniform(-0.3, 0.3, (4, 50)))
     rotors = Rotors(MAMBO, 0.0)
@@ -156,7 +156,7 @@ def test_rotors_exert_the_wrench_that_the_mixer_was_asked_for() -> None:
 
 
 def test_wrench_is_the_sum_of_the_forces_at_the_rotors() -> None:
-    """Torques are lever arm times force, and the reaction to the spin, with b and k of each flight."""
+    """Torque is lever arm times force plus the reaction to the spin, with b and k of each flight."""
     speeds = np.random.default_rng(2).uniform(500.0, 2500.0, (4, 2))
     factors = np.array([4.0e-8, 4.9e-8])
     rotors = Rotors(replace(MAMBO, thrust_factor_n_s2=factors), 0.0)
@@ -171,7 +171,7 @@ def test_wrench_is_the_sum_of_the_forces_at_the_rotors() -> None:
 
 
 def test_derivative_matches_the_matrix_form_of_the_paper() -> None:
-    """Equations 2 to 7 and Euler's equation hold for every flight of a batch, each with its own airframe."""
+    """Every flight of a batch, each with its own airframe, obeys equations 2 to 7 and Euler's equation."""
     rng = np.random.default_rng(3)
     flights = 40
     states, wrenches = rng.uniform(-1.4, 1.4, (12, flights)), rng.uniform(-1.0, 1.0, (4, flights))
@@ -188,14 +188,14 @@ def test_derivative_matches_the_matrix_form_of_the_paper() -> None:
 
 
 def test_world_velocity_is_the_rotated_body_velocity() -> None:
-    """Equation 2 with the full rotation of equation 3."""
+    """The world velocity is R v (equation 2), R the matrix product of equation 3."""
     state = TUMBLING[:, np.newaxis]
     expected = rotation(*TUMBLING[6:9]) @ TUMBLING[3:6]
     np.testing.assert_allclose(world_velocity(state)[:, 0], expected, rtol=1e-14)
 
 
 def test_integrator_is_exact_for_a_quadratic_input() -> None:
-    """A third-order rule integrates t^2 without error, so nodes and weights belong together."""
+    """A third-order rule integrates t^2 without error, which a mismatch of nodes and weights would spoil."""
 
     def derivative(_: FloatArray, time: float) -> FloatArray:
         return np.array([3.0 * time**2])
@@ -204,49 +204,49 @@ def test_integrator_is_exact_for_a_quadratic_input() -> None:
     np.testing.assert_allclose(bogacki_shampine(derivative, np.zeros(1), nodes, 1.0), [1.0], rtol=1e-15)
 
 
-def test_integrator_takes_the_tabulated_step() -> None:
-    """On y' = -y one step is 1 - h + h^2/2 - h^3/6, the expansion of the exponential to third order."""
+def test_integrator_step_is_the_third_order_taylor_polynomial() -> None:
+    """On y' = -y one step gives 1 - h + h^2/2 - h^3/6."""
     step = bogacki_shampine(lambda state, _: -state, np.ones(1), (None, None, None), 0.3)
     np.testing.assert_allclose(step, [1.0 - 0.3 + 0.3**2 / 2.0 - 0.3**3 / 6.0], rtol=1e-15)
 
 
 def test_free_motion_agrees_with_an_independent_integrator() -> None:
-    """Five seconds and 2.5 turns stay within 0.2 mm and 0.2 mrad of DOP853 on the matrix form."""
+    """After 5 s and 2.5 rolls the state is within 2e-4 of DOP853 on the matrix form."""
     body = body_of(Vehicle())
-    np.testing.assert_allclose(coast(body, 5.0, STEP_S), coast_exactly(body, 5.0), rtol=0.0, atol=2e-4)
+    np.testing.assert_allclose(tumble(body, 5.0, STEP_S), tumble_exactly(body, 5.0), rtol=0.0, atol=2e-4)
 
 
 def test_free_motion_converges_at_third_order() -> None:
     """Halving the step divides the error by about eight."""
     body = body_of(Vehicle())
-    exact = coast_exactly(body, 2.0)
-    errors = [np.linalg.norm(coast(body, 2.0, step_s) - exact) for step_s in (0.02, 0.01, 0.005)]
+    exact = tumble_exactly(body, 2.0)
+    errors = [np.linalg.norm(tumble(body, 2.0, step_s) - exact) for step_s in (0.02, 0.01, 0.005)]
     assert errors[0] / errors[1] == pytest.approx(8.0, abs=0.1)
     assert errors[1] / errors[2] == pytest.approx(8.0, abs=0.1)
 
 
 def test_rotor_speed_follows_the_command_with_its_lag() -> None:
-    """After one time constant 1/e of the way is left; without a lag nothing is."""
+    """After one time constant 1/e of the speed error remains; without lag none remains."""
     command = np.full((4, 2), 300.0)
     vehicle = Vehicle(motor_lag_s=np.array([0.05, 0.0]))
     state = vehicle.at_rest(np.zeros((3, 2)), 0.0, 100.0)
     start, goal = np.sqrt(13840.8 * 100.0), np.sqrt(13840.8 * 300.0)
-    body, speed = vehicle.coast(state, command)
+    body, speed = vehicle.integrate(state, command)
     np.testing.assert_allclose(speed[:, 1], goal, rtol=1e-15)
     for _ in range(9):
-        body, speed = vehicle.coast(VehicleState(body, speed, state.attitude_integral_rad_s), command)
+        body, speed = vehicle.integrate(VehicleState(body, speed, state.attitude_integral_rad_s), command)
     np.testing.assert_allclose(speed[:, 0], goal + (start - goal) / np.e, rtol=1e-12)
 
 
 def test_lagging_thrust_is_integrated_within_the_step() -> None:
-    """The climb of lagging rotors agrees with the integral of their exponential thrust."""
+    """The vertical velocity agrees with the closed-form integral of the thrust of lagging rotors."""
     lag_s, ticks = 0.03, 20
     vehicle = Vehicle(motor_lag_s=lag_s)
     start, goal = np.sqrt(13840.8 * 100.0), np.sqrt(13840.8 * 300.0)
     state = vehicle.at_rest(np.zeros((3, 1)), 0.0, 100.0)
     body, speed = state.body, state.rotor_speed_rad_s
     for _ in range(ticks):
-        body, speed = vehicle.coast(
+        body, speed = vehicle.integrate(
             VehicleState(body, speed, state.attitude_integral_rad_s), np.full((4, 1), 300.0)
         )
     time_s = ticks * STEP_S
@@ -259,7 +259,7 @@ def test_lagging_thrust_is_integrated_within_the_step() -> None:
 
 
 def test_hover_holds_still() -> None:
-    """Twenty seconds of hover move the vehicle by less than a nanometre."""
+    """Twenty seconds of hover move the drone by less than a nanometre."""
     start = np.array([0.0, 0.0, -1.1])
     last = fly_attitude(Vehicle(), np.zeros(2), 4000)[-1]
     np.testing.assert_allclose(last.body[:3, 0], start, atol=1e-9)
@@ -268,7 +268,7 @@ def test_hover_holds_still() -> None:
 
 @pytest.mark.parametrize(("axis", "lag_s"), [(0, 0.245), (1, 0.155)])
 def test_attitude_reaches_its_command_with_the_stock_lag(axis: int, lag_s: float) -> None:
-    """Roll is the slow axis, pitch the quick one: time to 63 % of a step of 0.05 rad."""
+    """A step of 0.05 rad reaches 63 % after 0.245 s in roll and 0.155 s in pitch."""
     command_rad = np.zeros(2)
     command_rad[axis] = 0.05
     angles = np.array([state.body[6 + axis, 0] for state in fly_attitude(Vehicle(), command_rad, 400)])
@@ -277,7 +277,7 @@ def test_attitude_reaches_its_command_with_the_stock_lag(axis: int, lag_s: float
 
 
 def test_stock_loops_have_the_stock_gains() -> None:
-    """Unit errors, rates and integrals give the gains of the stock controllers, roll before pitch."""
+    """Unit errors, rates and integrals return the gains of the stock controllers, roll before pitch."""
     none, one = np.zeros((2, 1)), np.ones((2, 1))
     np.testing.assert_array_equal(loops.attitude_torque(one, none, none, none), [[0.010], [0.013]])
     np.testing.assert_array_equal(loops.attitude_torque(none, one, none, none), [[-0.010], [-0.013]])
@@ -291,7 +291,7 @@ def test_stock_loops_have_the_stock_gains() -> None:
 
 
 def test_attitude_integral_leaks_and_is_limited() -> None:
-    """It grows by the error times the period, loses a thousandth a second, and stops at 2 rad s."""
+    """It grows by error times period, leaks a thousandth per second and saturates at 2 rad s."""
     error, none = np.array([[0.2], [-0.4]]), np.zeros((2, 1))
     np.testing.assert_allclose(loops.attitude_integral(error, none, none), 0.005 * error, rtol=1e-15)
     held = np.array([[1.0], [-1.0]])
@@ -301,7 +301,7 @@ def test_attitude_integral_leaks_and_is_limited() -> None:
 
 
 def test_altitude_loop_returns_to_its_reference() -> None:
-    """Half a metre below the reference is made good within five seconds."""
+    """From half a metre below, the drone reaches its altitude reference within five seconds."""
     vehicle = Vehicle()
     state = vehicle.at_rest(np.array([[0.0], [0.0], [-0.6]]), 0.0, MAMBO.hover_command)
     for _ in range(1000):
@@ -310,13 +310,13 @@ def test_altitude_loop_returns_to_its_reference() -> None:
 
 
 def test_altitude_thrust_is_limited() -> None:
-    """The demand never leaves +/- 1.20204 N."""
+    """The demanded thrust saturates at +/- 1.20204 N."""
     thrust_n = loops.altitude_thrust(-1.1, np.array([100.0, -100.0]), np.zeros(2))
     np.testing.assert_array_equal(thrust_n, [1.20204, -1.20204])
 
 
 def test_yaw_loop_holds_its_reference() -> None:
-    """A heading error of 0.3 rad is gone after five seconds."""
+    """The heading follows a step of 0.3 rad within five seconds."""
     vehicle = Vehicle()
     state = vehicle.at_rest(np.array([[0.0], [0.0], [-1.1]]), 0.5, MAMBO.hover_command)
     for _ in range(1000):
@@ -325,7 +325,7 @@ def test_yaw_loop_holds_its_reference() -> None:
 
 
 def test_drag_and_wind_balance_at_the_terminal_speed() -> None:
-    """Level flight in a steady wind settles at wind over drag, in both axes."""
+    """Level flight in steady wind reaches the speed wind / drag on both axes."""
     vehicle = Vehicle(drag_1_s=2.0, wind_m_s2=(0.5, -0.3))
     state = fly_attitude(vehicle, np.zeros(2), 1000)[-1]
     np.testing.assert_allclose(world_velocity(state.body)[:2, 0], [0.25, -0.15], rtol=1e-3)

@@ -1,4 +1,4 @@
-"""Sensors and estimators: what each instrument says, what each gate passes, how well truth is followed."""
+"""Sensors and estimators: readings of each instrument, gates of each filter, errors of the estimates."""
 
 from dataclasses import replace
 
@@ -23,27 +23,27 @@ QUIET = Sensors(noise_scale=0.0)
 
 
 def hovering(n: int = 1, z_m: float = -1.1) -> Seen:
-    """Return n drones at rest."""
+    """Return the true state of n drones at rest."""
     rest = np.zeros((3, n))
     position_m = rest.copy()
     position_m[2] = z_m
     return Seen(position_m, rest.copy(), rest.copy(), rest.copy())
 
 
-def said(z_m: float = -1.1, flow_m_s: float = 0.0, rate_rad_s: float = 0.0) -> Readings:
-    """Return what the instruments of one level drone say."""
+def readings_at(z_m: float = -1.1, flow_m_s: float = 0.0, rate_rad_s: float = 0.0) -> Readings:
+    """Return noise-free readings of one level drone."""
     imu = np.zeros((6, 1))
     imu[2], imu[3] = -GRAVITY_M_S2, rate_rad_s
     return Readings(imu, np.array([-z_m]), np.array([12.01725 * z_m]), np.full((2, 1), flow_m_s))
 
 
-def eight(sensors: Sensors, duration_s: float = 6.0, start: Start = Start.HOVER) -> Trace:
-    """Fly the Table II case with the PD."""
+def fly_eight(sensors: Sensors, duration_s: float = 6.0, start: Start = Start.HOVER) -> Trace:
+    """Fly the figure of eight of Table II with the PD."""
     return fly(Flight(Bernoulli(2.0, 0.5), duration_s, start=start, sensors=sensors), PdController())
 
 
 def errors(trace: Trace) -> dict[str, FloatArray]:
-    """Return how far the estimates stray, by axis."""
+    """Return the largest estimation error of each axis."""
     assert isinstance(trace, SensedTrace)
     return {
         "position": np.abs(trace.seen_position_m - trace.position_m).max(axis=(0, 1)),
@@ -53,39 +53,41 @@ def errors(trace: Trace) -> dict[str, FloatArray]:
 
 
 def test_noise_free_estimates_follow_the_truth() -> None:
-    """The figure of eight: tilt within 0.01 rad, height within 2 mm, position 0.15 m, velocity 0.2 m/s."""
-    found = errors(eight(replace(QUIET, derotated=True)))
+    """Over 6 s the errors stay below 0.01 rad of tilt, 2 mm of height, 0.15 m of position and 0.2 m/s."""
+    found = errors(fly_eight(replace(QUIET, derotated=True)))
     assert (found["euler"] < [0.01, 0.01, 0.001]).all(), found
     assert (found["position"] < [0.15, 0.15, 0.002]).all(), found
     assert (found["velocity"] < [0.2, 0.2, 0.01]).all(), found
 
 
-def test_rotation_left_in_the_flow_falsifies_the_velocity() -> None:
-    """Without derotation the velocity errs by up to twice as much, sideways as well as ahead."""
-    without, with_it = (errors(eight(replace(QUIET, derotated=yes)))["velocity"][:2] for yes in (False, True))
+def test_rotation_left_in_the_flow_biases_the_velocity() -> None:
+    """Without derotation the velocity error is at least 1.4 times as large on both axes."""
+    without, with_it = (
+        errors(fly_eight(replace(QUIET, derotated=yes)))["velocity"][:2] for yes in (False, True)
+    )
     assert (without > 1.4 * with_it).all()
 
 
-def test_a_hovering_noise_free_drone_is_seen_exactly() -> None:
-    """Nothing moves, so nothing may creep: ten seconds within 1e-9."""
+def test_noise_free_estimates_at_rest_do_not_drift() -> None:
+    """After ten seconds of hover the estimates are within 1e-9 of the true state."""
     true = hovering(2)
     suite = Suite(QUIET, (0, 1), true)
     for _ in range(2000):
-        seen = suite.look(true)
+        seen = suite.estimate(true)
     for name in ("position_m", "velocity_m_s", "euler_rad", "rates_rad_s"):
         np.testing.assert_allclose(getattr(seen, name), getattr(true, name), atol=1e-9)
 
 
-def test_take_off_is_seen_from_the_ground() -> None:
-    """The accelerometer carries the height through 4 m/s, noise-free within 0.15 m, and in the end 3 cm."""
-    trace = eight(QUIET, 1.0, start=Start.TAKE_OFF)
+def test_altitude_estimate_follows_a_take_off() -> None:
+    """Up to 4 m/s of climb the height error stays below 0.15 m; the drone ends within 3 cm of 1.1 m."""
+    trace = fly_eight(QUIET, 1.0, start=Start.TAKE_OFF)
     assert errors(trace)["position"][2] < 0.15
     assert isinstance(trace, SensedTrace)
     assert abs(trace.position_m[-1, 0, 2] + 1.1) < 0.03
 
 
 def noise(scale: float = 1.0) -> FloatArray:
-    """Return readings (k, 8) of the hovering drone less what it would read without noise."""
+    """Return the noise (k, 8): readings of the hovering drone minus those without noise."""
     true = hovering()
     noisy, quiet = (Instruments(Sensors(noise_scale=s), (5,), true) for s in (scale, 0.0))
     rows = []
@@ -97,7 +99,7 @@ def noise(scale: float = 1.0) -> FloatArray:
 
 
 def test_noise_has_the_variances_of_the_source() -> None:
-    """Each within 7 %, white, with zero mean, independent of each other, and scaled as asked."""
+    """Variances agree within 7 %; noise is white, zero-mean, independent and proportional to its scale."""
     found = noise()
     np.testing.assert_allclose(found.var(axis=0), NOISE_VARIANCES, rtol=0.07)
     assert (np.abs(found.mean(axis=0)) < 4.0 * np.sqrt(np.array(NOISE_VARIANCES) / len(found))).all()
@@ -106,7 +108,7 @@ def test_noise_has_the_variances_of_the_source() -> None:
 
 
 def test_bias_adds_to_the_imu() -> None:
-    """Of accelerometer and gyro, each axis its own."""
+    """Each axis of accelerometer and gyro has its own bias."""
     true = hovering()
     biased = Instruments(Sensors(0.0, (0.1, 0.2, 0.3), (0.4, 0.5, 0.6)), (0,), true)
     np.testing.assert_allclose(
@@ -115,7 +117,7 @@ def test_bias_adds_to_the_imu() -> None:
 
 
 def test_imu_responds_as_the_second_order_system_of_the_source() -> None:
-    """A step of the rates: what scipy finds for 190 rad/s and damping 0.707, from the tick after the mean."""
+    """A step of the rates gives the response that scipy simulates for 190 rad/s and damping 0.707."""
     true = hovering()
     imu = Instruments(QUIET, (0,), true)
     turning = replace(true, rates_rad_s=np.full((3, 1), 2.0))
@@ -123,14 +125,14 @@ def test_imu_responds_as_the_second_order_system_of_the_source() -> None:
     times = STEP_S * np.arange(40)
     w, d = instruments.IMU_RAD_S, instruments.IMU_DAMPING
     fine = np.linspace(0.0, times[-1], 40 * 200 - 199)
-    pushed = np.where(fine <= STEP_S, 1.0, 2.0)  # the first tick has the mean of 0 and 2
-    _, expected, _ = scipy.signal.lsim(([w * w], [1.0, 2.0 * d * w, w * w]), pushed, fine)
+    averaged = np.where(fine <= STEP_S, 1.0, 2.0)  # the input is the mean over a tick: first (0 + 2) / 2
+    _, expected, _ = scipy.signal.lsim(([w * w], [1.0, 2.0 * d * w, w * w]), averaged, fine)
     np.testing.assert_allclose(found, expected[::200][1:40], atol=0.01)
     assert max(found) > 2.05  # it overshoots
 
 
-def test_imu_stops_at_its_limits() -> None:
-    """50 m/s^2 and 10 rad/s, either way."""
+def test_imu_saturates_at_its_limits() -> None:
+    """Readings saturate at +/- 50 m/s^2 and +/- 10 rad/s."""
     true = hovering()
     imu = Instruments(QUIET, (0,), true)
     for sign in (1.0, -1.0):
@@ -142,8 +144,8 @@ def test_imu_stops_at_its_limits() -> None:
         np.testing.assert_allclose(found[3:], 10.0 * sign)
 
 
-def test_sonar_reads_its_least_height_below_it() -> None:
-    """On the ground it says 0.44 m; at 1 m, 1 m. The pressure falls by 12.01725 Pa a metre."""
+def test_sonar_saturates_at_its_least_height() -> None:
+    """The sonar reads 0.44 m on the ground and 1 m at 1 m; the pressure falls by 12.01725 Pa per metre."""
     for z_m, height_m in ((0.0, 0.44), (-0.3, 0.44), (-1.0, 1.0)):
         true = hovering(z_m=z_m)
         readings = Instruments(QUIET, (0,), true).read(true)
@@ -151,29 +153,29 @@ def test_sonar_reads_its_least_height_below_it() -> None:
         assert readings.pressure_pa[0] == pytest.approx(12.01725 * z_m)
 
 
-def test_optical_flow_comes_at_60_hz_and_is_held_and_late() -> None:
-    """In 200 ticks 60 new values, three in ten, each a value that was true one tick before it is read."""
+def test_optical_flow_is_sampled_at_60_hz_held_and_delayed() -> None:
+    """200 ticks have 60 new values, three in ten; each is the true velocity of one tick before."""
     true = hovering()
-    eyes = Instruments(QUIET, (0,), true)
+    camera = Instruments(QUIET, (0,), true)
     read = []
     for tick in range(201):
         moving = replace(true, velocity_m_s=np.array([[float(tick)], [0.0], [0.0]]))
-        read.append(float(eyes.read(moving).flow_m_s[0, 0]))
+        read.append(float(camera.read(moving).flow_m_s[0, 0]))
     changes = np.flatnonzero(np.diff(read)) + 1
     np.testing.assert_array_equal(np.array(read)[changes], changes - 1)
     assert len(changes[changes > 1]) in (59, 60)
     assert set(np.diff(changes)) == {3, 4}
 
 
-def test_turning_camera_adds_to_the_flow() -> None:
-    """Nose up at 1 m seems a flight ahead by 0.8 of the rate; rolling right, a flight to the left."""
+def test_camera_rotation_adds_to_the_flow() -> None:
+    """At 1 m, pitching up adds 0.8 of the rate to the forward flow; rolling right adds flow to the left."""
     true = replace(hovering(z_m=-1.0), rates_rad_s=np.array([[0.3], [0.5], [0.0]]))
     flow = Instruments(QUIET, (0,), true).read(true).flow_m_s[:, 0]
     np.testing.assert_allclose(flow, [0.4, -0.24])
 
 
-def test_kalman_gains_are_the_stationary_ones() -> None:
-    """What scipy's Riccati equation gives, and the velocity gain of the stock model, 0.1254656."""
+def test_kalman_gains_solve_the_riccati_equation() -> None:
+    """The altitude gains agree with scipy's solution; the velocity gain is the stock model's, 0.1254656."""
     a, c = np.array([[1.0, STEP_S], [0.0, 1.0]]), np.array([[1.0, 0.0]])
     q, r = estimators.ALTITUDE_NOISE
     p = scipy.linalg.solve_discrete_are(a.T, c.T, np.diag([0.0, q]), np.array([[r]]))
@@ -181,21 +183,21 @@ def test_kalman_gains_are_the_stationary_ones() -> None:
     assert estimators.velocity_gain() == pytest.approx(0.1254656, abs=5e-8)
 
 
-def test_low_pass_filters_are_those_of_the_source() -> None:
-    """Firwin of order 5 at 0.1, and a Butterworth of order 3 at 0.01, as scipy designs and runs them."""
+def test_low_pass_filters_match_scipy_designs() -> None:
+    """They are scipy's FIR filter of order 5 at 0.1 and its Butterworth filter of order 3 at 0.01."""
     np.testing.assert_allclose(estimators.ACCELEROMETER_TAPS, scipy.signal.firwin(6, 0.1), atol=1e-5)
     rng = np.random.default_rng(1)
     values = rng.normal(size=500)
     b, a = scipy.signal.butter(3, 0.01)
     expected, _ = scipy.signal.lfilter(b, a, values, zi=scipy.signal.lfilter_zi(b, a) * values[0])
-    slow = estimators._Slow(np.array([values[0]]))
-    found = [float(slow.update(np.array([value]))[0]) for value in values]
+    low_pass = estimators._LowPass(np.array([values[0]]))
+    found = [float(low_pass.update(np.array([value]))[0]) for value in values]
     np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize(("excess", "corrects"), [(0.0015, True), (-0.0015, True), (0.0025, False)])
-def test_accelerometer_has_a_say_on_the_tilt_only_near_g(excess: float, corrects: bool) -> None:
-    """Within 0.2 % of g a wrong roll fades by a thousandth a tick; beyond, it stays."""
+def test_accelerometer_corrects_the_tilt_only_near_g(excess: float, corrects: bool) -> None:
+    """Within 0.2 % of g a tilt error decays by a thousandth per tick; outside it stays."""
     attitude = Attitude(np.array([[0.1], [0.1], [0.0]]))
     imu = np.zeros((6, 1))
     imu[2] = -(1.0 + excess) * GRAVITY_M_S2
@@ -206,32 +208,34 @@ def test_accelerometer_has_a_say_on_the_tilt_only_near_g(excess: float, corrects
 
 
 @pytest.mark.parametrize(
-    ("sonar_m", "pressure_m", "counts"),
+    ("sonar_m", "pressure_m", "accepted"),
     [(1.35, 1.1, True), (1.45, 1.1, False), (0.44, 1.1, False), (1.35, 3.0, True)],
 )
-def test_sonar_counts_near_the_estimate_and_within_its_range(
+def test_sonar_is_accepted_near_the_estimate_and_within_its_range(
     sonar_m: float,
     pressure_m: float,
-    counts: bool,
+    accepted: bool,
 ) -> None:
-    """Beyond 0.3 m off, or at its least height, it is not heard; a sudden pressure alone does not gag it."""
+    """A reading off by more than 0.3 m or at the least height is rejected; a pressure jump alone is not."""
     altitude = Altitude(np.array([-1.1]), np.zeros(1))
-    readings = replace(said(), sonar_m=np.array([sonar_m]), pressure_pa=np.array([-12.01725 * pressure_m]))
+    readings = replace(
+        readings_at(), sonar_m=np.array([sonar_m]), pressure_pa=np.array([-12.01725 * pressure_m])
+    )
     altitude.update(readings, np.zeros(1))
-    assert (altitude.z_m[0] != -1.1) == counts
+    assert (altitude.z_m[0] != -1.1) == accepted
 
 
-def test_sonar_is_silenced_when_its_past_and_the_pressure_speak_against_the_estimate() -> None:
-    """The estimate stands 0.9 m from both slow courses; a sonar near it is an echo of something else."""
+def test_sonar_is_rejected_when_low_passed_sonar_and_pressure_contradict_the_estimate() -> None:
+    """Both low-passed heights are 0.9 m off, so a sonar reading near the estimate is an outlier."""
     altitude = Altitude(np.array([-2.0]), np.zeros(1))
     altitude.z_m = np.array([-1.1])
     altitude._predicted = altitude.z_m, np.zeros(1)
-    altitude.update(said(z_m=-1.0), np.zeros(1))
+    altitude.update(readings_at(z_m=-1.0), np.zeros(1))
     assert altitude.z_m[0] == -1.1
 
 
 @pytest.mark.parametrize(
-    ("flow_m_s", "tilt_rad", "rate_rad_s", "z_m", "counts"),
+    ("flow_m_s", "tilt_rad", "rate_rad_s", "z_m", "accepted"),
     [
         (0.5, 0.0, 0.0, -1.1, True),
         (0.5, 0.61, 0.6, -1.1, False),
@@ -242,45 +246,46 @@ def test_sonar_is_silenced_when_its_past_and_the_pressure_speak_against_the_esti
         (0.5, 0.0, 0.0, -0.39, False),
     ],
 )
-def test_optical_flow_passes_its_gates(
+def test_optical_flow_is_gated(
     flow_m_s: float,
     tilt_rad: float,
     rate_rad_s: float,
     z_m: float,
-    counts: bool,
+    accepted: bool,
 ) -> None:
-    """Tilt 0.6 rad and rate 7 rad/s, or rate 0.5 rad/s; jump 5 m/s; height 0.4 m."""
+    """Gates: tilt 0.6 rad and rate 7 rad/s, or rate 0.5 rad/s; jump 5 m/s; height 0.4 m."""
     velocity = Velocity(np.zeros((2, 1)), derotated=False)
     tilt = np.array([[tilt_rad], [0.0]])
-    velocity.update(said(flow_m_s=flow_m_s, rate_rad_s=rate_rad_s), tilt, np.array([z_m]), np.zeros((2, 1)))
-    expected = estimators.velocity_gain() * flow_m_s if counts else 0.0
+    readings = readings_at(flow_m_s=flow_m_s, rate_rad_s=rate_rad_s)
+    velocity.update(readings, tilt, np.array([z_m]), np.zeros((2, 1)))
+    expected = estimators.velocity_gain() * flow_m_s if accepted else 0.0
     np.testing.assert_allclose(velocity.velocity_m_s, expected)
 
 
 def test_yaw_drifts_as_a_random_walk_and_position_with_it() -> None:
-    """Yaw integrates the gyro's noise; x that of the velocity, which the accelerometer leaves behind.
+    """Yaw integrates the gyro noise; x integrates the velocity noise that the accelerometer causes.
 
-    Later the tilt, which walks as the yaw does, has x stray faster.
+    After some seconds the tilt, a random walk like the yaw, makes x drift faster.
     """
     flights, ticks = 400, 800
     true = hovering(flights)
     suite = Suite(Sensors(), tuple(range(flights)), true)
     yaw, x = np.empty((ticks, flights)), np.empty((ticks, flights))
     for tick in range(ticks):
-        seen = suite.look(true)
+        seen = suite.estimate(true)
         yaw[tick], x[tick] = seen.euler_rad[2], seen.position_m[0]
     for tick in (199, 399, 799):
         assert yaw[tick].var() == pytest.approx(0.002 * STEP_S * STEP_S * (tick + 1), rel=0.25)
     gain = estimators.velocity_gain()
-    left = (1.0 - gain) / gain * estimators.ACCELERATION_GAIN * STEP_S * STEP_S
+    factor = (1.0 - gain) / gain * estimators.ACCELERATION_GAIN * STEP_S * STEP_S
     for tick in (99, 199):
-        assert x[tick].var() == pytest.approx(0.3 * left * left * (tick + 1), rel=0.25)
+        assert x[tick].var() == pytest.approx(0.3 * factor * factor * (tick + 1), rel=0.25)
     assert x[799].var() > 4.0 * x[199].var()
 
 
-def test_seen_flight_can_be_measured_like_the_true_one() -> None:
-    """The same times and targets, with the estimates in the place of the truth."""
-    trace = eight(Sensors(), 1.0)
+def test_the_estimated_flight_is_a_trace_of_its_own() -> None:
+    """`as_seen` replaces the true state by the estimates and keeps times and targets."""
+    trace = fly_eight(Sensors(), 1.0)
     assert isinstance(trace, SensedTrace)
     seen = trace.as_seen()
     np.testing.assert_array_equal(seen.position_m, trace.seen_position_m)
