@@ -1,1 +1,1 @@
-"""One simulated flight: closed loop, trajectories, traces, metrics and its record."""
+"""One simulated flight: closed loop, trajectories, traces, metrics and the record that repeats it."""

@@ -1,11 +1,11 @@
-"""The closed loop: trajectory, position controller and vehicle, for n flights at once.
+"""The closed loop: trajectory, position controller and drone, for n flights at once.
 
-    target -> position controller --roll, pitch--> link -> stock loops -> rotors -> rigid body <- world
+    target -> position controller --roll, pitch--> link -> stock loops -> rotors -> rigid body <- disturbances
               every update period                          every 5 ms                    |
-                      ^------------------------------------------^---- sensors, if any --'
+                      ^------------------------------------------^-- sensors (optional) -'
 
-The simulation is pure: the same flight with the same controller gives the same trace, and a flight
-among many is the same, bit for bit, as the flight alone.
+The simulation is deterministic: the same flight with the same controller gives the same trace, and a flight
+gives the same bits alone and in a batch.
 """
 
 import math
@@ -31,17 +31,17 @@ from mambo_nmpc.sil.sensors.instruments import Sensors
 from mambo_nmpc.sil.sensors.suite import Suite
 
 HEIGHT_REFERENCE_M = -1.1
-"""z of every flight, up being negative."""
+"""Altitude reference of every flight: z points down."""
 
 TAKE_OFF_PHASE_S = 5.0
-"""Time that a take-off has before the trajectory's clock starts."""
+"""Time from the beginning of a take-off to t = 0 of the trajectory's clock."""
 
 LOST_M = 1e4
-"""Distance from the origin, along any axis, at which a flight counts as lost."""
+"""Distance from the origin along any axis beyond which a flight is lost."""
 
 
 class Outcome(Protocol):
-    """What a position controller returns for n flights."""
+    """The output of a position controller for n flights."""
 
     @property
     def command_rad(self) -> NDArray[np.floating[Any]]:
@@ -50,12 +50,12 @@ class Outcome(Protocol):
 
     @property
     def status(self) -> IntArray:
-        """0 where all went well (n,)."""
+        """0 where the controller accepted its input (n,)."""
         ...
 
 
 class PositionController(Protocol):
-    """What the closed loop asks of a position controller."""
+    """The interface of a position controller to the closed loop."""
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
         """Return the command for states (n, 7), targets (n, 4) and thrust accelerations (n,).
@@ -92,26 +92,26 @@ class Offset:
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """One simulation of n flights; what differs between them comes as an array (n,)."""
+    """One simulation of n flights; a quantity that differs between them is an array (n,)."""
 
     trajectory: Trajectory
     duration_s: float = 100.0
     flights: int = 1
     start: Start = Start.HOVER
     yaw_rad: PerFlight = 0.0
-    """Heading at the start, which the yaw loop holds."""
+    """Heading at the start, and reference of the yaw loop."""
     yaw_rate_rad_s: PerFlight = 0.0
-    """Rate at which the heading held turns, from t = 0 on."""
+    """Rate of the yaw reference from t = 0 on."""
     vehicle: Vehicle = field(default_factory=Vehicle)
     update_period_s: float = 0.01
-    """Period of the position controller: a whole number of ticks of 5 ms."""
+    """Period of the position controller: a whole multiple of the tick of 5 ms."""
     seeds: tuple[int, ...] | None = None
-    """One for each flight, of all that is random in it; None is 0 for all."""
+    """Random seed of each flight; None is 0 for all."""
     offset: Offset | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
     link: Link = field(default_factory=Link)
     sensors: Sensors | None = None
-    """What controllers and stock loops see the state through; None shows them the truth."""
+    """Sensors behind the estimates that position controller and stock loops receive; None: the true state."""
 
     def __post_init__(self) -> None:
         if not self.update_period_s <= self.duration_s < math.inf:
@@ -132,13 +132,16 @@ class Flight:
         return round(self.update_period_s / STEP_S)
 
     def times_s(self) -> FloatArray:
-        """Return the instants (k,) at which the position controller runs; t = 0 is one of them."""
+        """Return the times (k,) of the position controller's updates; t = 0 is one of them."""
         before = round(TAKE_OFF_PHASE_S / self.update_period_s) if self.start is Start.TAKE_OFF else 0
         after = round(self.duration_s / self.update_period_s)
         return self.update_period_s * np.arange(-before, after + 1, dtype=np.float64)
 
     def targets(self) -> FloatArray:
-        """Return the targets (k, n, 4) at these instants; raises `FlightError`."""
+        """Return the targets (k, n, 4) at the times of the updates.
+
+        Raises `FlightError` if the number of trajectories is not the number of flights.
+        """
         target = self.trajectory.target(self.times_s())
         if target.ndim == 2:
             return np.broadcast_to(target[:, np.newaxis, :], (len(target), self.flights, 4))
@@ -150,9 +153,9 @@ class Flight:
 def fly(
     flight: Flight, controller: PositionController, progress: Callable[[float], None] | None = None
 ) -> Trace:
-    """Simulate and return the trace; `progress` hears the share flown (0 to 1) after every update.
+    """Simulate the flights and return their trace; call `progress` with the share done after every update.
 
-    Raises `FlightError`.
+    Raises `FlightError` if the number of trajectories is not the number of flights.
     """
     times_s, targets = flight.times_s(), flight.targets()
     open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start is Start.TAKE_OFF else 0.0)
@@ -162,10 +165,10 @@ def fly(
     suite = None if flight.sensors is None else Suite(flight.sensors, seeds, truth(state))
     wire = Wire(flight.link, flight.flights)
     caller = _Caller(
-        controller, Drops(flight.link, seeds), _blank(times_s, targets, sensed=suite is not None)
+        controller, Drops(flight.link, seeds), _allocate_trace(times_s, targets, sensed=suite is not None)
     )
     for update, time_s in enumerate(times_s):
-        state = _without_lost(state)
+        state = _mark_lost(state)
         lifting = time_s < open_loop_until_s - STEP_S / 2.0
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
         for tick in range(flight.ticks_per_update):
@@ -185,7 +188,7 @@ def fly(
 
 
 def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
-    """Return the state in which n flights begin above or at their first targets (n, 4)."""
+    """Return the initial state of n flights, above their first targets (n, 4) or on the ground below."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
     command: PerFlight = MAMBO.command_min
@@ -199,20 +202,20 @@ def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
     for row in range(3):
         body[POSITION][row] += offset.position_m[row]
     body[EULER][:2] = [np.broadcast_to(angle, flight.flights) for angle in offset.tilt_rad]
-    velocity_m_s = np.stack([np.broadcast_to(part, flight.flights) for part in offset.velocity_m_s])
+    velocity_m_s = np.stack([np.broadcast_to(component, flight.flights) for component in offset.velocity_m_s])
     body[VELOCITY] = to_body(body[EULER], velocity_m_s)
     return state
 
 
 def _thrust_n(seen: Seen, lifting: bool) -> FloatArray:
-    """Return the total thrust (n,) asked for: open loop while lifting off, then the altitude loop."""
+    """Return the demanded total thrust (n,) in N: constant while lifting, then from the altitude loop."""
     if lifting:
         return np.full(seen.position_m.shape[1], loops.take_off_thrust())
     return loops.altitude_thrust(HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
 
 
-def _without_lost(state: VehicleState) -> VehicleState:
-    """Return the state with NaN in the flights that are lost."""
+def _mark_lost(state: VehicleState) -> VehicleState:
+    """Return the state with NaN in the flights that left the bounds or are not finite."""
     lost = ~(np.abs(state.body[POSITION]).max(axis=0) < LOST_M) | ~np.isfinite(state.body).all(axis=0)
     if not lost.any():
         return state
@@ -221,8 +224,8 @@ def _without_lost(state: VehicleState) -> VehicleState:
     )
 
 
-def _blank(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
-    """Return a trace to be filled in."""
+def _allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
+    """Return a trace with times and targets set and its other arrays uninitialized."""
     shape = targets.shape[:2]
     arrays: dict[str, Any] = {
         "time_s": times_s,
@@ -245,7 +248,7 @@ def _blank(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
 
 
 class _Caller:
-    """Calls the position controller of n flights, fills in the trace, and holds the command (2, n)."""
+    """Calls the position controller of n flights, records the trace and holds the command (2, n)."""
 
     def __init__(self, controller: PositionController, drops: Drops, trace: Trace) -> None:
         self._controller, self._drops = controller, drops
@@ -253,10 +256,9 @@ class _Caller:
         self.command_rad: FloatArray = np.zeros((2, trace.flights))
 
     def call(self, update: int, true: Seen, seen: Seen, thrust_n: FloatArray) -> None:
-        """Let the controller take one step on what it sees.
+        """Call the controller with the state `seen` and record the update.
 
-        Where the update is dropped it is handed a state that is not a number: it refuses that, and
-        remembers nothing of it.
+        A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
         """
         trace = self.trace
         measured = np.ascontiguousarray(

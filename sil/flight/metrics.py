@@ -1,8 +1,8 @@
 """Tracking metrics of a trace.
 
 e(t) is the Euclidean norm of the horizontal position error, u(t) the command, t the time on the
-trajectory's clock; the take-off is never counted. Integrals of e follow the trapezoidal rule over the
-instants of the trace, those of u are exact because commands are held.
+trajectory's clock; the take-off is left out. Integrals of e use the trapezoidal rule over the samples of the
+trace. Integrals of u are exact, because commands are held between samples.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 TRANSIENT_S = 10.0
-"""What is left out of a flight to judge it without its start."""
+"""Length of the initial transient that metrics may leave out."""
 
 
 @dataclass(frozen=True, eq=False)
 class Metrics:
-    """Metrics of n flights, each field (n,); NaN for a flight that diverged."""
+    """Metrics of n flights, each field (n,); NaN for a flight that was lost."""
 
     iae_m_s: FloatArray
     """Integral of e: IAE of Table II."""
@@ -34,11 +34,11 @@ class Metrics:
     effort_rad_s: FloatArray
     """Integral of the 1-norm of u."""
     command_variation_rad: FloatArray
-    """Mean 1-norm of the change of u from one step of the controller to the next."""
+    """Mean 1-norm of the change of u from one update of the controller to the next."""
 
 
 def horizontal_error_m(trace: Trace) -> FloatArray:
-    """Return e (k, n), the horizontal distance to the target."""
+    """Return e (k, n), the horizontal distance to the target in m."""
     offset_m = trace.target[..., :2] - trace.position_m[..., :2]
     return np.hypot(offset_m[..., 0], offset_m[..., 1])
 
@@ -46,14 +46,14 @@ def horizontal_error_m(trace: Trace) -> FloatArray:
 def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
     """Return the metrics from `start_s` to the end: 0 for the whole flight, or `TRANSIENT_S`.
 
-    Raises `ValueError` if less than two instants are left.
+    Raises `ValueError` if fewer than two samples are left.
     """
-    counted = trace.time_s >= start_s
-    time_s = trace.time_s[counted]
+    measured = trace.time_s >= start_s
+    time_s = trace.time_s[measured]
     if len(time_s) < 2:
         raise ValueError(f"start_s = {start_s:g} must lie before the end {trace.time_s[-1]:g} of the flight")
-    command_rad = trace.command_rad[counted]
-    error_m = horizontal_error_m(trace)[counted]
+    command_rad = trace.command_rad[measured]
+    error_m = horizontal_error_m(trace)[measured]
     weight_s = time_s[:, np.newaxis]
     span_s = time_s[-1] - time_s[0]
     ise_m2_s = _integral(error_m**2, time_s)
@@ -65,21 +65,21 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
         itae_m_s2=_integral(weight_s * error_m, time_s),
         rms_error_m=np.sqrt(ise_m2_s / span_s),
         max_error_m=error_m.max(axis=0),
-        effort_rad_s=_total(np.diff(time_s)[:, np.newaxis] * effort_rad),
-        command_variation_rad=_total(np.abs(np.diff(command_rad, axis=0)).sum(axis=-1)) / (len(time_s) - 1),
+        effort_rad_s=_sum(np.diff(time_s)[:, np.newaxis] * effort_rad),
+        command_variation_rad=_sum(np.abs(np.diff(command_rad, axis=0)).sum(axis=-1)) / (len(time_s) - 1),
     )
 
 
 def _integral(values: FloatArray, time_s: FloatArray) -> FloatArray:
     """Return the trapezoidal integrals (n,) of values (k, n)."""
     steps_s = np.diff(time_s)[:, np.newaxis]
-    return _total(steps_s * (values[1:] + values[:-1]) / 2.0)
+    return _sum(steps_s * (values[1:] + values[:-1]) / 2.0)
 
 
-def _total(values: FloatArray) -> FloatArray:
+def _sum(values: FloatArray) -> FloatArray:
     """Return the sums (n,) of values (k, n) over time.
 
-    NumPy adds along the innermost axis in another order than across it: laid out flight by flight, a flight
-    among many has the same bits as alone.
+    NumPy's order of additions depends on the memory layout. With time as the contiguous axis a flight in a
+    batch has the same bits as alone.
     """
     return np.asarray(np.ascontiguousarray(values.T).sum(axis=-1))

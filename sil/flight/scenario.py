@@ -1,7 +1,7 @@
-"""One flight as a record: every number that decides it, written to a file and flown again from it.
+"""One flight as a file: all parameters that determine it, so that it can be repeated bit for bit.
 
-A `Scenario` says what is flown, and in which world; a `Record` adds which controller flies it. Many scenarios
-make one `Flight` of many.
+A `Scenario` holds trajectory, start, drone, disturbances, link and sensors of one flight. A `Record` adds the
+controller and the digest of the trace. `flight_of` makes one `Flight` of several scenarios.
 """
 
 import json
@@ -39,16 +39,16 @@ INERTIA_KG_M2: Final[Three] = (
 
 
 class _Record(BaseModel):
-    """Frozen, no unknown keys, finite numbers only."""
+    """A frozen model that rejects unknown keys, infinity and NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
 
 
 class Scenario(_Record):
-    """One flight; by default the Table II case of a nominal Mambo, undisturbed, that sees the truth."""
+    """Parameters of one flight; default: Table II's, with a nominal, undisturbed Mambo without sensors."""
 
     seed: int = Field(0, ge=0, lt=2**63)
-    """Of all that is random in this flight."""
+    """Seed of sensor noise, gusts and dropped updates."""
 
     trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
     size_m: float = Field(2.0, ge=-1000.0, le=1000.0)
@@ -57,7 +57,7 @@ class Scenario(_Record):
 
     start: Start = Start.HOVER
     start_offset_m: Three = (0.0, 0.0, 0.0)
-    """From where the flight would start otherwise, in the world frame (NED)."""
+    """Offset from the nominal start in the world frame (NED)."""
     start_velocity_m_s: Three = (0.0, 0.0, 0.0)
     """In the world frame."""
     start_tilt_rad: Two = (0.0, 0.0)
@@ -73,7 +73,7 @@ class Scenario(_Record):
     drag_1_s: float = Field(float(Vehicle.drag_1_s), ge=0.0)
 
     wind_m_s2: Two = (0.0, 0.0)
-    """Steady push of the wind along x and y of the world."""
+    """Steady disturbance acceleration along x and y of the world."""
     wind_speed_m_s: float = Field(0.0, ge=0.0, le=50.0)
     """Mean wind 20 ft above the ground, with gusts; 0 is still air."""
     wind_direction_rad: float = 0.0
@@ -85,16 +85,16 @@ class Scenario(_Record):
     push_time_s: float = 0.0
 
     command_delay_ticks: int = Field(0, ge=0, le=200)
-    """Ticks of 5 ms by which the roll and pitch commands come late."""
+    """Delay of the roll and pitch commands in ticks of 5 ms."""
     dropped_share: float = Field(0.0, ge=0.0, le=1.0)
-    """Probability that an update of the position controller is left out, its command held."""
+    """Probability that an update of the position controller is dropped; its last command is held."""
 
     sensors: Literal["none", "mambo", "mambo-derotated"] = "none"
-    """`mambo-derotated` takes the turning of the camera out of the optical flow."""
+    """`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
-    """Factor on the standard deviation of every sensor's noise."""
+    """Factor on the standard deviation of all sensor noise."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
-    """What the calibration before take-off leaves of the bias."""
+    """Bias that remains after the calibration before take-off."""
     gyro_bias_rad_s: Three = (0.0, 0.0, 0.0)
 
     @model_validator(mode="after")
@@ -106,19 +106,19 @@ class Scenario(_Record):
         return self
 
 
-ALIKE: Final = ("duration_s", "start", "sensors")
-"""What all flights of one simulation have in common."""
+SHARED_KEYS: Final = ("duration_s", "start", "sensors")
+"""Keys that must be equal in all flights of one simulation."""
 
 
 def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
-    """Return the simulation of all scenarios at once, one flight each, in order; raises FlightError.
+    """Return one simulation with a flight for each scenario, in order.
 
-    Those of `ALIKE` must be the same in all.
+    Raises `FlightError` for no scenario, or if the scenarios differ in one of `SHARED_KEYS`.
     """
     if not scenarios:
         raise FlightError("flights = 0 must be 1 or more")
     first = scenarios[0]
-    for key in ALIKE:
+    for key in SHARED_KEYS:
         if any(getattr(scenario, key) != getattr(first, key) for scenario in scenarios):
             raise FlightError(f"{key} must be the same in all flights of one simulation")
 
@@ -175,15 +175,15 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
 
 
 class Record(_Record):
-    """A flight that can be flown again: the scenario, who flew it, and the digest of what came of it."""
+    """A flight that can be repeated: scenario, controller and digest of the trace."""
 
     format: Literal[1] = FORMAT
     scenario: Scenario
     controller: Literal["nmpc", "pd", "reference"] = "nmpc"
     settings: Settings
-    """Of the controller; the PD has but the update period of them."""
+    """Settings of the NMPC; the PD uses their update period only."""
     trace_sha256: str | None = None
-    """`Trace.digest` of the flight when it was first flown, if known."""
+    """`Trace.digest` of the original flight, if known."""
 
 
 def write_record(record: Record, path: Path) -> None:
@@ -192,7 +192,7 @@ def write_record(record: Record, path: Path) -> None:
 
 
 def read_record(path: Path) -> Record:
-    """Read what `write_record` wrote; raises ScenarioError, naming file, key and rule."""
+    """Read a record; raises `ScenarioError`, which names file, key and rule."""
     name = echo(str(path))
     try:
         with path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""What a closed-loop run leaves behind, and how it is written down."""
+"""The trace of a simulation: its arrays, digest, CSV and NPZ files."""
 
 import csv
 import hashlib
@@ -22,7 +22,7 @@ SEEN_COLUMNS = (
     *("seen_x_m", "seen_y_m", "seen_z_m", "seen_vx_m_s", "seen_vy_m_s", "seen_vz_m_s"),
     *("seen_roll_rad", "seen_pitch_rad", "seen_yaw_rad"),
 )
-"""After the others, where there are sensors."""
+"""Columns that follow `CSV_COLUMNS` in a flight with sensors."""
 
 
 _AXES: Final[dict[str, tuple[int, ...]]] = {
@@ -33,14 +33,14 @@ _AXES: Final[dict[str, tuple[int, ...]]] = {
     "command_rad": (2,),
     "thrust_acceleration_m_s2": (),
 }
-"""Axes of the arrays behind instant and flight; each seen one has those of the true one."""
+"""Axes of each array after sample and flight; `seen_position_m` has those of `position_m`, and so on."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The record of n flights at k instants, one for each step of the position controller.
+    """n flights, sampled at the k updates of the position controller.
 
-    Instants before t = 0 belong to the take-off. A flight that diverged is NaN from there on.
+    Samples before t = 0 belong to the take-off. A flight that is lost is NaN from then on.
     """
 
     time_s: FloatArray
@@ -54,20 +54,20 @@ class Trace:
     target: FloatArray
     """Target [x, y, vx, vy] in m and m/s (k, n, 4)."""
     command_rad: FloatArray
-    """Roll and pitch commanded from this instant to the next (k, n, 2)."""
+    """Roll and pitch command, held until the next sample (k, n, 2)."""
     thrust_acceleration_m_s2: FloatArray
-    """Thrust that the altitude loop asks for, over the nominal mass (k, n)."""
+    """Thrust demanded by the altitude loop, divided by the nominal mass (k, n)."""
     status: IntArray
     """Status of the position controller (k, n)."""
 
     def same_bits(self, other: "Trace") -> bool:
-        """Tell whether every array equals that of another trace, bit for bit."""
+        """Return whether every array equals that of another trace, bit for bit."""
         return type(self) is type(other) and all(
             getattr(self, f.name).tobytes() == getattr(other, f.name).tobytes() for f in fields(self)
         )
 
     def digest(self, flight: int = 0) -> str:
-        """Return the SHA-256 of every number of one flight."""
+        """Return the SHA-256 of times and arrays of one flight."""
         hasher = hashlib.sha256(self.time_s.tobytes())
         for column in fields(self):
             if column.name != "time_s":
@@ -81,13 +81,13 @@ class Trace:
 
     @property
     def diverged(self) -> NDArray[np.bool_]:
-        """Whether each flight was lost before its end (n,)."""
+        """Whether each flight was lost (n,)."""
         return np.asarray(np.isnan(self.position_m[-1]).any(axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
 class SensedTrace(Trace):
-    """A trace with sensors: the fields of `Trace` are the truth, these what the controllers saw instead."""
+    """A trace with sensors: the fields of `Trace` hold the true state, these the controllers' estimates."""
 
     seen_position_m: FloatArray
     """Estimated position in the world frame (k, n, 3)."""
@@ -97,7 +97,7 @@ class SensedTrace(Trace):
     """Estimated roll, pitch, yaw (k, n, 3)."""
 
     def as_seen(self) -> Trace:
-        """Return the flight as the controllers saw it, to be measured like the truth."""
+        """Return a trace with the estimates in place of the true state."""
         return replace(
             self,
             position_m=self.seen_position_m,
@@ -107,9 +107,9 @@ class SensedTrace(Trace):
 
 
 def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
-    """Write one flight of a trace with the columns `CSV_COLUMNS` (and `SEEN_COLUMNS`).
+    """Write one flight as CSV with the columns `CSV_COLUMNS` and, with sensors, `SEEN_COLUMNS`.
 
-    Numbers read back to the same bits.
+    Every number is spelled so that it reads back to the same bits.
     """
     seen = (
         [trace.seen_position_m, trace.seen_velocity_m_s, trace.seen_euler_rad]
@@ -140,13 +140,16 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
 
 
 def write_npz(trace: Trace, path: Path) -> None:
-    """Write all flights of a trace, one array for each field."""
+    """Write all flights of a trace as NPZ, one array per field."""
     with path.open("wb") as file:
         np.savez_compressed(file, **{field.name: getattr(trace, field.name) for field in fields(trace)})
 
 
 def read_npz(path: Path) -> Trace:
-    """Read what `write_npz` wrote; raises `TraceError`."""
+    """Read a trace that `write_npz` wrote.
+
+    Raises `TraceError` for a file that cannot be read, lacks an array, or whose arrays do not fit together.
+    """
     try:
         with path.open("rb") as file, np.load(file) as arrays:
             kind = SensedTrace if "seen_position_m" in arrays else Trace

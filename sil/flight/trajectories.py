@@ -1,7 +1,7 @@
 """Trajectories: target position and velocity in the world frame as pure functions of time.
 
-Every curve has its centre at the origin, and starts on its first point: before t = 0 the target waits
-there at rest. Half-width and radius are in metres, angular rate in rad/s.
+Every curve is centred at the origin. Before t = 0 the target rests on the first point of its curve.
+Half-width and radius are in metres, the angular rate in rad/s.
 """
 
 import csv
@@ -21,36 +21,36 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 STEP_TIME_S = 1.0
 COLUMNS = ("time_s", "x_m", "y_m")
 LARGEST = (1e6, 1e4, 1e4)
-"""Largest magnitude of a waypoint's time in s and position in m, column by column."""
+"""Largest magnitude of a waypoint's time in s, x in m and y in m."""
 
 LARGEST_FILE_BYTES = 10_000_000
 SHORTEST_LEG_S = 1e-6
-"""Least time from one waypoint to the next: no velocity is infinite."""
+"""Least time from one waypoint to the next, which bounds the velocity."""
 
 Point = tuple[float, float, float]
 """A waypoint: time in s, x and y in m."""
 
 
 class Trajectory(Protocol):
-    """What the closed loop asks of a trajectory, of one flight or of many."""
+    """The interface of a trajectory to the closed loop, for one flight or for n."""
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] in m and m/s.
 
-        Times of shape (...) give (..., 4), or (..., n, 4) if n flights have a target of their own.
+        Times of shape (...) give (..., 4), or (..., n, 4) with one target for each of n flights.
         """
         ...
 
 
-def _held_before_start(time_s: FloatArray, target: FloatArray) -> FloatArray:
-    """Take the velocity out of targets (..., 4) whose time (...) lies before the start."""
+def _rest_before_start(time_s: FloatArray, target: FloatArray) -> FloatArray:
+    """Set the velocity of targets (..., 4) to 0 where the time (...) is before t = 0."""
     target[..., 2:] *= (time_s >= 0.0)[..., np.newaxis]
     return target
 
 
 @dataclass(frozen=True)
 class Bernoulli:
-    """Lemniscate of Bernoulli from its centre, along x: the figure of eight of the paper."""
+    """Lemniscate of Bernoulli with its long axis along x, from its centre: the paper's figure of eight."""
 
     half_width_m: float
     angular_rate_rad_s: float
@@ -63,7 +63,7 @@ class Bernoulli:
         denominator = 1.0 + cosine * cosine
         x = self.half_width_m * sine / denominator
         speed = self.half_width_m * self.angular_rate_rad_s / (denominator * denominator)
-        return _held_before_start(
+        return _rest_before_start(
             times,
             np.stack(
                 [
@@ -79,7 +79,7 @@ class Bernoulli:
 
 @dataclass(frozen=True)
 class Lissajous:
-    """x = a sin(w t), y = a h sin(2 w t) with a height h relative to the half-width a."""
+    """x = a sin(w t), y = a h sin(2 w t): half-width a, ratio h of height to width."""
 
     half_width_m: float
     angular_rate_rad_s: float
@@ -91,7 +91,7 @@ class Lissajous:
         phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
         width, height = self.half_width_m, self.height * self.half_width_m
         rate = self.angular_rate_rad_s
-        return _held_before_start(
+        return _rest_before_start(
             times,
             np.stack(
                 [
@@ -119,7 +119,7 @@ class Gerono:
 
 @dataclass(frozen=True)
 class Circle:
-    """Circle about the origin from (radius, 0), towards +y."""
+    """Circle about the origin; it starts at (radius, 0) towards +y."""
 
     radius_m: float
     angular_rate_rad_s: float
@@ -130,12 +130,12 @@ class Circle:
         phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
         x, y = self.radius_m * np.cos(phase), self.radius_m * np.sin(phase)
         rate = self.angular_rate_rad_s
-        return _held_before_start(times, np.stack([x, y, -rate * y, rate * x], axis=-1))
+        return _rest_before_start(times, np.stack([x, y, -rate * y, rate * x], axis=-1))
 
 
 @dataclass(frozen=True)
 class Hover:
-    """The origin, for ever."""
+    """The origin at all times."""
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
@@ -144,7 +144,7 @@ class Hover:
 
 @dataclass(frozen=True)
 class Step:
-    """The origin, and from `STEP_TIME_S` on another point at rest."""
+    """The origin, and from `STEP_TIME_S` on the point (x, y); the target velocity is always 0."""
 
     x_m: float
     y_m: float
@@ -157,19 +157,22 @@ class Step:
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Straight lines between points, each reached at its time; the first and the last point are held."""
+    """Straight lines between waypoints, each at constant speed; the target rests before and after them.
+
+    Raises `TrajectoryError` unless times increase and all numbers are within `LARGEST`.
+    """
 
     points: tuple[Point, ...]
-    """Rows of (time s, x m, y m), times increasing."""
+    """Rows of time in s, x and y in m."""
 
     def __post_init__(self) -> None:
         _check([f"point {number}" for number in range(1, len(self.points) + 1)], self.points)
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a CSV file with the columns time_s, x_m, y_m, in any order and beside others.
+        """Read a CSV file with the columns time_s, x_m, y_m, in any order; other columns are ignored.
 
-        Raises `TrajectoryError`, naming file, line, column and rule.
+        Raises `TrajectoryError`, which names file, line, column and rule.
         """
         name = echo(str(path))
         try:
@@ -197,11 +200,11 @@ class Waypoints:
         velocity = np.zeros((len(knots) + 1, 2))
         velocity[1:-1] = np.stack([np.diff(x), np.diff(y)], axis=-1) / np.diff(knots)[:, np.newaxis]
         position = np.stack([np.interp(clock, knots, x), np.interp(clock, knots, y)], axis=-1)
-        return _held_before_start(times, np.concatenate([position, velocity[leg]], axis=-1))
+        return _rest_before_start(times, np.concatenate([position, velocity[leg]], axis=-1))
 
 
 def _check(places: Sequence[str], points: Sequence[Point]) -> None:
-    """Raise `TrajectoryError` for points that cannot be flown; `places` says where each of them stands."""
+    """Raise `TrajectoryError` for points that cannot be flown; `places` names each point in the message."""
     if not points:
         raise TrajectoryError("holds no waypoint; at least one is needed")
     for place, point in zip(places, points, strict=True):
@@ -219,7 +222,7 @@ def _check(places: Sequence[str], points: Sequence[Point]) -> None:
 
 
 def _read(rows: "csv.DictReader[str]") -> tuple[list[str], tuple[Point, ...]]:
-    """Return the points of a CSV file, and the line on which each stands."""
+    """Return the line number and the point of every row of a CSV file."""
     lines: list[str] = []
     points: list[Point] = []
     try:
@@ -235,25 +238,25 @@ def _read(rows: "csv.DictReader[str]") -> tuple[list[str], tuple[Point, ...]]:
 
 
 def _check_header(header: Sequence[str]) -> None:
-    """Raise `TrajectoryError` unless each column that we read stands there once."""
+    """Raise `TrajectoryError` unless the header names each of `COLUMNS` exactly once."""
     for column in COLUMNS:
         if header.count(column) != 1:
-            fault = "stands there twice" if column in header else "is missing"
+            fault = "appears more than once" if column in header else "is missing"
             raise TrajectoryError(
                 f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
             )
 
 
 def _point(row: dict[str, str], line: str, width: int) -> Point:
-    """Return the point in a row of a CSV file."""
-    if None in row:  # where DictReader puts what is beyond the header
-        raise TrajectoryError(f"{line}: has more than {width} fields, as many as the header")
+    """Return the point of one row of a CSV file."""
+    if None in row:  # the key under which DictReader stores fields beyond the header
+        raise TrajectoryError(f"{line}: has more fields than the {width} of the header")
     time_s, x_m, y_m = (_number(row[column], line, column) for column in COLUMNS)
     return time_s, x_m, y_m
 
 
 def _number(text: str | None, line: str, column: str) -> float:
-    """Return one field of a CSV row as a number; None is a field that the row does not have."""
+    """Return one field of a CSV row as a number; None is a field missing at the end of the row."""
     if not (text or "").strip():
         raise TrajectoryError(f"{line}: {column} is missing")
     try:
@@ -281,4 +284,4 @@ CURVES: Final[dict[str, Callable[[float, float], Trajectory]]] = {
     "hover": lambda size_m, rate_rad_s: Hover(),  # noqa: ARG005 - has neither size nor rate
     "step": lambda size_m, rate_rad_s: Step(size_m, 0.0),  # noqa: ARG005 - has no rate
 }
-"""Curves by name, made of a half-width, radius or step in m and an angular rate in rad/s."""
+"""Curve by name, as a function of size (half-width, radius or step in m) and angular rate in rad/s."""

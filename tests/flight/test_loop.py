@@ -1,4 +1,4 @@
-"""The closed loop: what is flown, what is recorded, what a lost flight leaves behind."""
+"""The closed loop: starts, controller interface, trace, lost flights and flights in a batch."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -31,7 +31,7 @@ FIGURE_OF_EIGHT = Bernoulli(half_width_m=2.0, angular_rate_rad_s=0.5)
 
 @dataclass(frozen=True)
 class Lean:
-    """A position controller that always commands the same angles, and reports status 3."""
+    """A position controller that always commands the same angles and returns status 3."""
 
     roll_rad: float
     pitch_rad: float
@@ -46,12 +46,12 @@ class Lean:
 
 @dataclass(frozen=True)
 class Echo:
-    """A position controller whose command is two columns of what it is given, state beside target."""
+    """A position controller that returns two columns of its input, state and target, as its command."""
 
     columns: tuple[int, int]
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> PdOutcome:
-        """Return numbers that the trace also records."""
+        """Return the chosen columns as command, and the thrust acceleration as status."""
         given = np.concatenate([state, target], axis=1)
         return PdOutcome(
             0.01 * given[:, self.columns], np.asarray(1e6 * thrust_acceleration_m_s2, dtype=np.int64)
@@ -67,7 +67,7 @@ def same(one: Trace, other: Trace) -> bool:
 
 
 def flight_of(trace: Trace, flight: int) -> Trace:
-    """Return one flight of a trace, as a trace."""
+    """Return a trace of one flight of a trace."""
     picked = {
         field.name: getattr(trace, field.name)[:, flight : flight + 1]
         for field in fields(Trace)
@@ -77,14 +77,14 @@ def flight_of(trace: Trace, flight: int) -> Trace:
 
 
 def test_pd_reproduces_its_row_of_table_2() -> None:
-    """IAE, ISE, ITSE and ITAE of the stock PD lie within 2 % of the printed 63.02, 47.86, 2460, 3200."""
+    """IAE, ISE, ITSE and ITAE of the stock PD are within 2 % of the printed 63.02, 47.86, 2460, 3200."""
     metrics = measure(fly(Flight(FIGURE_OF_EIGHT), PdController()))
     measured = [metrics.iae_m_s[0], metrics.ise_m2_s[0], metrics.itse_m2_s2[0], metrics.itae_m_s2[0]]
     np.testing.assert_allclose(measured, [63.02, 47.86, 2460.0, 3200.0], rtol=0.02)
 
 
-def test_printed_angular_rate_cannot_be_that_of_table_2() -> None:
-    """At 0.25 rad/s either figure of eight gives the PD less than half of the printed IAE."""
+def test_printed_angular_rate_contradicts_table_2() -> None:
+    """At 0.25 rad/s the IAE of the PD is less than half of the printed one on either figure of eight."""
     slow = Trajectories((Bernoulli(2.0, 0.25), Gerono(2.0, 0.25)))
     metrics = measure(fly(Flight(slow, flights=2), PdController()))
     np.testing.assert_allclose(metrics.iae_m_s, [21.7, 24.1], rtol=0.01)
@@ -92,7 +92,7 @@ def test_printed_angular_rate_cannot_be_that_of_table_2() -> None:
 
 
 def test_trace_covers_the_flight_at_the_controller_rate() -> None:
-    """A flight of one second at 100 Hz has 101 instants, both ends included, and (k, n, ...) arrays."""
+    """A flight of one second at 100 Hz has 101 samples, both ends included, in arrays (k, n, ...)."""
     trace = fly(Flight(FIGURE_OF_EIGHT, duration_s=1.0, flights=3), PdController())
     np.testing.assert_allclose(trace.time_s, np.linspace(0.0, 1.0, 101), atol=1e-12)
     for name, columns in (("position_m", 3), ("velocity_m_s", 3), ("euler_rad", 3), ("target", 4)):
@@ -104,7 +104,7 @@ def test_trace_covers_the_flight_at_the_controller_rate() -> None:
 
 
 def test_hover_start_is_level_and_at_rest_above_the_first_point() -> None:
-    """At t = 0 the vehicle hangs at z = -1.1 m over the first target, with its thrust equal to its weight."""
+    """At t = 0 the drone is at z = -1.1 m above the first target, with thrust equal to its weight."""
     trace = fly(Flight(Circle(1.5, 0.5), duration_s=0.1, yaw_rad=0.8), PdController())
     np.testing.assert_array_equal(trace.position_m[0, 0], [1.5, 0.0, -1.1])
     np.testing.assert_array_equal(trace.velocity_m_s[0, 0], 0.0)
@@ -112,14 +112,14 @@ def test_hover_start_is_level_and_at_rest_above_the_first_point() -> None:
     assert trace.thrust_acceleration_m_s2[0, 0] == pytest.approx(9.81, rel=1e-12)
 
 
-def test_hover_start_has_its_rotors_at_speed() -> None:
-    """Even lagging rotors carry the weight from the first instant."""
+def test_hover_start_has_rotors_at_hover_speed() -> None:
+    """Rotors with a lag carry the weight from the first tick."""
     trace = fly(Flight(Hover(), duration_s=1.0, vehicle=Vehicle(motor_lag_s=0.05)), PdController())
     np.testing.assert_allclose(trace.position_m[:, 0, 2], -1.1, atol=1e-9)
 
 
 def test_take_off_reaches_the_reference_height_before_the_clock_starts() -> None:
-    """From the ground at t = -5 s, open loop for one second, then to z = -1.1 m; the target waits."""
+    """From the ground at t = -5 s: constant thrust for 1 s, then the altitude loop; the target rests."""
     trace = fly(Flight(FIGURE_OF_EIGHT, duration_s=1.0, start=Start.TAKE_OFF), PdController())
     assert trace.time_s[0] == -5.0
     assert trace.time_s[500] == 0.0
@@ -140,7 +140,7 @@ def test_same_flight_gives_the_same_bits() -> None:
 
 
 def test_flight_in_a_batch_is_the_flight_alone() -> None:
-    """Trajectory, heading, airframe, lag, drag and wind of its own: each flight is as if it were alone."""
+    """Flights with different trajectories, headings, airframes, lags, drags and winds do not interact."""
     trajectories: tuple[Trajectory, ...] = (
         FIGURE_OF_EIGHT,
         Circle(1.0, 0.8),
@@ -178,8 +178,8 @@ def test_flight_in_a_batch_is_the_flight_alone() -> None:
         assert same(flight_of(batch, number), alone), number
 
 
-def test_controller_sees_the_state_and_target_of_its_instant() -> None:
-    """What reaches the controller is what the trace records at the same instant."""
+def test_controller_receives_the_recorded_state_and_target() -> None:
+    """The controller's input is what the trace records at the same update."""
     drifting = Vehicle(wind_m_s2=(0.5, 0.3))
     flight = Flight(FIGURE_OF_EIGHT, duration_s=3.0, yaw_rad=0.4, vehicle=drifting)
     for columns in ((0, 1), (2, 3), (4, 5), (6, 7), (8, 9), (10, 0)):
@@ -192,7 +192,7 @@ def test_controller_sees_the_state_and_target_of_its_instant() -> None:
 
 
 def test_recorded_velocity_is_the_rate_of_the_position() -> None:
-    """Velocities stand in the world frame, whatever heading and tilt."""
+    """Velocities are in the world frame for any heading and tilt."""
     trace = fly(Flight(FIGURE_OF_EIGHT, duration_s=10.0, yaw_rad=0.8), PdController())
     rates = (trace.position_m[2:] - trace.position_m[:-2]) / 0.02
     np.testing.assert_allclose(trace.velocity_m_s[1:-1], rates, atol=2e-3)
@@ -200,7 +200,7 @@ def test_recorded_velocity_is_the_rate_of_the_position() -> None:
 
 
 def test_command_is_held_between_updates() -> None:
-    """A slower controller with a constant command flies the same path as a fast one."""
+    """With a constant command the path does not depend on the update period."""
     fast = fly(Flight(Hover(), duration_s=1.0, update_period_s=0.005), Lean(0.05, -0.02))
     slow = fly(Flight(Hover(), duration_s=1.0, update_period_s=0.02), Lean(0.05, -0.02))
     np.testing.assert_array_equal(slow.position_m, fast.position_m[::4])
@@ -219,7 +219,7 @@ def test_command_is_held_between_updates() -> None:
 def test_command_accelerates_along_the_heading(
     roll_rad: float, pitch_rad: float, yaw_rad: float, direction: tuple[float, float]
 ) -> None:
-    """Nose down flies ahead and roll right flies right, whatever the heading, and the heading is held."""
+    """Pitching down accelerates forward, rolling right to the right, for any heading; the heading stays."""
     trace = fly(Flight(Hover(), duration_s=2.0, yaw_rad=yaw_rad), Lean(roll_rad, pitch_rad))
     travelled = trace.position_m[-1, 0, :2]
     np.testing.assert_allclose(travelled / np.hypot(*travelled), direction, atol=0.01)
@@ -227,59 +227,59 @@ def test_command_accelerates_along_the_heading(
 
 
 def test_step_of_the_target_is_reached() -> None:
-    """The PD brings the vehicle to a point one metre away and keeps its height."""
+    """The PD moves the drone to a point 1.4 m away and keeps its height."""
     trace = fly(Flight(Step(1.0, -1.0), duration_s=30.0), PdController())
     np.testing.assert_allclose(trace.position_m[-1, 0], [1.0, -1.0, -1.1], atol=0.02)
 
 
-def test_wind_pushes_the_pd_off_its_target() -> None:
-    """A steady side wind of 0.5 m/s^2 settles where Kp times the offset balances it."""
+def test_wind_leaves_the_pd_a_steady_error() -> None:
+    """In a steady side wind of 0.5 m/s^2 the PD settles where Kp times the error balances the wind."""
     vehicle = Vehicle(wind_m_s2=(0.0, 0.5))
     trace = fly(Flight(Hover(), duration_s=30.0, vehicle=vehicle), PdController())
     np.testing.assert_allclose(trace.position_m[-1, 0, 1], 0.5 / 9.81 / 0.24, rtol=0.05)
     assert abs(trace.position_m[-1, 0, 0]) < 1e-6
 
 
-def test_diverged_flight_is_recorded_and_leaves_the_others_alone() -> None:
-    """A flight blown out of bounds is NaN from there on and says so; its neighbour flies on."""
+def test_lost_flight_is_nan_and_does_not_affect_the_others() -> None:
+    """A flight blown out of bounds is NaN from then on and `diverged`; the flight beside it continues."""
     vehicle = Vehicle(drag_1_s=0.0, wind_m_s2=(np.array([0.0, 5e3]), 0.0))
     trace = fly(Flight(Hover(), 3.0, 2, vehicle=vehicle), Lean(0.0, 0.0))
     assert trace.diverged.tolist() == [False, True]
-    # 10 km at 5 km/s^2 take two seconds.
+    # At 5 km/s^2 the flight reaches 10 km after two seconds.
     np.testing.assert_allclose(trace.position_m[199, 1, 0], 2500.0 * 1.99**2, rtol=1e-9)
     assert np.isnan(trace.position_m[201:, 1]).all()
     assert np.isnan(trace.euler_rad[201:, 1]).all()
     np.testing.assert_allclose(trace.position_m[:, 0], [[0.0, 0.0, -1.1]] * 301, atol=1e-9)
 
 
-def test_overflowing_flight_diverges_without_a_warning() -> None:
-    """Numbers that leave the range of floating point end a flight, not the program."""
+def test_overflowing_flight_is_lost_without_a_warning() -> None:
+    """A floating-point overflow loses the flight and raises neither warning nor error."""
     vehicle = Vehicle(wind_m_s2=(1e308, 0.0))
     assert fly(Flight(Hover(), duration_s=0.1, vehicle=vehicle), PdController()).diverged.all()
 
 
 @pytest.mark.parametrize("update_period_s", [0.0, 0.007, 0.0125, -0.005])
 def test_update_period_must_be_a_multiple_of_the_tick(update_period_s: float) -> None:
-    """The position controller runs on ticks of the stock loops or not at all."""
+    """An update period that is not a positive multiple of 5 ms is rejected."""
     with pytest.raises(FlightError, match=r"update_period_s = .* must be a whole multiple of 0\.005"):
         Flight(Hover(), update_period_s=update_period_s)
 
 
 @pytest.mark.parametrize("duration_s", [0.0, -1.0, np.inf, np.nan])
 def test_duration_must_be_finite_and_positive(duration_s: float) -> None:
-    """A flight has an end, and at least one update before it."""
+    """A duration that is infinite, NaN or shorter than one update is rejected."""
     with pytest.raises(FlightError, match=r"duration_s = .* must be finite"):
         Flight(Hover(), duration_s=duration_s)
 
 
 def test_number_of_trajectories_must_be_the_number_of_flights() -> None:
-    """Two trajectories cannot serve three flights."""
+    """Two trajectories for three flights are rejected."""
     with pytest.raises(FlightError, match="flights = 3 must be 2"):
         fly(Flight(Trajectories((Hover(), Hover())), flights=3), PdController())
 
 
-def test_progress_hears_the_share_flown() -> None:
-    """Shares rise steadily and end at one."""
+def test_progress_is_called_with_the_share_done() -> None:
+    """The shares increase by equal steps and end at 1."""
     shares: list[float] = []
     fly(Flight(Hover(), duration_s=0.5), PdController(), shares.append)
     np.testing.assert_allclose(shares, np.arange(1, 52) / 51.0)

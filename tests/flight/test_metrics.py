@@ -1,4 +1,4 @@
-"""Metrics of hand-made traces whose integrals are known."""
+"""Metrics of synthetic traces whose integrals are known in closed form."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ def trace_of(time_s: FloatArray, error_m: FloatArray, command_rad: FloatArray) -
     )
 
 
-def steady(time_s: FloatArray) -> Trace:
-    """Return two flights: one 5 m off by 3 and 4 m and holding a command, one without error."""
+def constant_trace(time_s: FloatArray) -> Trace:
+    """Return two flights: one with a constant error of 5 m and a constant command, one with neither."""
     error_m = np.zeros((len(time_s), 2, 2))
     error_m[:, 0] = [3.0, -4.0]
     command_rad = np.zeros((len(time_s), 2, 2))
@@ -37,9 +37,9 @@ def steady(time_s: FloatArray) -> Trace:
     return trace_of(time_s, error_m, command_rad)
 
 
-def test_steady_error_has_the_integrals_of_a_constant() -> None:
-    """IAE e T, ISE e^2 T, ITSE e^2 T^2/2, ITAE e T^2/2 with e the Euclidean norm in the plane."""
-    metrics = measure(steady(np.linspace(0.0, 20.0, 2001)))
+def test_constant_error_has_the_integrals_of_a_constant() -> None:
+    """IAE is e T, ISE e^2 T, ITSE e^2 T^2/2, ITAE e T^2/2, with e the Euclidean norm in the plane."""
+    metrics = measure(constant_trace(np.linspace(0.0, 20.0, 2001)))
     np.testing.assert_allclose(metrics.iae_m_s, [100.0, 0.0], rtol=1e-12)
     np.testing.assert_allclose(metrics.ise_m2_s, [500.0, 0.0], rtol=1e-12)
     np.testing.assert_allclose(metrics.itse_m2_s2, [5000.0, 0.0], rtol=1e-12)
@@ -48,15 +48,15 @@ def test_steady_error_has_the_integrals_of_a_constant() -> None:
     np.testing.assert_allclose(metrics.max_error_m, [5.0, 0.0], rtol=1e-12)
 
 
-def test_steady_command_has_effort_but_no_variation() -> None:
-    """Effort is the 1-norm times the time; a held command never changes."""
-    metrics = measure(steady(np.linspace(0.0, 20.0, 2001)))
+def test_constant_command_has_effort_but_no_variation() -> None:
+    """Effort is the 1-norm times the duration; the variation of a constant command is 0."""
+    metrics = measure(constant_trace(np.linspace(0.0, 20.0, 2001)))
     np.testing.assert_allclose(metrics.effort_rad_s, [6.0, 0.0], rtol=1e-12)
     np.testing.assert_array_equal(metrics.command_variation_rad, 0.0)
 
 
-def test_last_command_takes_no_effort() -> None:
-    """A command counts from its instant to the next, so that of the last instant is never flown."""
+def test_last_command_adds_no_effort() -> None:
+    """A command is held from its sample to the next, so the last one is never applied."""
     command_rad = np.zeros((3, 1, 2))
     command_rad[:, 0, 0] = [0.1, -0.2, 7.0]
     trace = trace_of(np.array([0.0, 1.0, 2.0]), np.zeros((3, 1, 2)), command_rad)
@@ -64,7 +64,7 @@ def test_last_command_takes_no_effort() -> None:
 
 
 def test_command_variation_is_the_mean_change_per_step() -> None:
-    """A command that swings by 0.1 rad in roll and 0.2 rad in pitch changes by 0.3 rad a step."""
+    """A command that alternates by 0.1 rad in roll and 0.2 rad in pitch changes by 0.3 rad per step."""
     time_s = np.linspace(0.0, 1.0, 101)
     command_rad = np.zeros((101, 1, 2))
     command_rad[1::2, 0] = [0.1, -0.2]
@@ -74,7 +74,7 @@ def test_command_variation_is_the_mean_change_per_step() -> None:
 
 
 def test_error_is_integrated_by_the_trapezoidal_rule() -> None:
-    """An error that grows in proportion to time has an exact IAE, and an ITAE of the trapezoids."""
+    """An error proportional to time has the exact IAE, and the ITAE of the trapezoidal rule."""
     time_s = np.array([0.0, 1.0, 2.0, 3.0])
     error_m = np.zeros((4, 1, 2))
     error_m[:, 0, 1] = time_s
@@ -84,10 +84,10 @@ def test_error_is_integrated_by_the_trapezoidal_rule() -> None:
     np.testing.assert_allclose(metrics.max_error_m, 3.0)
 
 
-def test_take_off_is_not_counted() -> None:
-    """What happens before t = 0 leaves every metric alone."""
-    late = steady(np.linspace(0.0, 20.0, 2001))
-    early = steady(0.01 * np.arange(-500.0, 2001.0))
+def test_take_off_is_left_out() -> None:
+    """Samples before t = 0 do not change any metric."""
+    late = constant_trace(np.linspace(0.0, 20.0, 2001))
+    early = constant_trace(0.01 * np.arange(-500.0, 2001.0))
     early.position_m[:500] = 1e3
     early.command_rad[:500] = 1.0
     for name, value in vars(measure(late)).items():
@@ -95,8 +95,8 @@ def test_take_off_is_not_counted() -> None:
 
 
 def test_start_transient_can_be_left_out() -> None:
-    """From 10 s on only the rest of the flight counts, still weighted with the time since the start."""
-    trace = steady(0.01 * np.arange(2001.0))
+    """From 10 s on only the rest of the flight counts; ITAE still weights with the time since t = 0."""
+    trace = constant_trace(0.01 * np.arange(2001.0))
     trace.position_m[:900, 0] = 1e3
     metrics = measure(trace, TRANSIENT_S)
     assert TRANSIENT_S == 10.0
@@ -107,8 +107,8 @@ def test_start_transient_can_be_left_out() -> None:
 
 
 def test_diverged_flight_has_no_metrics() -> None:
-    """NaN in one flight stays in that flight."""
-    trace = steady(np.linspace(0.0, 20.0, 2001))
+    """The metrics of a lost flight are NaN; those of the flight beside it are not."""
+    trace = constant_trace(np.linspace(0.0, 20.0, 2001))
     trace.position_m[1500:, 1] = np.nan
     trace.command_rad[1500:, 1] = np.nan
     for value in vars(measure(trace)).values():
@@ -117,13 +117,13 @@ def test_diverged_flight_has_no_metrics() -> None:
 
 
 def test_flight_shorter_than_the_transient_is_refused() -> None:
-    """There is nothing to measure after the end."""
+    """A start of the measurement after the end of the flight raises `ValueError`."""
     with pytest.raises(ValueError, match="start_s = 10 must lie before the end 8"):
-        measure(steady(np.linspace(0.0, 8.0, 801)), TRANSIENT_S)
+        measure(constant_trace(np.linspace(0.0, 8.0, 801)), TRANSIENT_S)
 
 
 def test_a_flight_among_many_has_the_metrics_of_the_flight_alone() -> None:
-    """Bit for bit: sums over time run in the same order whatever else is measured."""
+    """The metrics are equal bit for bit: the order of the additions does not depend on the batch."""
     rng = np.random.default_rng(1)
     error_m, command_rad = rng.normal(size=(1001, 3, 2)), rng.normal(size=(1001, 3, 2))
     time_s = np.linspace(0.0, 10.0, 1001)

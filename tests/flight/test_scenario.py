@@ -1,4 +1,4 @@
-"""A flight as a record: written, read, flown among others and again."""
+"""Scenarios and records: files, flights in a batch, replay."""
 
 import json
 import subprocess
@@ -51,7 +51,7 @@ CALM = Scenario(seed=5, duration_s=2.0, sensors="mambo-derotated")
 
 
 def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
-    """Every number with its bits, settings included."""
+    """Scenario, settings, controller and digest are equal after writing and reading."""
     record = Record(scenario=HARD, settings=MAMBO, controller="reference", trace_sha256="ab" * 32)
     write_record(record, tmp_path / "flight.json")
     assert read_record(tmp_path / "flight.json") == record
@@ -70,7 +70,7 @@ def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
 def test_a_bad_record_names_file_key_and_rule(
     change: dict[str, object], message: str, tmp_path: Path
 ) -> None:
-    """One line for each fault."""
+    """The message names file, key and rule of the wrong entry."""
     path = tmp_path / "bad.json"
     write_record(Record(scenario=HARD, settings=MAMBO), path)
     document = json.loads(path.read_text())
@@ -82,8 +82,8 @@ def test_a_bad_record_names_file_key_and_rule(
     assert message in str(caught.value)
 
 
-def test_what_is_no_record_is_refused(tmp_path: Path) -> None:
-    """Missing, not JSON, or far too large."""
+def test_file_that_holds_no_record_is_refused(tmp_path: Path) -> None:
+    """A file that is missing, not JSON or larger than 1 MB raises `ScenarioError`."""
     (tmp_path / "text").write_text("hello")
     (tmp_path / "large").write_bytes(b" " * 1_000_001)
     for name, message in (
@@ -96,16 +96,16 @@ def test_what_is_no_record_is_refused(tmp_path: Path) -> None:
 
 
 def test_default_scenario_is_the_table_2_case() -> None:
-    """The very bits of a plain flight."""
+    """The default scenario gives the same bits as a `Flight` along Table II's trajectory."""
     plain = fly(Flight(Bernoulli(2.0, 0.5), 1.0), PdController())
     assert fly(flight_of([Scenario(duration_s=1.0)], 0.01), PdController()).same_bits(plain)
 
 
 @pytest.mark.parametrize("controller", ["pd", pytest.param("nmpc", marks=pytest.mark.long)])
 def test_a_flight_among_many_is_the_flight_alone(controller: str) -> None:
-    """Sensors, gusts, drops, delays and the rest: the same bits whatever flies beside it, in any place."""
+    """With sensors and all disturbances a flight gives the same bits in any batch, at any position."""
 
-    def flown(*scenarios: Scenario) -> list[str]:
+    def digests(*scenarios: Scenario) -> list[str]:
         n = len(scenarios)
         trace = fly(
             flight_of(scenarios, 0.01), PdController() if controller == "pd" else CompiledController(MAMBO, n)
@@ -114,14 +114,14 @@ def test_a_flight_among_many_is_the_flight_alone(controller: str) -> None:
 
     still = CALM.model_copy(update={"trajectory": "hover"})
     noisy = HARD.model_copy(update={"seed": 9, "noise_scale": 2.0, "dropped_share": 0.4})
-    alone = [flown(scenario)[0] for scenario in (HARD, CALM, still, noisy)]
+    alone = [digests(scenario)[0] for scenario in (HARD, CALM, still, noisy)]
     assert len(set(alone)) == 4
-    assert flown(HARD, CALM, still, noisy) == alone
-    assert flown(noisy, CALM, still, HARD, CALM) == [alone[3], alone[1], alone[2], alone[0], alone[1]]
+    assert digests(HARD, CALM, still, noisy) == alone
+    assert digests(noisy, CALM, still, HARD, CALM) == [alone[3], alone[1], alone[2], alone[0], alone[1]]
 
 
-def test_flights_of_one_simulation_share_what_they_must() -> None:
-    """Duration, start and sensors."""
+def test_scenarios_that_cannot_share_a_simulation_are_refused() -> None:
+    """Scenarios with different sensors, or none at all, raise `FlightError`."""
     with pytest.raises(FlightError, match="sensors must be the same"):
         flight_of([HARD, CALM.model_copy(update={"sensors": "none"})], 0.01)
     with pytest.raises(FlightError, match="flights = 0"):
@@ -129,7 +129,7 @@ def test_flights_of_one_simulation_share_what_they_must() -> None:
 
 
 def test_sensed_trace_survives_on_disk(tmp_path: Path) -> None:
-    """Truth and estimate, with their bits."""
+    """True and estimated state read back bit for bit."""
     trace = fly(flight_of([HARD, CALM], 0.01), PdController())
     write_npz(trace, tmp_path / "trace.npz")
     again = read_npz(tmp_path / "trace.npz")
@@ -137,8 +137,8 @@ def test_sensed_trace_survives_on_disk(tmp_path: Path) -> None:
     assert again.same_bits(trace)
 
 
-def test_step_sizes_are_those_by_which_the_plan_moves() -> None:
-    """Each iteration goes by its step size against its slope; one that shrank undoes the last."""
+def test_step_sizes_are_the_changes_of_the_plan() -> None:
+    """Each iteration moves the plan by its step size against the gradient sign, or undoes the last move."""
     watched = WatchedController(MAMBO, 2)
     brief = [scenario.model_copy(update={"duration_s": 0.5}) for scenario in (HARD, CALM)]
     fly(flight_of(brief, 0.01), watched)
@@ -156,7 +156,7 @@ def test_step_sizes_are_those_by_which_the_plan_moves() -> None:
 
 @pytest.mark.long
 def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
-    """The same bits as among others in C; a record that says otherwise, or options beside it, fail."""
+    """The reference replays a flight of the C bit for bit; a wrong digest or further options fail."""
     trace = fly(flight_of([CALM, HARD], 0.01), CompiledController(MAMBO, 2))
     good = Record(scenario=HARD, settings=MAMBO, trace_sha256=trace.digest(1))
     write_record(good, tmp_path / "good.json")

@@ -1,4 +1,4 @@
-"""Traces on disk."""
+"""Traces in NPZ and CSV files."""
 
 import csv
 from dataclasses import fields, replace
@@ -16,14 +16,14 @@ from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Trajectories
 
 @pytest.fixture(scope="module")
 def trace() -> Trace:
-    """Return half a second of two different flights."""
+    """Return the trace of two different flights of half a second."""
     both = Trajectories((Bernoulli(2.0, 0.5), Circle(1.0, 0.5)))
     flown = fly(Flight(both, duration_s=0.5, flights=2, yaw_rad=0.3), PdController())
     return replace(flown, status=np.arange(flown.status.size).reshape(flown.status.shape))
 
 
 def test_npz_reads_back_as_it_was_written(trace: Trace, tmp_path: Path) -> None:
-    """Every array of the trace survives with its bits and its type."""
+    """Every array reads back with the same bits and type."""
     write_npz(trace, tmp_path / "trace.npz")
     again = read_npz(tmp_path / "trace.npz")
     for field in fields(Trace):
@@ -31,8 +31,8 @@ def test_npz_reads_back_as_it_was_written(trace: Trace, tmp_path: Path) -> None:
         np.testing.assert_array_equal(after, before, strict=True)
 
 
-def test_csv_holds_the_flight_asked_for_bit_for_bit(trace: Trace, tmp_path: Path) -> None:
-    """One row for each instant, one named column for each number, nothing rounded."""
+def test_csv_holds_the_chosen_flight_bit_for_bit(trace: Trace, tmp_path: Path) -> None:
+    """There is one row per sample and one named column per number, none rounded."""
     write_csv(trace, tmp_path / "trace.csv", flight=1)
     with (tmp_path / "trace.csv").open(newline="", encoding="utf-8") as file:
         header, *rows = list(csv.reader(file))
@@ -49,7 +49,7 @@ def test_csv_holds_the_flight_asked_for_bit_for_bit(trace: Trace, tmp_path: Path
 
 
 def test_file_that_holds_no_trace_is_refused(tmp_path: Path) -> None:
-    """Missing, foreign and incomplete files raise one error that names the file."""
+    """Missing, foreign and incomplete files raise `TraceError`, which names the file."""
     (tmp_path / "text.npz").write_text("time_s,x_m\n", encoding="utf-8")
     np.savez(tmp_path / "other.npz", time_s=np.zeros(3))
     np.save(tmp_path / "array.npy", np.zeros(3))

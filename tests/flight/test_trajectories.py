@@ -1,4 +1,4 @@
-"""Trajectories: shapes, velocities, the wait before the start, and waypoint files."""
+"""Trajectories: shapes, velocities, rest before t = 0, and waypoint files."""
 
 import os
 from pathlib import Path
@@ -42,8 +42,8 @@ def test_velocity_is_the_derivative_of_the_position(trajectory: Trajectory) -> N
 
 
 @pytest.mark.parametrize("trajectory", ALL, ids=lambda each: type(each).__name__)
-def test_target_waits_on_the_first_point_before_the_start(trajectory: Trajectory) -> None:
-    """Before t = 0 the target rests where it is at t = 0."""
+def test_target_rests_on_the_first_point_before_the_start(trajectory: Trajectory) -> None:
+    """Before t = 0 the position is that at t = 0 and the velocity is 0."""
     before = trajectory.target(np.array([-5.0, -0.01]))
     np.testing.assert_array_equal(before[:, :2], np.tile(trajectory.target(0.0)[:2], (2, 1)))
     np.testing.assert_array_equal(before[:, 2:], 0.0)
@@ -51,7 +51,7 @@ def test_target_waits_on_the_first_point_before_the_start(trajectory: Trajectory
 
 @pytest.mark.parametrize("trajectory", ALL, ids=lambda each: type(each).__name__)
 def test_one_time_gives_the_row_of_many(trajectory: Trajectory) -> None:
-    """A single time gives (4,), an array of times (k, 4) with the same rows."""
+    """A single time returns (4,), an array of times (k, 4) with the same rows."""
     many = trajectory.target(TIMES_S)
     assert many.shape == (len(TIMES_S), 4)
     assert trajectory.target(0.5).shape == (4,)
@@ -59,7 +59,7 @@ def test_one_time_gives_the_row_of_many(trajectory: Trajectory) -> None:
 
 
 def test_bernoulli_is_the_lemniscate_of_its_half_width() -> None:
-    """(x^2 + y^2)^2 = a^2 (x^2 - y^2), reaching x = +/- a, from the origin and ahead first."""
+    """(x^2 + y^2)^2 = a^2 (x^2 - y^2) with extremes x = +/- a; it starts at the origin towards +x."""
     x, y, _, _ = Bernoulli(2.0, 0.5).target(TIMES_S).T
     np.testing.assert_allclose((x**2 + y**2) ** 2, 4.0 * (x**2 - y**2), atol=1e-12)
     assert (x.max(), x.min()) == (pytest.approx(2.0, abs=1e-4), pytest.approx(-2.0, abs=1e-4))
@@ -68,7 +68,7 @@ def test_bernoulli_is_the_lemniscate_of_its_half_width() -> None:
 
 
 def test_gerono_is_the_lemniscate_of_its_half_width() -> None:
-    """x^4 = a^2 (x^2 - y^2) with a quarter of the period from centre to tip."""
+    """x^4 = a^2 (x^2 - y^2); the curve reaches x = a after a quarter of its period."""
     x, y, _, _ = Gerono(1.5, 0.25).target(TIMES_S).T
     np.testing.assert_allclose(x**4, 1.5**2 * (x**2 - y**2), atol=1e-12)
     np.testing.assert_allclose(Gerono(1.5, 0.25).target(2.0 * np.pi)[:2], [1.5, 0.0], atol=1e-12)
@@ -82,7 +82,7 @@ def test_lissajous_is_as_high_as_it_is_wide() -> None:
 
 
 def test_circle_keeps_its_radius_and_its_speed() -> None:
-    """Radius about the origin and radius times rate, starting at (radius, 0) towards +y."""
+    """The speed is radius times rate; the circle starts at (radius, 0) towards +y."""
     x, y, vx, vy = Circle(0.8, 1.1).target(TIMES_S).T
     np.testing.assert_allclose(np.hypot(x, y), 0.8, rtol=1e-14)
     np.testing.assert_allclose(np.hypot(vx, vy), 0.88, rtol=1e-14)
@@ -102,7 +102,7 @@ def test_hover_stays_at_the_origin() -> None:
 
 
 def test_waypoints_are_joined_by_straight_lines_and_held() -> None:
-    """Between two points the target moves steadily; outside the file it rests on the first or last."""
+    """The target moves at constant speed between waypoints and rests before the first and after the last."""
     waypoints = Waypoints(((1.0, 0.0, 2.0), (3.0, 4.0, 2.0), (4.0, 4.0, 1.0)))
     targets = waypoints.target(np.array([0.5, 1.0, 2.0, 3.5, 4.0, 60.0]))
     expected = [
@@ -117,7 +117,7 @@ def test_waypoints_are_joined_by_straight_lines_and_held() -> None:
 
 
 def test_waypoints_are_read_from_a_file_by_column_name(tmp_path: Path) -> None:
-    """Columns may stand in any order, with spaces, beside others that are ignored."""
+    """Columns may be in any order, with spaces in the header; other columns are ignored."""
     path = tmp_path / "route.csv"
     path.write_text("y_m,note, time_s ,x_m\n0.5,start,0,1\n-0.5,end,2.5,1e-1\n", encoding="utf-8")
     assert Waypoints.read(path) == Waypoints(((0.0, 1.0, 0.5), (2.5, 0.1, -0.5)))
@@ -128,12 +128,12 @@ def test_waypoints_are_read_from_a_file_by_column_name(tmp_path: Path) -> None:
     [
         ("", "line 1: column time_s is missing; the header must name time_s,x_m,y_m"),
         ("time_s,x_m\n0,1\n", "line 1: column y_m is missing"),
-        ("time_s,x_m,y_m,x_m\n0,1,2,3\n", "line 1: column x_m stands there twice"),
+        ("time_s,x_m,y_m,x_m\n0,1,2,3\n", "line 1: column x_m appears more than once"),
         ("time_s,x_m,y_m\n", "holds no waypoint"),
         ("time_s,x_m,y_m\n0,0,0\n\n1,two,0\n", "line 4: x_m = two must be a number"),
         ("time_s,x_m,y_m\n0,0,0\n1,2\n", "line 3: y_m is missing"),
         ("time_s,x_m,y_m\n0,,0\n", "line 2: x_m is missing"),
-        ("time_s,x_m,y_m\n0,0,0,5\n", "line 2: has more than 3 fields"),
+        ("time_s,x_m,y_m\n0,0,0,5\n", "line 2: has more fields than the 3 of the header"),
         ('time_s,x_m,y_m\n0,0,"0\n', "line 2: is not CSV"),
         ("time_s,x_m,y_m\n0,0,0\n1,nan,0\n", r"line 3: x_m = nan must be a finite number"),
         ("time_s,x_m,y_m\n0,0,1e5\n", r"line 2: y_m = 100000.0 must be .* of magnitude 10000 or less"),
@@ -144,7 +144,7 @@ def test_waypoints_are_read_from_a_file_by_column_name(tmp_path: Path) -> None:
 def test_bad_waypoint_file_is_refused_with_file_line_and_rule(
     tmp_path: Path, text: str, message: str
 ) -> None:
-    """Nothing that cannot be flown gets past the reader, and the message says where it stands."""
+    """The reader rejects waypoints that cannot be flown; its message names file, line and rule."""
     path = tmp_path / "route.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(TrajectoryError, match=rf"^[^:]*route\.csv: {message}"):
@@ -152,7 +152,7 @@ def test_bad_waypoint_file_is_refused_with_file_line_and_rule(
 
 
 def test_unreadable_waypoint_file_is_refused(tmp_path: Path) -> None:
-    """A missing file and a file that is not text raise the same error, with the name once."""
+    """A missing file and a file that is not text raise `TrajectoryError`, which names the file once."""
     with pytest.raises(TrajectoryError, match=r"absent\.csv: cannot be read: No such file or directory$"):
         Waypoints.read(tmp_path / "absent.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x80")
@@ -161,7 +161,7 @@ def test_unreadable_waypoint_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_huge_waypoint_file_is_refused(tmp_path: Path) -> None:
-    """A file without an end, such as a device, is not read into memory."""
+    """A file above 10 MB is rejected before it is read into memory."""
     (tmp_path / "zero.csv").touch()
     os.truncate(tmp_path / "zero.csv", 2**40)
     with pytest.raises(TrajectoryError, match=r"zero\.csv: is larger than 10 MB"):
@@ -169,7 +169,7 @@ def test_huge_waypoint_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_flights_may_follow_different_trajectories() -> None:
-    """A combination gives each flight the target of its own trajectory."""
+    """`Trajectories` returns the target of each flight's own trajectory."""
     both = Trajectories((Bernoulli(2.0, 0.5), Hover(), Circle(1.0, 1.0)))
     assert both.target(1.0).shape == (3, 4)
     targets = both.target(TIMES_S)
