@@ -1,1 +1,1 @@
-"""Seeded Monte Carlo: many drawn flights, several controllers on the same draws, and statistics of both."""
+"""Monte Carlo: flights with random parameters, several controllers on the same flights, and statistics."""

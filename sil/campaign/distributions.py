@@ -1,7 +1,7 @@
 """The distributions that a campaign draws from, each as its quantile function.
 
-A quantile function turns one uniform number into one draw: every parameter takes exactly one number of its
-flight's stream, so that another distribution for one parameter leaves the draws of all others alone.
+A quantile function maps one uniform random number to one draw. Every parameter uses exactly one number of its
+flight's stream, so changing the distribution of one parameter does not change the draws of the others.
 """
 
 import math
@@ -20,7 +20,7 @@ _MOST_CHOICES: Final = 1000
 
 @dataclass(frozen=True)
 class Domain:
-    """What values a parameter may have: `low` to `high`, only whole ones if `whole`."""
+    """Admissible values of a parameter: `low` to `high`, whole numbers only if `whole`."""
 
     low: float
     high: float
@@ -31,8 +31,9 @@ class Domain:
 class Distribution:
     """One distribution within a domain.
 
-    `numbers` are the value of a constant, the limits of a uniform or log-uniform one, mean and standard
-    deviation of a normal one, or the values of a choice. A normal one is cut off at the domain's limits.
+    `numbers` holds the value of a constant, the limits of a uniform or log-uniform distribution, mean and
+    standard deviation of a normal one, or the values of a choice. A normal distribution is truncated at the
+    limits of the domain.
     """
 
     kind: Kind
@@ -40,7 +41,7 @@ class Distribution:
     domain: Domain
 
     def quantile(self, share: float) -> float:
-        """Return the value below which `share` of all draws lie; `share` is in [0, 1)."""
+        """Return the quantile of `share` in [0, 1): the value below which that share of all draws lies."""
         numbers = self.numbers
         match self.kind:
             case "constant":
@@ -64,12 +65,12 @@ class Distribution:
         return min(max(normal.inv_cdf(inner), domain.low), domain.high)
 
     def document(self) -> float | dict[str, list[float]]:
-        """Return the distribution as campaign.toml spells it."""
+        """Return the distribution as written in campaign.toml."""
         return self.numbers[0] if self.kind == "constant" else {self.kind: list(self.numbers)}
 
 
 def parse(value: Any, domain: Domain) -> Distribution:
-    """Return the distribution that campaign.toml spells as `value`; raises ValueError, "must ..."."""
+    """Return the distribution written as `value` in campaign.toml; raises ValueError, "must ..."."""
     match value:
         case dict() if len(value) == 1:
             ((kind, numbers),) = value.items()
@@ -94,7 +95,7 @@ def parse(value: Any, domain: Domain) -> Distribution:
 
 
 def _demand_count(kind: str, numbers: list[float]) -> None:
-    """Raise ValueError unless there are as many numbers as a distribution of this kind has."""
+    """Raise ValueError unless the number of `numbers` fits this kind of distribution."""
     if kind == "choice" and not 1 <= len(numbers) <= _MOST_CHOICES:
         raise ValueError(f"must have 1 to {_MOST_CHOICES} values to choose from")
     if kind in ("uniform", "log_uniform", "normal") and len(numbers) != 2:
@@ -102,7 +103,7 @@ def _demand_count(kind: str, numbers: list[float]) -> None:
 
 
 def _demand_order(kind: str, numbers: list[float], *, whole: bool) -> None:
-    """Raise ValueError unless the numbers, which lie in the domain, make a distribution of this kind."""
+    """Raise ValueError unless numbers within the domain are valid for this kind of distribution."""
     if whole and kind not in ("constant", "choice"):
         raise ValueError("must be a whole number or { choice = [value, ...] } of them")
     if kind in ("uniform", "log_uniform") and numbers[0] > numbers[1]:

@@ -1,6 +1,6 @@
-"""Where batches are flown: processes of this machine, or the workers of a running Dask cluster.
+"""Executors that run batches of flights: processes of this machine, or the workers of a Dask cluster.
 
-Both are executors as the standard library defines them, and everything else treats them alike.
+Both have the interface of `concurrent.futures.Executor`; the rest of the campaign does not distinguish them.
 """
 
 import asyncio
@@ -26,20 +26,21 @@ PATIENCE_S: Final = 5.0
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor, how many tasks it runs at once, and what the end of a worker says about it."""
+    """An executor, its number of workers, and a function that explains the failure of a worker."""
 
     executor: Executor
     workers: int
     trouble: Callable[[BaseException], str | None]
+    """Returns the reason if an exception means that a worker or scheduler failed, else None."""
 
     def run(
         self, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]
     ) -> Iterator[tuple[int, Any]]:
-        """Yield number and result of each task as it is finished, in any order; raises WorkerError.
+        """Yield number and result of each task as it finishes, in any order.
 
-        Errors of ours that a task raises are raised here.
+        Raises WorkerError if a worker fails, and passes on a `MamboNmpcError` that a task raises.
         """
-        with _interrupts_blocked():  # worker processes inherit that, so Ctrl-C is for this one alone
+        with _interrupts_blocked():  # worker processes inherit the mask, so Ctrl-C reaches this process only
             asked: dict[Future[Any], int] = {
                 self.executor.submit(function, *task): number for number, task in enumerate(tasks)
             }
@@ -60,7 +61,7 @@ class Pool:
 
 @contextlib.contextmanager
 def processes(count: int) -> Iterator[Pool]:
-    """Hold `count` worker processes of this machine; they end with this one, however it ends."""
+    """Start `count` worker processes on this machine; they end when this process ends, even if killed."""
 
     def trouble(error: BaseException) -> str | None:
         return "a worker process has died" if isinstance(error, BrokenProcessPool) else None
@@ -71,11 +72,11 @@ def processes(count: int) -> Iterator[Pool]:
         except BaseException:
             for child in active_children():
                 child.terminate()
-            raise  # the executor, broken now, takes leave of its tasks, and is waited for
+            raise  # leaving the `with` cancels the tasks of the broken executor and waits for it
 
 
 def _follow_parent() -> None:
-    """End this process when its parent has ended, even by a kill."""
+    """End this process as soon as its parent has ended, even if the parent was killed."""
     parent = parent_process()
     assert parent is not None  # a worker has one
 
@@ -88,7 +89,7 @@ def _follow_parent() -> None:
 
 @contextlib.contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Let Ctrl-C wait, here and in processes that are started meanwhile for good."""
+    """Block SIGINT in this process; processes started meanwhile inherit the mask and keep it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
@@ -98,13 +99,13 @@ def _interrupts_blocked() -> Iterator[None]:
 
 @contextlib.contextmanager
 def cluster(address: str) -> Iterator[Pool]:
-    """Hold a connection to the Dask scheduler at `address`; raises WorkerError if there is none."""
+    """Connect to the Dask scheduler at `address`; raises WorkerError if none answers or it has no workers."""
     try:
         from distributed import Client  # noqa: PLC0415 - an optional extra
     except ImportError:
-        raise WorkerError("--scheduler wants Dask; install mambo-nmpc with its extra dask") from None
+        raise WorkerError('--scheduler needs Dask; pip install "mambo-nmpc[dask]" installs it') from None
     option = f"--scheduler {echo(address)}"
-    for name in ("distributed", "distributed.client"):  # what matters comes as an exception
+    for name in ("distributed", "distributed.client"):  # errors arrive as exceptions
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         asyncio.run(asyncio.wait_for(_knock(address), PATIENCE_S))
@@ -112,13 +113,13 @@ def cluster(address: str) -> Iterator[Pool]:
     except (OSError, ValueError) as error:
         reason = str(error) or f"no answer within {PATIENCE_S:g} s"
         raise WorkerError(
-            f"{option}: is no Dask scheduler that can be reached ({echo(reason)}); "
+            f"{option}: no Dask scheduler answers there ({echo(reason)}); "
             "start one with `dask scheduler`, and give its address as in tcp://host:8786"
         ) from None
 
     def trouble(error: BaseException) -> str:
         if isinstance(error, CancelledError):
-            return f"{option}: the scheduler is gone"
+            return f"{option}: the connection to the scheduler is lost"
         return (
             f"{option}: a worker has failed, {type(error).__name__}: {echo(str(error))}; mambo-nmpc "
             f"{__version__} must be installed where scheduler and workers run"
@@ -136,7 +137,7 @@ def cluster(address: str) -> Iterator[Pool]:
 
 
 async def _knock(address: str) -> None:
-    """Connect to a scheduler and take leave: what Client itself does not give up when nobody answers."""
+    """Connect to a scheduler and disconnect; unlike Client, this gives up if nothing answers."""
     from distributed.core import connect  # noqa: PLC0415 - an optional extra
 
     connection = await connect(address, timeout=PATIENCE_S)

@@ -1,6 +1,6 @@
-"""Read campaign.toml: what is drawn, what is flown, and by whom.
+"""Read campaign.toml: distributions of the parameters, flight and controllers.
 
-Messages name file, key, value, rule and fix, all faults of a file at once.
+A message names file, key, value, rule and fix; all errors of a file are reported together.
 """
 
 import difflib
@@ -40,7 +40,7 @@ _LONGEST_LIST: Final = 10
 
 
 class Section(BaseModel):
-    """Frozen, no unknown keys, no silent conversion, finite numbers only."""
+    """A frozen section of a file that rejects unknown keys, conversions of type, infinity and NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -49,7 +49,7 @@ File = TypeVar("File", bound=Section)
 
 
 class FlightSection(Section):
-    """What all flights have in common."""
+    """Keys that all flights share."""
 
     trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
     size_m: float = Field(2.0, ge=-1000, le=1000)
@@ -81,7 +81,7 @@ Draws: Any = create_model(
 
 
 class CampaignFile(Section):
-    """The keys of campaign.toml; a missing key is that of the default campaign."""
+    """The keys of campaign.toml; a missing key has its value in the default campaign."""
 
     seed: int = Field(0, ge=0, le=2**63 - 1)
     controllers: tuple[str, ...] = Field((PD, "mambo"), strict=False)
@@ -105,37 +105,37 @@ class Entrant:
     name: str
     kind: Literal["pd", "nmpc"]
     settings: Settings
-    """The PD has but the update period of them."""
+    """The PD uses their update period only."""
 
     def document(self) -> dict[str, Any]:
-        """Return plain values, which travel to other processes and into files."""
+        """Return the controller as plain values, for other processes and for files."""
         return {"name": self.name, "kind": self.kind, "settings": self.settings.model_dump()}
 
     @classmethod
     def from_document(cls, document: dict[str, Any]) -> "Entrant":
-        """Return what `document` describes."""
+        """Return the controller that `document` describes."""
         return cls(document["name"], document["kind"], Settings.model_validate(document["settings"]))
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign; the first of the entrants is the one that the others are compared with."""
+    """A campaign; the other controllers are compared with the first one."""
 
     file: CampaignFile
     entrants: tuple[Entrant, ...]
 
     def draw(self, flight: int) -> Draw:
-        """Return what flight number `flight` is."""
+        """Return seed and parameters of flight number `flight`."""
         return draw(self.file.seed, flight, {name: getattr(self.file.draws, name) for name in PARAMETERS})
 
     def document(self) -> dict[str, Any]:
-        """Return everything that decides the result, as plain values."""
+        """Return everything that determines the result, as plain values."""
         document: dict[str, Any] = self.file.model_dump(mode="json")
         return document | {"controllers": [entrant.document() for entrant in self.entrants]}
 
 
 def scenario(flight: dict[str, Any], drawn: Draw) -> Scenario:
-    """Return one flight, from the section [flight] as plain values and from what was drawn."""
+    """Return one flight from the section [flight] as plain values and from its draws."""
     return Scenario.model_validate(flight | scenario_values(drawn))
 
 
@@ -145,19 +145,19 @@ def default() -> Campaign:
 
 
 def read(path: Path) -> Campaign:
-    """Read a campaign.toml; controllers named by a path are looked for beside it.
+    """Read a campaign.toml; paths of controllers are relative to its folder.
 
-    Raises UnreadableFileError for what is not TOML, InvalidSettingsError with every broken rule, and the
-    errors of the controllers' files.
+    Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors of
+    the file and of its controllers' files.
     """
     source = echo(str(path))
     return _campaign(read_as(CampaignFile, path), path.parent, source)
 
 
 def read_as(model: type[File], path: Path) -> File:
-    """Return the file at `path` as `model`, which has sections like a campaign's.
+    """Read the file at `path` as a `model` with sections like those of campaign.toml.
 
-    Raises UnreadableFileError for what is not TOML, InvalidSettingsError with every broken rule.
+    Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors.
     """
     source = echo(str(path))
     document = parse_document(read_text(path), source)
@@ -169,7 +169,7 @@ def read_as(model: type[File], path: Path) -> File:
 
 
 def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
-    """Look the controllers up, and try whether they can fly."""
+    """Load the controllers and check that each can be simulated."""
     entrants = tuple(_entrant(name, folder, source) for name in file.controllers)
     names = [entrant.name for entrant in entrants]
     for name in names:
@@ -190,7 +190,7 @@ def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
 
 
 def _entrant(named: str, folder: Path, source: str) -> Entrant:
-    """Return the controller called `named` in the file `source`, which is in `folder`."""
+    """Return the controller that the file `source` in `folder` calls `named`: PD, preset or file."""
     if named == PD:
         return Entrant(PD, "pd", Settings())
     path = folder / named
@@ -212,7 +212,7 @@ def _entrant(named: str, folder: Path, source: str) -> Entrant:
 
 
 def _fault(details: ErrorDetails, model: type[Section]) -> str:
-    """Say which key is wrong, with its value, and what to write instead."""
+    """Return a message that names a wrong key, its value and the rule."""
     names = [str(part) for part in details["loc"]]
     dotted = echo(".".join(names))
     value = spelled(details["input"])
@@ -230,7 +230,7 @@ def _fault(details: ErrorDetails, model: type[Section]) -> str:
 
 
 def _section(names: Sequence[str], model: type[Section]) -> Any:
-    """Return the model that has, or should have, the key at the path `names`."""
+    """Return the model of the section to which the key at the path `names` belongs."""
     section: Any = model
     for name in names[:-1]:
         section = section.model_fields[name].annotation
@@ -238,7 +238,7 @@ def _section(names: Sequence[str], model: type[Section]) -> Any:
 
 
 def _unknown(names: Sequence[str], dotted: str, model: type[Section]) -> str:
-    """Say that a key does not exist, with the nearest one that does."""
+    """Return a message that a key does not exist, with similar keys that do."""
     keys = list(_section(names, model).model_fields)
     near = [key for key in keys if key.startswith(f"{names[-1]}_")]
     near = near or difflib.get_close_matches(names[-1], keys, n=1)
@@ -248,7 +248,7 @@ def _unknown(names: Sequence[str], dotted: str, model: type[Section]) -> str:
 
 
 def spelled(value: object) -> str:
-    """Return a value nearly as TOML spells it, shortened."""
+    """Return a value in about the notation of TOML, shortened, for messages."""
     if isinstance(value, dict) and len(value) == 1:
         ((key, inner),) = value.items()
         return f"{{ {echo(str(key))} = {spelled(inner)} }}"

@@ -1,6 +1,6 @@
-"""Fly a batch of drawn flights with every controller, and say what became of each: what a worker does.
+"""The task of a worker: fly a batch of drawn flights with every controller and return their results.
 
-Everything that comes in and goes out is plain values, so that it travels to other processes and machines.
+Arguments and results are plain values, which can be sent to other processes and machines.
 """
 
 import threading
@@ -25,23 +25,23 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
-"""Of the true flight."""
+"""Metrics of the true flight."""
 
 SEEN: Final = "seen_"
 SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
-"""Also of the flight as sensors and estimators show it: those that are about the error."""
+"""Metrics of the error that are also computed from the estimates."""
 
 CRASHED, REFUSED, DIGEST = "crashed", "refused_updates", "trace_sha256"
 
 Row = dict[str, float | str]
-"""What became of one flight: `<controller>_<index>`."""
+"""Results of one flight by `<controller>_<index>`."""
 
 _BUILDING: Final = threading.Lock()
-"""Threads of one worker build the C one after the other: the second finds it built."""
+"""Lets only one thread of a worker compile at a time; the next finds the result in the cache."""
 
 
 def columns(names: Sequence[str], *, sensed: bool) -> tuple[str, ...]:
-    """Return the keys of a row, for controllers of these names."""
+    """Return the keys of a row for controllers of these names, in the order of the table."""
     seen = tuple(SEEN + name for name in SEEN_INDICES) if sensed else ()
     return tuple(f"{name}_{key}" for name in names for key in (CRASHED, REFUSED, *INDICES, *seen, DIGEST))
 
@@ -49,14 +49,14 @@ def columns(names: Sequence[str], *, sensed: bool) -> tuple[str, ...]:
 def fly_batch(
     version: str, entrants: Sequence[dict[str, Any]], flight: dict[str, Any], drawn: Sequence[Draw]
 ) -> list[Row]:
-    """Fly the flights `drawn` with every controller; return a row for each, in order.
+    """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
-    `flight` is the section [flight], `version` that of the program that asks. Raises WorkerError if this is
-    another version, BuildError if there is no compiler here.
+    `flight` is the section [flight], `version` that of the calling program. Raises WorkerError if the worker
+    has another version, BuildError if it has no compiler.
     """
     if version != __version__:
         raise WorkerError(
-            f"a worker has mambo-nmpc {__version__} and this is {version}; install the same there"
+            f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
         )
     scenarios = [scenario(flight, one) for one in drawn]
     rows: list[Row] = [{} for _ in drawn]
@@ -79,7 +79,7 @@ def _controller(entrant: Entrant, n: int) -> PositionController:
 
 
 def _found(trace: Trace) -> dict[str, list[Any]]:
-    """Return what became of n flights, each value a list of n."""
+    """Return the results of n flights by key, each a list of n."""
     refused = (trace.status != 0) & (trace.status != NOT_CALLED)
     found: dict[str, list[Any]] = {
         CRASHED: crashed(trace).astype(int).tolist(),
@@ -95,7 +95,7 @@ def _found(trace: Trace) -> dict[str, list[Any]]:
 
 
 def crashed(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Tell which flights were lost, tilted too far to carry the weight, or touched the ground (n,)."""
+    """Return which flights (n,) were lost, tilted beyond `CRASH_TILT_RAD` or on the ground after t = 0."""
     flown = trace.time_s >= 0.0
     angles_rad: FloatArray = trace.euler_rad[flown]
     level = np.cos(angles_rad[..., 0]) * np.cos(angles_rad[..., 1])

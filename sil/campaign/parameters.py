@@ -1,6 +1,6 @@
-"""What varies from flight to flight: every parameter, its domain, and how the default campaign draws it.
+"""The parameters that vary from flight to flight: domain, and distribution in the default campaign.
 
-Sources of the default ranges are in docs/campaign.md.
+docs/campaign.md gives the sources of the default ranges.
 """
 
 import math
@@ -24,13 +24,13 @@ class Parameter:
 
 
 def _parameter(name: str, low: float, high: float, default: Any, *, whole: bool = False) -> Parameter:
-    """Return a parameter with its default distribution, as campaign.toml would spell it."""
+    """Return a parameter; `default` is its distribution in the notation of campaign.toml."""
     domain = Domain(low, high, whole)
     return Parameter(name, domain, parse(default, domain))
 
 
 def _axes(stem: str, unit: str, axes: str, domain: tuple[float, float], default: Any) -> list[Parameter]:
-    """Return a parameter for each axis."""
+    """Return one parameter per axis."""
     return [_parameter(f"{stem}_{axis}{unit}", *domain, default) for axis in axes]
 
 
@@ -68,14 +68,14 @@ PARAMETERS: Final[dict[str, Parameter]] = {
         _parameter("push_time_s", 0.0, 3600.0, 0.0),
     )
 }
-"""In the order in which a flight's stream is used: a new one comes last."""
+"""In the order in which they use the random stream of a flight: a new parameter must be appended."""
 
 Draw = dict[str, float]
-"""One flight: its parameters by name, and the `seed` of what is random within it."""
+"""One flight: its parameters by name, and the `seed` of its noise, gusts and dropped updates."""
 
 
 def draw(seed: int, flight: int, distributions: Mapping[str, Distribution]) -> Draw:
-    """Return what flight number `flight` is, from the campaign's seed and that number alone."""
+    """Return seed and parameters of flight number `flight`; they depend on both numbers only."""
     numbers, noise = np.random.SeedSequence(seed, spawn_key=(flight,)).spawn(2)
     shares = np.random.Generator(np.random.Philox(numbers)).random(len(PARAMETERS))
     drawn: Draw = {"seed": int(noise.generate_state(1, np.uint64)[0] >> np.uint64(1))}
@@ -86,27 +86,27 @@ def draw(seed: int, flight: int, distributions: Mapping[str, Distribution]) -> D
 
 
 def scenario_values(drawn: Draw) -> dict[str, Any]:
-    """Return the draws as keys of `sil.scenario.Scenario`; thrust and torque of the rotors scale alike."""
+    """Return the draws as keys of a `Scenario`; rotor thrust and torque have the same scale."""
 
     def parts(stem: str, unit: str, axes: str = "xyz") -> tuple[float, ...]:
         return tuple(drawn[f"{stem}_{axis}{unit}"] for axis in axes)
 
     scale = drawn["thrust_scale"]
-    real = replace(
+    airframe = replace(
         MAMBO,
         thrust_factor_n_s2=scale * MAMBO.thrust_factor_n_s2,
         torque_factor_n_m_s2=scale * MAMBO.torque_factor_n_m_s2,
     )
     factors = parts("inertia_scale", "")
-    same = (
+    unchanged = (
         *("seed", "mass_kg", "motor_lag_s", "drag_1_s", "battery_sag_1_s", "command_delay_ticks"),
         *("dropped_share", "noise_scale", "wind_speed_m_s", "wind_direction_rad", "yaw_rad"),
         *("yaw_rate_rad_s", "payload_kg", "payload_time_s", "push_time_s"),
     )
-    return {name: drawn[name] for name in same} | {
+    return {name: drawn[name] for name in unchanged} | {
         "inertia_kg_m2": tuple(f * j for f, j in zip(factors, MAMBO.inertia_kg_m2, strict=True)),
-        "thrust_factor_n_s2": real.thrust_factor_n_s2,
-        "torque_factor_n_m_s2": real.torque_factor_n_m_s2,
+        "thrust_factor_n_s2": airframe.thrust_factor_n_s2,
+        "torque_factor_n_m_s2": airframe.torque_factor_n_m_s2,
         "accelerometer_bias_m_s2": parts("accelerometer_bias", "_m_s2"),
         "gyro_bias_rad_s": parts("gyro_bias", "_rad_s"),
         "wind_m_s2": parts("wind", "_m_s2", "xy"),

@@ -17,9 +17,9 @@ _LABELS: Final = ("IAE, m s", "ISE, m² s", "ITSE, m² s²", "ITAE, m s²")
 
 
 def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path, Path]:
-    """Draw shares of flights up to an index, and up to a ratio over the first; write stem.png and stem.svg.
+    """Draw cumulative distributions of each index and of its ratio to the first controller's.
 
-    Flights that crash are missing from the top of a curve.
+    Writes stem.png and stem.svg. Because of crashed flights a curve ends below 1.
     """
     rows = 1 if len(names) == 1 else 2
     other = names[1] if len(names) == 2 else "another"
@@ -44,7 +44,7 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
 
 
 def _draw_shares(axes: Axes, values: FloatArray, colour: str, name: str) -> None:
-    """Draw the share of flights (0 to 1) up to each value; those that are not finite only count."""
+    """Draw the share of flights (0 to 1) up to each finite value; infinite ones count in the total."""
     counted = values[~np.isnan(values)]
     shares = np.arange(1, len(counted) + 1) / max(len(counted), 1)
     ordered = np.sort(counted)

@@ -1,4 +1,4 @@
-"""What a campaign found: the summary, its text, and records that fly again."""
+"""Results of a campaign: summary, text and records for replay."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -17,7 +17,7 @@ _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
 
 def numeric(store: Store) -> Table:
-    """Return the columns of numbers of a table."""
+    """Return the numeric columns of the table."""
     return {
         name: np.array(values, np.float64)
         for name, values in store.values().items()
@@ -26,7 +26,7 @@ def numeric(store: Store) -> Table:
 
 
 def summary_of(campaign: Campaign, table: Table) -> dict[str, Any]:
-    """Return what a finished campaign found, the worst flights with the records that replay them."""
+    """Return statistics of a finished campaign, and the worst flights with the names of their records."""
     names = [entrant.name for entrant in campaign.entrants]
     return {
         "campaign": campaign.document(),
@@ -52,7 +52,7 @@ def _record_name(flight: int, name: str) -> str:
 
 
 def write_records(campaign: Campaign, store: Store) -> None:
-    """Write a record of each flight of each controller, for `fly --replay`; raises UnwritableError."""
+    """Write one record per flight and controller for `fly --replay`; raises UnwritableError."""
     values = store.values()
     section = campaign.file.flight.model_dump()
     with refusals(store.folder):
@@ -71,7 +71,7 @@ def write_records(campaign: Campaign, store: Store) -> None:
 
 
 def campaign_text(summary: Mapping[str, Any], folder: str) -> str:
-    """Spell a summary: a block for each controller, the improvements, and how to see the worst flights."""
+    """Return a summary as text: statistics per controller, improvements, commands to replay the worst."""
     lines: list[str] = []
     for name, found in summary["controllers"].items():
         lines.append(f"{name:34}" + "".join(f"{title:>10}" for title in _SHOWN.values()))
@@ -80,14 +80,14 @@ def campaign_text(summary: Mapping[str, Any], folder: str) -> str:
             lines.append(f"  {index:32}{values}")
         lines.append(f"  crashed: {_proportion(found['crashed'])}")
         if found["refused_an_input"]["count"]:
-            lines.append(f"  refused an input: {_proportion(found['refused_an_input'])}")
+            lines.append(f"  rejected an input: {_proportion(found['refused_an_input'])}")
         lines.append("")
     if summary["improvements"]:
         first = next(iter(summary["controllers"]))
-        lines.append(f"{first} over another, flight by flight: median ratio, its 95 % interval, better in")
+        lines.append(f"ratio of {first} to the other, per flight: median, 95 % interval, ratio above 1 in")
         lines += [_improvement(one) for one in summary["improvements"]]
         lines.append("")
-    lines.append("worst flights by IAE, and how to see them:")
+    lines.append("worst flights by IAE, and the commands that replay them:")
     for name, flights in summary["worst"].items():
         for one in flights:
             what = "crashed" if one["crashed"] else f"{_digits(one['iae_m_s'])} m s"

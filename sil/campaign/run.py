@@ -1,4 +1,4 @@
-"""Run a campaign: what is missing in its folder is flown, batch by batch, and the table put in order."""
+"""Run a campaign: fly the flights that are missing in its folder, batch by batch."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -14,27 +14,30 @@ from mambo_nmpc.sil.campaign.store import Store, open_store
 from mambo_nmpc.sil.errors import FlightError
 
 MOST_IN_A_BATCH: Final = 100
-"""Flights for NumPy at once: a trace of 100 s takes 2 MB, and more gain little."""
+"""Flights in one simulation: a trace of 100 s takes 2 MB, and larger batches are hardly faster."""
 
 
 def table_columns(campaign: Campaign) -> tuple[str, ...]:
-    """Return the columns of the table after the flight's number: what was drawn, then what came of it."""
+    """Return the columns of the table after the flight's number: seed, draws, results."""
     names = [entrant.name for entrant in campaign.entrants]
     sensed = campaign.file.flight.sensors != "none"
     return ("seed", *PARAMETERS, *columns(names, sensed=sensed))
 
 
 def opened(campaign: Campaign, folder: Path) -> AbstractContextManager[Store]:
-    """Hold the folder of a campaign; raises what `open_store` does."""
+    """Open and lock the folder of a campaign; raises what `open_store` raises."""
     return open_store(folder, campaign.document(), table_columns(campaign))
 
 
 def missing(store: Store, flights: int) -> list[int]:
-    """Return the flights that are not in the table yet; raises FlightError if it has more than `flights`."""
+    """Return the numbers of the flights that are not in the table.
+
+    Raises FlightError if the table has more than `flights`.
+    """
     last = max(store.lines, default=-1)
     if last >= flights:
         raise FlightError(
-            f"{store.folder}: has flight {last} already; --flights must be {last + 1} or more, "
+            f"{store.folder}: already has flight {last}; --flights must be {last + 1} or more, "
             "or name another folder with -o"
         )
     return [flight for flight in range(flights) if flight not in store.lines]
@@ -49,7 +52,7 @@ def fly_missing(
     *,
     batch: int = MOST_IN_A_BATCH,
 ) -> None:
-    """Fly what is missing and store it; `progress` hears how many flights are finished."""
+    """Fly the missing flights and store them; call `progress` with the number of finished flights."""
     left = missing(store, flights)
     size = max(1, min(batch, -(-len(left) // pool.workers)))
     drawn = {flight: campaign.draw(flight) for flight in left}

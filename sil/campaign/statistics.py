@@ -1,7 +1,7 @@
-"""What a campaign says: distributions of the indices, crashes, and the improvement over the first controller.
+"""Statistics of a campaign: quantiles of the indices, crashes, improvement over the first controller.
 
-A crashed flight counts as infinitely bad in every index: leaving it out would flatter whoever crashes in hard
-flights. Intervals hold 95 %.
+Every index of a crashed flight is infinite: leaving such flights out would favour a controller that crashes
+in difficult ones. Intervals are 95 % confidence intervals.
 """
 
 import math
@@ -23,7 +23,7 @@ CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 9999
 WORST: Final = 5
 _SEED: Final = 0
-"""Of the resampling: the same table gives the same intervals."""
+"""Seed of the bootstrap, fixed so that the same table gives the same intervals."""
 
 Table = Mapping[str, FloatArray]
 """Columns (n,) by name, in the order of the flights."""
@@ -31,7 +31,7 @@ Table = Mapping[str, FloatArray]
 
 @dataclass(frozen=True)
 class Proportion:
-    """A share of flights with its interval after Clopper and Pearson."""
+    """A share of flights with its Clopper-Pearson confidence interval."""
 
     count: int
     flights: int
@@ -42,10 +42,10 @@ class Proportion:
 
 @dataclass(frozen=True)
 class Improvement:
-    """One index of the first controller over that of another, flight by flight.
+    """Ratio of an index of the first controller to that of another, flight by flight.
 
-    `median` is the median of the ratios with its bootstrap interval, `better` the share of flights with a
-    ratio above 1. Flights in which both crash have no ratio; `flights` counts the others.
+    `median` is the median of the ratios, `low` and `high` its bootstrap interval, `better` the share of
+    flights with a ratio above 1. Flights in which both crash have no ratio; `flights` counts the others.
     """
 
     controller: str
@@ -58,7 +58,7 @@ class Improvement:
 
 
 def proportion(count: int, flights: int) -> Proportion:
-    """Return a share with its Clopper-Pearson interval."""
+    """Return the share `count` / `flights` with its Clopper-Pearson interval."""
     from scipy.stats import binomtest  # noqa: PLC0415 - takes a second
 
     interval = binomtest(count, flights).proportion_ci(CONFIDENCE, method="exact")
@@ -71,19 +71,19 @@ def judged(table: Table, name: str, index: str) -> FloatArray:
 
 
 def quantiles(values: FloatArray) -> dict[str, float]:
-    """Return the `QUANTILES` of values (n,): each is one of the values, so that infinite ones do no harm."""
+    """Return the `QUANTILES` of values (n,), without interpolation, because values may be infinite."""
     found = np.quantile(values, QUANTILES, method="inverted_cdf")
     return {f"{share:g}": float(value) for share, value in zip(QUANTILES, found, strict=True)}
 
 
 def improvement(table: Table, first: str, name: str, index: str) -> Improvement | None:
-    """Compare a controller with the first one on the same flights; None if both crash in all."""
+    """Compare a controller with the first one on the same flights; None if both crash in every flight."""
     ours, theirs = judged(table, name, index), judged(table, first, index)
-    both = np.isfinite(ours) | np.isfinite(theirs)
-    if not both.any():
+    comparable = np.isfinite(ours) | np.isfinite(theirs)
+    if not comparable.any():
         return None
     with np.errstate(divide="ignore"):
-        ratios = theirs[both] / ours[both]
+        ratios = theirs[comparable] / ours[comparable]
     low, high = _median_interval(ratios)
     return Improvement(
         controller=name,
@@ -102,7 +102,7 @@ def _median_interval(values: FloatArray) -> tuple[float, float]:
         return math.nan, math.nan
     from scipy.stats import bootstrap  # noqa: PLC0415 - takes a second
 
-    with np.errstate(invalid="ignore"):  # the standard error, which is not used, of infinite medians
+    with np.errstate(invalid="ignore"):  # scipy's standard error, unused here, is NaN for infinite medians
         result = bootstrap(
             (values,),
             np.median,
@@ -116,13 +116,13 @@ def _median_interval(values: FloatArray) -> tuple[float, float]:
 
 
 def worst(table: Table, name: str) -> list[int]:
-    """Return the positions of the worst flights of a controller: crashes first, then by IAE."""
+    """Return the rows of the `WORST` worst flights of a controller: crashes first, then by IAE."""
     order = np.lexsort((-np.nan_to_num(table[f"{name}_iae_m_s"], nan=math.inf), -table[f"{name}_{CRASHED}"]))
     return [int(position) for position in order[:WORST]]
 
 
 def summarise(table: Table, names: Sequence[str], *, sensed: bool) -> dict[str, Any]:
-    """Return all statistics as plain values; `names` are the controllers, the first to compare with."""
+    """Return all statistics as plain values; the controllers `names` are compared with the first one."""
     indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES if sensed)]
     compared = [*COMPARED, *(SEEN + index for index in COMPARED if sensed)]
     flights = len(table[f"{names[0]}_{CRASHED}"])

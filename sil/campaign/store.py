@@ -1,8 +1,8 @@
-"""The folder of a campaign: which campaign it is, and every flight that is finished, safe from a kill.
+"""The folder of a campaign: its identity, and the table of finished flights, which survives a killed run.
 
-`campaign.json` says what is flown, and marks the folder. `flights.csv` has a line for each finished flight,
-appended when its batch comes back and brought to the disk before the next; a line that a kill or a full disk
-cuts short is dropped by the next run. Once all flights are there the lines are put in order.
+`campaign.json` identifies the campaign and marks the folder. `flights.csv` has one line per finished flight.
+A batch is appended and flushed to the disk as soon as it returns. The next run drops a last line that a kill
+or a full disk truncated. When all flights are finished the lines are sorted by flight.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ Value = float | str
 
 
 class Store:
-    """An open folder; `lines` has the finished flights by number, as they stand in the table."""
+    """The open folder of a campaign; `lines` holds the table's line of each finished flight by number."""
 
     def __init__(self, folder: Path, columns: Sequence[str]) -> None:
         self.folder = folder
@@ -45,7 +45,7 @@ class Store:
         self._file.close()
 
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
-        """Append finished flights and bring them to the disk; raises UnwritableError."""
+        """Append finished flights and flush them to the disk; raises UnwritableError."""
         lines = {flight: self._line(flight, row) for flight, row in rows.items()}
         with refusals(
             self._table, "; the flights finished so far are kept, and the same command goes on from there"
@@ -54,7 +54,7 @@ class Store:
         self.lines |= lines
 
     def put_in_order(self) -> None:
-        """Replace the table by one in the order of the flights, whole or not at all."""
+        """Sort the table by flight, atomically."""
         ordered = [self._header(), *(self.lines[flight] for flight in sorted(self.lines))]
         with refusals(self.folder):
             put(self._table, "".join(ordered).encode())
@@ -79,9 +79,9 @@ class Store:
         os.fsync(self._file.fileno())
 
     def _read(self) -> dict[int, str]:
-        """Return the lines of an earlier run by flight, and cut off what is not a whole line.
+        """Return the lines of an earlier run by flight, after removing a truncated last line.
 
-        Raises ForeignFilesError for a table that is not ours.
+        Raises ForeignFilesError for a table that this campaign did not write.
         """
         name = echo(str(self._table))
         with refusals(self.folder):
@@ -103,7 +103,7 @@ class Store:
                 continue
             if number == 1 or not (flight.isascii() and flight.isdigit()) or int(flight) in found:
                 raise ForeignFilesError(
-                    f"{name}: line {number} is not of this campaign, somebody has edited the table; "
+                    f"{name}: line {number} is not a line of this campaign, the table was edited; "
                     "restore it, or name another folder with -o",
                     (str(self._table),),
                 )
@@ -113,10 +113,10 @@ class Store:
 
 @contextlib.contextmanager
 def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[Store]:
-    """Hold `folder` for a run of `campaign`, and yield what is in it.
+    """Open and lock `folder` for a run of `campaign`.
 
-    Raises ForeignFilesError for a folder with other work or another campaign, BusyError if another run holds
-    it, UnwritableError for what the file system refuses.
+    Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
+    locked it, UnwritableError if the file system refuses an access.
     """
     with refusals(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
 
 @contextlib.contextmanager
 def refusals(place: Path, advice: str = "") -> Iterator[None]:
-    """Turn what the file system refuses at or below `place` into an UnwritableError."""
+    """Convert an OSError at or below `place` to an UnwritableError."""
     try:
         yield
     except OSError as error:
@@ -137,7 +137,10 @@ def refusals(place: Path, advice: str = "") -> Iterator[None]:
 
 
 def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
-    """Mark an empty folder with `identity` in `<kind>.json`; refuse one that holds anything else."""
+    """Write `identity` to `<kind>.json` in an empty folder, or compare it with the one that is there.
+
+    Raises ForeignFilesError for a folder with other files or another identity.
+    """
     name, path = echo(str(folder)), folder / f"{kind}.json"
     identity = {"generator": f"{GENERATOR}{__version__}", **identity}
     try:
@@ -147,7 +150,7 @@ def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
     if not isinstance(held, dict) or not str(held.get("generator")).startswith(GENERATOR):
         if any(not one.name.startswith(f".{path.name}") for one in folder.iterdir()):
             raise ForeignFilesError(
-                f"{name}: holds files that are not a {kind} of ours; name another folder with -o", ()
+                f"{name}: holds files that are not from a mambo-nmpc {kind}; name another folder with -o", ()
             )
         with refusals(folder):
             put(path, (json.dumps(identity, indent=2) + "\n").encode())
@@ -160,7 +163,7 @@ def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
 
 
 def _difference(where: str, held: Any, asked: Any) -> str | None:
-    """Say where two documents differ first, or return None."""
+    """Return a phrase on the first difference of two documents, or None."""
     if isinstance(held, dict) and isinstance(asked, dict):
         for key in dict.fromkeys((*held, *asked)):
             found = _difference(f"{where}.{key}" if where else key, held.get(key), asked.get(key))
@@ -173,7 +176,7 @@ def _difference(where: str, held: Any, asked: Any) -> str | None:
         return next((found for found in differences if found), None)
     if held == asked:
         return None
-    return f"with {echo(where)} = {echo(json.dumps(held))} where {echo(json.dumps(asked))} is asked for"
+    return f"with {echo(where)} = {echo(json.dumps(held))} instead of {echo(json.dumps(asked))}"
 
 
 def _csv_line(cells: Sequence[Value | int]) -> str:

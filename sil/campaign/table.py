@@ -1,4 +1,4 @@
-"""The table of a campaign read back: a flight a line, what was drawn, and what became of each controller."""
+"""Read the table of a campaign: one line per flight with its draws and the results of each controller."""
 
 import csv
 from pathlib import Path
@@ -20,7 +20,7 @@ COMPARED: Final = {
 
 
 def read_table(path: Path) -> Table:
-    """Return the table at `path` without a last line that is cut short; raises ResultsError."""
+    """Return the numeric columns of a table without a truncated last line; raises ResultsError."""
     name = echo(str(path))
     try:
         text = path.read_text("utf-8")
@@ -33,5 +33,5 @@ def read_table(path: Path) -> Table:
         }
     except (OSError, ValueError, csv.Error) as error:
         raise ResultsError(
-            f"{name}: is no table of a campaign: {echo(str(error))}; run campaign again"
+            f"{name}: is not the table of a campaign: {echo(str(error))}; run campaign again"
         ) from error

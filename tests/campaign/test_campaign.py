@@ -1,4 +1,4 @@
-"""Campaigns on paper: what is drawn, what campaign.toml may say, and statistics against values by hand."""
+"""Draws, campaign.toml and statistics of campaigns, without flying."""
 
 import math
 from dataclasses import replace
@@ -29,7 +29,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def faults(folder: Path, text: str) -> list[str]:
-    """Return what is said of a campaign.toml, without its name."""
+    """Return the messages on a campaign.toml, without its name."""
     path = written(folder, text)
     with pytest.raises(MamboNmpcError) as caught:
         file.read(path)
@@ -53,13 +53,13 @@ def faults(folder: Path, text: str) -> list[str]:
     ],
 )
 def test_quantiles_of_the_distributions(value: object, share: float, expected: float) -> None:
-    """The value below which a share of the draws lie."""
+    """The quantile is the value below which the given share of draws lies."""
     assert parse(value, WIDE).quantile(share) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.999999, 1.0 - 2.0**-53])
-def test_a_normal_draw_stays_in_the_domain(share: float) -> None:
-    """Cut off, not piled up: the quantiles in between are those of the truncated distribution."""
+def test_a_normal_distribution_is_truncated_at_its_domain(share: float) -> None:
+    """Draws stay in the domain, and quantiles are those of the truncated distribution, not of clipping."""
     domain = Domain(0.0, 1.0)
     cut = parse({"normal": [0.5, 10.0]}, domain)
     assert 0.0 <= cut.quantile(share) <= 1.0
@@ -70,13 +70,13 @@ def test_a_normal_draw_stays_in_the_domain(share: float) -> None:
 @pytest.mark.parametrize(
     "value", [3.5, {"uniform": [2.0, 4.0]}, {"normal": [1.0, 2.0]}, {"choice": [1.0, 2.0]}]
 )
-def test_a_distribution_is_spelled_as_it_is_read(value: object) -> None:
-    """What campaign.json keeps is what campaign.toml says."""
+def test_a_distribution_is_written_as_it_is_read(value: object) -> None:
+    """campaign.json has the notation of campaign.toml."""
     assert parse(value, WIDE).document() == value
 
 
-def test_a_flight_depends_on_seed_and_number_alone() -> None:
-    """Neither on other flights, nor on the distributions of other parameters."""
+def test_a_draw_depends_on_seed_and_flight_only() -> None:
+    """Draws depend neither on other flights nor on the distributions of other parameters."""
     assert draw(5, 17, DEFAULTS) == draw(5, 17, DEFAULTS)
     assert draw(5, 17, DEFAULTS) != draw(5, 18, DEFAULTS)
     assert draw(5, 17, DEFAULTS) != draw(6, 17, DEFAULTS)
@@ -85,12 +85,12 @@ def test_a_flight_depends_on_seed_and_number_alone() -> None:
 
 
 def test_seeds_of_flights_differ() -> None:
-    """Noise of one flight is not that of another."""
+    """2000 flights have 2000 seeds, and so different noise."""
     assert len({draw(0, flight, DEFAULTS)["seed"] for flight in range(2000)}) == 2000
 
 
 def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
-    """A thousand flights: mean and limits of a uniform parameter, shares of a choice, no correlation."""
+    """Over 1000 flights mean, limits, shares of a choice and correlation are those of the distributions."""
     flights = [draw(0, flight, DEFAULTS) for flight in range(1000)]
     mass_kg = np.array([flight["mass_kg"] for flight in flights])
     assert 0.063 <= mass_kg.min() < 0.0632
@@ -102,8 +102,8 @@ def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
     assert abs(np.corrcoef(mass_kg, yaw_rad)[0, 1]) < 0.1
 
 
-def test_every_draw_can_fly() -> None:
-    """All parameters reach the scenario: at its limits every one makes another scenario, and a valid one."""
+def test_every_parameter_changes_the_scenario() -> None:
+    """Each parameter at a limit of its domain gives a valid scenario that differs from the nominal one."""
     nominal = {name: replace(parameter.default, kind="constant") for name, parameter in PARAMETERS.items()}
     section = file.FlightSection().model_dump()
     plain = file.scenario(section, draw(0, 0, nominal))
@@ -115,7 +115,7 @@ def test_every_draw_can_fly() -> None:
 
 
 def test_scales_apply_to_the_nominal_mambo() -> None:
-    """Thrust and torque of the rotors alike, inertia axis by axis."""
+    """The thrust scale applies to rotor thrust and torque, the inertia scale to one axis."""
     drawn = draw(0, 0, DEFAULTS) | {"thrust_scale": 0.5, "inertia_scale_y": 2.0}
     flown = file.scenario(file.FlightSection().model_dump(), drawn)
     assert flown.thrust_factor_n_s2 == 0.5 * MAMBO.thrust_factor_n_s2
@@ -124,7 +124,7 @@ def test_scales_apply_to_the_nominal_mambo() -> None:
 
 
 def test_an_empty_file_is_the_default_campaign(tmp_path: Path) -> None:
-    """Every key has a default: PD and preset mambo, 100 s of the figure of eight, with sensors."""
+    """The defaults are PD and preset mambo, 100 s on the figure of eight, derotated sensors."""
     read = file.read(written(tmp_path, ""))
     assert read == file.default()
     assert [(entrant.name, entrant.kind) for entrant in read.entrants] == [("pd", "pd"), ("mambo", "nmpc")]
@@ -133,15 +133,15 @@ def test_an_empty_file_is_the_default_campaign(tmp_path: Path) -> None:
 
 
 def test_a_controller_may_be_a_file_beside_the_campaign(tmp_path: Path) -> None:
-    """Named by its stem, wherever the command runs."""
+    """The path is relative to campaign.toml, and the name is the stem of the file."""
     (tmp_path / "calm.toml").write_text("[cost]\neffort_weight = 1000\n")
     read = file.read(written(tmp_path, 'controllers = ["table1", "calm.toml"]'))
     assert [entrant.name for entrant in read.entrants] == ["table1", "calm"]
     assert read.entrants[1].settings.cost.effort_weight == 1000.0
 
 
-def test_the_campaign_is_its_values(tmp_path: Path) -> None:
-    """A key written with its default changes nothing; a drawn parameter does."""
+def test_a_campaign_is_identified_by_its_values(tmp_path: Path) -> None:
+    """Writing out a default keeps the identity of a campaign; another distribution changes it."""
     same = file.read(written(tmp_path, "seed = 0\n[draws]\nmass_kg = { uniform = [0.063, 0.08] }\n"))
     assert same.document() == file.default().document()
     other = file.read(written(tmp_path, "[draws]\nmass_kg = 0.063\n"))
@@ -180,8 +180,8 @@ BAD = {
 
 
 @pytest.mark.parametrize("text", BAD)
-def test_a_bad_file_is_told_key_value_and_rule(text: str, tmp_path: Path) -> None:
-    """One line for one fault, no traceback."""
+def test_an_error_names_key_value_and_rule(text: str, tmp_path: Path) -> None:
+    """One error in campaign.toml gives one line."""
     (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.007\n")
     (tmp_path / "wrong.toml").write_text("[horizon]\ncontrol = 11\n")
     (tmp_path / "a b.toml").write_text("")
@@ -189,26 +189,26 @@ def test_a_bad_file_is_told_key_value_and_rule(text: str, tmp_path: Path) -> Non
     assert BAD[text] in fault
 
 
-def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
-    """Not one after the other."""
+def test_all_errors_are_reported_together(tmp_path: Path) -> None:
+    """Three errors in campaign.toml give three lines."""
     assert len(faults(tmp_path, "seed = -1\n[draws]\nmass_kg = 0\nyaw = 1\n")) == 3
 
 
 def test_a_missing_campaign_is_named(tmp_path: Path) -> None:
-    """As every file is."""
+    """A campaign.toml that does not exist raises `UnreadableFileError`."""
     with pytest.raises(UnreadableFileError, match="no such file"):
         file.read(tmp_path / "absent.toml")
 
 
 def table(**columns: list[float]) -> dict[str, np.ndarray]:
-    """Return a table of controllers a and b without crashes, but for the columns given."""
+    """Return a table of controllers a and b with the given columns; by default nothing crashes."""
     n = len(next(iter(columns.values())))
     healthy = {f"{name}_crashed": [0.0] * n for name in "ab"}
     return {name: np.array(values, np.float64) for name, values in (healthy | columns).items()}
 
 
 def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
-    """None of ten: the upper limit solves (1 - p)^10 = 2.5 %; all of them: the mirror image."""
+    """For 0 of 10 the upper limit solves (1 - p)^10 = 2.5 %; the interval for 10 of 10 mirrors it."""
     none, every = proportion(0, 10), proportion(10, 10)
     limit = 1.0 - 0.025 ** (1 / 10)
     assert [none.low, none.high] == pytest.approx([0.0, limit])
@@ -217,7 +217,7 @@ def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
 
 
 def test_quantiles_are_values_of_the_sample() -> None:
-    """And infinite ones among them do no harm to the others."""
+    """Quantiles are not interpolated, so an infinite value affects only quantiles that select it."""
     values = np.array([4.0, math.inf, 1.0, 3.0, 2.0])
     found = quantiles(values)
     assert (found["0"], found["0.25"], found["0.5"], found["0.75"]) == (1.0, 2.0, 3.0, 4.0)
@@ -225,7 +225,7 @@ def test_quantiles_are_values_of_the_sample() -> None:
 
 
 def test_improvement_is_the_median_of_the_ratios() -> None:
-    """Flight by flight, not of the medians; with the share of flights that are better."""
+    """Median and share of better flights are those of the ratios flight by flight."""
     found = improvement(
         table(a_iae_m_s=[2.0, 9.0, 4.0, 1.0, 8.0], b_iae_m_s=[1.0, 3.0, 1.0, 2.0, 8.0]), "a", "b", "iae_m_s"
     )
@@ -236,7 +236,7 @@ def test_improvement_is_the_median_of_the_ratios() -> None:
 
 
 def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
-    """The median of a lognormal is exp(mu); its interval is near that of the asymptotic formula."""
+    """For lognormal ratios the interval contains exp(mu) and has about the asymptotic width."""
     ratios = np.exp(np.random.default_rng(1).normal(math.log(3.0), 0.5, 1000))
     found = improvement(table(a_iae_m_s=ratios.tolist(), b_iae_m_s=[1.0] * 1000), "a", "b", "iae_m_s")
     assert found is not None
@@ -246,7 +246,7 @@ def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
 
 
 def test_a_crash_is_infinitely_bad() -> None:
-    """Whoever crashes loses the flight; where both crash there is nothing to compare."""
+    """A controller that crashes is worse in that flight; flights in which both crash are left out."""
     columns = table(
         a_iae_m_s=[1.0, 1.0, 1.0, 1.0],
         b_iae_m_s=[0.5, 0.5, 0.5, 0.5],
@@ -263,13 +263,13 @@ def test_a_crash_is_infinitely_bad() -> None:
 
 
 def test_the_worst_flights_are_crashes_then_the_largest_iae() -> None:
-    """At most five; a lost flight, whose IAE is no number, is among the crashes."""
+    """At most five flights are returned; a lost flight, whose IAE is NaN, is among the crashes."""
     columns = table(a_iae_m_s=[1.0, 7.0, math.nan, 3.0, 2.0, 9.0], a_crashed=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
     assert worst(columns, "a") == [2, 3, 5, 1, 4]
 
 
 def test_statistics_are_reproducible() -> None:
-    """The same table gives the same intervals."""
+    """The same table gives the same statistics, bootstrap intervals included."""
     rng = np.random.default_rng(2)
     columns = {f"{name}_{index}": rng.uniform(1.0, 2.0, 20) for name in "ab" for index in INDICES}
     columns |= {f"{name}_{key}": np.zeros(20) for name in "ab" for key in ("crashed", "refused_updates")}
@@ -277,7 +277,7 @@ def test_statistics_are_reproducible() -> None:
 
 
 def test_every_parameter_is_documented() -> None:
-    """With its name and its default in docs/campaign.md."""
+    """docs/campaign.md names every parameter."""
     text = (ROOT / "docs" / "campaign.md").read_text("utf-8")
     missing = [name for name in PARAMETERS if f"`{name}`" not in text]
     assert missing == []

@@ -1,4 +1,4 @@
-"""Campaigns flown: the same bytes whoever flies in whatever order, and whatever stops them in between."""
+"""Campaigns give the same bytes for any workers, batches and interruptions; folders are protected."""
 
 import csv
 import json
@@ -51,7 +51,7 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 def run_script(text: str, *arguments: object) -> subprocess.CompletedProcess[str]:
-    """Run a script in a session of its own, and wait for all who hold its output: no worker may stay."""
+    """Run a script in a session of its own; return when all processes that hold its output have ended."""
     line = [sys.executable, "-c", text, *map(str, arguments)]
     return subprocess.run(
         line, capture_output=True, text=True, check=False, timeout=120, start_new_session=True
@@ -83,20 +83,20 @@ def fly_on_threads(
 def test_the_table_depends_neither_on_batches_nor_on_workers(
     batch: int, source: Path, whole: Path, tmp_path: Path
 ) -> None:
-    """One process or two threads, one flight for NumPy at a time or all: the same bytes."""
+    """One process and two threads, with any batch size, give the same bytes."""
     assert fly_on_threads(source, tmp_path, batch=batch) == (whole / "flights.csv").read_bytes()
 
 
 @pytest.mark.long
-def test_two_processes_fly_what_one_flies(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Every file of the folder, pictures and records included, to the byte."""
+def test_two_processes_give_the_results_of_one(source: Path, whole: Path, tmp_path: Path) -> None:
+    """All files of the folder are equal to the byte, pictures and records included."""
     done = command("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
-    assert (done.returncode, "pd over another" in done.stdout) == (0, True), done.stderr
+    assert (done.returncode, "ratio of pd to the other" in done.stdout) == (0, True), done.stderr
     assert contents(tmp_path) == contents(whole)
 
 
 def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Path) -> None:
-    """A line for each flight with what was drawn and what came of it; a record for each that replays."""
+    """The table has draws and results of each flight, and there is a record per flight and controller."""
     names = set(contents(whole))
     records = {f"flights/{flight:06}-{name}.json" for flight in range(FLIGHTS) for name in ("pd", "mambo")}
     assert names == {"campaign.json", "flights.csv", "summary.json", "campaign.png", "campaign.svg"} | records
@@ -114,8 +114,8 @@ def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Pa
 
 
 @pytest.mark.long
-def test_a_worst_flight_replays_to_the_bit(whole: Path, tmp_path: Path) -> None:
-    """By the command that the campaign prints, in Python rather than C, and alone rather than in a batch."""
+def test_a_worst_flight_replays_bit_for_bit(whole: Path, tmp_path: Path) -> None:
+    """`fly --replay` repeats it with the Python reference, alone, with the same bits as the C in a batch."""
     worst = json.loads((whole / "summary.json").read_text())["worst"]["mambo"][0]
     done = command("fly", "--replay", whole / worst["record"], "--json", "-o", tmp_path)
     assert done.returncode == 0, done.stderr
@@ -141,8 +141,8 @@ with opened(campaign, Path(sys.argv[2])) as store, processes(2) as pool:
 
 
 @pytest.mark.long
-def test_a_killed_campaign_goes_on_to_the_same_bytes(source: Path, whole: Path, tmp_path: Path) -> None:
-    """SIGKILL in the middle: what was finished is there, no worker stays, and nothing differs in the end."""
+def test_a_killed_campaign_resumes_to_the_same_bytes(source: Path, whole: Path, tmp_path: Path) -> None:
+    """SIGKILL keeps finished flights and leaves no worker; the resumed campaign ends with the same bytes."""
     done = run_script(KILLED, source, tmp_path)
     assert done.returncode == -signal.SIGKILL
     before = (tmp_path / "flights.csv").read_text().splitlines()
@@ -167,8 +167,8 @@ main()
 
 
 @pytest.mark.long
-def test_ctrl_c_leaves_a_folder_that_goes_on(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Exit 130 and one line, though the terminal interrupts the workers too."""
+def test_a_campaign_resumes_after_ctrl_c(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Ctrl-C, which also signals the workers, exits with 130 and one line."""
     arguments = ("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
     done = run_script(STOPPED, *arguments)
     assert done.returncode == INTERRUPTED
@@ -181,8 +181,8 @@ def test_ctrl_c_leaves_a_folder_that_goes_on(source: Path, whole: Path, tmp_path
     assert contents(tmp_path) == contents(whole)
 
 
-def test_a_full_disk_is_told_and_goes_on(source: Path, whole: Path, tmp_path: Path) -> None:
-    """The table is cut short in the middle of a line; the next run drops that and flies the rest."""
+def test_a_campaign_resumes_after_a_full_disk(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The disk truncates a line of the table; the next run drops that line and flies the rest."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
 
     def fill(finished: int) -> None:
@@ -199,24 +199,24 @@ def test_a_full_disk_is_told_and_goes_on(source: Path, whole: Path, tmp_path: Pa
     assert fly_on_threads(source, tmp_path) == (whole / "flights.csv").read_bytes()
 
 
-def test_a_finished_campaign_grows(source: Path, whole: Path, tmp_path: Path) -> None:
-    """More flights later are the same as all at once; fewer would lose some, and are refused."""
+def test_a_finished_campaign_may_be_extended(source: Path, whole: Path, tmp_path: Path) -> None:
+    """An extended campaign equals one of the full size; fewer flights than finished ones are refused."""
     fly_on_threads(source, tmp_path, 2)
     assert fly_on_threads(source, tmp_path, FLIGHTS) == (whole / "flights.csv").read_bytes()
-    with pytest.raises(FlightError, match="has flight 5 already; --flights must be 6 or more"):
+    with pytest.raises(FlightError, match="already has flight 5; --flights must be 6 or more"):
         fly_on_threads(source, tmp_path, 4)
 
 
-def test_only_what_is_missing_is_flown(source: Path, tmp_path: Path) -> None:
-    """Flight by flight: none that is finished is flown again."""
+def test_only_missing_flights_are_flown(source: Path, tmp_path: Path) -> None:
+    """A finished flight is not flown again."""
     fly_on_threads(source, tmp_path, 2)
     finished: list[int] = []
     fly_on_threads(source, tmp_path, FLIGHTS, batch=1, progress=finished.append)
     assert finished == [2, 3, 4, 5, 6]
 
 
-def test_a_campaign_may_be_killed_again_and_again(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Half a line is cut off before anything follows it, so that the next run reads both."""
+def test_a_campaign_survives_repeated_kills(source: Path, whole: Path, tmp_path: Path) -> None:
+    """A truncated line is removed before the next one is appended."""
     campaign, lines = file.read(source), (whole / "flights.csv").read_bytes().splitlines(keepends=True)
     for flight in range(3):
         with opened(campaign, tmp_path) as store:
@@ -230,12 +230,15 @@ def test_a_campaign_may_be_killed_again_and_again(source: Path, whole: Path, tmp
 
 
 def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
-    """And told in what it differs; nothing is touched."""
+    """The message names the first difference, and no file changes."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     (tmp_path / "other.toml").write_text(CAMPAIGN.replace("seed = 4", "seed = 5"))
     (tmp_path / "third.toml").write_text(CAMPAIGN + "[draws]\nmass_kg = 0.07\n")
-    for name, difference in (("other", "seed = 4 where 5"), ("third", "draws.mass_kg = .* where 0.07")):
+    for name, difference in (
+        ("other", "seed = 4 instead of 5"),
+        ("third", "draws.mass_kg = .* instead of 0.07"),
+    ):
         with pytest.raises(ForeignFilesError, match=f"holds another campaign, with {difference}"):
             fly_on_threads(tmp_path / f"{name}.toml", folder)
     assert contents(folder) == contents(whole)
@@ -243,34 +246,34 @@ def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("name", ["thesis.tex", "campaign.json", "flights.csv"])
-def test_work_of_others_is_refused(name: str, source: Path, tmp_path: Path) -> None:
-    """A file of one of our names does not make a folder ours."""
+def test_a_folder_with_other_files_is_refused(name: str, source: Path, tmp_path: Path) -> None:
+    """A foreign file that has the name of a result does not mark a folder of results."""
     (tmp_path / name).write_text("{}")
-    with pytest.raises(ForeignFilesError, match="not a campaign of ours"):
+    with pytest.raises(ForeignFilesError, match="not from a mambo-nmpc campaign"):
         fly_on_threads(source, tmp_path)
     assert contents(tmp_path) == {name: b"{}"}
 
 
 @pytest.mark.parametrize("line", [b"x,1\n", b"0\n", b""])
 def test_an_edited_table_is_refused(line: bytes, source: Path, whole: Path, tmp_path: Path) -> None:
-    """A line of something else, half a line, a line twice: nothing is flown on top of that."""
+    """A foreign line, a short line or a repeated line stops the campaign before it flies."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     table = folder / "flights.csv"
     lines = table.read_bytes().splitlines(keepends=True)
     table.write_bytes(b"".join([*lines[:3], line or lines[1]]))
-    with pytest.raises(ForeignFilesError, match="line 4 is not of this campaign"):
+    with pytest.raises(ForeignFilesError, match="line 4 is not a line of this campaign"):
         fly_on_threads(source, folder)
 
 
 def test_one_run_at_a_time(source: Path, tmp_path: Path) -> None:
-    """Two would fly everything twice."""
+    """A second run in the same folder raises `BusyError`."""
     with opened(file.read(source), tmp_path), pytest.raises(BusyError, match="another run"):
         fly_on_threads(source, tmp_path)
 
 
-def test_a_dead_worker_is_told(source: Path, tmp_path: Path) -> None:
-    """Killed for want of memory, say: what is finished stays."""
+def test_a_dead_worker_is_reported(source: Path, tmp_path: Path) -> None:
+    """A worker process that ends, for instance for lack of memory, raises `WorkerError`."""
     campaign = file.read(source)
     with (
         opened(campaign, tmp_path) as store,
@@ -282,38 +285,38 @@ def test_a_dead_worker_is_told(source: Path, tmp_path: Path) -> None:
 
 
 def test_workers_of_another_version_are_refused() -> None:
-    """Their flights might differ."""
-    with pytest.raises(WorkerError, match=r"a worker has mambo-nmpc .* and this is 0\.0\.0"):
+    """Another version might give other flights, so it raises `WorkerError`."""
+    with pytest.raises(WorkerError, match=r"a worker has mambo-nmpc .*, the campaign 0\.0\.0"):
         fly_batch("0.0.0", [], {}, [])
 
 
-def test_a_scheduler_names_the_workers(tmp_path: Path) -> None:
-    """So --workers beside it is a mistake."""
+def test_scheduler_and_workers_exclude_each_other(tmp_path: Path) -> None:
+    """With --scheduler the cluster determines the workers, so --workers is an error."""
     done = command("campaign", "--scheduler", "tcp://127.0.0.1:1", "--workers", 2, "-o", tmp_path / "out")
     assert done.returncode == 2
     assert "leave out --workers" in done.stderr
     assert not (tmp_path / "out").exists()
 
 
-def test_a_bad_address_is_told() -> None:
-    """With what an address looks like."""
+def test_a_bad_address_is_reported() -> None:
+    """The message shows the form of an address."""
     require_module("distributed")
     with pytest.raises(WorkerError, match=r"missing port number.*as in tcp://host:8786"), cluster("garbage"):
         pass
 
 
 @pytest.mark.long
-def test_a_dead_scheduler_is_told_within_seconds() -> None:
-    """Nobody listens at that port."""
+def test_an_unreachable_scheduler_is_reported_within_seconds() -> None:
+    """An address where nothing listens raises `WorkerError`."""
     require_module("distributed")
-    with pytest.raises(WorkerError, match="is no Dask scheduler that can be reached"), cluster("127.0.0.1:1"):
+    with pytest.raises(WorkerError, match="no Dask scheduler answers there"), cluster("127.0.0.1:1"):
         pass
 
 
 @pytest.mark.long
-@pytest.mark.filterwarnings("default")  # of the cluster's own
-def test_a_dask_cluster_flies_what_one_process_flies(source: Path, whole: Path, tmp_path: Path) -> None:
-    """The same bytes from the workers of a cluster."""
+@pytest.mark.filterwarnings("default")  # Dask itself warns
+def test_a_dask_cluster_gives_the_results_of_one_process(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The workers of a cluster give the same bytes."""
     require_module("distributed")
     from distributed import LocalCluster  # noqa: PLC0415 - an optional extra
 

@@ -236,7 +236,7 @@ def test_a_table_of_a_campaign_with_a_broken_line_is_refused() -> None:
     made("campaign")
     with Path("campaign/flights.csv").open("a") as file:
         file.write("\n")
-    assert "flights.csv: is no table of a campaign" in run("campaign", code=2)
+    assert "flights.csv: is not the table of a campaign" in run("campaign", code=2)
 
 
 @pytest.mark.parametrize("name", ["position_m", "time_s", "status", "thrust_acceleration_m_s2"])
