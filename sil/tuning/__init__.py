@@ -1,1 +1,1 @@
-"""Tuning: a search for settings that track well with calm commands, on drawn flights of the compiled C."""
+"""Tuning: search for settings with small tracking error and small command variation, on random flights."""

@@ -1,4 +1,4 @@
-"""Read tune.toml: which settings are searched, from which controller on, and on which drawn flights."""
+"""Read tune.toml: ranges of the searched settings, base controller and flights."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -31,9 +31,9 @@ DEFAULT_SEARCH: Final[dict[str, dict[str, Any]]] = {
         "initial_step_rad": {"log_uniform": [0.0005, 0.05]},
     },
 }
-"""No trial takes more work than the base, which has the longest horizons and the most iterations.
+"""The base has the longest horizons and the most iterations, so no trial takes more computation than it.
 
-The tracking weight is the scale of the effort weight, and stays.
+The tracking weight stays fixed, because only its ratio to the effort weight matters.
 """
 
 _FIXED: Final = ("horizon.update_period_s", "cost.tracking_weight")
@@ -41,13 +41,13 @@ _MOST_KEYS: Final = 10
 
 
 class TuningFlight(FlightSection):
-    """What all flights have in common: shorter ones than those of a campaign, for many are flown."""
+    """Keys that all flights share; flights are shorter than in a campaign, because every trial flies them."""
 
     duration_s: float = Field(20.0, ge=1, le=3600)
 
 
 class TuneFile(Section):
-    """The keys of tune.toml; a missing key is that of the default study."""
+    """The keys of tune.toml; a missing key has its value in the default study."""
 
     seed: int = Field(1, ge=0, le=2**63 - 1)
     base: str = "mambo"
@@ -59,7 +59,7 @@ class TuneFile(Section):
 
 @dataclass(frozen=True)
 class Tuning:
-    """What is searched: `search` has a distribution for each dotted key, the rest stays as in `base`."""
+    """A study: `search` has a range for each searched key, as in cost.effort_weight; `base` has all others."""
 
     file: TuneFile
     base: Settings
@@ -67,13 +67,13 @@ class Tuning:
 
     @property
     def start(self) -> dict[str, float]:
-        """The values of the base for what is searched."""
+        """The base's values of the searched keys."""
         return {path: _value(self.base, path) for path in self.search}
 
     def settings(self, values: Mapping[str, float]) -> Settings:
-        """Return the base with other values for what is searched, in four digits, as people write them.
+        """Return the base with `values` of the searched keys, rounded to four digits.
 
-        Raises InvalidSettingsError.
+        Raises InvalidSettingsError for a combination that breaks a rule.
         """
         document = self.base.model_dump()
         for path, value in values.items():
@@ -83,19 +83,19 @@ class Tuning:
         return controller_toml.validated(document, "the search")
 
     def drawn(self) -> list[Draw]:
-        """Return the flights that every trial flies."""
+        """Return the draws of the flights that every trial flies."""
         distributions = {name: getattr(self.file.draws, name) for name in PARAMETERS}
         return [draw(self.file.seed, flight, distributions) for flight in range(self.file.flights)]
 
     def document(self) -> dict[str, Any]:
-        """Return everything that decides the trials, as plain values."""
+        """Return everything that determines the trials, as plain values."""
         document: dict[str, Any] = self.file.model_dump(mode="json")
         search = {path: distribution.document() for path, distribution in self.search.items()}
         return document | {"base": self.base.model_dump(), "search": search}
 
 
 def rounded(value: float) -> float:
-    """Return the number of four digits next to `value`."""
+    """Return `value` rounded to four significant digits."""
     return float(f"{value:.4g}")
 
 
@@ -105,16 +105,16 @@ def default() -> Tuning:
 
 
 def read(path: Path) -> Tuning:
-    """Read a tune.toml; a base named by a path is looked for beside it.
+    """Read a tune.toml; the path of the base is relative to its folder.
 
-    Raises UnreadableFileError for what is not TOML, InvalidSettingsError for broken rules, and the errors of
-    the base's file.
+    Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with the errors of
+    the file and of the base's file.
     """
     return _tuning(read_as(TuneFile, path), path.parent, echo(str(path)))
 
 
 def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
-    """Look the base up, and try whether all that may be searched can fly."""
+    """Load the base and check that every combination of the ranges' ends is valid and can be simulated."""
     path = folder / file.base
     try:
         base = presets.load(file.base if file.base in presets.names() or not path.exists() else str(path))
@@ -135,7 +135,7 @@ def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
 def _search(
     sections: Mapping[str, Mapping[str, Any]], base: Settings, source: str
 ) -> dict[str, Distribution]:
-    """Return what is searched by dotted key; raises InvalidSettingsError with every broken rule."""
+    """Return the range of each searched key; raises InvalidSettingsError with all errors."""
     found: dict[str, Distribution] = {}
     faults: list[str] = []
     for path, value in (
@@ -155,7 +155,7 @@ def _search(
 
 
 def _range(path: str, value: Any, base: Settings) -> Distribution:
-    """Return one range; raises ValueError, "must ..."."""
+    """Return the range of one key; raises ValueError, "must ..."."""
     key = KEYS.get(path)
     if key is None or key.low is None or key.high is None or path in _FIXED:
         free = [one for one in KEYS if KEYS[one].low is not None and one not in _FIXED]
@@ -166,12 +166,12 @@ def _range(path: str, value: Any, base: Settings) -> Distribution:
     held, numbers = _value(base, path), found.numbers
     ranged = found.kind in ("uniform", "log_uniform")
     if not (numbers[0] <= held <= numbers[1] if ranged else held in numbers):
-        raise ValueError(f"must include the base's {held:g}: the search begins there")
+        raise ValueError(f"must include the base's {held:g}: the search starts there")
     return found
 
 
 def _demand_valid_corners(tuning: Tuning, source: str) -> None:
-    """Raise InvalidSettingsError unless ends of ranges go with each other in every combination."""
+    """Raise InvalidSettingsError unless every combination of the ranges' ends is valid."""
     ends = [(min(found.numbers), max(found.numbers)) for found in tuning.search.values()]
     for corner in product(*ends):
         try:
@@ -179,7 +179,7 @@ def _demand_valid_corners(tuning: Tuning, source: str) -> None:
         except InvalidSettingsError as error:
             fault = error.faults[0].partition(": ")[2]
             raise InvalidSettingsError(
-                (f"{source}: search: ends of its ranges do not go together: {fault}",)
+                (f"{source}: search: a combination of the ranges' ends is invalid: {fault}",)
             ) from None
 
 

@@ -1,4 +1,4 @@
-"""What a study found: the Pareto front, the point of it that is chosen, and the controller.toml it makes."""
+"""Results of a study: Pareto front, chosen point and its controller.toml."""
 
 import csv
 import io
@@ -10,13 +10,14 @@ from mambo_nmpc.sil.tuning.file import Tuning, rounded
 from mambo_nmpc.sil.tuning.study import Judged, study_name
 
 IAE_ALLOWANCE: Final = 1.1
-"""The chosen point has an IAE of at most this times the least found."""
+"""Bound on the IAE of the chosen point, relative to the least IAE found."""
 
 RULE: Final = "the least command variation with an IAE within 10 % of the least found"
+"""How the point is chosen; stands in controller.toml."""
 
 
 def pareto_front(trials: Sequence[Judged]) -> list[Judged]:
-    """Return the trials that no other beats in both IAE and command variation, by IAE."""
+    """Return the Pareto-optimal trials in IAE and command variation, sorted by IAE."""
     front: list[Judged] = []
     for trial in sorted(trials, key=lambda one: (one.iae_m_s, one.command_variation_rad, one.number)):
         if not front or trial.command_variation_rad < front[-1].command_variation_rad:
@@ -25,12 +26,12 @@ def pareto_front(trials: Sequence[Judged]) -> list[Judged]:
 
 
 def chosen(front: Sequence[Judged]) -> Judged:
-    """Return the point of a front, sorted by IAE, that `RULE` names."""
+    """Return the point of a front, which is sorted by IAE, according to `RULE`."""
     return [one for one in front if one.iae_m_s <= IAE_ALLOWANCE * front[0].iae_m_s][-1]
 
 
 def front_csv(front: Sequence[Judged]) -> str:
-    """Return the front as CSV, a line for each trial; `chosen` is 1 for one of them."""
+    """Return the front as CSV, one line per trial; `chosen` is 1 for the chosen one."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     keys = list(front[0].values)
@@ -43,11 +44,11 @@ def front_csv(front: Sequence[Judged]) -> str:
 
 
 def controller_text(tuning: Tuning, trials: Sequence[Judged]) -> str:
-    """Return the controller.toml of the chosen trial; its head says where it comes from."""
+    """Return the controller.toml of the chosen trial; its head names study, trial and result."""
     best, flight = chosen(pareto_front(trials)), tuning.file.flight
     title = (
         f"Found by mambo-nmpc tune: trial {best.number} of {len(trials)} in study {study_name(tuning)}, seed "
-        f"{tuning.file.seed}: {RULE}. Over {tuning.file.flights} drawn flights of {flight.duration_s:g} s "
+        f"{tuning.file.seed}: {RULE}. Over {tuning.file.flights} random flights of {flight.duration_s:g} s "
         f"on {flight.trajectory}, sensors {flight.sensors}: mean IAE {best.iae_m_s:.4g} m s, command "
         f"variation {best.command_variation_rad:.4g} rad an update, {best.crashed} crashed."
     )

@@ -1,4 +1,4 @@
-"""The picture of a study: every trial, the Pareto front, where the search began and what is chosen."""
+"""The picture of a study: all trials, Pareto front, base and chosen point."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from mambo_nmpc.sil.tuning.study import Judged
 def draw_front(trials: Sequence[Judged], base: Sequence[Judged], stem: Path) -> tuple[Path, Path]:
     """Draw IAE against command variation, both logarithmic; write stem.png and stem.svg.
 
-    A controller that never moves its command has no place on such an axis.
+    A trial without any command variation is left out, as it has no place on a logarithmic axis.
     """
     front = pareto_front(trials)
     best = chosen(front)

@@ -1,7 +1,7 @@
-"""The study: Optuna proposes settings, drawn flights of the compiled C judge them, a storage keeps both.
+"""The study: Optuna proposes settings, flights of the compiled C evaluate them, a database stores both.
 
-Trials are proposed in rounds of `ROUND`, each from a seed of its own, so that neither the number of workers
-nor a stop in between changes what is proposed.
+Trials are proposed in rounds of `ROUND`, each with a seed of its own, so the proposals depend neither on the
+number of workers nor on interruptions.
 """
 
 import contextlib
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
 ROUND: Final = 8
-"""Trials that are proposed before the first of them is judged."""
+"""Trials proposed together, before any of them is evaluated."""
 
 DRAWN_AT_RANDOM: Final = 20
-"""Trials before the search begins to learn from them."""
+"""Random trials before the sampler uses earlier results."""
 
 CRASH_ERROR_M: Final = 10.0
-"""Distance from the target all along that a crashed flight counts as; none counts as more."""
+"""Constant error that a crashed flight is assigned; the IAE of every flight is bounded by it, too."""
 
 DATABASE: Final = "study.db"
 
@@ -45,11 +45,11 @@ _OWNER: Final = "folder"
 
 @dataclass(frozen=True)
 class Judged:
-    """One finished trial: what was tried, and what came of it, means over all flights."""
+    """One finished trial: settings and results, which are means over all flights."""
 
     number: int
     values: dict[str, float]
-    """By dotted key of controller.toml."""
+    """Value by key of controller.toml, as in cost.effort_weight."""
     iae_m_s: float
     command_variation_rad: float
     crashed: int
@@ -57,15 +57,16 @@ class Judged:
 
 @contextlib.contextmanager
 def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["Study"]:
-    """Hold the study of `tuning` in a storage: that of the URL, or a file in `folder`; raises StudyError.
+    """Open the study of `tuning` in the database at the URL `storage`, or in a file in `folder`.
 
-    The name of the study follows from what decides it, so that others may live in the same storage.
+    The name of the study is derived from its document, so several studies can share a database. Raises
+    StudyError if Optuna is not installed or the database refuses an access.
     """
     try:
         import optuna  # noqa: PLC0415 - an optional extra
         from sqlalchemy.exc import SQLAlchemyError  # noqa: PLC0415 - comes with it
     except ImportError:
-        raise StudyError('tuning wants Optuna; pip install "mambo-nmpc[tune]" brings it') from None
+        raise StudyError('tuning needs Optuna; pip install "mambo-nmpc[tune]" installs it') from None
     optuna.logging.set_verbosity(optuna.logging.CRITICAL)
     where = f"sqlite:///{(folder / DATABASE).resolve()}" if storage is None else storage
     named = echo(str(folder / DATABASE)) if storage is None else "--storage"
@@ -84,13 +85,13 @@ def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["S
     except (SQLAlchemyError, ImportError, optuna.exceptions.StorageInternalError) as error:
         reason = str(error.__cause__ or error).splitlines()[0]
         raise StudyError(
-            f"{named}: the storage refuses ({echo(reason)}); what it has is kept. A URL is as in "
-            "sqlite:////home/me/study.db or postgresql://host/name, with that database's driver installed"
+            f"{named}: the database refused an access ({echo(reason)}); its trials are kept. A URL has the form "
+            "sqlite:////home/me/study.db or postgresql://host/name; the database's driver must be installed"
         ) from error
 
 
 def study_name(tuning: Tuning) -> str:
-    """Return the name of a study in its storage."""
+    """Return the name of a study in its database."""
     document = {"version": __version__, **tuning.document()}
     return f"mambo-nmpc-{hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:16]}"
 
@@ -98,9 +99,9 @@ def study_name(tuning: Tuning) -> str:
 def search(
     tuning: Tuning, study: "Study", folder: Path, trials: int, *, pool: Pool, progress: Callable[[int], None]
 ) -> None:
-    """Go on until the study has `trials` finished trials; `progress` hears how many it has.
+    """Run trials until the study has `trials` finished ones; call `progress` with their number.
 
-    What an earlier run from `folder` began and did not finish is flown first. Raises WorkerError.
+    Trials that an earlier run in `folder` proposed and did not finish are flown first. Raises WorkerError.
     """
     drawn = tuning.drawn()
     flight = tuning.file.flight.model_dump()
@@ -125,9 +126,10 @@ def search(
 
 
 def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int, tuple[float, float]]:
-    """Return how many flights crashed, and mean IAE and command variation of all.
+    """Return the number of crashed flights, and the means of IAE and command variation over all flights.
 
-    A crashed flight counts as `CRASH_ERROR_M` away all along, with commands that jump from limit to limit.
+    A crashed flight is assigned a constant error of `CRASH_ERROR_M` and a command that jumps between its limits
+    at every update. These values bound those of all other flights, too.
     """
     worst = np.array([CRASH_ERROR_M * duration_s, 4.0 * tilt_rad])
     found = np.array(
@@ -140,7 +142,7 @@ def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int,
 
 
 def judged(study: "Study") -> list[Judged]:
-    """Return the finished trials of a study, in order."""
+    """Return the finished trials of a study by number."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
     crashed = study.user_attrs
@@ -158,7 +160,7 @@ def _begun(study: "Study") -> int:
 
 
 def _ask(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, float]]:
-    """Return number and values of a new trial, which the study then waits for."""
+    """Propose a new trial; return its number and values."""
     from optuna.samplers import TPESampler  # noqa: PLC0415 - an optional extra
 
     entropy = np.random.SeedSequence(tuning.file.seed, spawn_key=(_begun(study),))
@@ -172,7 +174,7 @@ def _ask(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, flo
 
 
 def _suggest(trial: "Trial", path: str, found: Distribution) -> float:
-    """Return what the sampler proposes for one key."""
+    """Return the sampler's proposal for one key."""
     if found.kind == "choice":
         value: Any = trial.suggest_categorical(path, found.numbers)
         return float(value)
@@ -180,7 +182,7 @@ def _suggest(trial: "Trial", path: str, found: Distribution) -> float:
 
 
 def _left_over(tuning: Tuning, study: "Study", owner: str) -> dict[int, dict[str, float]]:
-    """Return the trials that an earlier run of `owner` asked for; give up those half proposed."""
+    """Return the unfinished trials of an earlier run of `owner`; fail those without all values."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
     waiting: Sequence[FrozenTrial] = [

@@ -1,4 +1,4 @@
-"""Tuning: what is searched, how it is judged, studies that stop and go on, the controller they make."""
+"""Tuning: tune.toml, objectives, interrupted studies, Pareto front and the controller found."""
 
 import csv
 import math
@@ -35,7 +35,7 @@ optimizer.iterations = { choice = [4, 5] }
 
 @pytest.fixture(scope="module", name="source")
 def _source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Write a study of short flights."""
+    """Write the tune.toml of a study with short flights."""
     require_module("optuna")
     path = tmp_path_factory.mktemp("source") / "tune.toml"
     path.write_text(TUNE)
@@ -44,7 +44,7 @@ def _source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module", name="whole")
 def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Search that study without interruption."""
+    """Run that study without interruption."""
     folder = tmp_path_factory.mktemp("whole")
     claim(folder, "study", {"command": "tune", **file.read(source).document()})
     search_on_threads(source, folder)
@@ -60,7 +60,7 @@ def search_on_threads(
     storage: str | None = None,
     progress: Callable[[int], None] = lambda _: None,
 ) -> list[Judged]:
-    """Search on two threads of this process, and return the finished trials."""
+    """Run a study on two threads of this process; return the finished trials."""
     tuning = file.read(source)
     with open_study(tuning, folder, storage) as study, ThreadPoolExecutor(2) as threads:
         search(tuning, study, folder, trials, pool=Pool(threads, 2, lambda _: None), progress=progress)
@@ -85,7 +85,7 @@ def one(number: int, iae_m_s: float, variation_rad: float) -> Judged:
 
 
 def row(iae_m_s: float, variation_rad: float, crashed: int = 0) -> dict[str, float | str]:
-    """Return what became of a flight."""
+    """Return the results of a flight."""
     return {
         "tuned_iae_m_s": iae_m_s,
         "tuned_command_variation_rad": variation_rad,
@@ -93,8 +93,8 @@ def row(iae_m_s: float, variation_rad: float, crashed: int = 0) -> dict[str, flo
     }
 
 
-def test_the_search_begins_at_the_base_and_stays_in_its_ranges(source: Path, whole: Path) -> None:
-    """The first trial is the base; what is not searched is as in the base in all."""
+def test_the_search_starts_at_the_base_and_stays_in_its_ranges(source: Path, whole: Path) -> None:
+    """The first trial is the base; in all trials, settings that are not searched are the base's."""
     tuning = file.read(source)
     found = found_in(whole, source)
     assert [trial.number for trial in found] == list(range(TRIALS))
@@ -107,14 +107,14 @@ def test_the_search_begins_at_the_base_and_stays_in_its_ranges(source: Path, who
     assert len({trial.values["cost.effort_weight"] for trial in found}) == TRIALS
 
 
-def test_a_study_grows_to_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Some trials now and the others later are the same as all at once."""
+def test_an_extended_study_has_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Two trials, extended to three, equal three trials at once."""
     assert len(search_on_threads(source, tmp_path, 2)) == 2
     assert search_on_threads(source, tmp_path) == found_in(whole, source)
 
 
-def test_an_interrupted_study_goes_on_to_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Trials that were proposed and not flown are flown by the next run."""
+def test_an_interrupted_study_resumes_to_the_same_trials(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The next run flies the trials that were proposed and not finished."""
 
     def stop(finished: int) -> None:
         if finished == 1:
@@ -127,14 +127,14 @@ def test_an_interrupted_study_goes_on_to_the_same_trials(source: Path, whole: Pa
 
 
 def test_folders_share_a_storage(source: Path, whole: Path, tmp_path: Path) -> None:
-    """A second folder with the same URL has the trials of the first, and leaves no file of its own."""
+    """A second folder with the same URL has the trials of the first and no database of its own."""
     url = f"sqlite:///{whole / 'study.db'}"
     assert search_on_threads(source, tmp_path, storage=url) == found_in(whole, source)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, whole: Path) -> None:
-    """The controller is the chosen point of the front, and its head says where it comes from."""
+    """controller.toml is the chosen point of the front, and its head names trial, study and seed."""
     rows = list(csv.DictReader((whole / "front.csv").read_text().splitlines()))
     picked = [line for line in rows if line["chosen"] == "1"]
     assert len(picked) == 1
@@ -149,8 +149,8 @@ def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, 
     assert (whole / "front.svg").is_file()
 
 
-def test_a_finished_study_says_what_it_found_and_is_quiet(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Base and chosen point on stdout; without a terminal no progress; nothing is flown again."""
+def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_path: Path) -> None:
+    """stdout has base and chosen point, stderr no progress without a terminal; no trial is flown again."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     done = command("tune", source, "--trials", TRIALS, "-o", folder)
@@ -160,43 +160,45 @@ def test_a_finished_study_says_what_it_found_and_is_quiet(source: Path, whole: P
     assert (folder / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
 
 
-def test_another_study_and_work_of_others_are_refused(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Nothing is touched in a folder that is not this study's."""
+def test_folders_of_another_study_or_other_files_are_refused(
+    source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """A folder with another study, or with foreign files, raises `ForeignFilesError`."""
     other = tmp_path / "tune.toml"
     other.write_text(source.read_text().replace("flights = 1", "flights = 2"))
-    with pytest.raises(ForeignFilesError, match="holds another study, with flights = 1 where 2"):
+    with pytest.raises(ForeignFilesError, match="holds another study, with flights = 1 instead of 2"):
         tune(other, output=whole, trials=1)
-    with pytest.raises(ForeignFilesError, match="not a study of ours"):
+    with pytest.raises(ForeignFilesError, match="not from a mambo-nmpc study"):
         tune(other, output=tmp_path, trials=1)
 
 
 def test_missing_optuna_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever has not installed the extra is told how to."""
+    """Without Optuna the message says how to install it."""
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(StudyError, match=r'pip install "mambo-nmpc\[tune\]"'):
         tune(output=tmp_path, trials=1)
 
 
 @pytest.mark.parametrize("url", ["nonsense", "nosuch://host/db", "sqlite:////no/such/folder/a.db"])
-def test_a_storage_that_refuses_is_told(url: str, source: Path, tmp_path: Path) -> None:
-    """One line that names the option and shows what a URL looks like."""
-    with pytest.raises(StudyError, match=r"^--storage: the storage refuses .*postgresql://") as caught:
+def test_a_database_that_refuses_access_is_reported(url: str, source: Path, tmp_path: Path) -> None:
+    """The message is one line that names the option and shows the form of a URL."""
+    with pytest.raises(StudyError, match=r"^--storage: the database refused .*postgresql://") as caught:
         tune(source, output=tmp_path, trials=1, storage=url)
     assert "\n" not in str(caught.value)
 
 
-def test_a_database_that_is_none_is_told(source: Path, tmp_path: Path) -> None:
-    """A file of that name that is something else is no reason for a traceback."""
+def test_a_file_that_is_not_a_database_is_reported(source: Path, tmp_path: Path) -> None:
+    """A study.db that is not a database raises `StudyError`, which names it."""
     (tmp_path / "study.db").write_text("no database at all, but long enough to be looked at as one" * 100)
     with (
-        pytest.raises(StudyError, match=r"study\.db: the storage refuses"),
+        pytest.raises(StudyError, match=r"study\.db: the database refused"),
         open_study(file.read(source), tmp_path, None),
     ):
         pass
 
 
 def test_a_crashed_flight_counts_as_worst() -> None:
-    """However well it tracked before; and no flight counts as worse than that."""
+    """A crashed flight is assigned the bounds of both objectives, and no other flight exceeds them."""
     crashed, means = judge([row(1.0, 0.01), row(0.5, 0.001, crashed=1), row(1e9, 9.0)], 20.0, 0.35)
     assert crashed == 1
     worst = (CRASH_ERROR_M * 20.0, 4 * 0.35)
@@ -205,8 +207,8 @@ def test_a_crashed_flight_counts_as_worst() -> None:
     assert (crashed, means) == (1, worst)
 
 
-def test_the_front_has_what_no_other_beats_and_the_calmest_near_the_best_is_chosen() -> None:
-    """Sorted by IAE; equal trials count once; the allowance decides."""
+def test_the_front_is_pareto_optimal_and_the_choice_follows_the_rule() -> None:
+    """The front is sorted by IAE and has equal trials once; within 10 % the least variation is chosen."""
     best, calm, calmest = one(3, 1.0, 0.5), one(1, IAE_ALLOWANCE, 0.2), one(0, 1.2, 0.1)
     front = pareto_front([calmest, calm, one(2, 1.1, 0.3), best, one(4, 1.0, 0.5), one(5, 1.05, 0.6)])
     assert front == [best, calm, calmest]
@@ -223,17 +225,17 @@ FAULTS = {
     "search.code.prefix = 1": "search.code.prefix = 1 must name a number",
     "search.horizon.update_period_s = 0.01": "update_period_s = 0.01 must name a number",
     "search.cost.effort_weight = 3.0": "search.cost.effort_weight = 3.0 must be a range",
-    "search.cost.effort_weight = { uniform = [2, 3] }": "must include the base's 1: the search begins there",
+    "search.cost.effort_weight = { uniform = [2, 3] }": "must include the base's 1: the search starts there",
     "search.horizon.control = { uniform = [1, 3] }": "must be a whole number or { choice",
     "search.horizon.control = { choice = [2, 60] }": "must lie in 1..50",
-    "search.horizon.control = { choice = [2, 20] }": "ends of its ranges do not go together",
+    "search.horizon.control = { choice = [2, 20] }": "a combination of the ranges' ends is invalid",
     "search = {}": "search must have 1 to 10 keys",
 }
 
 
 @pytest.mark.parametrize(("text", "message"), FAULTS.items())
 def test_a_fault_names_file_key_value_and_rule(text: str, message: str, tmp_path: Path) -> None:
-    """What is wrong in a tune.toml is said before anything is flown."""
+    """An error in tune.toml raises `InvalidSettingsError` before any flight."""
     path = tmp_path / "tune.toml"
     path.write_text(text)
     with pytest.raises(InvalidSettingsError) as caught:
@@ -244,14 +246,14 @@ def test_a_fault_names_file_key_value_and_rule(text: str, message: str, tmp_path
 
 
 def test_no_trial_of_the_default_study_costs_more_than_its_base() -> None:
-    """Horizons and iterations end at those of preset mambo."""
+    """The largest horizons and iteration count of the search are those of preset mambo."""
     tuning = file.default()
     for path in ("horizon.prediction", "horizon.control", "optimizer.iterations"):
         assert max(tuning.search[path].numbers) == tuning.start[path]
 
 
 def test_the_documented_study_is_the_default_one(tmp_path: Path) -> None:
-    """What docs/tuning.md prints is what is searched without a file."""
+    """The tune.toml in docs/tuning.md equals the default study."""
     text = (Path(__file__).parents[2] / "docs" / "tuning.md").read_text("utf-8")
     path = tmp_path / "tune.toml"
     path.write_text(text.split("```toml\n")[1].split("```")[0])
@@ -272,8 +274,8 @@ main()
 
 
 @pytest.mark.long
-def test_ctrl_c_leaves_a_study_that_goes_on(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Exit 130 and one line, though the terminal interrupts the workers too."""
+def test_a_study_resumes_after_ctrl_c(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Ctrl-C, which also signals the workers, exits with 130 and one line."""
     arguments = ("tune", source, "--trials", TRIALS, "--workers", 2, "-o", tmp_path)
     line = [sys.executable, "-c", STOPPED, *map(str, arguments)]
     done = subprocess.run(
