@@ -59,7 +59,7 @@ class TuneFile(Section):
 
 @dataclass(frozen=True)
 class Tuning:
-    """A study: `search` has a range for each searched key, as in cost.effort_weight; `base` has all others."""
+    """A study: `search` has a range for each searched key, as cost.effort_weight; `base` has the others."""
 
     file: TuneFile
     base: Settings

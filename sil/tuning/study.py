@@ -85,8 +85,8 @@ def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["S
     except (SQLAlchemyError, ImportError, optuna.exceptions.StorageInternalError) as error:
         reason = str(error.__cause__ or error).splitlines()[0]
         raise StudyError(
-            f"{named}: the database refused an access ({echo(reason)}); its trials are kept. A URL has the form "
-            "sqlite:////home/me/study.db or postgresql://host/name; the database's driver must be installed"
+            f"{named}: the database refused an access ({echo(reason)}); its trials are kept. A URL is as in "
+            "sqlite:////home/me/study.db or postgresql://host/name, with that database's driver installed"
         ) from error
 
 
@@ -128,8 +128,8 @@ def search(
 def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int, tuple[float, float]]:
     """Return the number of crashed flights, and the means of IAE and command variation over all flights.
 
-    A crashed flight is assigned a constant error of `CRASH_ERROR_M` and a command that jumps between its limits
-    at every update. These values bound those of all other flights, too.
+    A crashed flight is assigned a constant error of `CRASH_ERROR_M` and a command that jumps between its
+    limits at every update. These values bound those of all other flights, too.
     """
     worst = np.array([CRASH_ERROR_M * duration_s, 4.0 * tilt_rad])
     found = np.array(

@@ -150,7 +150,7 @@ def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, 
 
 
 def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_path: Path) -> None:
-    """stdout has base and chosen point, stderr no progress without a terminal; no trial is flown again."""
+    """Base and chosen point are printed, progress only on a terminal; no trial is flown again."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     done = command("tune", source, "--trials", TRIALS, "-o", folder)
