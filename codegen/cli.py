@@ -81,6 +81,8 @@ def _exit_code(error: BaseException) -> int:
             return INTERRUPTED
         case MemoryError():
             typer.echo("there is not enough memory", err=True)
+        case LookupError():  # jinja2.TemplateNotFound is an OSError too, but a bug of ours
+            raise error
         case OSError():
             stdout_failed = _silence_broken_stdout()
             if isinstance(error, BrokenPipeError):
