@@ -1,29 +1,149 @@
-"""The wheel, installed where nothing else of ours is, does what the checkout does."""
+"""What is installed is mambo_nmpc, all of it, and it works beside folders that have our folders' names."""
 
+import os
+import re
+import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
+from tests.support.tools import require
+
 ROOT = Path(__file__).parent.parent
+FOLDERS = ("codegen", "sil", "templates")
+BUILD_SDIST = "import sys; from setuptools import build_meta; print(build_meta.build_sdist(sys.argv[1]))"
+# Runs each line of stdin as a command; the exit code of this script is that of the first that fails.
+MANY_COMMANDS = """
+import sys
+from mambo_nmpc.__main__ import main
+for line in sys.stdin.read().splitlines():
+    sys.argv = ["mambo-nmpc", *line.split()]
+    try:
+        main()
+    except SystemExit as leaving:
+        if leaving.code:
+            sys.exit(f"{line}: exit code {leaving.code}")
+"""
+
+
+def run(*command: str | Path, folder: Path, stdin: str = "", **environment: str) -> str:
+    """Run a command in `folder` and return its stdout; a failure shows its stderr."""
+    done = subprocess.run(
+        [str(word) for word in command],
+        cwd=folder,
+        input=stdin,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def tracked() -> list[str]:
+    """Return the paths of all files under version control."""
+    return run(require("git", "git"), "ls-files", folder=ROOT).splitlines()
+
+
+def installed(path: str) -> str:
+    """Return where a tracked file of ours stands in site-packages."""
+    return "mambo_nmpc/" + path.removeprefix("sil/package/")
+
+
+def files_of(wheel: Path) -> set[str]:
+    """Return the files of a wheel, without those that describe it."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    return {name for name in names if not re.match(r"mambo_nmpc-[^/]*\.dist-info/", name)}
+
+
+def wheel_of(source: Path, folder: Path) -> Path:
+    """Build the wheel of a source folder or archive."""
+    run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", "wheels", source, folder=folder)
+    return next((folder / "wheels").glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the tracked files, in which an earlier build left a module that is no more."""
+    folder = tmp_path_factory.mktemp("source")
+    for path in tracked():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / path, folder / path)
+    stale = folder / "build" / "lib" / "mambo_nmpc" / "stale.py"
+    stale.parent.mkdir(parents=True)
+    stale.write_text("", "utf-8")
+    return folder
 
 
 @pytest.mark.long
-def test_the_wheel_generates_and_flies_in_a_clean_environment(tmp_path: Path) -> None:
-    """Templates, presets and the glue are in the wheel; the bundle equals the committed one."""
+def test_wheel_and_source_archive_hold_every_tracked_file_and_no_other(source: Path, tmp_path: Path) -> None:
+    """A package missing in pyproject.toml, or a stale module in build/lib, changes the list of files."""
+    expected = {
+        installed(path) for path in tracked() if path.startswith(tuple(f"{name}/" for name in FOLDERS))
+    }
+    assert {"mambo_nmpc/py.typed", "mambo_nmpc/templates/src/nmpc.c.j2"} <= expected
+    assert files_of(wheel_of(source, tmp_path)) == expected
 
-    def run(*command: str | Path) -> str:
-        line = [str(word) for word in command]
-        done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+    run(sys.executable, "-m", "venv", "builder", folder=tmp_path)
+    python = tmp_path / "builder" / "bin" / "python"
+    run(python, "-m", "pip", "install", "-q", "setuptools>=77", folder=tmp_path)
+    run(python, "-c", BUILD_SDIST, tmp_path, folder=source)
+    (tmp_path / "again").mkdir()
+    archive = next(tmp_path.glob("*.tar.gz"))
+    assert files_of(wheel_of(archive, tmp_path / "again")) == expected
 
-    run(sys.executable, "-m", "venv", "clean")
-    python = tmp_path / "clean" / "bin" / "python"
-    run(python, "-m", "pip", "wheel", "-q", "--no-deps", "-w", "wheels", ROOT)
-    wheel = next((tmp_path / "wheels").glob("mambo_nmpc-*.whl"))
-    run(python, "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt", wheel)
-    command = tmp_path / "clean" / "bin" / "mambo-nmpc"
-    run(command, "generate", "mambo", "-o", ROOT / "generated" / "mambo", "--check")
-    assert "IAE" in run(command, "fly", "--duration-s", "1", "-o", "flight")
+
+@pytest.mark.long
+def test_the_wheel_generates_and_flies_in_a_clean_environment(source: Path, tmp_path: Path) -> None:
+    """Only mambo_nmpc is added to site-packages, and the bundle equals the committed one."""
+    wheel = wheel_of(source, tmp_path)
+    run(sys.executable, "-m", "venv", "clean", folder=tmp_path)
+    binaries = tmp_path / "clean" / "bin"
+    constraints = ROOT / "constraints.txt"
+    run(binaries / "python", "-m", "pip", "install", "-q", "-c", constraints, wheel, folder=tmp_path)
+    packages = next((tmp_path / "clean" / "lib").glob("python*/site-packages"))
+    assert not [name for name in FOLDERS if (packages / name).exists()]
+    command = binaries / "mambo-nmpc"
+    run(command, "generate", "mambo", "-o", ROOT / "generated" / "mambo", "--check", folder=tmp_path)
+    assert "IAE" in run(command, "fly", "--duration-s", "1", "-o", "flight", folder=tmp_path)
+
+
+def test_every_command_works_beside_folders_of_our_names(tmp_path: Path) -> None:
+    """A user's own packages codegen, sil and templates, on the search path, change nothing."""
+    require("gcc", "gcc")
+    for name in FOLDERS:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("", "utf-8")
+    path = str(tmp_path)
+    module = (sys.executable, "-m", "mambo_nmpc")
+    assert re.match(r"mambo-nmpc \d", run(*module, "--version", folder=tmp_path, PYTHONPATH=path))
+    shown = run(*module, "--help", folder=tmp_path, PYTHONPATH=path, COLUMNS="200")
+    commands = re.findall(r"^│ ([a-z][a-z0-9-]*) ", shown, re.MULTILINE)
+    assert {"init", "generate", "fly", "doctor", "report"} <= set(commands)
+    lines = [f"{command} --help" for command in commands]
+    lines += ["presets", "init", "generate controller.toml -o c", "fly --duration-s 1 -o flight", "doctor"]
+    run(sys.executable, "-c", MANY_COMMANDS, folder=tmp_path, stdin="\n".join(lines), PYTHONPATH=path)
+    assert (tmp_path / "c" / "src" / "nmpc.c").is_file()
+    assert (tmp_path / "flight" / "trace.csv").is_file()
+
+
+def test_a_missing_template_is_a_bug_with_a_traceback(tmp_path: Path) -> None:
+    """It is a broken installation, not a file that the user could provide."""
+    package = tmp_path / "mambo_nmpc"
+    shutil.copytree(ROOT / "sil" / "package", package)
+    for name in ("codegen", "sil"):
+        (package / name).symlink_to(ROOT / name)
+    shutil.copytree(ROOT / "templates", package / "templates")
+    (package / "templates" / "src" / "nmpc_cost.c.j2").unlink()
+    command = [sys.executable, "-m", "mambo_nmpc", "generate", "-o", "c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Traceback")
+    assert "TemplateNotFound" in done.stderr.splitlines()[-1]
+    assert "nmpc_cost.c.j2" in done.stderr.splitlines()[-1]
+    assert not (tmp_path / "c").exists()
