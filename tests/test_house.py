@@ -1,82 +1,167 @@
-"""The house keeps its shape: who may import whom, and what the project may not name."""
+"""The structure of the project: who may import whom, and what a module may be."""
 
 import ast
-import re
 import subprocess
 import sys
+import tomllib
+from collections import defaultdict
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
-OURS = {"codegen", "sil", "templates", "tests", "benchmarks"}
-ALLOWED = {"codegen": set(), "sil": {"codegen"}, "templates": set(), "benchmarks": {"codegen", "sil"}}
+OURS = ("codegen", "sil", "templates", "benchmarks", "tests")
 LONGEST_MODULE = 500
+# A wing of sil imports only wings above it in this list.
+WINGS = [
+    "errors",
+    "plant",
+    "sensors",
+    "firmware",
+    "files",
+    "show",
+    "flight",
+    "emulation",
+    "controllers",
+    "paper",
+    "footprint",
+    "faults",
+    "campaign",
+    "verify",
+    "tuning",
+    "report",
+    "cli",
+    "package",
+]
+# What else a top-level folder imports of ours.
+ALLOWED = {
+    "codegen": set(),
+    "templates": set(),
+    "sil": {"codegen"},
+    "benchmarks": {"codegen", "sil"},
+    "tests": {"codegen", "sil", "templates", "benchmarks", "mambo_nmpc"},
+}
 
 
-def imported(path: Path) -> set[str]:
-    """Return the top-level packages that a module imports."""
+@cache
+def modules() -> dict[str, Path]:
+    """Return all modules and packages of ours, named by their folders: sil.plant.rotors."""
+    paths = [path for folder in OURS for path in (ROOT / folder).rglob("*.py")]
+    dotted = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths}
+    return {name.removesuffix(".__init__"): path for path, name in dotted.items()}
+
+
+@cache
+def tree(module: str) -> ast.Module:
+    """Parse a module."""
+    return ast.parse(modules()[module].read_text("utf-8"))
+
+
+def imported(module: str) -> set[str]:
+    """Return the names that a module imports anywhere in it, of ours those of modules and packages."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in ast.walk(tree(module)):
         if isinstance(node, ast.Import):
-            names |= {alias.name.partition(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            names.add(node.module.partition(".")[0])
+            names |= {ours(alias.name) for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} imports relatively"
+            source = ours(node.module or "")
+            inside = {f"{source}.{alias.name}" for alias in node.names}
+            names |= (inside & modules().keys()) | ({source} if inside - modules().keys() else set())
     return names
 
 
-@pytest.mark.parametrize("package", ALLOWED)
-def test_imports_run_one_way(package: str) -> None:
-    """Codegen imports nothing of ours, sil only codegen, and no test is imported by anything."""
-    for path in (ROOT / package).rglob("*.py"):
-        beyond = imported(path) & OURS - ALLOWED[package] - {package}
-        assert not beyond, f"{path} imports {beyond}"
+def ours(name: str) -> str:
+    """Return the name of an installed module by its folders."""
+    return name.removeprefix("mambo_nmpc.")
 
 
-def module_name(path: Path) -> str:
-    """Return the name by which a module of ours is imported."""
-    return ".".join(("mambo_nmpc", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
+def wing(module: str) -> str:
+    """Return the part of sil that a module belongs to."""
+    return module.split(".")[1]
 
 
-def test_no_modules_import_each_other_in_a_circle() -> None:
-    """Nor inside functions: `TopologicalSorter` raises CycleError with the modules of a circle."""
-    paths = [path for package in ("codegen", "sil") for path in (ROOT / package).rglob("*.py")]
-    modules = {module_name(path): path for path in paths}
-    graph = {}
-    for module, path in modules.items():
-        graph[module] = {
-            name if (name := f"{node.module}.{alias.name}") in modules else node.module
-            for node in ast.walk(ast.parse(path.read_text("utf-8")))
-            if isinstance(node, ast.ImportFrom)
-            for alias in node.names
-        } - {module}
-    assert len(list(TopologicalSorter(graph).static_order())) >= len(modules)
+def test_top_level_folders_import_one_way() -> None:
+    """Codegen and templates import nothing of ours, sil only codegen, and nothing imports tests."""
+    for module in modules():
+        folder = module.partition(".")[0]
+        others = {name.partition(".")[0] for name in imported(module)} & {*OURS, "mambo_nmpc"} - {folder}
+        assert others <= ALLOWED[folder], f"{module} imports {others - ALLOWED[folder]}"
+
+
+def test_wings_import_one_way() -> None:
+    """A wing of sil imports only wings below it."""
+    inside = [module for module in modules() if module.startswith("sil.")]
+    assert {wing(module) for module in inside} == set(WINGS)
+    upwards = [
+        f"{module} imports {name}"
+        for module in inside
+        for name in imported(module)
+        if name.startswith("sil.") and WINGS.index(wing(name)) > WINGS.index(wing(module))
+    ]
+    assert not upwards
+
+
+def test_no_import_runs_in_a_circle() -> None:
+    """Not even through an import inside a function."""
+    TopologicalSorter({module: imported(module) & modules().keys() for module in modules()}).prepare()
 
 
 def test_generating_needs_neither_compiler_nor_plot() -> None:
     """Codegen imports no cffi, no matplotlib and no scipy."""
-    for path in (ROOT / "codegen").rglob("*.py"):
-        assert not imported(path) & {"cffi", "matplotlib", "scipy"}, path
+    for module in modules():
+        if module.startswith("codegen"):
+            assert not {name.partition(".")[0] for name in imported(module)} & {"cffi", "matplotlib", "scipy"}
 
 
 def test_tests_never_import_each_other() -> None:
     """What they share is in tests.support."""
-    for path in (ROOT / "tests").rglob("test_*.py"):
-        assert not re.search(r"^(from|import) tests\.test_", path.read_text("utf-8"), re.MULTILINE), path
+    for module in modules():
+        if module.startswith("tests."):
+            others = {name for name in imported(module) if name.startswith("tests.")}
+            assert all(name.startswith("tests.support") for name in others), f"{module} imports {others}"
 
 
-def test_no_module_is_too_long() -> None:
-    """A module of more than 500 lines knows more than one thing."""
-    for package in OURS:
-        for path in (ROOT / package).rglob("*.py"):
-            assert len(path.read_text("utf-8").splitlines()) <= LONGEST_MODULE, path
+def test_one_class_name_is_one_class() -> None:
+    """Whoever reads a name in one module need not ask which of two classes it is."""
+    homes = defaultdict(list)
+    for module in modules():
+        if not module.startswith("tests"):
+            for node in ast.walk(tree(module)):
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    homes[node.name].append(module)
+    assert not {name: where for name, where in homes.items() if len(where) > 1}
 
 
-def test_a_command_that_draws_nothing_loads_no_plotting_library() -> None:
-    """Help and generation stay quick, and work where matplotlib does not."""
-    script = "import sys; from mambo_nmpc.sil.cli.app import main; print('matplotlib' in sys.modules)"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+def test_every_folder_of_modules_is_installed() -> None:
+    """A package that pyproject.toml does not list is missing in the wheel."""
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["packages"]
+    folders = [
+        "mambo_nmpc" if name == "sil.package" else f"mambo_nmpc.{name}"
+        for name, path in modules().items()
+        if path.name == "__init__.py" and not name.startswith(("tests", "benchmarks"))
+    ]
+    assert sorted(listed) == sorted(folders)
+
+
+def test_modules_are_short_and_named_by_their_subject() -> None:
+    """A module of more than 500 lines, or one of utilities, has more than one subject."""
+    for module, path in modules().items():
+        assert len(path.read_text("utf-8").splitlines()) <= LONGEST_MODULE, path
+        assert module.rpartition(".")[2] not in {"utils", "util", "helpers", "misc"}, path
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["generate", "--help"]])
+def test_help_loads_no_plotting_library(arguments: list[str]) -> None:
+    """Help answers at once, and works where matplotlib does not."""
+    script = (
+        "import atexit, sys\n"
+        "from mambo_nmpc.__main__ import main\n"
+        "atexit.register(lambda: print('matplotlib' in sys.modules))\n"
+        "main()"
     )
-    assert done.stdout.split() == ["False"]
+    command = [sys.executable, "-c", script, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("False\n")
