@@ -1,5 +1,7 @@
 # make fly        set up, generate the C of preset mambo, compile it, fly Table II; results in build/fly
-# make test       set up, check style and types, run the tests; with CI=true also the long ones
+# make check      style, types, and the tests that need no compiler: what to run while editing
+# make test       set up everything, check style and types, run the tests; with CI=true also the long ones
+#                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
 # make bench      time flights against RotorPy, and updates against peers; results in build/bench
@@ -16,8 +18,8 @@ PEERS = build/peers
 SETUP_PEERS = $(PEERS)/.installed
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
-# What the tests want beside a C compiler; named as Debian names it.
-TOOLS = gcc g++ clang make cmake binutils \
+# Compilers, emulators and analysers that the tests want: Debian's packages, and the commands that show them.
+TOOL_PACKAGES = gcc g++ clang make cmake binutils \
     gcc-arm-linux-gnueabi libc6-dev-armel-cross gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc qemu-system-misc \
     frama-c-base cppcheck libclang-rt-14-dev chromium
 TOOL_COMMANDS = gcc g++ clang make cmake nm \
@@ -28,28 +30,37 @@ ifeq ($(CI),true)
 MARKED = -m "long or not long"
 endif
 
-.PHONY: fly test tools generated bench bench-peers clean
+# Tests that need no compiler and take seconds. They run with a PATH on which there is none.
+CHECKED = tests/test_house.py tests/campaign/test_campaign.py tests/codegen tests/files tests/firmware \
+    tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
+    tests/flight/test_trajectories.py tests/plant tests/sensors
+
+.PHONY: fly check test tools generated bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
 	$(BIN)/mambo-nmpc table2 -o build/fly
 	@echo "pictures: build/fly/figure3.png and .svg; the C: build/mambo"
 
+check: $(SETUP_TEST)
+	$(STYLE_AND_TYPES)
+	@CI= PATH="$(CURDIR)/$(BIN)" $(BIN)/python -m pytest -q -r fE -n auto $(CHECKED)
+
 test: tools $(SETUP_TEST)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(TYPING)
-	$(BIN)/mypy
+	$(STYLE_AND_TYPES)
 	$(BIN)/python -m pytest -n auto $(MARKED)
 
-# Where there is apt and the right to use it, install what is missing; elsewhere say what to install.
+# As root on a system with apt, install all packages if a command is missing; elsewhere name them.
 tools:
-	@missing=""; for tool in $(TOOL_COMMANDS); do command -v $$tool >/dev/null || missing=yes; done; \
+	@missing=""; for tool in $(TOOL_COMMANDS); do command -v $$tool >/dev/null || missing="$$missing $$tool"; done; \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	if command -v apt-get >/dev/null && [ "$$(id -u)" = 0 ]; then \
-	    apt-get update --quiet=2 && apt-get install --quiet=2 --yes --no-install-recommends $(TOOLS) >/dev/null; \
+	echo "missing on this system:$$missing"; \
+	if [ "$(TOOLS)" != no ] && command -v apt-get >/dev/null && [ "$$(id -u)" = 0 ]; then \
+	    echo "installing with apt-get, which 'make test TOOLS=no' does not: $(TOOL_PACKAGES)"; \
+	    apt-get update --quiet=2 && \
+	    apt-get install --quiet=2 --yes --no-install-recommends $(TOOL_PACKAGES) >/dev/null; \
 	else \
-	    echo "some tests will be skipped without these tools; install: $(TOOLS)"; \
+	    echo "tests that need one of them are skipped; Debian's packages: $(TOOL_PACKAGES)"; \
 	fi
 
 generated: $(SETUP)
@@ -95,11 +106,14 @@ $(SETUP_BENCH): pyproject.toml constraints.txt
 	$(PIP_INSTALL) ".[bench]"
 	@touch $@ $(SETUP)
 
-# mypy finds the one installed package here: its folders, linked side by side.
-define TYPING
+# mypy reads the one installed package from a folder in which its parts are linked side by side.
+define STYLE_AND_TYPES
+$(BIN)/ruff check .
+$(BIN)/ruff format --check .
 @mkdir -p build/typing/mambo_nmpc
 @ln -sfn ../../../codegen ../../../sil ../../../templates ../../../sil/package/__init__.py \
     ../../../sil/package/__main__.py ../../../sil/package/py.typed build/typing/mambo_nmpc/
+$(BIN)/mypy
 endef
 
 clean:
