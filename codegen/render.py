@@ -1,5 +1,6 @@
 """Render the templates: settings in, {path: text} of a bundle out; a pure function, no clock and no path."""
 
+import hashlib
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -43,6 +44,11 @@ DEVIATIONS: Final = "deviations.txt"
 
 _OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
 _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
+_REFUSAL: Final = """
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != {})
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+"""
 _BYTES: Final = {"float32": (4, 4), "float64": (8, 8), "fixed": (4, 8)}
 """Size of a number and of a sum."""
 
@@ -71,20 +77,24 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if amalgamate:
-        layout = {"header_folder": "", "source_folder": "", "sources": ["nmpc.c"]}
+        layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
         library = _amalgamated(text, public, code)
     else:
         layout = {
             "header_folder": "include/",
             "source_folder": "src/",
+            "headers": [f"include/{name}" for name in public],
             "sources": [f"src/{name}" for name in code],
         }
         library = {
             f"include/{name}" if name in public else f"src/{name}": content for name, content in text.items()
         }
     files = library | {path: template.render(context | layout) for path, template in project.items()}
-    prefix = settings.code.prefix
-    named = {with_prefix(path, prefix): with_prefix(text, prefix) for path, text in files.items()}
+    prefix, settings_id = settings.code.prefix, _settings_id(settings)
+    named = {
+        with_prefix(path, prefix): with_prefix(_guarded(path, text, settings_id), prefix)
+        for path, text in files.items()
+    }
     return named | {"controller.toml": to_toml(settings)}
 
 
@@ -134,6 +144,7 @@ def _context(design: Design) -> dict[str, object]:
         ],
         "version": __version__,
         "digest": settings.digest[:16],
+        "settings_id": _settings_id(settings),
         "fixed": numbers.formats is not None,
         "formats": numbers.formats,
         "sine_bits": SINE_BITS,
@@ -177,6 +188,21 @@ def _context(design: Design) -> dict[str, object]:
         "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in proofs(scalar).items()},
         "rule_flags": " ".join(RULE_FLAGS),
     }
+
+
+def _settings_id(settings: Settings) -> str:
+    """Return 32 bits, as a constant of C, that differ for other settings and for another generator version."""
+    digest = hashlib.sha256(f"{__version__} {settings.digest}".encode()).hexdigest()
+    return f"0x{digest[:8].upper()}UL"
+
+
+def _guarded(path: str, text: str, settings_id: str) -> str:
+    """Let a file of C refuse the headers of another bundle, once it has included its own."""
+    includes = list(_OWN_INCLUDE.finditer(text))
+    if not path.endswith((".c", ".h")) or not includes:
+        return text
+    end = includes[-1].end()
+    return text[:end] + _REFUSAL.format(settings_id) + text[end:]
 
 
 def _powers(numbers: Representation, sign: int) -> dict[str, str]:
