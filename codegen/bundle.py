@@ -1,29 +1,30 @@
 """Put a bundle on disk, and compare one: the manifest tells our files from everybody else's.
 
 A bundle is {relative POSIX path: text}, written as UTF-8 with the line ends it has. Its manifest holds the
-generator's version and the SHA-256 of every file: a pure function of the bundle. What stands in the folder
-and not in its manifest is somebody's work, and so is a file of ours that no longer has its SHA-256.
+generator's version and the SHA-256 of every file. A file in the folder that is not in the manifest, or no
+longer has its SHA-256, is the user's work: it is overwritten only with `force`.
 """
 
 import difflib
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Literal
 
-from mambo_nmpc.codegen import __version__, exchange
+from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.atomic import is_left_over, staged
 from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, UnwritableError, echo
-from mambo_nmpc.codegen.exchange import JOURNAL, MANIFEST, STAND_IN
 
+MANIFEST = "manifest.json"
 GENERATOR = "mambo-nmpc"
 
 
 @dataclass(frozen=True)
 class Changes:
-    """What writing a bundle does to its folder: sorted paths; `kept` are the files that are not ours."""
+    """What writing a bundle does to its folder, as sorted paths; `kept` are the user's own files."""
 
     created: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
@@ -48,7 +49,8 @@ class Drift:
 
 def manifest(files: Mapping[str, str]) -> str:
     """Return the manifest of `files` as JSON text."""
-    return _listing({path: _sha256(files[path].encode()) for path in sorted(files)})
+    sha256s = {path: _sha256(files[path].encode()) for path in sorted(files)}
+    return json.dumps({"generator": f"{GENERATOR} {__version__}", "files": sha256s}, indent=2) + "\n"
 
 
 def write(
@@ -56,30 +58,26 @@ def write(
 ) -> Changes:
     """Bring `directory` to the bundle `files`, file by file, and return what changed.
 
-    Files that are not ours stay. A run that finds no room or permission leaves the old bundle; one stopped
-    midway the old one, the new one, or one that refuses to compile until the next run. With `dry_run` nothing
-    is written. Raises, unless `force`, ForeignFilesError if a path of the bundle holds somebody's work and
-    LayoutError if the folder holds a bundle of the other layout; UnwritableError if the disk refuses.
+    All new files are on the disk before the first is renamed into its place; the manifest comes last. A run
+    killed in between leaves C files of two bundles, which do not compile together; the same run, repeated,
+    finishes the work. With `dry_run` nothing is written. Raises, unless `force`, ForeignFilesError if a path
+    of the bundle holds the user's work and LayoutError if the folder holds a bundle of the other layout;
+    UnwritableError if the file system refuses.
     """
     contents = _contents(files)
     name = echo(str(directory))
+    target = Path(os.path.realpath(directory))
     try:
-        target = _resolved(directory)
-        if dry_run:
-            changes = _plan(contents, target, name, force=force)
-        else:
-            with exchange.exclusive(target, name):
-                changes = _plan(contents, target, name, force=force)
-                _apply(changes, contents, target, lambda: _plan(contents, target, name, force=force).removed)
+        changes = _plan(contents, target, name, force=force)
+        if not dry_run:
+            _apply(contents, changes, target, name, force=force)
         ours = {*contents, *changes.removed}
-        kept = [path for path in _files_in(target) if path not in ours and not exchange.is_left_over(path)]
+        kept = (path for path in _files_in(target) if path not in ours and not is_left_over(path))
         return replace(changes, kept=tuple(kept))
     except OSError as error:
         file = error.filename2 or error.filename
         where = f" ({echo(str(file))})" if file else ""
-        halfway = os.path.lexists(directory / JOURNAL)
-        what_next = "; unfinished until mambo-nmpc generate has run again" if halfway else ""
-        raise UnwritableError(f"{name}: cannot be written: {error.strerror}{where}{what_next}") from error
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror}{where}") from error
 
 
 def check(files: Mapping[str, str], directory: Path) -> tuple[Drift, ...]:
@@ -112,29 +110,10 @@ def _contents(files: Mapping[str, str]) -> dict[str, bytes]:
     return {path: complete[path].encode() for path in sorted(complete)}
 
 
-def _is_safe(path: object) -> bool:
+def _is_safe(path: str) -> bool:
     """Whether `path` is relative, in normal form, and stays inside its folder."""
-    if not isinstance(path, str) or "\0" in path:
-        return False
-    try:
-        os.fsencode(path)
-    except UnicodeEncodeError:
-        return False
     pure = PurePosixPath(path)
     return bool(pure.parts) and not pure.is_absolute() and ".." not in pure.parts and str(pure) == path
-
-
-def _resolved(directory: Path) -> Path:
-    """Return the folder behind every link in `directory`; raises UnwritableError if it can be none."""
-    try:
-        target = directory.resolve()
-    except RuntimeError:
-        raise UnwritableError(f"{echo(str(directory))}: is a loop of symbolic links") from None
-    if not target.name:
-        raise UnwritableError(f"{echo(str(directory))}: is the root of the file system; name a folder in it")
-    if target.exists() and not target.is_dir():
-        raise UnwritableError(f"{echo(str(directory))}: is a file; name a folder")
-    return target
 
 
 def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool) -> Changes:
@@ -143,7 +122,7 @@ def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool
     known = _known(target)
     found = {path: _content(target / path) for path in {*contents, *known}}
     ours = {
-        path for path, content in found.items() if content is not None and _is_ours(content, known.get(path))
+        path for path, content in found.items() if content is not None and _sha256(content) == known.get(path)
     }
     present = {path for path in contents if os.path.lexists(target / path)}
     changed = tuple(path for path in contents if path in present and found[path] != contents[path])
@@ -158,47 +137,31 @@ def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool
     )
 
 
-def _apply(
-    changes: Changes, contents: Mapping[str, bytes], target: Path, last_look: Callable[[], tuple[str, ...]]
-) -> None:
-    """Do what `changes` says, and put right what a killed run left; touch nothing if that is nothing."""
-    known = _known(target)
-    exchange.clear(target, {*known, *contents, JOURNAL})
-    if changes.any:
-        differing = {*changes.created, *changes.changed}
-        guards = _guards(contents, differing, changes.removed)
-        written = {path: contents[path] for path in contents if path in differing or path in guards}
-        hashes = {path: known.get(path, set()) | {_sha256(contents[path])} for path in contents}
-        journal = _listing({path: sorted(sha256s) for path, sha256s in sorted({**known, **hashes}.items())})
-        exchange.replace(target, written, guards, journal.encode(), last_look)
-    exchange.finish(target, known.keys() - contents.keys())
+def _apply(contents: Mapping[str, bytes], changes: Changes, target: Path, name: str, *, force: bool) -> None:
+    """Remove what a killed run left, and do what `changes` says.
 
-
-def _guards(contents: Iterable[str], differing: Iterable[str], removed: Iterable[str]) -> tuple[str, ...]:
-    """Return the headers to shut while files change: of the new bundle, and of the old one if it goes.
-
-    None if a single file of C changes: that is old or new by itself.
+    Dropped files go after the renames, headers after the sources that include them; the manifest comes last.
     """
-    if sum(path.endswith((".c", ".h")) for path in (*differing, *removed)) < 2:
-        return ()
-    return tuple(sorted({*_common_header(contents), *_common_header(removed)}))
-
-
-def _common_header(paths: Iterable[str]) -> tuple[str, ...]:
-    """Return the header that all C among `paths` includes: PREFIX_config.h, or the only one."""
-    headers = [path for path in paths if path.endswith(".h")]
-    configs = sorted((path for path in headers if path.endswith("_config.h")), key=len)
-    return tuple(configs[-1:] or headers[:1])
+    for path in _files_in(target):
+        if is_left_over(path):
+            (target / path).unlink()
+    rank = {path: 1 + path.endswith(".h") for path in changes.removed} | {MANIFEST: 3}
+    differing = (*changes.created, *changes.changed, *changes.removed)
+    ordered = sorted(differing, key=lambda path: rank.get(path, 0))
+    with staged({target / path: contents.get(path) for path in ordered}):
+        if _plan(contents, target, name, force=force) != changes:
+            raise UnwritableError(f"{name}: somebody changed files during the run; run it again")
 
 
 def _refuse_blocked(contents: Mapping[str, bytes], target: Path, name: str) -> None:
     """Refuse folders where a file belongs, files or links where a folder does: no force removes them."""
     blocked = {path for path in contents if (target / path).is_dir() and not (target / path).is_symlink()}
-    for path in contents:
-        for parent in _folders_of(path):
-            place = target / parent
-            if place.is_symlink() or (place.exists() and not place.is_dir()):
-                blocked.add(str(parent))
+    folders = {folder for path in contents for folder in _folders_of(path)}
+    blocked |= {
+        str(folder)
+        for folder in folders
+        if (target / folder).is_symlink() or ((target / folder).exists() and not (target / folder).is_dir())
+    }
     if blocked:
         names = ", ".join(echo(path) for path in sorted(blocked))
         raise ForeignFilesError(
@@ -229,34 +192,24 @@ def _refuse_foreign(foreign: tuple[str, ...], known: Iterable[str], name: str) -
         )
 
 
-def _known(target: Path) -> dict[str, set[str]]:
-    """Return {path: SHA-256s} of what we wrote into `target`, by its manifest and a killed run's journal.
+def _known(target: Path) -> dict[str, object]:
+    """Return {path: SHA-256} of what we wrote into `target`, by its manifest; nothing if that is not ours.
 
-    Nothing of either if it is not ours; no path that leads out of `target`.
+    No path in it leads out of `target`.
     """
-    known: dict[str, set[str]] = {}
-    for listing in (MANIFEST, JOURNAL):
-        content = _content(target / listing) or b""
-        try:
-            document = json.loads(content)
-            if document["generator"].split()[0] != GENERATOR:
-                continue
-            listed = {
-                path: {sha256s} if isinstance(sha256s, str) else set(sha256s)
-                for path, sha256s in document["files"].items()
-                if _is_safe(path) and not any((target / parent).is_symlink() for parent in _folders_of(path))
-            }
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            continue
-        if listing == MANIFEST:
-            listed[MANIFEST] = {_sha256(content)}
-        known = {path: known.get(path, set()) | listed.get(path, set()) for path in {**known, **listed}}
-    return known
-
-
-def _is_ours(content: bytes, sha256s: set[str] | None) -> bool:
-    """Whether we wrote `content` at a path where we wrote `sha256s`."""
-    return content == STAND_IN or (sha256s is not None and _sha256(content) in sha256s)
+    content = _content(target / MANIFEST) or b""
+    try:
+        document = json.loads(content)
+        if document["generator"].split()[0] != GENERATOR:
+            return {}
+        listed = {
+            path: sha256
+            for path, sha256 in document["files"].items()
+            if _is_safe(path) and not any((target / parent).is_symlink() for parent in _folders_of(path))
+        }
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return {}
+    return {**listed, MANIFEST: _sha256(content)}
 
 
 def _folders_of(path: str) -> list[PurePosixPath]:
@@ -266,11 +219,8 @@ def _folders_of(path: str) -> list[PurePosixPath]:
 
 def _files_in(folder: Path) -> list[str]:
     """Return the relative POSIX path of everything in `folder` that is not itself a folder, sorted."""
-    files = []
-    for here, folders, names in os.walk(folder):
-        links = (name for name in folders if (Path(here) / name).is_symlink())
-        files += [(Path(here) / name).relative_to(folder).as_posix() for name in (*names, *links)]
-    return sorted(files)
+    places = (place for place in folder.rglob("*") if place.is_symlink() or not place.is_dir())
+    return sorted(place.relative_to(folder).as_posix() for place in places)
 
 
 def _content(path: Path) -> bytes | None:
@@ -279,11 +229,6 @@ def _content(path: Path) -> bytes | None:
         return path.read_bytes() if path.is_file() and not path.is_symlink() else None
     except FileNotFoundError:
         return None
-
-
-def _listing(sha256s: Mapping[str, object]) -> str:
-    """Return {path: SHA-256s} as the JSON text of a manifest or journal."""
-    return json.dumps({"generator": f"{GENERATOR} {__version__}", "files": sha256s}, indent=2) + "\n"
 
 
 def _sha256(content: bytes) -> str:

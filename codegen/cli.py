@@ -16,7 +16,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from mambo_nmpc.codegen import __version__, bundle, exchange
+from mambo_nmpc.codegen import __version__, bundle
+from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import (
     BAD_INPUT,
     INTERRUPTED,
@@ -158,12 +159,11 @@ def init(
     if place.exists() and not place.is_file():
         raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
     try:
-        with exchange.exclusive(place.parent, echo(str(place.parent))):
-            if os.path.lexists(output) and not force:
-                raise FileExistsRefusedError(
-                    f"{name}: already exists; name another with -o, or overwrite it with --force"
-                )
-            exchange.put(place, text.encode())
+        if os.path.lexists(output) and not force:
+            raise FileExistsRefusedError(
+                f"{name}: already exists; name another with -o, or overwrite it with --force"
+            )
+        put(place, text.encode())
     except OSError as error:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
     typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)

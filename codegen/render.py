@@ -191,7 +191,7 @@ def _context(design: Design) -> dict[str, object]:
 
 
 def _settings_id(settings: Settings) -> str:
-    """Return 32 bits, as a constant of C, that differ for other settings and for another generator version."""
+    """Return a C constant of 32 bits, another one for other settings or another version of the generator."""
     digest = hashlib.sha256(f"{__version__} {settings.digest}".encode()).hexdigest()
     return f"0x{digest[:8].upper()}UL"
 

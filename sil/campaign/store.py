@@ -16,8 +16,8 @@ from types import TracebackType
 from typing import Any, Final, Self
 
 from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
-from mambo_nmpc.codegen.exchange import put
 from mambo_nmpc.sil.files.folders import GENERATOR, locked
 
 TABLE: Final = "flights.csv"

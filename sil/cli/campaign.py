@@ -9,8 +9,8 @@ from typing import Annotated, Any
 import typer
 
 from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.codegen.exchange import put
 from mambo_nmpc.sil.campaign import file
 from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes
 from mambo_nmpc.sil.campaign.file import Campaign

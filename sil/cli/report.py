@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
-from mambo_nmpc.codegen.exchange import put
 
 MARK = '<meta name="generator" content="mambo-nmpc">'
 """What marks a page as ours, which may be written anew."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen import cli as generating
+from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.codegen.exchange import put
 from mambo_nmpc.sil.campaign.executors import processes
 from mambo_nmpc.sil.campaign.store import claim, refusals
 from mambo_nmpc.sil.cli.progress import counting_bar

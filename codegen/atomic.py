@@ -1,0 +1,71 @@
+"""Write files whole or not at all: each is written beside its place first, then renamed into it."""
+
+import contextlib
+import os
+import stat
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+_NEW = ".mambo-nmpc-new"
+
+
+def put(place: Path, content: bytes) -> None:
+    """Write one file whole or not at all, its folder made if it is missing; raises OSError."""
+    with staged({place: content}):
+        pass
+
+
+@contextlib.contextmanager
+def staged(files: Mapping[Path, bytes | None]) -> Iterator[None]:
+    """Write new files to the disk beside their places; on leaving rename them, in the order of `files`.
+
+    None in place of a content removes the file, and its folder if that is empty then. An error up to the
+    first rename leaves every place as it was. Raises OSError that names the place.
+    """
+    missing = {folder for place in files for folder in place.parents if not folder.exists()}
+    new = {place: place.with_name(f".{place.name}.{os.getpid()}{_NEW}") for place in files}
+    try:
+        for place, content in files.items():
+            if content is not None:
+                _write(new[place], place, content)
+        yield
+        for place, content in files.items():
+            if content is not None:
+                new[place].replace(place)
+            else:
+                place.unlink(missing_ok=True)
+                with contextlib.suppress(OSError):
+                    os.removedirs(place.parent)
+    except BaseException:
+        for path in new.values():
+            with contextlib.suppress(OSError):
+                path.unlink()
+        for folder in sorted(missing, reverse=True):
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        raise
+
+
+def is_left_over(path: str) -> bool:
+    """Whether a killed run left the new file `path` beside its place."""
+    return path.endswith(_NEW)
+
+
+def _write(new: Path, place: Path, content: bytes) -> None:
+    """Bring `new` to the disk, with permissions and owner of the file at `place` if there is one."""
+    try:
+        if not place.parent.exists():
+            place.parent.mkdir(parents=True, exist_ok=True)
+        with new.open("wb") as file:
+            if place.is_file() and not place.is_symlink():
+                old = place.stat()
+                with contextlib.suppress(OSError):
+                    os.fchown(file.fileno(), old.st_uid, old.st_gid)
+                with contextlib.suppress(OSError):
+                    os.fchmod(file.fileno(), stat.S_IMODE(old.st_mode))
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        error.filename = str(place)
+        raise
