@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.errors import InvalidSettingsError
@@ -230,6 +231,65 @@ def test_the_bundle_builds_by_cmake(tmp_path: Path) -> None:
     shell("cmake", "-S", ".", "-B", "out", folder=tmp_path)
     shell("cmake", "--build", "out", folder=tmp_path)
     assert "all steps equal" in shell("out/nmpc_example", folder=tmp_path)
+
+
+@pytest.mark.parametrize("amalgamate", [False, True])
+def test_a_project_finds_the_installed_bundle(tmp_path: Path, *, amalgamate: bool) -> None:
+    """`find_package` brings the library and its headers, under the bundle's prefix."""
+    require("cmake", "cmake")
+    placed(renamed(presets.load("mambo"), "drone"), tmp_path / "drone", amalgamate=amalgamate)
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.10)\nproject(firmware C)\n"
+        "find_package(drone_controller REQUIRED)\nadd_executable(firmware main.c)\n"
+        "target_link_libraries(firmware PRIVATE drone_controller)\n"
+    )
+    header = "drone.h" if amalgamate else "drone_self_test.h"
+    (tmp_path / "main.c").write_text(
+        f'#include "{header}"\nint main(void) {{ drone_t one; return drone_self_test(&one); }}\n'
+    )
+    shell("cmake", "-S", "drone", "-B", "one", folder=tmp_path)
+    shell("cmake", "--build", "one", folder=tmp_path)
+    shell("cmake", "--install", "one", "--prefix", "installed", folder=tmp_path)
+    shell("cmake", "-S", ".", "-B", "two", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", folder=tmp_path)
+    shell("cmake", "--build", "two", folder=tmp_path)
+    shell("two/firmware", folder=tmp_path)
+
+
+@pytest.mark.parametrize("amalgamate", [False, True])
+def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path, *, amalgamate: bool) -> None:
+    """Objects of another processor, of other flags, or without -fPIC are never linked."""
+    require("make", "make")
+    require("readelf", "binutils")
+    require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+    placed(presets.load("mambo"), tmp_path, amalgamate=amalgamate)
+
+    def machine(board: str) -> str:
+        printed = shell("readelf", "-h", f"build/{board}/libnmpc_controller.a", folder=tmp_path)
+        return " ".join(set(re.findall(r"Machine: +(.+)", printed)))
+
+    assert "-c" in shell("make", folder=tmp_path)
+    host = machine("host")
+    shell("make", "BOARD=crazyflie", folder=tmp_path)
+    assert (machine("host"), machine("crazyflie")) == (host, "ARM")
+    shell("make", "shared", folder=tmp_path)
+    assert (tmp_path / "build/host/libnmpc_controller.so").is_file()
+    assert shell("make", folder=tmp_path) == ""
+    for other in ("CFLAGS=-std=c99 -O1 -ffp-contract=off", "CC=gcc -pipe", "TARGET=-fno-inline"):
+        flag = other.split("=", 1)[1]
+        assert flag in shell("make", other, folder=tmp_path)
+        assert shell("make", other, folder=tmp_path) == ""
+    assert "-c" in shell("make", folder=tmp_path)
+
+
+def test_make_lists_the_boards_when_it_knows_none_of_that_name(tmp_path: Path) -> None:
+    """It does not silently build for the host."""
+    require("make", "make")
+    placed(presets.load("mambo"), tmp_path)
+    command = ["make", "BOARD=crazyfly"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert f"BOARD=crazyfly is unknown; the boards are: {' '.join(boards.names())}." in done.stderr
+    assert not (tmp_path / "build").exists()
 
 
 @pytest.mark.parametrize(
