@@ -45,6 +45,10 @@ typedef long long nmpc_sum_t;
 #define NMPC_VERSION "mambo-nmpc 0.1.0"
 #define NMPC_SETTINGS_DIGEST "c69ced21572a3204"
 
+/* Identifies the settings and the generator's version. Every other C file of this bundle checks it, so that files of
+ * different bundles do not compile together. */
+#define NMPC_SETTINGS_ID 0xD4C905DCUL
+
 /* Horizons: Np, Nc and Imax of Table I. A move is one angle at one step of the control horizon. */
 #define NMPC_PREDICTION_HORIZON 10
 #define NMPC_CONTROL_HORIZON 2

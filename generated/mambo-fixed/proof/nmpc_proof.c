@@ -13,6 +13,10 @@
 
 #include "nmpc.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 #define INPUTS 12
 
 static volatile nmpc_real_t any_real;

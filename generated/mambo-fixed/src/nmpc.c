@@ -13,6 +13,10 @@
 #include "nmpc_optimizer.h"
 #include "nmpc_predictor.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* Assertions at compile time: an array of negative size stops the build. */
 typedef char nmpc_assert_horizons[((NMPC_CONTROL_HORIZON >= 1)
                                    && (NMPC_CONTROL_HORIZON <= NMPC_PREDICTION_HORIZON)

@@ -7,6 +7,10 @@
 
 #include "nmpc_float.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* Numbers per unit, and units per number. */
 #define NMPC_POSITION_SCALE 524288.0f
 #define NMPC_VELOCITY_SCALE 8.388608e+06f

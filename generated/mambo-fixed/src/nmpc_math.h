@@ -8,6 +8,10 @@
 
 #include "nmpc_config.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* Products shift negative numbers to the right, and C leaves open what that does: an array of negative size stops
  * the build where it is not rounding down. */
 typedef char nmpc_assert_shift_rounds_down[(((-3) >> 1) == -2) ? 1 : -1];

@@ -6,6 +6,10 @@
  */
 #include "nmpc_predictor.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES] = {
     { 67717, 117223, 0, 0 },
     { 516006, 861829, 67717, 117223 },

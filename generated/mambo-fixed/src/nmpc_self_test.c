@@ -8,6 +8,10 @@
 
 #include "nmpc_math.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 #define NMPC_SELF_TEST_STEPS 24
 
 typedef struct {

@@ -8,6 +8,10 @@
 #include "nmpc.h"
 #include "nmpc_self_test.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x8D00AE40UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 #define THRUST_ACCELERATION_M_S2 9.81
 #define STEPS_PER_LINE 50
 #define LINES 11

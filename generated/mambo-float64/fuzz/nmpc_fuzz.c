@@ -21,6 +21,10 @@
 
 #include "nmpc.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x8D00AE40UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* A call is one byte and NMPC_FUZZ_REALS numbers of the host's format. Bits 0 and 1 of the byte choose the
  * function; each of the bits 2 to 5 makes a pointer argument null, the first argument's first. */
 #define NMPC_FUZZ_REALS 12

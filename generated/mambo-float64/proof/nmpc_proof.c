@@ -15,6 +15,10 @@
 
 #include "nmpc.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x8D00AE40UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 #define INPUTS 12
 
 static volatile nmpc_real_t any_real;

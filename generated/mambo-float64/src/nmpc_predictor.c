@@ -6,6 +6,10 @@
  */
 #include "nmpc_predictor.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x8D00AE40UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES] = {
     { 0.06457953288686658, 0.11179242846615922, 0.0, 0.0 },
     { 0.49210190603011394, 0.8219046118872821, 0.06457953288686658, 0.11179242846615922 },

@@ -41,6 +41,10 @@ typedef float nmpc_sum_t;
 #define NMPC_VERSION "mambo-nmpc 0.1.0"
 #define NMPC_SETTINGS_DIGEST "0b8111c251952992"
 
+/* Identifies the settings and the generator's version. Every other C file of this bundle checks it, so that files of
+ * different bundles do not compile together. */
+#define NMPC_SETTINGS_ID 0x4C22561DUL
+
 /* Horizons: Np, Nc and Imax of Table I. A move is one angle at one step of the control horizon. */
 #define NMPC_PREDICTION_HORIZON 10
 #define NMPC_CONTROL_HORIZON 2

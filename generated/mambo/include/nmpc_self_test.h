@@ -8,6 +8,10 @@
 
 #include "nmpc.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* Frozen steps: an episode is a controller stepped NMPC_SELF_TEST_TICKS times from nmpc_init(). */
 #define NMPC_SELF_TEST_EPISODES 1000
 #define NMPC_SELF_TEST_TICKS 100

@@ -7,6 +7,10 @@
 #include "nmpc_math.h"
 #include "nmpc_predictor.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* The errors along one axis of the world. */
 typedef struct {
     nmpc_real_t distance_m; /* the sum of their sizes */

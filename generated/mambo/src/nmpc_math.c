@@ -6,6 +6,10 @@
  */
 #include "nmpc_math.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 #define NMPC_SINE_TERMS 4
 #define NMPC_COSINE_TERMS 5
 

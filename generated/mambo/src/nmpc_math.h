@@ -8,6 +8,10 @@
 
 #include "nmpc_config.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* Flags that would change the arithmetic of this library. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0))
 #error "build without -ffast-math: the input check relies on NaN, the bits on the order of operations"

@@ -6,6 +6,10 @@
  */
 #include "nmpc_predictor.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES] = {
     { 0.06457953f, 0.11179243f, 0.0f, 0.0f },
     { 0.4921019f, 0.8219046f, 0.06457953f, 0.11179243f },

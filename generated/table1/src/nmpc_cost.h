@@ -7,6 +7,10 @@
 
 #include "nmpc.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD76A4655UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif

@@ -8,6 +8,10 @@
 #include "nmpc_cost.h"
 #include "nmpc_math.h"
 
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD76A4655UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
 /* What RPROP remembers of a move from one iteration to the next. */
 typedef struct {
     nmpc_real_t step_rad;
