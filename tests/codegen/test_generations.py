@@ -13,7 +13,8 @@ import pytest
 from mambo_nmpc.codegen import bundle
 from mambo_nmpc.codegen import render as rendering
 from mambo_nmpc.codegen.atomic import is_left_over
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.bundles import FILES, NEXT, content, expected
 from tests.support.tools import require
 
