@@ -65,6 +65,7 @@ def test_reference_and_compiled_flights_print_the_same(tmp_path: Path) -> None:
         command("fly", "--duration-s", "1", "--controller", kind, "--json", "-o", kind, folder=tmp_path)
         for kind in ("nmpc", "reference")
     ]
+    assert [flight.returncode for flight in flights] == [0, 0], flights[0].stderr
     metrics = [json.loads(flight.stdout)["metrics"] for flight in flights]
     assert metrics[0] == metrics[1]
 
