@@ -9,8 +9,6 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).parent.parent
 OURS = ("codegen", "sil", "templates", "benchmarks", "tests")
 LONGEST_MODULE = 500
@@ -153,8 +151,7 @@ def test_modules_are_short_and_named_by_their_subject() -> None:
         assert module.rpartition(".")[2] not in {"utils", "util", "helpers", "misc"}, path
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["generate", "--help"]])
-def test_help_loads_no_plotting_library(arguments: list[str]) -> None:
+def test_help_loads_no_plotting_library() -> None:
     """Help answers at once, and works where matplotlib does not."""
     script = (
         "import atexit, sys\n"
@@ -162,6 +159,6 @@ def test_help_loads_no_plotting_library(arguments: list[str]) -> None:
         "atexit.register(lambda: print('matplotlib' in sys.modules))\n"
         "main()"
     )
-    command = [sys.executable, "-c", script, *arguments]
+    command = [sys.executable, "-c", script, "--help"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.endswith("False\n")
