@@ -6,7 +6,6 @@ for which core they build, but can run no other program and name no file.
 """
 
 import difflib
-import json
 import re
 from collections.abc import Sequence
 from importlib import resources
@@ -24,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
+from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo, echo_value
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 
 _FOLDER = resources.files("mambo_nmpc.codegen") / "data" / "boards"
@@ -217,7 +216,7 @@ def _fault(details: ErrorDetails) -> str:
                 f"did you mean {near[0]}?" if near else f"there are {', '.join(keys)}"
             )
         case "model_type":
-            value = _spelled(details["input"])
+            value = echo_value(details["input"])
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
         case "budget":
             return f"{dotted}.{details['msg']}"
@@ -225,7 +224,7 @@ def _fault(details: ErrorDetails) -> str:
             rule = details["msg"]
             for subject in _PYDANTIC_SUBJECTS:
                 rule = rule.replace(subject, "must")
-            return f"{dotted} = {_spelled(details['input'])} {rule}"
+            return f"{dotted} = {echo_value(details['input'])} {rule}"
 
 
 def _fields(section: Sequence[int | str]) -> dict[str, Any]:
@@ -234,16 +233,6 @@ def _fields(section: Sequence[int | str]) -> dict[str, Any]:
     for part in section:
         model = model.model_fields[part].annotation
     return {key: field for key, field in model.model_fields.items() if key != "name"}
-
-
-def _spelled(value: object) -> str:
-    """Return a value nearly as TOML spells it, shortened."""
-    try:
-        return echo(json.dumps(value, ensure_ascii=False, default=str))
-    except ValueError:
-        return "a number too long to repeat"
-    except RecursionError:
-        return "a value too deep to repeat"
 
 
 def _not_found(name: str) -> SourceNotFoundError:

@@ -1,5 +1,6 @@
 """Every exception of generating C, one class per thing a caller would do differently."""
 
+import json
 from typing import ClassVar
 
 BAD_INPUT, INTERRUPTED, NO_READER = 2, 130, 141
@@ -17,6 +18,14 @@ def echo(text: str) -> str:
     half = (LONGEST_ECHO - 3) // 2
     tail = "".join(c if c.isprintable() else "?" for c in text[-half:])
     return f"{visible[:half]}...{tail}"
+
+
+def echo_value(value: object) -> str:
+    """Return a value of a TOML file as JSON spells it, fit for one line of a terminal."""
+    try:
+        return echo(json.dumps(value, ensure_ascii=False, default=str))
+    except (ValueError, RecursionError):  # a number of thousands of digits, a thousand tables in each other
+        return "a value too long to repeat"
 
 
 class MamboNmpcError(Exception):

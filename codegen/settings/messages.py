@@ -9,11 +9,8 @@ from collections.abc import Mapping
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.errors import echo, echo_value
 from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key
-
-_LONGEST_NUMBER_BITS = 190
-"""Whole numbers up to here (58 digits) are repeated in a message, longer ones described."""
 
 
 def faults(error: ValidationError, document: Mapping[str, object]) -> tuple[str, ...]:
@@ -88,15 +85,11 @@ def _spelled_name(name: str) -> str:
 def _spelled_value(value: object) -> str:
     """Return a value as TOML spells it, shortened; a whole table or list only by its kind."""
     match value:
-        case bool():
-            return str(value).lower()
-        case int() if value.bit_length() > _LONGEST_NUMBER_BITS:
-            return f"{'-' if value < 0 else ''}1e{int(value.bit_length() * math.log10(2))} or so"
-        case str():
-            return echo(json.dumps(value[:1000], ensure_ascii=False))
         case dict():
             return "a table"
         case list():
             return "a list"
+        case str() | int():
+            return echo_value(value)
         case _:
             return echo(str(value))

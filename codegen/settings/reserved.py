@@ -1,4 +1,4 @@
-"""Words that C has taken already, so that no prefix may be one of them."""
+"""Names that C, C++, their libraries and POSIX define: none of them may be a prefix."""
 
 _KEYWORDS = """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
@@ -57,8 +57,3 @@ STANDARD_NAMES = frozenset(
     ]
 )
 """Prefixes that would shadow a header of the C library (stdio.h) or take a name of it or of POSIX (pid_t)."""
-
-DEVICES = frozenset(
-    ["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10))]
-)
-"""Prefixes of which Windows makes no file, whatever its ending: a bundle with aux.h cannot be checked out."""

@@ -308,11 +308,6 @@ class Code(_Section):
                 "keyword",
                 f"must not be a header or a name of the C library or POSIX; write for example {prefix}_nmpc",
             )
-        if prefix in reserved.DEVICES:
-            raise PydanticCustomError(
-                "keyword",
-                f"must not be a device of Windows, no file's name there; write for example {prefix}_nmpc",
-            )
         return prefix
 
 

@@ -9,10 +9,7 @@ from mambo_nmpc.codegen.errors import UnreadableFileError, echo
 
 LARGEST_FILE_BYTES = 64_000
 
-_SECTION = re.compile(r"\s*\[\s*([^\[\]]*?)\s*\]")
-_TWICE = re.compile("Cannot (declare|overwrite|mutate|redefine)")
-_LONG_NUMBER = re.compile(r"\d(_?\d){4300,}")
-_PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>.*)\)", re.DOTALL)
+_PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>line (?P<line>\d+), column \d+)\)", re.DOTALL)
 
 
 def read_text(path: Path) -> str:
@@ -30,17 +27,16 @@ def read_text(path: Path) -> str:
     if len(content) > LARGEST_FILE_BYTES:
         raise UnreadableFileError(f"{name}: is larger than 64 kB; such files take a few")
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise UnreadableFileError(f"{name}: line {line}: is not UTF-8; save the file as UTF-8") from None
-    return text
 
 
 def parse_document(text: str, source: str) -> dict[str, Any]:
     """Return what TOML `text` says; `source` begins every message. Raises UnreadableFileError."""
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text + "\n")  # else a fault at the end of the last line has no line number
     except RecursionError:
         raise UnreadableFileError(
             f"{source}: is nested too deeply; write [section] and key = value"
@@ -50,29 +46,10 @@ def parse_document(text: str, source: str) -> dict[str, Any]:
 
 
 def _syntax_fault(message: str, text: str) -> str:
-    """Put the place that tomllib reports last in front, as compilers do."""
-    number = _LONG_NUMBER.search(text)
-    if number and "digits" in message:
-        line = text.count("\n", 0, number.start()) + 1
-        return f"line {line}: a number has {len(number[0])} digits; write a shorter one"
+    """Put the place that tomllib reports last in front, as compilers do, and repeat the line at fault."""
     found = _PLACE.fullmatch(message)
     if found is None:
         return f"is not TOML: {echo(message)}"
-    last_line = text.rstrip().count("\n") + 1
-    place = found["place"].replace("end of document", f"line {last_line}")
-    line_number = re.match(r"line (\d+)", place)
-    if line_number and _TWICE.match(found["reason"]):
-        names = re.findall(r"'([^']*)'", found["reason"])
-        return f"{place}: {_set_twice(text.splitlines()[: int(line_number[1])], names)}"
-    return f"{place}: {echo(found['reason'])}"
-
-
-def _set_twice(lines: list[str], names: list[str]) -> str:
-    """Say which section or key the last of `lines` sets again; tomllib may have told its `names`."""
-    opened = [found[1] for line in lines if (found := _SECTION.match(line))]
-    if _SECTION.match(lines[-1]):
-        section = echo(f"[{opened[-1]}]")
-        return f"{section} is there already; put all its keys below one {section}"
-    key, assigned, _ = lines[-1].partition("=")
-    dotted = ".".join(names or [*opened[-1:], key.strip()]) if names or assigned else "a key"
-    return f"{echo(dotted)} is set already; keep one of the two"
+    advice = "; write each section and key once" if found["reason"].startswith("Cannot") else ""
+    line = text.split("\n")[int(found["line"]) - 1].strip()
+    return f"{found['place']}: {echo(found['reason'])}{advice}: {echo(line)}"

@@ -4,7 +4,6 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 """
 
 import difflib
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +23,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
+from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo, echo_value
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
@@ -251,10 +250,5 @@ def spelled(value: object) -> str:
     """Return a value in about the notation of TOML, shortened, for messages."""
     if isinstance(value, dict) and len(value) == 1:
         ((key, inner),) = value.items()
-        return f"{{ {echo(str(key))} = {spelled(inner)} }}"
-    try:
-        return echo(json.dumps(value, ensure_ascii=False, default=str))
-    except ValueError:
-        return "a number too long to repeat"
-    except RecursionError:
-        return "a value too deep to repeat"
+        return f"{{ {echo(str(key))} = {echo_value(inner)} }}"
+    return echo_value(value)

@@ -179,7 +179,7 @@ def test_unknown_board_lists_those_there_are(
         (
             "value = 168_000_000",
             f"value = 0x{'f' * 6000}",
-            "clock_hz.value = a number too long to repeat must be less than or equal to 100000000000",
+            "clock_hz.value = a value too long to repeat must be less than or equal to 100000000000",
         ),
         ('value = "single"', 'value = "half"', "fpu.value = \"half\" must be 'none', 'single' or 'double'"),
         (
@@ -215,10 +215,10 @@ def test_unknown_board_lists_those_there_are(
         (
             'value = "single"',
             f"value{'.a' * 2_000} = 1",
-            "fpu.value = a value too deep to repeat must be 'none', 'single' or 'double'",
+            "fpu.value = a value too long to repeat must be 'none', 'single' or 'double'",
         ),
         ("title =", "fpu_bits = 32\ntitle =", "fpu_bits is not a key of a board; there are title, core, fpu"),
-        ("title =", "core = 5\ntitle =", "[core] is there already"),
+        ("title =", "core = 5\ntitle =", "Cannot overwrite a value; write each section and key once: [core]"),
         (
             "title =",
             'name = "own"\ntitle =',

@@ -176,11 +176,6 @@ def test_bounds_are_closed(key: Key) -> None:
             'code.prefix = "pid" must not be a header or a name of the C library or POSIX; '
             "write for example pid_nmpc",
         ),
-        (
-            'code.prefix = "aux"',
-            'code.prefix = "aux" must not be a device of Windows, no file\'s name there; '
-            "write for example aux_nmpc",
-        ),
     ],
 )
 def test_fault_names_key_value_rule_and_fix(text: str, fault: str) -> None:
@@ -306,19 +301,18 @@ def test_schema_is_valid_and_refuses_what_the_rules_refuse() -> None:
     [
         (b"[horizon]\nprediction 10\n", "line 2, column 12: Expected '=' after a key in a key/value pair"),
         (b"[horizon]\nprediction =\n", "line 2"),
-        (b"[horizon]\nprediction = ", "line 2: Invalid value"),
-        (b"\na = " + b"9" * 5000, "line 2: a number has 5000 digits; write a shorter one"),
+        (b"[horizon]\nprediction = ", "line 2, column 14: Invalid value: prediction ="),
+        (b"a = " + b"9" * 5000, "is not TOML: Exceeds the limit"),
         (
             b"[cost]\neffort_weight = 1\neffort_weight = 2",
-            "line 3: cost.effort_weight is set already; keep one of the two",
+            "line 3, column 18: Cannot overwrite a value; write each section and key once: effort_weight = 2",
         ),
         (
             b"[cost]\n[horizon]\n[cost] # again\n",
-            "line 3, column 6: [cost] is there already; put all its keys below one [cost]",
+            "line 3, column 6: Cannot declare ('cost',) twice; write each section and key once: [cost]",
         ),
-        (b"cost.effort_weight = 1\n[cost]\n", "line 2, column 6: [cost] is there already"),
-        (b"cost = {}\ncost.effort_weight = 1\n", "line 2, column 23: cost is set already"),
-        (b'x = """\n"""\nx = """\n"""', "line 4: a key is set already; keep one of the two"),
+        (b"[cost", "line 1, column 6: Expected ']' at the end of a table declaration: [cost"),
+        (b"a = [1\n", "is not TOML: Unclosed array"),
         (b"a = " + b"[" * 20000, "is nested too deeply; write [section] and key = value"),
         (b"# caf\xe9", "line 1: is not UTF-8; save the file as UTF-8"),
         (b"#" * 64_001, "is larger than 64 kB; such files take a few"),

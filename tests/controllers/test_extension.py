@@ -1,7 +1,6 @@
 """Building and caching the C: private, once, and with messages that say what is missing."""
 
 import os
-import stat
 import subprocess
 import sys
 import time
@@ -42,72 +41,26 @@ def test_the_cache_is_private(empty_cache: Path) -> None:
         cache_folder()
 
 
-AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
-STRANGER = 1234
-
-
-@pytest.mark.parametrize("mode", [0o770, 0o777])
-def test_a_cache_below_what_others_may_write_is_refused(empty_cache: Path, mode: int) -> None:
-    """They could put their own in its place; nothing is made there. A sticky /tmp is no danger."""
-    empty_cache.parent.chmod(mode)
-    with pytest.raises(CacheError, match=f"others may write to {empty_cache.parent}, "):
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
+def test_the_cache_of_somebody_else_is_refused(empty_cache: Path) -> None:
+    """Its owner could put other code there."""
+    empty_cache.mkdir(mode=0o700)
+    os.chown(empty_cache, 1234, 1234)
+    with pytest.raises(CacheError, match="others may write"):
         cache_folder()
-    assert not empty_cache.exists()
-    empty_cache.parent.chmod(mode | stat.S_ISVTX)
-    assert cache_folder() == empty_cache
 
 
-@AS_ROOT
-def test_root_leaves_the_cache_of_somebody_else_alone(empty_cache: Path) -> None:
-    """Neither loads from it, nor makes a folder in it that its owner could then not use."""
-    os.chown(empty_cache.parent, STRANGER, STRANGER)
-    with pytest.raises(CacheError, match="belongs to somebody else"):
+@pytest.mark.parametrize("name", ["file", "link"])
+def test_what_is_no_folder_is_no_cache(empty_cache: Path, name: str) -> None:
+    """The message names it."""
+    if name == "file":
+        empty_cache.write_text("")
+    else:
+        empty_cache.symlink_to(empty_cache)
+    with pytest.raises(
+        CacheError, match=f"cannot use the cache folder {empty_cache}: .*; set XDG_CACHE_HOME"
+    ):
         cache_folder()
-    assert not empty_cache.exists()
-
-
-def test_folders_made_for_the_cache_are_private_whatever_the_umask(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where a group shares what its members make, the cache is still one's own."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
-    before = os.umask(0o002)
-    try:
-        made = cached("name", make)
-    finally:
-        os.umask(before)
-    assert made.stat().st_mode & 0o777 == 0o600
-    assert {place.stat().st_mode & 0o777 for place in list(made.parents)[:3]} == {0o700}
-
-
-def test_the_cache_is_used_where_its_path_leads(empty_cache: Path, tmp_path: Path) -> None:
-    """A link in its path, which somebody may turn round later, is followed once."""
-    (tmp_path / "elsewhere").mkdir(mode=0o700)
-    empty_cache.symlink_to(tmp_path / "elsewhere")
-    assert cached("name", make).parent == tmp_path / "elsewhere"
-
-
-@pytest.mark.parametrize("plant", ["writable by others", "link", pytest.param("foreign", marks=AS_ROOT)])
-def test_a_planted_build_is_not_trusted(empty_cache: Path, tmp_path: Path, plant: str) -> None:
-    """Put there while others could write to the folder, under the name that its content asks for."""
-    planted = cached("name", make)
-    before = planted.stat().st_ino
-    match plant:
-        case "writable by others":
-            planted.chmod(0o666)
-        case "link":
-            planted.rename(tmp_path / "theirs")
-            planted.symlink_to(tmp_path / "theirs")
-        case _:
-            os.chown(planted, STRANGER, STRANGER)
-    found = cached("name", make)
-    assert found.lstat().st_ino != before
-    assert (found.is_symlink(), found.stat().st_uid, found.stat().st_mode & 0o777) == (
-        False,
-        os.getuid(),
-        0o600,
-    )
-    assert list(empty_cache.iterdir()) == [found]
 
 
 def test_a_cache_named_by_a_relative_path_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

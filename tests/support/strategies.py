@@ -11,13 +11,13 @@ from pydantic import ValidationError
 
 from mambo_nmpc.codegen.settings.keys import KEYS, Key, spelled
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.settings.reserved import DEVICES, KEYWORDS, STANDARD_NAMES
+from mambo_nmpc.codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
 from tests.support.cases import SCALARS
 
 Values = dict[str, Any]
 """Settings by their dotted paths."""
 
-RESERVED = KEYWORDS | STANDARD_NAMES | DEVICES
+RESERVED = KEYWORDS | STANDARD_NAMES
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 CHOICES = [key for key in KEYS.values() if key.kind == "one of"]
 
@@ -274,4 +274,4 @@ def _others_at_odds(draw: st.DrawFn, values: Values) -> Broken:
         return _with(rest, path, most, f"must be more than {least!r} (ranges.thrust_acceleration_min_m_s2)")
     text = toml(values)
     line = f"line {len(values) + 1}, column "
-    return Broken(f"{text}{path} = 1\n", line, path, "is set already; keep one of the two")
+    return Broken(f"{text}{path} = 1\n", line, path, "write each section and key once")
