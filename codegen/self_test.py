@@ -1,4 +1,4 @@
-"""Self-test vectors of a bundle: consecutive steps, and what the reference controller makes of them."""
+"""Self-test vectors of a bundle: the inputs of consecutive steps, and the results of the reference."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,11 +29,12 @@ class SelfTestStep:
 
 
 def self_test(design: Design) -> list[SelfTestStep]:
-    """Run the reference controller through STEPS inputs spread over those of a flight.
+    """Run the reference controller through STEPS inputs in the range of a flight.
 
-    The first is an error too small for a normal number: it shows a board that flushes those to zero. Of the
-    others every seventh is out of range, in turn its state, its target and its thrust. The spread is a Weyl
-    sequence rather than a random number generator, whose stream may change with a library's version.
+    The first one has a position error below the smallest normal number: a board that flushes such numbers to
+    zero fails there. Of the others every seventh is out of range, in turn its state, its target and its
+    thrust. The values are a Weyl sequence, because the stream of a library's random number generator may
+    change with its version.
     """
     settings = design.settings
     controller = ReferenceController(design)

@@ -33,7 +33,7 @@ class Search:
 
 
 class Rprop:
-    """The search of one controller: its constants, in the scalar type of the controller."""
+    """The search of one controller; its constants are numbers of that controller."""
 
     def __init__(self, settings: Settings, arithmetic: Arithmetic) -> None:
         optimizer, constant = settings.optimizer, arithmetic.numbers.constant
@@ -51,9 +51,9 @@ class Rprop:
         self._limit = constant(settings.limits.tilt_rad, "angle")
 
     def next_step(self, step: Real, agreement: Real) -> Real:
-        """Return the step sizes after a slope: larger where its sign is that of the last one, else smaller.
+        """Return the next step sizes: grown where the gradient keeps its sign, shrunk where the sign changes.
 
-        agreement is the product of both signs, of the shape of `step`; where it is 0 the size stays.
+        agreement, of the shape of `step`, is this sign times the previous one; where it is 0 the size stays.
         """
         longer = np.minimum(self._arithmetic.scaled(step, self._increase), self._step_max)
         shorter = np.maximum(self._arithmetic.scaled(step, self._decrease), self._step_min)
@@ -62,13 +62,13 @@ class Rprop:
     def minimize(self, evaluate: Evaluate, moves_rad: Real) -> Search:
         """Search from `moves_rad` for exactly `optimizer.iterations` evaluations.
 
-        After convergence, once the cost has changed by less than the tolerance, the slopes are taken as 0:
-        the plan is frozen, the iterations still run.
+        Once the cost changes by less than the tolerance, the signs of the gradient are taken as 0: the plan
+        is frozen, the remaining iterations still run (constant time).
         """
         scalar = moves_rad.dtype.type
         step = np.full_like(moves_rad, self.initial_step)
-        direction = np.zeros_like(moves_rad)
-        before = moves_rad
+        previous_sign = np.zeros_like(moves_rad)
+        previous = moves_rad
         cost = np.zeros(len(moves_rad), dtype=scalar)
         gradient = np.zeros_like(moves_rad)
         iterations = np.zeros(len(moves_rad), dtype=np.int64)
@@ -81,15 +81,15 @@ class Rprop:
                 converged = converged | (np.abs(cost - previous_cost) < self.tolerance)
             iterations = iterations + ~converged
 
-            slope = np.where(converged[:, None, None], scalar(0), sign(gradient))
-            agreement = slope * direction
+            signs = np.where(converged[:, None, None], scalar(0), sign(gradient))
+            agreement = signs * previous_sign
             step = self.next_step(step, agreement)
-            ahead = agreement >= 0
-            moved = np.minimum(np.maximum(moves_rad - (slope * step), -self._limit), self._limit)
-            stepped_back = before if self._backtracking else moves_rad
-            before = np.where(ahead, moves_rad, before)
-            moves_rad = np.where(ahead, moved, stepped_back)
-            direction = np.where(ahead, slope, scalar(0))
+            moving = agreement >= 0
+            moved = np.minimum(np.maximum(moves_rad - (signs * step), -self._limit), self._limit)
+            stepped_back = previous if self._backtracking else moves_rad
+            previous = np.where(moving, moves_rad, previous)
+            moves_rad = np.where(moving, moved, stepped_back)
+            previous_sign = np.where(moving, signs, scalar(0))
         return Search(moves_rad, cost, gradient, iterations, converged)
 
 

@@ -1,4 +1,4 @@
-"""Read and write controller.toml: text to settings with every fault at once, settings to commented text."""
+"""Read and write controller.toml: text to settings, reporting all faults at once, and settings to text."""
 
 import textwrap
 from collections.abc import Mapping
@@ -38,7 +38,7 @@ def validated(document: Mapping[str, object], source: str) -> Settings:
     try:
         return Settings.model_validate(document)
     except ValidationError as error:
-        raise _invalid(source, error, document) from None
+        raise InvalidSettingsError(tuple(f"{source}: {fault}" for fault in faults(error, document))) from None
 
 
 def with_option(settings: Settings, path: str, value: object, source: str = "settings") -> Settings:
@@ -68,7 +68,3 @@ def to_toml(settings: Settings, title: str = _TITLE) -> str:
 
 def _comment(text: str) -> str:
     return textwrap.fill(text, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
-
-
-def _invalid(source: str, error: ValidationError, document: Mapping[str, object]) -> InvalidSettingsError:
-    return InvalidSettingsError(tuple(f"{source}: {fault}" for fault in faults(error, document)))

@@ -1,4 +1,4 @@
-"""The keys of controller.toml as records made from the settings model: what messages and comments quote."""
+"""The keys of controller.toml, read from the JSON schema of the settings: for messages and comments."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,9 +8,9 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 @dataclass(frozen=True)
 class Key:
-    """One setting: its dotted path, what it means, what it admits.
+    """One setting: its dotted path, its description and its admissible values.
 
-    `kind` is "whole number", "number", "one of" or "text"; `domain` is the admitted values in words; `rule`
+    `kind` is "whole number", "number", "one of" or "text"; `domain` is the admissible values in words; `rule`
     follows "must" in a message; `low` and `high` bound a number and are None for text.
     """
 
