@@ -236,7 +236,5 @@ def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
 
 def test_a_changed_value_obeys_the_rule_between_sections() -> None:
     """`with_option` refuses what a file with that value would be refused for."""
-    with pytest.raises(
-        InvalidSettingsError, match=r"^settings: cost.effort_weight = 1e-06 must not be so small"
-    ):
+    with pytest.raises(InvalidSettingsError, match=r"cost.effort_weight = 1e-06 must not be so small"):
         with_option(MAMBO, "cost.effort_weight", 1e-6)
