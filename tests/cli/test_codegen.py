@@ -13,14 +13,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli, errors
+from mambo_nmpc.codegen import cli, command, errors
 from mambo_nmpc.codegen.settings import controller_toml, presets
 from mambo_nmpc.codegen.settings.model import Settings
 
-COMMAND = "from mambo_nmpc.codegen import cli; app = cli.root(); cli.register(app); app()"
+COMMAND = "from mambo_nmpc.codegen import cli, command; app = command.root(); cli.register(app); app()"
 INTERRUPTED = """
-from mambo_nmpc.codegen import cli
-app = cli.root()
+from mambo_nmpc.codegen import cli, command
+app = command.root()
 cli.register(app)
 @app.command()
 def stop(): raise KeyboardInterrupt
@@ -31,7 +31,7 @@ app()
 @pytest.fixture(scope="module")
 def app() -> typer.Typer:
     """Build the command with the sub-commands of codegen."""
-    app = cli.root()
+    app = command.root()
     cli.register(app)
     return app
 

@@ -1,0 +1,142 @@
+"""The root of `mambo-nmpc`, where errors become a message and an exit code, and what its commands share.
+
+Results go to stdout, messages to stderr. Nothing here is slow to import: `--help` answers at once.
+"""
+
+import errno
+import io
+import os
+import sys
+import traceback
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.errors import BAD_INPUT, INTERRUPTED, NO_READER, MamboNmpcError, echo
+
+if TYPE_CHECKING:
+    from mambo_nmpc.codegen.settings.model import Settings
+
+EXIT_CODES = (
+    "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "
+    "130 interrupted; 141 nobody reads the output."
+)
+
+Source = Annotated[str, typer.Argument(help="A preset or a controller.toml.")]
+Scalar = Annotated[
+    str | None, typer.Option(help="Type of the numbers (code.scalar).", metavar="float32|float64|fixed")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
+
+
+class RootGroup(TyperGroup):
+    """The root of the command: errors become a message and an exit code, without a traceback."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run a command line, help and version included, up to the last byte on stdout."""
+        try:
+            if sys.stdout is None:
+                raise OSError(errno.EBADF, "is closed", "stdout")
+            if isinstance(sys.stdout, io.TextIOWrapper):  # replace characters that the terminal cannot encode
+                sys.stdout.reconfigure(errors="backslashreplace")
+            try:
+                return super().main(*arguments, **options)
+            finally:
+                sys.stdout.flush()
+        except OSError as error:
+            sys.exit(_exit_code(error))
+        except SystemExit as leaving:
+            if isinstance(leaving.__context__, BrokenPipeError):  # typer and rich meet it first, and exit 1
+                sys.exit(_exit_code(leaving.__context__))
+            raise
+
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
+        """Run a command; with `--debug` an error shows its traceback first."""
+        try:
+            result = super().invoke(ctx)
+            sys.stdout.flush()
+        except (MamboNmpcError, OSError, MemoryError, KeyboardInterrupt) as error:
+            if ctx.params["_debug"] and not isinstance(error, KeyboardInterrupt | BrokenPipeError):
+                traceback.print_exception(error)
+            raise typer.Exit(_exit_code(error)) from error
+        return result
+
+
+def _exit_code(error: BaseException) -> int:
+    """Return the exit code of a command that ended in `error`, and say why on stderr."""
+    match error:
+        case KeyboardInterrupt():
+            return INTERRUPTED
+        case MemoryError():
+            typer.echo("there is not enough memory", err=True)
+        case LookupError():  # jinja2.TemplateNotFound is an OSError too, but a bug of ours
+            raise error
+        case OSError():
+            stdout_failed = _silence_broken_stdout()
+            if isinstance(error, BrokenPipeError):
+                return NO_READER
+            file = "stdout" if stdout_failed else error.filename or "cannot read or write"
+            typer.echo(f"{echo(str(file))}: {error.strerror or error}", err=True)
+        case MamboNmpcError():
+            typer.echo(str(error), err=True)
+            return error.exit_code
+    return BAD_INPUT
+
+
+def _silence_broken_stdout() -> bool:
+    """Send what stdout cannot take to nowhere, lest it fail again at exit; return whether that was so."""
+    if sys.stdout is None:
+        return False
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
+
+
+def root() -> typer.Typer:
+    """Return the command without sub-commands, for `register` of each package to fill."""
+    return typer.Typer(
+        name="mambo-nmpc",
+        cls=RootGroup,
+        callback=_root_options,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        epilog=examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller")
+        + f"\n\n{EXIT_CODES}",
+    )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"mambo-nmpc {__version__}")
+        raise typer.Exit
+
+
+def _root_options(
+    _debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    _version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version),
+    ] = False,
+) -> None:
+    """Generate a static-memory C99 NMPC for a very small drone, and fly it in software."""
+
+
+def load(source: str, scalar: str | None) -> "Settings":
+    """Load a preset or a controller.toml, with another scalar type if one is named."""
+    from mambo_nmpc.codegen.settings import controller_toml, presets
+
+    settings = presets.load(source)
+    if scalar is None:
+        return settings
+    return controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
+
+
+def examples(*lines: str) -> str:
+    """Return an epilog of example commands, one paragraph each, so that help keeps them on their lines."""
+    return "\n\n".join(("Examples:", *lines))
