@@ -30,6 +30,7 @@ from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values
 from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.flight.names import CurveName, SensorsName, Start
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 
 PD: Final = "pd"
@@ -50,12 +51,12 @@ File = TypeVar("File", bound=Section)
 class FlightSection(Section):
     """Keys that all flights share."""
 
-    trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
+    trajectory: CurveName = "bernoulli"
     size_m: float = Field(2.0, ge=-1000, le=1000)
     rate_rad_s: float = Field(0.5, ge=-100, le=100)
     duration_s: float = Field(100.0, ge=1, le=3600)
-    start: Literal["hover", "take-off"] = "hover"
-    sensors: Literal["none", "mambo", "mambo-derotated"] = "mambo-derotated"
+    start: Start = "hover"
+    sensors: SensorsName = "mambo-derotated"
 
 
 def _drawn(parameter: Parameter) -> Any:

@@ -1,19 +1,30 @@
-"""Pictures of a campaign: the indices of Table II over all flights, and the improvement flight by flight."""
+"""Pictures of a campaign: indices over all flights, and the improvement flight by flight."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+import matplotlib as mpl
 import numpy as np
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mambo_nmpc.sil.campaign.file import PD
+from mambo_nmpc.sil.campaign.flights import CRASHED
 from mambo_nmpc.sil.campaign.statistics import COMPARED, Table, judged
-from mambo_nmpc.sil.footprint.plots import save
 from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.show.plots import style
+from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, PlainLogFormatter, inline, save, style
 
 _LABELS: Final = ("IAE, m s", "ISE, m² s", "ITSE, m² s²", "ITAE, m s²")
+_HUES: Final = ("#2ca02c", FLOWN, "#9467bd", "#8c564b", "#e377c2")
+_SHOWN: Final = {
+    "iae_m_s": "IAE, m s",
+    "max_error_m": "largest error, m",
+    "rms_error_m": "rms error, m",
+    "command_variation_rad": "command variation, rad",
+}
+"""Indices that a page compares controllers by, with labels."""
 
 
 def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path, Path]:
@@ -50,3 +61,27 @@ def _draw_shares(axes: Axes, values: FloatArray, colour: str, name: str) -> None
     ordered = np.sort(counted)
     shown = np.isfinite(ordered)
     axes.step(ordered[shown], shares[shown], where="post", color=colour, label=name)
+
+
+def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup]:
+    """Return a picture of each compared index: the share of flights up to a value, a line a controller."""
+    pictures: list[Markup] = []
+    with style(), mpl.rc_context({"text.parse_math": False}):  # a controller's name is no formula
+        for index, label in _SHOWN.items():
+            figure = Figure(figsize=(PANEL_INCHES, 3.2), layout="constrained")
+            axes = figure.subplots()
+            for row, name in enumerate(controllers):
+                if {f"{name}_{index}", f"{name}_{CRASHED}"} <= table.keys():
+                    values = np.sort(judged(table, name, index))
+                    shown = np.isfinite(values)
+                    shares = 100.0 * np.arange(1, len(values) + 1) / len(values)
+                    colour = COMMAND if name == PD else _HUES[row % len(_HUES)]
+                    axes.step(values[shown], shares[shown], where="post", color=colour, label=name)
+            if not axes.lines:
+                continue
+            axes.set(xlabel=label, ylabel="flights below, %", xscale="log", ylim=(0, 102))
+            axes.xaxis.set_major_formatter(PlainLogFormatter())
+            axes.xaxis.set_minor_formatter(PlainLogFormatter())
+            axes.legend(loc="lower right")
+            pictures.append(inline(figure, f"Distribution of {label}, for {', '.join(controllers)}"))
+    return pictures

@@ -1,22 +1,95 @@
 """Results of a campaign: summary, text and records for replay."""
 
-from collections.abc import Mapping
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
+from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.file import Campaign, scenario
 from mambo_nmpc.sil.campaign.flights import CRASHED, DIGEST
-from mambo_nmpc.sil.campaign.statistics import Table, summarise, worst
-from mambo_nmpc.sil.campaign.store import FLIGHT, Store, refusals
+from mambo_nmpc.sil.campaign.statistics import (
+    Distributions,
+    Improvement,
+    Proportion,
+    Table,
+    distributions,
+    improvements,
+    worst,
+)
+from mambo_nmpc.sil.campaign.store import FLIGHT, FlightStore, refusals
+from mambo_nmpc.sil.files.folders import SUMMARY
+from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.scenario import Record, write_record
+from mambo_nmpc.sil.show.numbers import digits
 
 RECORDS: Final = "flights"
+PICTURE: Final = "campaign"
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
 
-def numeric(store: Store) -> Table:
+class _Part(BaseModel):
+    """Part of what decides a campaign, of which a page shows some keys and the summary keeps all."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+
+class DrawnFlight(_Part):
+    """Parameters of all flights of a campaign."""
+
+    trajectory: str
+    size_m: float
+    rate_rad_s: float
+    duration_s: float
+    sensors: str
+
+
+class NamedController(_Part):
+    """A controller of a campaign."""
+
+    name: str
+
+
+class Drawn(_Part):
+    """What a campaign flies; the first controller is the one that the others are compared with."""
+
+    seed: int
+    flight: DrawnFlight
+    controllers: list[NamedController]
+
+
+@dataclass(frozen=True)
+class WorstFlight:
+    """A flight to look at, with the record that flies it again."""
+
+    flight: int
+    crashed: bool
+    iae_m_s: Number
+    max_error_m: Number
+    record: str
+
+
+class CampaignSummary(Summary):
+    """A finished campaign."""
+
+    command = "campaign"
+
+    campaign: Drawn
+    flights: int
+    controllers: dict[str, Distributions]
+    improvements: list[Improvement]
+    worst: dict[str, list[WorstFlight]]
+
+
+class UnfinishedCampaign(Drawn, Summary):
+    """What the folder of a campaign says before its last flight."""
+
+    command = "campaign"
+
+
+def numeric(store: FlightStore) -> Table:
     """Return the numeric columns of the table."""
     return {
         name: np.array(values, np.float64)
@@ -25,33 +98,35 @@ def numeric(store: Store) -> Table:
     }
 
 
-def summary_of(campaign: Campaign, table: Table) -> dict[str, Any]:
+def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
     """Return statistics of a finished campaign, and the worst flights with the names of their records."""
     names = [entrant.name for entrant in campaign.entrants]
-    return {
-        "campaign": campaign.document(),
-        "flights": len(table[FLIGHT]),
-        **summarise(table, names, sensed=campaign.file.flight.sensors != "none"),
-        "worst": {name: [_worst(table, name, row) for row in worst(table, name)] for name in names},
-    }
+    sensed = campaign.file.flight.sensors != "none"
+    return CampaignSummary(
+        campaign=Drawn.model_validate(campaign.document()),
+        flights=len(table[FLIGHT]),
+        controllers=distributions(table, names, sensed=sensed),
+        improvements=improvements(table, names, sensed=sensed),
+        worst={name: [_worst(table, name, row) for row in worst(table, name)] for name in names},
+    )
 
 
-def _worst(table: Table, name: str, row: int) -> dict[str, Any]:
+def _worst(table: Table, name: str, row: int) -> WorstFlight:
     flight = int(table[FLIGHT][row])
-    return {
-        "flight": flight,
-        "crashed": bool(table[f"{name}_{CRASHED}"][row]),
-        "iae_m_s": float(table[f"{name}_iae_m_s"][row]),
-        "max_error_m": float(table[f"{name}_max_error_m"][row]),
-        "record": _record_name(flight, name),
-    }
+    return WorstFlight(
+        flight=flight,
+        crashed=bool(table[f"{name}_{CRASHED}"][row]),
+        iae_m_s=float(table[f"{name}_iae_m_s"][row]),
+        max_error_m=float(table[f"{name}_max_error_m"][row]),
+        record=_record_name(flight, name),
+    )
 
 
 def _record_name(flight: int, name: str) -> str:
     return f"{RECORDS}/{flight:06}-{name}.json"
 
 
-def write_records(campaign: Campaign, store: Store) -> None:
+def write_records(campaign: Campaign, store: FlightStore) -> None:
     """Write one record per flight and controller for `fly --replay`; raises UnwritableError."""
     values = store.values()
     section = campaign.file.flight.model_dump()
@@ -70,45 +145,50 @@ def write_records(campaign: Campaign, store: Store) -> None:
                 write_record(record, store.folder / _record_name(flight, entrant.name))
 
 
-def campaign_text(summary: Mapping[str, Any], folder: str) -> str:
+def finish(campaign: Campaign, store: FlightStore) -> CampaignSummary:
+    """Put the table in order, and write what follows from it, the summary last; raises UnwritableError."""
+    from mambo_nmpc.sil.campaign.plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
+
+    store.put_in_order()
+    write_records(campaign, store)
+    table = numeric(store)
+    summary = summarise(campaign, table)
+    with refusals(store.folder):
+        draw_campaign(table, [entrant.name for entrant in campaign.entrants], store.folder / PICTURE)
+        put(store.folder / SUMMARY, summary.text().encode())
+    return summary
+
+
+def campaign_text(summary: CampaignSummary, folder: str) -> str:
     """Return a summary as text: statistics per controller, improvements, commands to replay the worst."""
     lines: list[str] = []
-    for name, found in summary["controllers"].items():
+    for name, found in summary.controllers.items():
         lines.append(f"{name:34}" + "".join(f"{title:>10}" for title in _SHOWN.values()))
-        for index, quantiles in found["quantiles"].items():
-            values = "".join(f"{_digits(quantiles[share]):>10}" for share in _SHOWN)
+        for index, quantiles in found.quantiles.items():
+            values = "".join(f"{digits(quantiles[share]):>10}" for share in _SHOWN)
             lines.append(f"  {index:32}{values}")
-        lines.append(f"  crashed: {_proportion(found['crashed'])}")
-        if found["refused_an_input"]["count"]:
-            lines.append(f"  rejected an input: {_proportion(found['refused_an_input'])}")
+        lines.append(f"  crashed: {_spelled(found.crashed)}")
+        if found.refused_an_input.count:
+            lines.append(f"  rejected an input: {_spelled(found.refused_an_input)}")
         lines.append("")
-    if summary["improvements"]:
-        first = next(iter(summary["controllers"]))
+    if summary.improvements:
+        first = next(iter(summary.controllers))
         lines.append(f"ratio of {first} to the other, per flight: median, 95 % interval, ratio above 1 in")
-        lines += [_improvement(one) for one in summary["improvements"]]
+        for one in summary.improvements:
+            interval = f"{digits(one.low)} .. {digits(one.high)}"
+            ratio = f"{digits(one.median):>9}  {interval:20}"
+            lines.append(f"  {one.controller:12} {one.index:18}{ratio}{_spelled(one.better)}")
         lines.append("")
     lines.append("worst flights by IAE, and the commands that replay them:")
-    for name, flights in summary["worst"].items():
-        for one in flights:
-            what = "crashed" if one["crashed"] else f"{_digits(one['iae_m_s'])} m s"
-            lines.append(f"  {name:12} {what:>12}  mambo-nmpc fly --replay {echo(folder)}/{one['record']}")
+    for name, flights in summary.worst.items():
+        for flight in flights:
+            what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
+            lines.append(f"  {name:12} {what:>12}  mambo-nmpc fly --replay {echo(folder)}/{flight.record}")
     return "\n".join(lines)
 
 
-def _improvement(one: Mapping[str, Any]) -> str:
-    interval = f"{_digits(one['low'])} .. {_digits(one['high'])}"
+def _spelled(one: Proportion) -> str:
     return (
-        f"  {one['controller']:12} {one['index']:18}{_digits(one['median']):>9}  {interval:20}"
-        f"{_proportion(one['better'])}"
+        f"{one.count} of {one.flights} flights, "
+        f"{100 * one.share:.3g} % ({100 * one.low:.3g} .. {100 * one.high:.3g} %)"
     )
-
-
-def _proportion(one: Mapping[str, Any]) -> str:
-    return (
-        f"{one['count']} of {one['flights']} flights, "
-        f"{100 * one['share']:.3g} % ({100 * one['low']:.3g} .. {100 * one['high']:.3g} %)"
-    )
-
-
-def _digits(value: float) -> str:
-    return f"{value:.0f}" if 1000 <= abs(value) < np.inf else f"{value:.4g}"

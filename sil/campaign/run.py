@@ -10,7 +10,7 @@ from mambo_nmpc.sil.campaign.executors import Pool
 from mambo_nmpc.sil.campaign.file import Campaign
 from mambo_nmpc.sil.campaign.flights import columns, fly_batch
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS
-from mambo_nmpc.sil.campaign.store import Store, open_store
+from mambo_nmpc.sil.campaign.store import FlightStore, open_store
 from mambo_nmpc.sil.errors import FlightError
 
 MOST_IN_A_BATCH: Final = 100
@@ -24,12 +24,12 @@ def table_columns(campaign: Campaign) -> tuple[str, ...]:
     return ("seed", *PARAMETERS, *columns(names, sensed=sensed))
 
 
-def opened(campaign: Campaign, folder: Path) -> AbstractContextManager[Store]:
+def opened(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
     """Open and lock the folder of a campaign; raises what `open_store` raises."""
     return open_store(folder, campaign.document(), table_columns(campaign))
 
 
-def missing(store: Store, flights: int) -> list[int]:
+def missing(store: FlightStore, flights: int) -> list[int]:
     """Return the numbers of the flights that are not in the table.
 
     Raises FlightError if the table has more than `flights`.
@@ -45,7 +45,7 @@ def missing(store: Store, flights: int) -> list[int]:
 
 def fly_missing(
     campaign: Campaign,
-    store: Store,
+    store: FlightStore,
     flights: int,
     pool: Pool,
     progress: Callable[[int], None],

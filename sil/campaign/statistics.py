@@ -6,13 +6,14 @@ in difficult ones. Intervals are 95 % confidence intervals.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.sil.campaign.flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
+from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -41,6 +42,15 @@ class Proportion:
 
 
 @dataclass(frozen=True)
+class Distributions:
+    """Results of a controller over all flights: shares, and quantiles by index and share."""
+
+    crashed: Proportion
+    refused_an_input: Proportion
+    quantiles: dict[str, dict[str, Number]]
+
+
+@dataclass(frozen=True)
 class Improvement:
     """Ratio of an index of the first controller to that of another, flight by flight.
 
@@ -51,9 +61,9 @@ class Improvement:
     controller: str
     index: str
     flights: int
-    median: float
-    low: float
-    high: float
+    median: Number
+    low: Number
+    high: Number
     better: Proportion
 
 
@@ -121,24 +131,25 @@ def worst(table: Table, name: str) -> list[int]:
     return [int(position) for position in order[:WORST]]
 
 
-def summarise(table: Table, names: Sequence[str], *, sensed: bool) -> dict[str, Any]:
-    """Return all statistics as plain values; the controllers `names` are compared with the first one."""
+def distributions(table: Table, names: Sequence[str], *, sensed: bool) -> dict[str, Distributions]:
+    """Return the statistics of each controller."""
     indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES if sensed)]
-    compared = [*COMPARED, *(SEEN + index for index in COMPARED if sensed)]
-    flights = len(table[f"{names[0]}_{CRASHED}"])
-    improvements = [improvement(table, names[0], name, index) for name in names[1:] for index in compared]
     return {
-        "controllers": {
-            name: {
-                "crashed": asdict(_share(table[f"{name}_{CRASHED}"], flights)),
-                "refused_an_input": asdict(_share(table[f"{name}_{REFUSED}"], flights)),
-                "quantiles": {index: quantiles(judged(table, name, index)) for index in indices},
-            }
-            for name in names
-        },
-        "improvements": [asdict(one) for one in improvements if one is not None],
+        name: Distributions(
+            crashed=_share(table[f"{name}_{CRASHED}"]),
+            refused_an_input=_share(table[f"{name}_{REFUSED}"]),
+            quantiles={index: quantiles(judged(table, name, index)) for index in indices},
+        )
+        for name in names
     }
 
 
-def _share(values: NDArray[Any], flights: int) -> Proportion:
-    return proportion(int((values > 0).sum()), flights)
+def improvements(table: Table, names: Sequence[str], *, sensed: bool) -> list[Improvement]:
+    """Compare every controller with the first one."""
+    compared = [*COMPARED, *(SEEN + index for index in COMPARED if sensed)]
+    found = [improvement(table, names[0], name, index) for name in names[1:] for index in compared]
+    return [one for one in found if one is not None]
+
+
+def _share(values: NDArray[Any]) -> Proportion:
+    return proportion(int((values > 0).sum()), len(values))

@@ -26,7 +26,7 @@ FLIGHT: Final = "flight"
 Value = float | str
 
 
-class Store:
+class FlightStore:
     """The open folder of a campaign; `lines` holds the table's line of each finished flight by number."""
 
     def __init__(self, folder: Path, columns: Sequence[str]) -> None:
@@ -112,7 +112,7 @@ class Store:
 
 
 @contextlib.contextmanager
-def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[Store]:
+def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[FlightStore]:
     """Open and lock `folder` for a run of `campaign`.
 
     Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
@@ -122,7 +122,7 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
         folder.mkdir(parents=True, exist_ok=True)
     with locked(folder):
         claim(folder, "campaign", {"command": "campaign", **campaign})
-        with Store(folder, columns) as store:
+        with FlightStore(folder, columns) as store:
             yield store
 
 

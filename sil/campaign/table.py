@@ -2,21 +2,12 @@
 
 import csv
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.statistics import Table
 from mambo_nmpc.sil.errors import ResultsError
-
-COMPARED: Final = {
-    "iae_m_s": "IAE, m s",
-    "max_error_m": "largest error, m",
-    "rms_error_m": "rms error, m",
-    "command_variation_rad": "command variation, rad",
-}
-"""Indices that a page compares controllers by, with labels."""
 
 
 def read_table(path: Path) -> Table:

@@ -5,22 +5,10 @@ from typing import Annotated
 
 import typer
 
-from mambo_nmpc.codegen import cli as generating
-from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
 
 MARK = '<meta name="generator" content="mambo-nmpc">'
 """What marks a page as ours, which may be written anew."""
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command of this module to `app`."""
-    app.command(
-        epilog=generating.examples(
-            "mambo-nmpc report flight",
-            "mambo-nmpc report table2 footprint faults verification -o controller.html",
-        )
-    )(report)
 
 
 def report(
@@ -33,7 +21,8 @@ def report(
     ] = Path("report.html"),
 ) -> None:
     """Show results on one HTML page that needs no network and no other file."""
-    from mambo_nmpc.sil.report.page import report_page  # noqa: PLC0415 - it loads the plotting library
+    from mambo_nmpc.codegen.atomic import put
+    from mambo_nmpc.sil.report.page import report_page
 
     name = echo(str(output))
     try:

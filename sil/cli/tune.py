@@ -7,35 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_nmpc.codegen import cli as generating
-from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.campaign.executors import processes
-from mambo_nmpc.sil.campaign.store import claim, refusals
-from mambo_nmpc.sil.cli.progress import counting_bar
-from mambo_nmpc.sil.files.folders import locked
-from mambo_nmpc.sil.tuning import file
-from mambo_nmpc.sil.tuning.file import Tuning
-from mambo_nmpc.sil.tuning.front import RULE, chosen, controller_text, front_csv, pareto_front
-from mambo_nmpc.sil.tuning.study import Judged, judged, open_study, search
+from mambo_nmpc.sil.cli.options import Workers
 
 if TYPE_CHECKING:
     from optuna import Study
 
+    from mambo_nmpc.sil.tuning.file import Tuning
+    from mambo_nmpc.sil.tuning.study import FinishedTrial
+
 CONTROLLER, FRONT = "controller.toml", "front"
-_MOST_TRIALS = 100_000
-_MOST_WORKERS = 1024
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command of this module to `app`."""
-    app.command(
-        epilog=generating.examples(
-            "mambo-nmpc tune -o tuned",
-            "mambo-nmpc tune tune.toml --trials 300 -o tuned",
-            "mambo-nmpc tune --storage postgresql://db/studies -o tuned",
-        )
-    )(tune)
 
 
 def tune(
@@ -46,19 +27,20 @@ def tune(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Folder for the results; a study begun there goes on.")
     ] = Path("tune"),
-    trials: Annotated[int, typer.Option(help="Trials in all.", min=1, max=_MOST_TRIALS)] = 100,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            help="Processes on this machine; one for each processor by default.", min=1, max=_MOST_WORKERS
-        ),
-    ] = None,
+    trials: Annotated[int, typer.Option(help="Trials in all.", min=1, max=100_000)] = 100,
+    workers: Workers = None,
     storage: Annotated[
         str | None,
         typer.Option(help="URL of a database that machines share, instead of a file in the folder."),
     ] = None,
 ) -> None:
     """Search settings that track well with calm commands, on drawn flights; goes on where it stopped."""
+    from mambo_nmpc.sil.campaign.store import claim, refusals
+    from mambo_nmpc.sil.files.folders import locked
+    from mambo_nmpc.sil.tuning import file
+    from mambo_nmpc.sil.tuning.front import RULE, chosen, pareto_front
+    from mambo_nmpc.sil.tuning.study import judged, open_study
+
     tuning = file.default() if source is None else file.read(source)
     with refusals(output):
         output.mkdir(parents=True, exist_ok=True)
@@ -78,8 +60,12 @@ def tune(
     typer.echo(f"{echo(str(output))}: {CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg", err=True)
 
 
-def _search(tuning: Tuning, study: "Study", folder: Path, trials: int, workers: int) -> None:
+def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers: int) -> None:
     """Search until there are enough trials; say on Ctrl-C what is kept."""
+    from mambo_nmpc.sil.campaign.executors import processes
+    from mambo_nmpc.sil.cli.progress import counting_bar
+    from mambo_nmpc.sil.tuning.study import judged, search
+
     if len(judged(study)) >= trials:
         return
     try:
@@ -95,14 +81,17 @@ def _search(tuning: Tuning, study: "Study", folder: Path, trials: int, workers: 
         raise
 
 
-def _base(tuning: Tuning, found: list[Judged]) -> list[Judged]:
+def _base(tuning: "Tuning", found: "list[FinishedTrial]") -> "list[FinishedTrial]":
     """Return the trial of the base: the first, unless a kill has cost it."""
     return [one for one in found if one.values == tuning.start][:1]
 
 
-def _finish(tuning: Tuning, found: list[Judged], folder: Path) -> None:
+def _finish(tuning: "Tuning", found: "list[FinishedTrial]", folder: Path) -> None:
     """Write what follows from the trials, the controller last."""
-    from mambo_nmpc.sil.tuning.plots import draw_front  # noqa: PLC0415 - loaded when drawing
+    from mambo_nmpc.codegen.atomic import put
+    from mambo_nmpc.sil.campaign.store import refusals
+    from mambo_nmpc.sil.tuning.front import controller_text, front_csv, pareto_front
+    from mambo_nmpc.sil.tuning.plots import draw_front
 
     with refusals(folder):
         put(folder / f"{FRONT}.csv", front_csv(pareto_front(found)).encode())

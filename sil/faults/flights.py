@@ -23,13 +23,15 @@ from mambo_nmpc.sil.faults.injection import (
     ReweightedController,
     WeightChange,
 )
-from mambo_nmpc.sil.faults.scenarios import TO_THE_END, Scenario, scenarios
+from mambo_nmpc.sil.faults.scenarios import TO_THE_END, FaultScenario, scenarios
+from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, horizontal_error_m
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover, Trajectories, Trajectory
 from mambo_nmpc.sil.paper.table2 import CASES
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.link import NOT_CALLED
 from mambo_nmpc.sil.plant.loops import THRUST_LIMIT_N, WEIGHT_N
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 
@@ -54,6 +56,10 @@ NEVER: Final = 2**31
 """The patience of a caller who never levels out."""
 
 
+STATUS_NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
+"""What a step came to, by status, in ascending order."""
+
+
 class End(StrEnum):
     """How a flight ended."""
 
@@ -73,7 +79,7 @@ class Verdict:
     """What became of a scenario: the worst over its moments.
 
     turning:     whether the drone turned throughout: then it has a band of its own.
-    statuses:    seen while it lasted; NOT_CALLED where the controller was not called.
+    statuses:    names of those seen while it lasted, in the order of their numbers.
     expected:    whether these are the statuses that the scenario demands.
     largest_...: from its begin on; the error is the distance to the true target.
     band_m:      how close to its target a flight must be to be back.
@@ -83,14 +89,24 @@ class Verdict:
     course: str
     fault: str
     turning: bool
-    statuses: tuple[int, ...]
+    statuses: tuple[str, ...]
     expected: bool
-    largest_command_rad: float
-    largest_tilt_rad: float
-    largest_error_m: float
-    band_m: float
-    recovery_s: float
+    largest_command_rad: Number
+    largest_tilt_rad: Number
+    largest_error_m: Number
+    band_m: Number
+    recovery_s: Number
     end: End
+
+
+class FaultsSummary(Summary):
+    """Flights with faults."""
+
+    command = "faults"
+
+    source: str
+    settings: str
+    flights: list[Verdict]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +115,7 @@ class _Sortie:
 
     course: str
     turning: bool
-    scenario: Scenario | None
+    scenario: FaultScenario | None
     begin: int = 0
     end: int = 0
 
@@ -113,7 +129,7 @@ def fly_faults(
     settings: Settings,
     controller: Callable[[int], CompiledController],
     progress: Callable[[float], None] | None = None,
-    chosen: Sequence[Scenario] | None = None,
+    chosen: Sequence[FaultScenario] | None = None,
 ) -> tuple[Verdict, ...]:
     """Fly every scenario, or those `chosen`, on every course at every moment; course by course, in order.
 
@@ -151,7 +167,7 @@ def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
         raise FlightError(f"horizon.{error}") from error
 
 
-def _sorties(chosen: Sequence[Scenario], period_s: float) -> list[_Sortie]:
+def _sorties(chosen: Sequence[FaultScenario], period_s: float) -> list[_Sortie]:
     sorties = [_Sortie(course, turning, None) for course in COURSES for turning in (False, True)]
     last = round(DURATION_S / period_s) + 1
     for course in COURSES:
@@ -241,7 +257,7 @@ def _verdict(
         course=sortie.course,
         fault=scenario.name,
         turning=sortie.turning,
-        statuses=tuple(sorted(seen)),
+        statuses=tuple(STATUS_NAMES[status] for status in sorted(seen)),
         expected=scenario.answers is None or seen == scenario.answers,
         largest_command_rad=float(np.abs(trace.command_rad[flown, row]).max()),
         largest_tilt_rad=float(tilt_rad.max()),
@@ -256,7 +272,7 @@ def _worst(verdicts: Sequence[Verdict]) -> Verdict:
     """Return the worst in every respect."""
     return replace(
         verdicts[0],
-        statuses=tuple(sorted({status for verdict in verdicts for status in verdict.statuses})),
+        statuses=all_statuses(verdicts),
         expected=all(verdict.expected for verdict in verdicts),
         largest_command_rad=_largest(verdicts, "largest_command_rad"),
         largest_tilt_rad=_largest(verdicts, "largest_tilt_rad"),
@@ -264,6 +280,12 @@ def _worst(verdicts: Sequence[Verdict]) -> Verdict:
         recovery_s=_largest(verdicts, "recovery_s"),
         end=max((verdict.end for verdict in verdicts), key=ORDER.index),
     )
+
+
+def all_statuses(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
+    """Return the names of all statuses seen, in the order of their numbers."""
+    seen = {status for verdict in verdicts for status in verdict.statuses}
+    return tuple(name for name in STATUS_NAMES.values() if name in seen)
 
 
 def _largest(verdicts: Sequence[Verdict], name: str) -> float:

@@ -18,7 +18,7 @@ from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 
 @dataclass(frozen=True, eq=False)
-class Inputs:
+class ControllerInput:
     """What one controller is handed at one update: state (7,), target (4,), thrust over mass."""
 
     state: FloatArray
@@ -26,19 +26,19 @@ class Inputs:
     thrust_acceleration_m_s2: float
 
 
-Alter = Callable[[Inputs, Inputs, int], Inputs]
+Alter = Callable[[ControllerInput, ControllerInput, int], ControllerInput]
 """The inputs now, those when the fault began, the updates since then -> what the controller is handed."""
 
 Drop = Callable[[int], bool]
 """The updates since the fault began -> whether this one is left out."""
 
 
-def untouched(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+def untouched(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
     """Hand on the inputs as they are."""
     return now
 
 
-def frozen_state(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+def frozen_state(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
     """Repeat the state with which the fault began; target and thrust go on."""
     return replace(now, state=began.state)
 
@@ -46,7 +46,7 @@ def frozen_state(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG
 def state_set_to(column: int | slice, value: float, *, on: int = 1, of: int = 1) -> Alter:
     """Overwrite columns of the state in the first `on` of every `of` updates."""
 
-    def alter(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         state = now.state.copy()
         if since % of < on:
             state[column] = value
@@ -58,7 +58,7 @@ def state_set_to(column: int | slice, value: float, *, on: int = 1, of: int = 1)
 def state_scaled(scale: ArrayLike) -> Alter:
     """Multiply the state by `scale` (7,): the wrong unit."""
 
-    def alter(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         return replace(now, state=now.state * np.asarray(scale))
 
     return alter
@@ -67,13 +67,13 @@ def state_scaled(scale: ArrayLike) -> Alter:
 def yaw_shifted(shift_rad: float) -> Alter:
     """Add `shift_rad` to the measured yaw."""
 
-    def alter(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         return replace(now, state=now.state + np.array([0.0] * 6 + [shift_rad]))
 
     return alter
 
 
-def yaw_wrapped(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+def yaw_wrapped(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
     """Measure the yaw within half a turn of north: it jumps where the drone turns through south."""
     state = now.state.copy()
     state[6] = (state[6] + np.pi) % (2.0 * np.pi) - np.pi
@@ -83,7 +83,7 @@ def yaw_wrapped(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG0
 def target_moved(by_m: float) -> Alter:
     """Move the target along x."""
 
-    def alter(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         return replace(now, target=now.target + np.array([by_m, 0.0, 0.0, 0.0]))
 
     return alter
@@ -92,7 +92,7 @@ def target_moved(by_m: float) -> Alter:
 def thrust_reported(value_m_s2: float) -> Alter:
     """Report this thrust acceleration, whatever it is."""
 
-    def alter(now: Inputs, began: Inputs, since: int) -> Inputs:  # noqa: ARG001 - an Alter
+    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         return replace(now, thrust_acceleration_m_s2=value_m_s2)
 
     return alter
@@ -151,7 +151,7 @@ class FaultyController:
     def __init__(self, controller: PositionController, faults: Sequence[Fault | None]) -> None:
         self._controller = controller
         self._faults = [(row, fault) for row, fault in enumerate(faults) if fault is not None]
-        self._began: dict[int, Inputs] = {}
+        self._began: dict[int, ControllerInput] = {}
         self._update = 0
         latest = max((fault.late_updates for _, fault in self._faults), default=0)
         level = np.zeros((len(faults), 2))
@@ -163,7 +163,7 @@ class FaultyController:
         called = np.ones(len(state), np.bool_)
         active = [(row, fault) for row, fault in self._faults if fault.active(self._update)]
         for row, fault in active:
-            now = Inputs(state[row].copy(), target[row].copy(), float(thrust[row]))
+            now = ControllerInput(state[row].copy(), target[row].copy(), float(thrust[row]))
             since = self._update - fault.begin
             given = fault.alter(now, self._began.setdefault(row, now), since)
             state[row], target[row], thrust[row] = given.state, given.target, given.thrust_acceleration_m_s2

@@ -6,8 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from mambo_nmpc.sil.faults.flights import COURSES, STRAY_M, Verdict
-from mambo_nmpc.sil.footprint.plots import save
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, style
+from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, save, style
 
 
 def draw_faults(verdicts: Sequence[Verdict], stem: Path) -> tuple[Path, Path]:

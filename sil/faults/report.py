@@ -1,17 +1,13 @@
-"""What flights with faults found: as a table, as CSV, as a picture."""
+"""What flights with faults found: as a table, and as CSV."""
 
 import csv
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.sil.faults.flights import COURSES, ORDER, Verdict
-from mambo_nmpc.sil.plant.link import NOT_CALLED
-
-_NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
+from mambo_nmpc.sil.faults.flights import COURSES, ORDER, Verdict, all_statuses
 
 
 def table(verdicts: Sequence[Verdict]) -> str:
@@ -21,7 +17,7 @@ def table(verdicts: Sequence[Verdict]) -> str:
     rows = [[*head, "end"], ["---"] * (len(head) + 1)]
     for fault in dict.fromkeys(verdict.fault for verdict in verdicts):
         pair = [verdict for verdict in verdicts if verdict.fault == fault]
-        row = [fault, _answers(pair)]
+        row = [fault, ", ".join(all_statuses(pair))]
         row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
         for verdict in pair:
             never = math.isnan(verdict.recovery_s)
@@ -37,24 +33,10 @@ def table(verdicts: Sequence[Verdict]) -> str:
 _LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
 
 
-def _answers(verdicts: Sequence[Verdict]) -> str:
-    seen = sorted({status for verdict in verdicts for status in verdict.statuses})
-    return ", ".join(_NAMES.get(status, str(status)) for status in seen)
-
-
-def records(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
-    """Return the verdicts for JSON, statuses by name."""
-    return [
-        asdict(verdict)
-        | {"end": verdict.end.value, "statuses": [_NAMES.get(s, str(s)) for s in verdict.statuses]}
-        for verdict in verdicts
-    ]
-
-
 def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:
     """Write a CSV file, a course and fault a line."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Verdict)], lineterminator="\n")
         writer.writeheader()
-        for record in records(verdicts):
-            writer.writerow(record | {"statuses": " ".join(record["statuses"])})
+        for verdict in verdicts:
+            writer.writerow(asdict(verdict) | {"statuses": " ".join(verdict.statuses)})

@@ -27,14 +27,14 @@ TO_THE_END: Final = math.inf
 
 
 @dataclass(frozen=True, eq=False)
-class Scenario:
+class FaultScenario:
     """A fault by name, without its moment.
 
     answers: the statuses that it must bring about, each of them and no other; None where that is open.
     weights: tracking and effort weight set when it begins; the right ones come back when it ends.
     moved_m: how far along x the target has truly moved, once it has begun.
     turning: whether the drone turns its heading throughout.
-    levelled: whether the caller levels out at `sil.fault_flights.PATIENCE` refused steps.
+    levelled: whether the caller levels out at `sil.faults.flights.PATIENCE` refused steps.
     """
 
     name: str
@@ -54,7 +54,7 @@ _FEET_PER_M: Final = 1.0 / 0.3048
 _DEGREES_PER_RAD: Final = 180.0 / math.pi
 
 
-def scenarios(settings: Settings) -> tuple[Scenario, ...]:
+def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     """Return the faults for a controller: its ranges say what is beyond them."""
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
@@ -66,42 +66,50 @@ def scenarios(settings: Settings) -> tuple[Scenario, ...]:
     bad_thrust, bad_weight = _only(Status.BAD_THRUST), _only(Status.OK, Status.BAD_WEIGHT)
     levels_out = "caller levels out"
     return (
-        Scenario("state NaN in 3 of 10 steps, 5 s", 5.0, bursts, answers=_only(Status.OK, Status.BAD_STATE)),
-        Scenario("state NaN, 0.2 s", 0.2, outage, answers=bad_state),
-        Scenario("state NaN, 1 s", 1.0, outage, answers=bad_state),
-        Scenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
-        Scenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
-        Scenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
-        Scenario("state NaN to the end", TO_THE_END, outage, answers=bad_state),
-        Scenario(f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True),
-        Scenario("x infinite, 1 s", 1.0, state_set_to(0, math.inf), answers=bad_state),
-        Scenario("vy minus infinite, 1 s", 1.0, state_set_to(3, -math.inf), answers=bad_state),
-        Scenario("state frozen, 0.2 s", 0.2, frozen_state),
-        Scenario("state frozen, 1 s", 1.0, frozen_state),
-        Scenario("state frozen, 5 s", 5.0, frozen_state),
-        Scenario("every 2nd tick dropped, 5 s", 5.0, drop=every(2), answers=_only(Status.OK, NOT_CALLED)),
-        Scenario("all ticks dropped, 0.2 s", 0.2, drop=always, answers=_only(NOT_CALLED)),
-        Scenario("all ticks dropped, 1 s", 1.0, drop=always, answers=_only(NOT_CALLED)),
-        Scenario("commands 2 ticks late, 5 s", 5.0, late_updates=2),
-        Scenario("commands 5 ticks late, 5 s", 5.0, late_updates=5),
-        Scenario("commands 20 ticks late, 5 s", 5.0, late_updates=20),
-        Scenario(f"target {jump_m:g} m off, 0.2 s", 0.2, jump),
-        Scenario(f"target {jump_m:g} m off, 1 s", 1.0, jump),
-        Scenario(f"target {jump_m:g} m off, 5 s", 5.0, jump),
-        Scenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
-        Scenario("target beyond the range, 1 s", 1.0, target_moved(beyond_m), answers=bad_target),
-        Scenario("thrust reported as zero, 1 s", 1.0, thrust_reported(0.0), answers=bad_thrust),
-        Scenario("thrust NaN, 1 s", 1.0, thrust_reported(_NAN), answers=bad_thrust),
-        Scenario("yaw a turn off, to the end", TO_THE_END, yaw_shifted(2.0 * math.pi)),
-        Scenario("yaw wrapped at pi, turning, to the end", TO_THE_END, yaw_wrapped, turning=True),
-        Scenario("yaw half a turn off, 1 s", 1.0, yaw_shifted(math.pi)),
-        Scenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
-        Scenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
-        Scenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
-        Scenario("weights NaN, 5 s", 5.0, weights=(_NAN, _NAN), answers=bad_weight),
-        Scenario("tracking weight -1, 5 s", 5.0, weights=(-1.0, right.effort_weight), answers=bad_weight),
-        Scenario("both weights zero, 5 s", 5.0, weights=(0.0, 0.0)),
-        Scenario("effort weight 1e6, 5 s", 5.0, weights=(right.tracking_weight, 1e6)),
+        FaultScenario(
+            "state NaN in 3 of 10 steps, 5 s", 5.0, bursts, answers=_only(Status.OK, Status.BAD_STATE)
+        ),
+        FaultScenario("state NaN, 0.2 s", 0.2, outage, answers=bad_state),
+        FaultScenario("state NaN, 1 s", 1.0, outage, answers=bad_state),
+        FaultScenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
+        FaultScenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
+        FaultScenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
+        FaultScenario("state NaN to the end", TO_THE_END, outage, answers=bad_state),
+        FaultScenario(
+            f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True
+        ),
+        FaultScenario("x infinite, 1 s", 1.0, state_set_to(0, math.inf), answers=bad_state),
+        FaultScenario("vy minus infinite, 1 s", 1.0, state_set_to(3, -math.inf), answers=bad_state),
+        FaultScenario("state frozen, 0.2 s", 0.2, frozen_state),
+        FaultScenario("state frozen, 1 s", 1.0, frozen_state),
+        FaultScenario("state frozen, 5 s", 5.0, frozen_state),
+        FaultScenario(
+            "every 2nd tick dropped, 5 s", 5.0, drop=every(2), answers=_only(Status.OK, NOT_CALLED)
+        ),
+        FaultScenario("all ticks dropped, 0.2 s", 0.2, drop=always, answers=_only(NOT_CALLED)),
+        FaultScenario("all ticks dropped, 1 s", 1.0, drop=always, answers=_only(NOT_CALLED)),
+        FaultScenario("commands 2 ticks late, 5 s", 5.0, late_updates=2),
+        FaultScenario("commands 5 ticks late, 5 s", 5.0, late_updates=5),
+        FaultScenario("commands 20 ticks late, 5 s", 5.0, late_updates=20),
+        FaultScenario(f"target {jump_m:g} m off, 0.2 s", 0.2, jump),
+        FaultScenario(f"target {jump_m:g} m off, 1 s", 1.0, jump),
+        FaultScenario(f"target {jump_m:g} m off, 5 s", 5.0, jump),
+        FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
+        FaultScenario("target beyond the range, 1 s", 1.0, target_moved(beyond_m), answers=bad_target),
+        FaultScenario("thrust reported as zero, 1 s", 1.0, thrust_reported(0.0), answers=bad_thrust),
+        FaultScenario("thrust NaN, 1 s", 1.0, thrust_reported(_NAN), answers=bad_thrust),
+        FaultScenario("yaw a turn off, to the end", TO_THE_END, yaw_shifted(2.0 * math.pi)),
+        FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, yaw_wrapped, turning=True),
+        FaultScenario("yaw half a turn off, 1 s", 1.0, yaw_shifted(math.pi)),
+        FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
+        FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
+        FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
+        FaultScenario("weights NaN, 5 s", 5.0, weights=(_NAN, _NAN), answers=bad_weight),
+        FaultScenario(
+            "tracking weight -1, 5 s", 5.0, weights=(-1.0, right.effort_weight), answers=bad_weight
+        ),
+        FaultScenario("both weights zero, 5 s", 5.0, weights=(0.0, 0.0)),
+        FaultScenario("effort weight 1e6, 5 s", 5.0, weights=(right.tracking_weight, 1e6)),
     )
 
 

@@ -11,13 +11,13 @@ gives the same bits alone and in a batch.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.flight.names import Start
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Trajectory
 from mambo_nmpc.sil.plant import loops
@@ -66,21 +66,12 @@ class PositionController(Protocol):
         ...
 
 
-class Start(Enum):
-    """How a flight begins, always above or at the first point of its trajectory."""
-
-    HOVER = "hover"
-    """At `HEIGHT_REFERENCE_M`, level and at rest, at t = 0."""
-    TAKE_OFF = "take-off"
-    """On the ground, `TAKE_OFF_PHASE_S` before t = 0."""
-
-
 Three = tuple[PerFlight, PerFlight, PerFlight]
 
 
 @dataclass(frozen=True, eq=False)
 class Offset:
-    """How a start differs from the one described by `Start`."""
+    """How a start differs from the one described by `Flight.start`."""
 
     position_m: Three = (0.0, 0.0, 0.0)
     """In the world frame."""
@@ -97,7 +88,9 @@ class Flight:
     trajectory: Trajectory
     duration_s: float = 100.0
     flights: int = 1
-    start: Start = Start.HOVER
+    start: Start = "hover"
+    """Above the first point of the trajectory: at `HEIGHT_REFERENCE_M`, level and at rest, at t = 0; or on
+    the ground, `TAKE_OFF_PHASE_S` before t = 0."""
     yaw_rad: PerFlight = 0.0
     """Heading at the start, and reference of the yaw loop."""
     yaw_rate_rad_s: PerFlight = 0.0
@@ -133,7 +126,7 @@ class Flight:
 
     def times_s(self) -> FloatArray:
         """Return the times (k,) of the position controller's updates; t = 0 is one of them."""
-        before = round(TAKE_OFF_PHASE_S / self.update_period_s) if self.start is Start.TAKE_OFF else 0
+        before = round(TAKE_OFF_PHASE_S / self.update_period_s) if self.start == "take-off" else 0
         after = round(self.duration_s / self.update_period_s)
         return self.update_period_s * np.arange(-before, after + 1, dtype=np.float64)
 
@@ -158,7 +151,7 @@ def fly(
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
     times_s, targets = flight.times_s(), flight.targets()
-    open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start is Start.TAKE_OFF else 0.0)
+    open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start == "take-off" else 0.0)
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, _start(flight, targets[0])
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
@@ -192,7 +185,7 @@ def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
     command: PerFlight = MAMBO.command_min
-    if flight.start is Start.HOVER:
+    if flight.start == "hover":
         position_m[2] = HEIGHT_REFERENCE_M
         command = MAMBO.hover_command
     state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)

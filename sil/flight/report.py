@@ -1,29 +1,94 @@
-"""What flights found, as plain text for a terminal, a pipe or a diff."""
+"""What a flight found: the record that is written and read, and its text."""
 
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
+from pydantic import SerializerFunctionWrapHandler, model_serializer
 
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, Metrics, measure
+from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
-from mambo_nmpc.sil.paper.table2 import (
-    CASES,
-    INDICES,
-    PRINTED_IMPROVEMENT,
-    PRINTED_NMPC,
-    PRINTED_PD,
-    Four,
-    Row,
-    Table2,
-    digits,
-)
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
 _UNITS |= {"_rad": "rad", "_m": "m"}
+
+
+class FlightSummary(Summary):
+    """What every flight found."""
+
+    controller: str
+    settings: str
+    same_bits_as_host: bool | None
+    lost: bool
+    mostly_refused: bool
+    """Whether more than half of the updates on the trajectory were refused."""
+    statuses: dict[str, int]
+    refusals: list[str]
+    metrics: dict[str, Number]
+    metrics_without_transient: dict[str, Number] | None = None
+    metrics_as_seen: dict[str, Number] | None = None
+
+    @property
+    def columns(self) -> dict[str, dict[str, float]]:
+        """The metrics by the heading of their column."""
+        columns = {
+            "whole flight": self.metrics,
+            "after 10 s": self.metrics_without_transient,
+            "as seen": self.metrics_as_seen,
+        }
+        return {heading: values for heading, values in columns.items() if values is not None}
+
+    @property
+    def good(self) -> bool:
+        """Whether the flight ended in the air and controlled, with the bits it should have."""
+        return not self.lost and not self.mostly_refused and self.same_bits_as_host is not False
+
+    @model_serializer(mode="wrap")
+    def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        optional = ("metrics_without_transient", "metrics_as_seen")
+        return {key: value for key, value in dump(self).items() if value is not None or key not in optional}
+
+
+class FlySummary(FlightSummary):
+    """A flight; `trajectory_sha256` is of a file of waypoints."""
+
+    command = "fly"
+
+    board: str | None
+    source: str
+    update_period_s: float
+    trajectory: str
+    trajectory_sha256: str | None
+    size_m: float
+    rate_rad_s: float
+    yaw_rad: float
+    wind_m_s2: tuple[float, float]
+    wind_speed_m_s: float
+    sensors: str
+    seed: int
+    motor_lag_s: float
+    start: str
+    duration_s: float
+
+
+class ReplaySummary(FlightSummary):
+    """A recorded flight, flown again."""
+
+    command = "fly --replay"
+
+    replay: str
+    scenario: Scenario
+    same_bits_as_recorded: bool | None
+
+    @property
+    def good(self) -> bool:
+        """Whether the flight ended in the air and controlled, and equals the recorded one."""
+        return super().good and self.same_bits_as_recorded is not False
 
 
 def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
@@ -61,54 +126,49 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
     return [f"{sentence}; the last command was kept" for sentence in sentences]
 
 
-def found(trace: Trace, settings: Settings) -> dict[str, Any]:
-    """Return what a flight is judged by; "mostly_refused" is about the time on the trajectory."""
+def judge(trace: Trace, settings: Settings) -> dict[str, Any]:
+    """Return the keys of a `FlightSummary` that follow from the trace."""
     status = trace.status[:, 0]
     names = {NOT_CALLED: "NOT_CALLED", **{int(each): each.name for each in Status}}
     counts = {name: int((status == value).sum()) for value, name in names.items()}
     refused = ~np.isin(status[trace.time_s >= 0.0], (Status.OK, NOT_CALLED))
-    summary: dict[str, Any] = {
+    long = trace.time_s[-2] >= TRANSIENT_S
+    return {
         "lost": bool(trace.diverged[0]),
         "mostly_refused": bool(np.mean(refused) > 0.5),
         "statuses": {name: count for name, count in counts.items() if count},
         "refusals": refusals(trace, settings),
         "metrics": numbers(measure(trace)),
+        "metrics_without_transient": numbers(measure(trace, TRANSIENT_S)) if long else None,
+        "metrics_as_seen": numbers(measure(trace.as_seen())) if isinstance(trace, SensedTrace) else None,
     }
-    if trace.time_s[-2] >= TRANSIENT_S:
-        summary["metrics_without_transient"] = numbers(measure(trace, TRANSIENT_S))
-    if isinstance(trace, SensedTrace):
-        summary["metrics_as_seen"] = numbers(measure(trace.as_seen()))
-    return summary
 
 
-def flight_text(summary: dict[str, Any]) -> str:
+def flight_text(summary: FlightSummary) -> str:
     """Spell the summary of a flight: a metric a line, with and without the start transient, and as seen."""
-    columns = {"whole flight": summary["metrics"]}
-    for heading, key in (("after 10 s", "metrics_without_transient"), ("as seen", "metrics_as_seen")):
-        if key in summary:
-            columns[heading] = summary[key]
+    columns = summary.columns
     lines = [f"{'':22}" + "".join(f"{heading:>14}" for heading in columns)]
-    for key in summary["metrics"]:
+    for key in summary.metrics:
         name, unit = named(key)
         lines.append(
             f"{name:22}" + "".join(f"{values[key]:14.5g}" for values in columns.values()) + f"  {unit}"
         )
     quiet = ("OK", "NOT_CALLED")
-    refused = {name: count for name, count in summary["statuses"].items() if name not in quiet}
+    refused = {name: count for name, count in summary.statuses.items() if name not in quiet}
     if refused:
         lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
-        lines += [f"  {sentence}" for sentence in summary["refusals"]]
-    if summary.get("same_bits_as_recorded") is not None:
-        same = "equals" if summary["same_bits_as_recorded"] else "DIFFERS FROM"
+        lines += [f"  {sentence}" for sentence in summary.refusals]
+    if isinstance(summary, ReplaySummary) and summary.same_bits_as_recorded is not None:
+        same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
         lines.append(f"flown again: the trace {same} the recorded one, bit for bit")
-    if summary["same_bits_as_host"] is not None:
-        same = "equals" if summary["same_bits_as_host"] else "DIFFERS FROM"
+    if isinstance(summary, FlySummary) and summary.same_bits_as_host is not None:
+        same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
         lines.append(
-            f"flown on the core of {summary['board']}: the trace {same} that of this machine, bit for bit"
+            f"flown on the core of {summary.board}: the trace {same} that of this machine, bit for bit"
         )
-    if summary["lost"]:
+    if summary.lost:
         lines.append("LOST: the vehicle left the world before the end of the flight")
-    elif summary["mostly_refused"]:
+    elif summary.mostly_refused:
         lines.append("NOT CONTROLLED: the controller refused more than half of its inputs")
     return "\n".join(lines)
 
@@ -119,31 +179,3 @@ def named(key: str) -> tuple[str, str]:
     name = key.removesuffix(suffix).replace("_", " ")
     words = [word.upper() if word in ("iae", "ise", "itse", "itae") else word for word in name.split()]
     return " ".join(words), _UNITS.get(suffix, "")
-
-
-def table2_text(result: Table2) -> str:
-    """Spell Table II: a block for each case, printed above measured, then what the paper claims."""
-    lines = [f"{'':68}  PD over NMPC"]
-    for case in CASES:
-        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
-        lines[-1] += "".join(f"{index:>9}" for index in INDICES)
-        if case == next(iter(CASES)):
-            lines += [_line("printed PD", PRINTED_PD, None)]
-            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
-        lines += [_row(row) for row in result.rows if row.case == case]
-        lines += [""]
-    lines += ["the paper's claims, as flown here:"]
-    lines += [
-        f"  {'holds' if claim.holds else 'does not hold':13}  {claim.text}: {claim.evidence}"
-        for claim in result.claims
-    ]
-    return "\n".join(lines)
-
-
-def _row(row: Row) -> str:
-    return _line(f"flown {row.controller}", row.measured, row.improvement)
-
-
-def _line(name: str, values: Four, improvement: Four | None) -> str:
-    ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
-    return f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values) + ratios

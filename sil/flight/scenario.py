@@ -16,7 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.errors import FlightError, ScenarioError
-from mambo_nmpc.sil.flight.loop import Flight, Offset, Start
+from mambo_nmpc.sil.flight.loop import Flight, Offset
+from mambo_nmpc.sil.flight.names import ControllerName, CurveName, SensorsName, Start
 from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectories
 from mambo_nmpc.sil.plant.airframe import MAMBO
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -50,12 +51,12 @@ class Scenario(_Record):
     seed: int = Field(0, ge=0, lt=2**63)
     """Seed of sensor noise, gusts and dropped updates."""
 
-    trajectory: Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"] = "bernoulli"
+    trajectory: CurveName = "bernoulli"
     size_m: float = Field(2.0, ge=-1000.0, le=1000.0)
     rate_rad_s: float = Field(0.5, ge=-100.0, le=100.0)
     duration_s: float = Field(100.0, gt=0.0, le=3600.0)
 
-    start: Start = Start.HOVER
+    start: Start = "hover"
     start_offset_m: Three = (0.0, 0.0, 0.0)
     """Offset from the nominal start in the world frame (NED)."""
     start_velocity_m_s: Three = (0.0, 0.0, 0.0)
@@ -89,8 +90,7 @@ class Scenario(_Record):
     dropped_share: float = Field(0.0, ge=0.0, le=1.0)
     """Probability that an update of the position controller is dropped; its last command is held."""
 
-    sensors: Literal["none", "mambo", "mambo-derotated"] = "none"
-    """`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
+    sensors: SensorsName = "none"
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
     """Factor on the standard deviation of all sensor noise."""
     accelerometer_bias_m_s2: Three = (0.0, 0.0, 0.0)
@@ -179,7 +179,7 @@ class Record(_Record):
 
     format: Literal[1] = FORMAT
     scenario: Scenario
-    controller: Literal["nmpc", "pd", "reference"] = "nmpc"
+    controller: ControllerName = "nmpc"
     settings: Settings
     """Settings of the NMPC; the PD uses their update period only."""
     trace_sha256: str | None = None

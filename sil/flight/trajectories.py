@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.errors import TrajectoryError
+from mambo_nmpc.sil.flight.names import CurveName
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 STEP_TIME_S = 1.0
@@ -276,7 +277,7 @@ class Trajectories:
         return np.stack([trajectory.target(time_s) for trajectory in self.each], axis=-2)
 
 
-CURVES: Final[dict[str, Callable[[float, float], Trajectory]]] = {
+CURVES: Final[dict[CurveName, Callable[[float, float], Trajectory]]] = {
     "bernoulli": Bernoulli,
     "gerono": Gerono,
     "lissajous": Lissajous,

@@ -1,13 +1,14 @@
 """Exact instruction counts of one control step on an emulated core, and a search for the worst input."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.emulated import EmulatedController
@@ -27,15 +28,15 @@ HARNESS: Final = (
 
 
 @dataclass(frozen=True)
-class Inputs:
+class InputSequence:
     """Inputs of consecutive steps of one controller: state (k, 7), target (k, 4), thrust (k,)."""
 
     state: FloatArray
     target: FloatArray
     thrust: FloatArray
 
-    def __add__(self, other: "Inputs") -> "Inputs":
-        return Inputs(
+    def __add__(self, other: "InputSequence") -> "InputSequence":
+        return InputSequence(
             np.concatenate([self.state, other.state]),
             np.concatenate([self.target, other.target]),
             np.concatenate([self.thrust, other.thrust]),
@@ -50,8 +51,8 @@ class InstructionCounts:
     least: int
     mean: float
     most: int
-    by_function: dict[str, float]
-    """Mean of a step, most first."""
+    by_function: Annotated[dict[str, float], Field(exclude=True)] = field(default_factory=dict)
+    """Mean of a step, most first; not in a summary."""
 
 
 class CountingController:
@@ -74,17 +75,17 @@ class CountingController:
         return int(outcome.status[0]), by_function
 
 
-def in_flight(trace: Trace, every: int) -> Inputs:
+def in_flight(trace: Trace, every: int) -> InputSequence:
     """Take every so many-th input that the first flight of a trace gave its controller."""
     chosen = slice(0, None, every)
     state = np.concatenate(
         [trace.position_m[chosen, 0, :2], trace.velocity_m_s[chosen, 0, :2], trace.euler_rad[chosen, 0]],
         axis=1,
     )
-    return Inputs(state, trace.target[chosen, 0], trace.thrust_acceleration_m_s2[chosen, 0])
+    return InputSequence(state, trace.target[chosen, 0], trace.thrust_acceleration_m_s2[chosen, 0])
 
 
-def spread(settings: Settings, count: int) -> Inputs:
+def spread(settings: Settings, count: int) -> InputSequence:
     """Draw inputs from millimetres off the target to the ends of all ranges, heading anywhere."""
     rng = np.random.default_rng(0)
     ranges = settings.ranges
@@ -94,11 +95,11 @@ def spread(settings: Settings, count: int) -> Inputs:
     state = np.clip(target + scale * rng.normal(0, 1, (count, 4)), -bounds, bounds)
     attitude = rng.uniform(-1, 1, (count, 3)) * [0.5, 0.5, 1000.0]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
-    return Inputs(np.concatenate([state, attitude], axis=1), target, rng.uniform(low, high, count))
+    return InputSequence(np.concatenate([state, attitude], axis=1), target, rng.uniform(low, high, count))
 
 
 def count_instructions(
-    settings: Settings, elf: Path, core: str, inputs: Inputs, search_steps: int
+    settings: Settings, elf: Path, core: str, inputs: InputSequence, search_steps: int
 ) -> InstructionCounts:
     """Count the steps of `inputs`, then climb from the most expensive one for `search_steps` more.
 

@@ -1,18 +1,23 @@
 """What a controller takes of a board: flash, RAM, stack, instructions, time; and where it goes."""
 
 import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from pydantic import computed_field
+
 from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import plainly_named
 from mambo_nmpc.sil.controllers.emulated import build_guest
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
 from mambo_nmpc.sil.firmware.disassembly import is_readable
 from mambo_nmpc.sil.firmware.elf import load
@@ -37,14 +42,27 @@ class Limit:
     """One measured value against its budget; `unit` is of both."""
 
     name: str
-    value: float
-    budget: float
+    value: Number
+    budget: Number
     unit: str
 
+    @computed_field  # type: ignore[prop-decorator] # mypy knows no decorated property
     @property
     def share(self) -> float:
         """The value as a share of the budget."""
         return self.value / self.budget
+
+    @computed_field  # type: ignore[prop-decorator] # likewise
+    @property
+    def percent(self) -> str:
+        """The share in %, with three digits."""
+        return f"{100 * self.share:.3g}"
+
+    @computed_field  # type: ignore[prop-decorator] # likewise
+    @property
+    def width(self) -> float:
+        """The width of the bar on a page, in %."""
+        return min(100, round(100 * self.share, 1))
 
 
 @dataclass(frozen=True)
@@ -94,7 +112,8 @@ class Footprint:
             limits.append(Limit("stack", self.stack.bytes, budget.stack_bytes, "B"))
         if self.time_s is not None:
             period_ms = 1000 * self.update_period_s
-            limits.append(Limit("time", 1000 * self.time_s[1], budget.period_share * period_ms, "ms"))
+            time_ms = float(f"{1000 * self.time_s[1]:.4g}")  # an estimate has no more digits
+            limits.append(Limit("time", time_ms, budget.period_share * period_ms, "ms"))
         return tuple(limits)
 
     @property
@@ -166,3 +185,23 @@ def _counts(
         return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2), ""
     except EmulatorError as error:
         return None, str(error)
+
+
+def measure_boards(
+    settings: Settings, boards: Sequence[Board], optimisation: str, progress: Callable[[float], None]
+) -> tuple[list[Footprint], list[str]]:
+    """Measure on every board that has a compiler here; returns footprints, and what is missing for others.
+
+    Raises BuildError if there is no compiler for any.
+    """
+    measured: list[Footprint] = []
+    missing: list[str] = []
+    for index, board in enumerate(boards):
+        try:
+            measured.append(measure_footprint(settings, board, optimisation))
+        except BuildError as error:
+            missing.append(str(error))
+        progress((index + 1) / len(boards))
+    if not measured:
+        raise BuildError("\n".join(missing))
+    return measured, missing

@@ -1,35 +1,29 @@
-"""Pictures of footprints and sweeps."""
+"""Pictures of footprints and sweeps: as files, and for a page."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Final
 
 import matplotlib as mpl
+from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter, MaxNLocator
+from matplotlib.ticker import MaxNLocator
 
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.sil.footprint.measure import Footprint
 from mambo_nmpc.sil.footprint.sweep import Point, budgets
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, style
+from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, PlainLogFormatter, inline, save, style
 
-SWEPT: Final = {
+_SWEPT: Final = {
     "flash_bytes": "flash, B",
     "ram_bytes": "RAM, B",
     "time_ms": "time of a step, ms (upper estimate)",
     "iae_m_s": "IAE, m s",
 }
 """What a sweep measures and its picture shows, with labels."""
-
-
-class PlainLogFormatter(LogFormatter):
-    """Labels the same ticks of a logarithmic axis, but writes 0.02 for 2e-02."""
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        """Return the label of the tick at `x`, empty for one that has none."""
-        return f"{x:g}" if super().__call__(x, pos) else ""
 
 
 def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, Path]:
@@ -59,14 +53,6 @@ def _spelled(value: float) -> str:
     return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
-def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write a figure as PNG and SVG."""
-    png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
-    figure.savefig(png, dpi=160, metadata={"Software": None})
-    figure.savefig(svg, metadata={"Date": None, "Creator": None})
-    return png, svg
-
-
 def draw_sweep(
     points: Sequence[Point], board: Board, update_period_s: float, stem: Path
 ) -> tuple[Path, Path]:
@@ -78,16 +64,16 @@ def draw_sweep(
     with style():
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")
         limits = budgets(board, update_period_s)
-        for axes, quantity in zip(figure.subplots(2, 2).flat, SWEPT, strict=True):
-            draw_swept(axes, points, quantity, limits.get(quantity))
+        for axes, quantity in zip(figure.subplots(2, 2).flat, _SWEPT, strict=True):
+            _draw_swept(axes, points, quantity, limits.get(quantity))
         handles, labels = axes.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
         figure.suptitle(board.title, parse_math=False)
         return save(figure, stem)
 
 
-def draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float | None) -> None:
-    """Draw one quantity of `SWEPT` against the prediction horizon, and its limit if that is near."""
+def _draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float | None) -> None:
+    """Draw one quantity of `_SWEPT` against the prediction horizon, and its limit if that is near."""
     controls = sorted({point.control for point in points})
     iterations = sorted({point.iterations for point in points})
     for (row, control), (column, count) in product(enumerate(controls), enumerate(iterations)):
@@ -99,9 +85,27 @@ def draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float 
         axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour, markersize=3.5)
     if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
         axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
-    axes.set(xlabel="prediction horizon", ylabel=SWEPT[quantity])
+    axes.set(xlabel="prediction horizon", ylabel=_SWEPT[quantity])
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if quantity in ("iae_m_s", "time_ms"):
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(PlainLogFormatter())
         axes.yaxis.set_minor_formatter(PlainLogFormatter())
+
+
+def sweep_panels(points: Sequence[Point], budgets: Mapping[str, float]) -> list[Markup]:
+    """Return a picture of each swept quantity against the prediction horizon; the first has the legend."""
+    pictures: list[Markup] = []
+    with style():
+        for quantity, label in _SWEPT.items():
+            if all(math.isnan(getattr(point, quantity)) for point in points):
+                continue
+            figure = Figure(figsize=(PANEL_INCHES, 3.4), layout="constrained")
+            axes = figure.subplots()
+            _draw_swept(axes, points, quantity, budgets.get(quantity))
+            if not pictures:
+                axes.legend(fontsize=7, handlelength=2.6)
+            pictures.append(
+                inline(figure, f"{label} against the prediction horizon; the table has the values")
+            )
+    return pictures

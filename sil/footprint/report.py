@@ -1,28 +1,76 @@
-"""A footprint as text, JSON and a page: the same figures, three times."""
+"""Footprints as a record, as text and as a page: the same figures, three times."""
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import astuple, dataclass
 
-from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.files.summary import Summary
+from mambo_nmpc.sil.firmware.gate import Forbidden
+from mambo_nmpc.sil.firmware.sizes import Parts
+from mambo_nmpc.sil.firmware.stack import Frame
+from mambo_nmpc.sil.footprint.counts import InstructionCounts
 from mambo_nmpc.sil.footprint.measure import Footprint, Limit
 from mambo_nmpc.sil.show.page import render_page
 
 _HEAD = ("board", "flash B", "RAM B", "stack B", "instructions a step", "time ms", "period", "")
 
 
-def summary(footprints: Sequence[Footprint], source: str, settings: Settings) -> dict[str, Any]:
-    """Return everything that was measured, ready for JSON."""
-    first = footprints[0]
-    return {
-        "generator": f"mambo-nmpc {__version__}",
-        "command": "footprint",
-        "source": source,
-        "digest": settings.digest[:16],
-        "scalar": settings.code.scalar,
-        "optimisation": first.optimisation,
-        "boards": [_board(footprint) for footprint in footprints],
-    }
+@dataclass(frozen=True)
+class FunctionFootprint:
+    """A symbol of the program; a dash is what was not measured."""
+
+    name: str
+    size: int | str
+    frame: int | str
+    depth: int | str
+    instructions: int | str
+
+
+@dataclass(frozen=True)
+class BoardFootprint:
+    """The footprint on one board."""
+
+    name: str
+    title: str
+    core: str
+    compiler: str
+    fits: bool
+    complete: bool
+    limits: tuple[Limit, ...]
+    flash_bytes: Parts
+    flash_sections: dict[str, int]
+    ram_bytes: Parts
+    instance_bytes: int
+    stack_path: tuple[Frame, ...]
+    instructions: InstructionCounts | None
+    cycles_estimate: tuple[float, float] | None
+    time_s_estimate: tuple[float, float] | None
+    forbidden: tuple[Forbidden, ...]
+    functions: list[FunctionFootprint]
+    notes: list[str]
+
+
+class FootprintSummary(Summary):
+    """Footprints on boards."""
+
+    command = "footprint"
+
+    source: str
+    digest: str
+    scalar: str
+    optimisation: str
+    boards: list[BoardFootprint]
+
+
+def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) -> FootprintSummary:
+    """Return everything that was measured."""
+    return FootprintSummary(
+        source=source,
+        digest=settings.digest[:16],
+        scalar=settings.code.scalar,
+        optimisation=footprints[0].optimisation,
+        boards=[_board(footprint) for footprint in footprints],
+    )
 
 
 def text(footprints: Sequence[Footprint]) -> str:
@@ -32,14 +80,14 @@ def text(footprints: Sequence[Footprint]) -> str:
     if len(footprints) == 1:
         functions = _functions(footprints[0])
         head = ("function", "size B", "own frame B", "deepest B", "instructions")
-        lines += ["", *_columns([head, *(tuple(str(value) for value in f.values()) for f in functions)])]
+        lines += ["", *_columns([head, *(tuple(map(str, astuple(one))) for one in functions)])]
     notes = [note for footprint in footprints for note in _notes(footprint)]
     return "\n".join([*lines, *(["", *notes] if notes else [])])
 
 
-def page(summary_of_all: dict[str, Any]) -> str:
+def page(summary: FootprintSummary) -> str:
     """Render the summary as one HTML page that needs no other file."""
-    return render_page("footprint.html.j2", summary_of_all)
+    return render_page("footprint.html.j2", {"summary": summary})
 
 
 def _row(footprint: Footprint) -> tuple[str, ...]:
@@ -56,58 +104,43 @@ def _row(footprint: Footprint) -> tuple[str, ...]:
     )
 
 
-def _board(footprint: Footprint) -> dict[str, Any]:
-    counts = footprint.counts
-    return {
-        "name": footprint.board.name,
-        "title": footprint.board.title,
-        "core": footprint.board.core.value,
-        "compiler": footprint.compiler,
-        "fits": footprint.fits,
-        "complete": footprint.complete,
-        "limits": [_limit(limit) for limit in footprint.limits],
-        "flash_bytes": vars(footprint.added.flash),
-        "flash_sections": footprint.added.sections.flash,
-        "ram_bytes": vars(footprint.added.ram),
-        "instance_bytes": footprint.instance_bytes,
-        "stack_path": [] if footprint.stack is None else [vars(frame) for frame in footprint.stack.path],
-        "instructions": None
-        if counts is None
-        else {"steps": counts.steps, "least": counts.least, "mean": counts.mean, "most": counts.most},
-        "cycles_estimate": footprint.cycles,
-        "time_s_estimate": footprint.time_s,
-        "forbidden": [vars(found) for found in footprint.forbidden],
-        "functions": _functions(footprint),
-        "notes": _notes(footprint),
-    }
+def _board(footprint: Footprint) -> BoardFootprint:
+    return BoardFootprint(
+        name=footprint.board.name,
+        title=footprint.board.title,
+        core=footprint.board.core.value,
+        compiler=footprint.compiler,
+        fits=footprint.fits,
+        complete=footprint.complete,
+        limits=footprint.limits,
+        flash_bytes=footprint.added.flash,
+        flash_sections=footprint.added.sections.flash,
+        ram_bytes=footprint.added.ram,
+        instance_bytes=footprint.instance_bytes,
+        stack_path=() if footprint.stack is None else footprint.stack.path,
+        instructions=footprint.counts,
+        cycles_estimate=footprint.cycles,
+        time_s_estimate=footprint.time_s,
+        forbidden=footprint.forbidden,
+        functions=_functions(footprint),
+        notes=_notes(footprint),
+    )
 
 
-def _limit(limit: Limit) -> dict[str, Any]:
-    return {
-        "name": limit.name,
-        "value": float(f"{limit.value:.4g}") if limit.unit == "ms" else limit.value,
-        "budget": limit.budget,
-        "unit": limit.unit,
-        "share": limit.share,
-        "percent": f"{100 * limit.share:.3g}",
-        "width": min(100, round(100 * limit.share, 1)),
-    }
-
-
-def _functions(footprint: Footprint) -> list[dict[str, Any]]:
+def _functions(footprint: Footprint) -> list[FunctionFootprint]:
     """Return size, frame, depth and instructions of every symbol, most instructions first."""
     counts = footprint.counts.by_function if footprint.counts else {}
     frames, depths = (footprint.stack.frames, footprint.stack.depths) if footprint.stack else ({}, {})
     sizes = footprint.added.own | footprint.added.helpers
     names = dict.fromkeys([*counts, *sorted(sizes, key=lambda name: -sizes[name])])
     return [
-        {
-            "name": name,
-            "size": sizes.get(name, "-"),
-            "frame": frames.get(name, "-"),
-            "depth": depths.get(name, "-"),
-            "instructions": round(counts[name]) if name in counts else "-",
-        }
+        FunctionFootprint(
+            name,
+            sizes.get(name, "-"),
+            frames.get(name, "-"),
+            depths.get(name, "-"),
+            round(counts[name]) if name in counts else "-",
+        )
         for name in names
     ]
 

@@ -34,7 +34,7 @@ class BuildDigest:
     reason: str = ""
 
 
-def same_bits(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
+def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
     """Yield the digest of the reference first, then of every build on this machine and on `boards`."""
     yield BuildDigest(REFERENCE, "NumPy", "", _spelled(self_test_digest(Design(settings), episodes)))
     for name in HOST_COMPILERS:
@@ -47,7 +47,7 @@ def same_bits(settings: Settings, boards: Sequence[Board], episodes: int) -> Ite
 
 
 def builds(boards: Sequence[Board]) -> int:
-    """Count what `same_bits` yields."""
+    """Count what `run_everywhere` yields."""
     return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(BOARD_COMPILERS) * len(boards))
 
 

@@ -14,6 +14,7 @@ from typing import Any, Final
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.footprint.measure import measure_footprint
@@ -48,14 +49,27 @@ class Point:
     iterations: int
     flash_bytes: int
     ram_bytes: int
-    stack_bytes: float
-    instructions: float
-    time_ms: float
-    iae_m_s: float
+    stack_bytes: Number
+    instructions: Number
+    time_ms: Number
+    iae_m_s: Number
     fits: bool
 
 
-def sweep(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
+class SweepSummary(Summary):
+    """A grid of horizons and iterations; `budget` is what `budgets` returns."""
+
+    command = "sweep"
+
+    source: str
+    settings: str
+    board: str
+    budget: dict[str, Number]
+    points: list[Point]
+    largest_fit: Point | None
+
+
+def measure_grid(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
     """Yield the points of the grid in order, measured on all processors of this machine."""
     jobs = [(settings.model_dump(), board.model_dump(), *point) for point in grid.points()]
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
@@ -108,4 +122,14 @@ def _measured(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Poin
         time_ms=math.nan if footprint.time_s is None else 1000 * footprint.time_s[1],
         iae_m_s=float(metrics.iae_m_s[0]),
         fits=footprint.fits and footprint.complete,
+    )
+
+
+def point_text(point: Point) -> str:
+    """Spell a point in a line."""
+    return (
+        f"prediction {point.prediction:2}  control {point.control:2}  iterations {point.iterations:3}  "
+        f"flash {point.flash_bytes} B  RAM {point.ram_bytes} B  stack {point.stack_bytes:g} B  "
+        f"instructions {point.instructions:g}  IAE {point.iae_m_s:.4g} m s  "
+        f"{'fits' if point.fits else 'not shown to fit'}"
     )

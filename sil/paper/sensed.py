@@ -9,11 +9,14 @@ import numpy as np
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.traces import SensedTrace
-from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S, INDICES, PD, PRINTED_NMPC, PRINTED_PD, Four, digits
+from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S, INDICES, PRINTED_NMPC, PRINTED_PD, Four
 from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.show.numbers import digits
 
 PRESETS: Final = ("mambo", "table1")
 """Which fly beside the PD."""
@@ -43,8 +46,18 @@ class SensedRow:
     lost: int
     tracked: Four
     seen: Four
-    worst_iae_m_s: float
-    drift_m: float
+    worst_iae_m_s: Number
+    drift_m: Number
+
+
+class SensedSummary(Summary):
+    """The Table II case through sensors and estimators."""
+
+    command = "table2 --sensors"
+
+    scalar: str | None
+    """The type of numbers that was asked for instead of the presets' own."""
+    rows: list[SensedRow]
 
 
 def fly_sensed(
@@ -53,7 +66,7 @@ def fly_sensed(
     *,
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
-) -> tuple[SensedRow, ...]:
+) -> list[SensedRow]:
     """Fly the case with the PD and the compiled C of `settings` by name, each with every view."""
     jobs = [(name, view) for name in (PD, *settings) for view in VIEWS]
     rows = []
@@ -64,7 +77,7 @@ def fly_sensed(
                 progress((flown + share) / len(jobs))
 
         rows.append(_row(name, settings.get(name), view, report, duration_s=duration_s, flights=flights))
-    return tuple(rows)
+    return rows
 
 
 def _row(

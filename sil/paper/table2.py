@@ -1,6 +1,6 @@
 """Table II of the paper, flown again: PD and every preset, measured beside printed, claim by claim."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,10 +9,13 @@ import numpy as np
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly
 from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
+from mambo_nmpc.sil.show.numbers import digits, three_digits
 
 INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")
 PRINTED_PD: Final = (63.02, 47.86, 2460.0, 3200.0)
@@ -27,15 +30,14 @@ CASES: Final[dict[str, Trajectory]] = {
 """The Table II case, which reproduces the printed PD row, and the two readings of the printed text."""
 
 DURATION_S: Final = 100.0
-PD: Final = "PD"
 _CLOSE: Final = 0.10
 
-Four = tuple[float, float, float, float]
+Four = tuple[Number, Number, Number, Number]
 """IAE (m s), ISE (m^2 s), ITSE (m^2 s^2), ITAE (m s^2)."""
 
 
 @dataclass(frozen=True)
-class Row:
+class Table2Row:
     """One controller in one case."""
 
     case: str
@@ -54,21 +56,25 @@ class Claim:
     evidence: str
 
 
-@dataclass(frozen=True)
-class Table2:
-    """All rows, the verdicts, and the traces by controller (one flight for each case, in order)."""
+class Table2Summary(Summary):
+    """Table II, flown again."""
 
-    rows: tuple[Row, ...]
-    claims: tuple[Claim, ...]
-    traces: dict[str, Trace]
+    command = "table2"
 
-    def row(self, case: str, controller: str) -> Row:
-        """Return the row of a controller in a case."""
-        return next(row for row in self.rows if (row.case, row.controller) == (case, controller))
+    scalar: str | None
+    """The type of numbers that was asked for instead of the presets' own."""
+    cases: list[str]
+    rows: list[Table2Row]
+    claims: list[Claim]
 
 
-def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], None] | None = None) -> Table2:
-    """Fly every case with the PD and with the compiled C of `settings` by name, 100 s each."""
+def fly_table2(
+    settings: Mapping[str, Settings], progress: Callable[[float], None] | None = None
+) -> dict[str, Trace]:
+    """Fly every case with the PD and with the compiled C of `settings` by name, 100 s each.
+
+    Returns the traces by controller, one flight for each case, in order.
+    """
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
     controllers: dict[str, PositionController] = {PD: PdController()}
     controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
@@ -80,17 +86,50 @@ def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], Non
                 progress((flown + share) / len(controllers))
 
         traces[name] = fly(flight, controller, report)
-    rows = tuple(_rows(traces))
-    return Table2(rows, tuple(_claims(rows)), traces)
+    return traces
 
 
-def _rows(traces: dict[str, Trace]) -> list[Row]:
+def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summary:
+    """Compare what `fly_table2` flew with what is printed, and judge the claims of section III."""
+    rows = _rows(traces)
+    return Table2Summary(scalar=scalar, cases=list(CASES), rows=rows, claims=_claims(rows))
+
+
+def table2_text(summary: Table2Summary) -> str:
+    """Spell Table II: a block for each case, printed above measured, then what the paper claims."""
+    lines = [f"{'':68}  PD over NMPC"]
+    for case in CASES:
+        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
+        lines[-1] += "".join(f"{index:>9}" for index in INDICES)
+        if case == next(iter(CASES)):
+            lines += [_line("printed PD", PRINTED_PD, None)]
+            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
+        lines += [
+            _line(f"flown {row.controller}", row.measured, row.improvement)
+            for row in summary.rows
+            if row.case == case
+        ]
+        lines += [""]
+    lines += ["the paper's claims, as flown here:"]
+    lines += [
+        f"  {'holds' if claim.holds else 'does not hold':13}  {claim.text}: {claim.evidence}"
+        for claim in summary.claims
+    ]
+    return "\n".join(lines)
+
+
+def _line(name: str, values: Four, improvement: Four | None) -> str:
+    ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
+    return f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values) + ratios
+
+
+def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:
     indices = {
         name: np.array([metrics.iae_m_s, metrics.ise_m2_s, metrics.itse_m2_s2, metrics.itae_m_s2])
         for name, metrics in ((name, measure(trace)) for name, trace in traces.items())
     }
     return [
-        Row(
+        Table2Row(
             case=case,
             controller=name,
             measured=_four(values[:, column]),
@@ -106,8 +145,7 @@ def _four(values: np.ndarray) -> Four:
     return iae, ise, itse, itae
 
 
-def _claims(rows: tuple[Row, ...]) -> list[Claim]:
-    """Judge what section III of the paper claims."""
+def _claims(rows: Sequence[Table2Row]) -> list[Claim]:
     case, *printed_readings = CASES
     return [
         _pd_claim(rows, case),
@@ -116,7 +154,7 @@ def _claims(rows: tuple[Row, ...]) -> list[Claim]:
     ]
 
 
-def _pd_claim(rows: tuple[Row, ...], case: str) -> Claim:
+def _pd_claim(rows: Sequence[Table2Row], case: str) -> Claim:
     measured = next(row.measured for row in rows if (row.case, row.controller) == (case, PD))
     deviation = max(abs(ours / theirs - 1) for ours, theirs in zip(measured, PRINTED_PD, strict=True))
     return Claim(
@@ -126,23 +164,15 @@ def _pd_claim(rows: tuple[Row, ...], case: str) -> Claim:
     )
 
 
-def _improvement_claim(row: Row) -> Claim:
+def _improvement_claim(row: Table2Row) -> Claim:
     improvement = row.improvement or (np.nan,) * 4
     holds = all(ours >= theirs for ours, theirs in zip(improvement, PRINTED_IMPROVEMENT, strict=True))
     return Claim(
-        text=f"{row.controller} improves on the PD by at least " + spelled(PRINTED_IMPROVEMENT),
+        text=f"{row.controller} improves on the PD by at least " + _spelled(PRINTED_IMPROVEMENT),
         holds=holds,
-        evidence="measured " + spelled(improvement),
+        evidence="measured " + _spelled(improvement),
     )
 
 
-def spelled(values: tuple[float, ...]) -> str:
-    """Spell four indices or ratios with three digits."""
-    return " / ".join(
-        f"{value:#.3g}".rstrip(".") if abs(value) < 1000 else f"{value:.0f}" for value in values
-    )
-
-
-def digits(value: float) -> str:
-    """Spell a value with four digits, and a large one in full."""
-    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+def _spelled(values: Four) -> str:
+    return " / ".join(map(three_digits, values))

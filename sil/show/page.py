@@ -2,17 +2,15 @@
 
 import base64
 import hashlib
-import math
 from collections.abc import Mapping
 from typing import Any, Final
 
 import jinja2
 from markupsafe import Markup
 
-from mambo_nmpc.sil.paper.table2 import digits, spelled
+from mambo_nmpc.sil.show.numbers import digits_or_dash, fixed_or_dash, three_digits_or_dash
 
 _SCRIPT: Final = "flight.js"
-_DASH: Final = "\N{EN DASH}"
 
 
 def render_page(template: str, context: Mapping[str, Any]) -> str:
@@ -29,18 +27,8 @@ def render_page(template: str, context: Mapping[str, Any]) -> str:
         autoescape=True,
         keep_trailing_newline=True,
     )
-    environment.filters |= {"digits": _digits, "three": _three}
+    environment.filters |= {"digits": digits_or_dash, "three": three_digits_or_dash, "fixed": fixed_or_dash}
     style, script = (loader.get_source(environment, name)[0] for name in ("style.css", _SCRIPT))
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     own = {"style": Markup(style), "script": Markup(script), "script_digest": digest}
     return environment.get_template(template).render({**context, **own})
-
-
-def _digits(value: float | None) -> str:
-    """Spell a measured value with four digits, and what was not measured as a dash."""
-    return _DASH if value is None or not math.isfinite(value) else digits(value)
-
-
-def _three(value: float | None) -> str:
-    """Spell a ratio or a statistic with three digits, and what there is not as a dash."""
-    return _DASH if value is None or not math.isfinite(value) else spelled((value,))

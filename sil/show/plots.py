@@ -1,24 +1,24 @@
-"""Pictures of flights, after the paper's Fig. 3: path, error, commands; PNG and SVG."""
+"""How pictures look: one style; PNG and SVG files; and SVG on a page, in its colours, light or dark."""
 
 import contextlib
+import hashlib
+import io
+import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
-import numpy as np
-from matplotlib.axes import Axes
+from markupsafe import Markup
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
-
-from mambo_nmpc.sil.flight.metrics import horizontal_error_m
-from mambo_nmpc.sil.flight.traces import Trace
+from matplotlib.ticker import LogFormatter
 
 TARGET, FLOWN, COMMAND = "#c4c4c4", "#0072B2", "#E69F00"
 """Colours that stay apart for colour-blind readers and in grey (Okabe and Ito)."""
 
-COLUMN_LABELS: Final = ("y (east), m", "error, m", "roll, rad", "pitch, rad")
+PANEL_INCHES: Final = 4.2
+"""Width of a picture on a page, of which two stand side by side."""
 
 _STYLE: Final[dict[Any, Any]] = {
     "font.size": 9,
@@ -33,30 +33,17 @@ _STYLE: Final[dict[Any, Any]] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "mambo-nmpc",
 }
-_COLUMN_INCHES: Final = 4.2
-_HEIGHT_INCHES: Final = 8.2
-
-
-def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
-    """Draw the first flight of each trace as a column under its title; write stem.png and stem.svg.
-
-    The columns share their scales, so that they can be compared by eye.
-    """
-    with style():
-        figure = Figure(figsize=(_COLUMN_INCHES * len(flights), _HEIGHT_INCHES), layout="constrained")
-        rows = figure.subplots(4, len(flights), squeeze=False, sharey="row", height_ratios=(1.9, 1, 1, 1))
-        for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
-            draw_column(column, trace, title)
-        for axes, label in zip(rows[:, 0], COLUMN_LABELS, strict=True):
-            axes.set_ylabel(label)
-        _share_horizontal_scale(rows[0])
-        rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
-        for axes in (rows[0, 0], rows[2, 0]):
-            axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
-        png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
-        figure.savefig(png, dpi=160, metadata={"Software": None})
-        figure.savefig(svg, metadata={"Date": None, "Creator": None})
-    return png, svg
+_VARIABLES: Final = {
+    "#000000": "currentColor",
+    "#444444": "var(--quiet)",
+    "#e6e6e6": "var(--line)",
+    TARGET.lower(): "var(--target)",
+    FLOWN.lower(): "var(--flown)",
+    COMMAND.lower(): "var(--other)",
+    "#1f77b4": "var(--flown)",
+    "#ff7f0e": "var(--other)",
+}
+"""Colours of the pictures on white, the first two of matplotlib's cycle among them, and the page's names."""
 
 
 @contextlib.contextmanager
@@ -69,36 +56,44 @@ def style() -> Iterator[None]:
         yield
 
 
-def draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
-    """Draw the first flight of a trace in four axes (4,): path, error, roll, pitch."""
-    _draw_path(column[0], trace, title)
-    _draw_error(column[1], trace)
-    _draw_angle(column[2], trace, axis=0)
-    _draw_angle(column[3], trace, axis=1)
-    column[3].set_xlabel("time, s")
+class PlainLogFormatter(LogFormatter):
+    """Labels the same ticks of a logarithmic axis, but writes 0.02 for 2e-02."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of the tick at `x`, empty for one that has none."""
+        return f"{x:g}" if super().__call__(x, pos) else ""
 
 
-def _draw_path(axes: Axes, trace: Trace, title: str) -> None:
-    """Draw the target as a broad line beneath: it stays visible however often it is flown around."""
-    target, flown = trace.target[:, 0], trace.position_m[:, 0]
-    axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=4, label="target")
-    axes.plot(flown[:, 0], flown[:, 1], color=FLOWN, label="flown")
-    axes.set_title(title, loc="right", parse_math=False)
-    axes.set(xlabel="x (north), m", aspect="equal")
+def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
+    """Write a figure as PNG and SVG."""
+    png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
+    figure.savefig(png, dpi=160, metadata={"Software": None})
+    figure.savefig(svg, metadata={"Date": None, "Creator": None})
+    return png, svg
 
 
-def _draw_error(axes: Axes, trace: Trace) -> None:
-    axes.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
-    axes.set_ylim(0, None)
+def inline(figure: Figure, description: str) -> Markup:
+    """Return a figure as an SVG element: no background, the page's font and colours, ids of its own."""
+    text = io.StringIO()
+    figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<!--.*?-->|<(metadata|style).*?</\1>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'(<(?:g|svg)[^>]*?) id="[^"]*"', r"\1", svg)
+    svg = re.sub(r'\sxmlns(:\w+)?="[^"]*"|\sversion="1.1"', "", svg).replace("xlink:href", "href")
+    svg = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d\.\d)\d+", r"\1", tag[0]), svg)
+    svg = re.sub(r"\s*\n(?:L )?", " ", svg)
+    svg = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", svg)
+    svg = re.sub(r"; font-family: [^;\"]*", "", svg)
+    svg = re.sub(r"(?<=: )#[0-9a-f]{6}", lambda colour: _VARIABLES.get(colour[0], colour[0]), svg)
+    role = Markup('<svg role="img" aria-label="{}"').format(description)
+    return Markup(_with_own_ids(svg).replace("<svg", role, 1))
 
 
-def _draw_angle(axes: Axes, trace: Trace, axis: int) -> None:
-    """Draw the command as a broader line beneath: both show where they agree, and where one chatters."""
-    axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=2, label="command")
-    axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=0.9, label="flown")
-
-
-def _share_horizontal_scale(row: NDArray[Any]) -> None:
-    limits = np.array([axes.get_xlim() for axes in row])
-    for axes in row:
-        axes.set_xlim(limits[:, 0].min(), limits[:, 1].max())
+def _with_own_ids(svg: str) -> str:
+    """Return the SVG with ids made of its content: those of matplotlib vary with the last bit of a place."""
+    found = list(dict.fromkeys(re.findall(r' id="([^"]+)"', svg)))
+    numbered = {name: f"n{number}" for number, name in enumerate(found)}
+    plain = re.sub("|".join(found), lambda name: numbered[name[0]], svg)
+    digest = hashlib.sha256(plain.encode()).hexdigest()[:8]
+    return re.sub("|".join(found), lambda name: f"s{digest}{numbered[name[0]]}", svg)

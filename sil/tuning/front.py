@@ -7,7 +7,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.sil.tuning.file import Tuning, rounded
-from mambo_nmpc.sil.tuning.study import Judged, study_name
+from mambo_nmpc.sil.tuning.study import FinishedTrial, study_name
 
 IAE_ALLOWANCE: Final = 1.1
 """Bound on the IAE of the chosen point, relative to the least IAE found."""
@@ -16,21 +16,21 @@ RULE: Final = "the least command variation with an IAE within 10 % of the least 
 """How the point is chosen; stands in controller.toml."""
 
 
-def pareto_front(trials: Sequence[Judged]) -> list[Judged]:
+def pareto_front(trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
     """Return the Pareto-optimal trials in IAE and command variation, sorted by IAE."""
-    front: list[Judged] = []
+    front: list[FinishedTrial] = []
     for trial in sorted(trials, key=lambda one: (one.iae_m_s, one.command_variation_rad, one.number)):
         if not front or trial.command_variation_rad < front[-1].command_variation_rad:
             front.append(trial)
     return front
 
 
-def chosen(front: Sequence[Judged]) -> Judged:
+def chosen(front: Sequence[FinishedTrial]) -> FinishedTrial:
     """Return the point of a front, which is sorted by IAE, according to `RULE`."""
     return [one for one in front if one.iae_m_s <= IAE_ALLOWANCE * front[0].iae_m_s][-1]
 
 
-def front_csv(front: Sequence[Judged]) -> str:
+def front_csv(front: Sequence[FinishedTrial]) -> str:
     """Return the front as CSV, one line per trial; `chosen` is 1 for the chosen one."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -43,7 +43,7 @@ def front_csv(front: Sequence[Judged]) -> str:
     return text.getvalue()
 
 
-def controller_text(tuning: Tuning, trials: Sequence[Judged]) -> str:
+def controller_text(tuning: Tuning, trials: Sequence[FinishedTrial]) -> str:
     """Return the controller.toml of the chosen trial; its head names study, trial and result."""
     best, flight = chosen(pareto_front(trials)), tuning.file.flight
     title = (

@@ -5,13 +5,14 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mambo_nmpc.sil.footprint.plots import save
-from mambo_nmpc.sil.show.plots import style
+from mambo_nmpc.sil.show.plots import save, style
 from mambo_nmpc.sil.tuning.front import chosen, pareto_front
-from mambo_nmpc.sil.tuning.study import Judged
+from mambo_nmpc.sil.tuning.study import FinishedTrial
 
 
-def draw_front(trials: Sequence[Judged], base: Sequence[Judged], stem: Path) -> tuple[Path, Path]:
+def draw_front(
+    trials: Sequence[FinishedTrial], base: Sequence[FinishedTrial], stem: Path
+) -> tuple[Path, Path]:
     """Draw IAE against command variation, both logarithmic; write stem.png and stem.svg.
 
     A trial without any command variation is left out, as it has no place on a logarithmic axis.

@@ -44,7 +44,7 @@ _OWNER: Final = "folder"
 
 
 @dataclass(frozen=True)
-class Judged:
+class FinishedTrial:
     """One finished trial: settings and results, which are means over all flights."""
 
     number: int
@@ -141,13 +141,15 @@ def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int,
     return int(crashed.sum()), (iae_m_s, variation_rad)
 
 
-def judged(study: "Study") -> list[Judged]:
+def judged(study: "Study") -> list[FinishedTrial]:
     """Return the finished trials of a study by number."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
     crashed = study.user_attrs
     return [
-        Judged(one.number, dict(one.params), one.values[0], one.values[1], crashed[f"{CRASHED}_{one.number}"])
+        FinishedTrial(
+            one.number, dict(one.params), one.values[0], one.values[1], crashed[f"{CRASHED}_{one.number}"]
+        )
         for one in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
     ]
 

@@ -1,6 +1,7 @@
 """Check: whatever fails in flight, commands stay bounded, bad input is refused, and the drone comes back."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 
 import numpy as np
@@ -9,7 +10,7 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
-from mambo_nmpc.sil.faults.report import records, table, write_csv
+from mambo_nmpc.sil.faults.report import table, write_csv
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, scenarios
 from mambo_nmpc.sil.files.folders import finite
 from mambo_nmpc.sil.verify.bundle import controller
@@ -56,7 +57,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
     else:
         outcome = Outcome.PASSED
         evidence = _evidence(verdicts, ending)
-    figures = finite({"wrong": wrong, "flights": records(verdicts)})
+    figures = finite({"wrong": wrong, "flights": [asdict(verdict) for verdict in verdicts]})
     return Result(outcome, evidence, figures, {"compiler": host_toolchain().identity().splitlines()[0]})
 
 

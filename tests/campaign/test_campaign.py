@@ -13,7 +13,7 @@ from mambo_nmpc.sil.campaign import file
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
 from mambo_nmpc.sil.campaign.flights import INDICES
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
-from mambo_nmpc.sil.campaign.statistics import improvement, proportion, quantiles, summarise, worst
+from mambo_nmpc.sil.campaign.statistics import improvement, improvements, proportion, quantiles, worst
 from mambo_nmpc.sil.plant.airframe import MAMBO
 
 ROOT = Path(__file__).parents[2]
@@ -273,7 +273,7 @@ def test_statistics_are_reproducible() -> None:
     rng = np.random.default_rng(2)
     columns = {f"{name}_{index}": rng.uniform(1.0, 2.0, 20) for name in "ab" for index in INDICES}
     columns |= {f"{name}_{key}": np.zeros(20) for name in "ab" for key in ("crashed", "refused_updates")}
-    assert summarise(columns, "ab", sensed=False) == summarise(columns, "ab", sensed=False)
+    assert improvements(columns, "ab", sensed=False) == improvements(columns, "ab", sensed=False)
 
 
 def test_every_parameter_is_documented() -> None:

@@ -156,12 +156,12 @@ def test_a_killed_campaign_resumes_to_the_same_bytes(source: Path, whole: Path, 
 STOPPED = """
 import os, signal
 from mambo_nmpc.__main__ import main
-from mambo_nmpc.sil.campaign.store import Store
-add = Store.add
+from mambo_nmpc.sil.campaign.store import FlightStore
+add = FlightStore.add
 def add_and_stop(self, rows):
     add(self, rows)
     os.killpg(0, signal.SIGINT)
-Store.add = add_and_stop
+FlightStore.add = add_and_stop
 main()
 """
 

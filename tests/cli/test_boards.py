@@ -5,14 +5,12 @@ import shutil
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import boards, cli
+from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.cli import app as cli_app
-from mambo_nmpc.sil.cli import boards as cli_boards
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.footprint.plots import draw_footprints
+from tests.support.command import run
 from tests.support.tools import board_builder, only, require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
@@ -27,16 +25,6 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def _no_compiler(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a machine without any command."""
     monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("bin")))
-
-
-def run(*arguments: str, code: int = 0) -> tuple[str, str]:
-    """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
-    app = cli.root()
-    cli_app.register(app)
-    cli_boards.register(app)
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == code, (result.output, result.exception)
-    return result.stdout, result.stderr
 
 
 @pytest.fixture

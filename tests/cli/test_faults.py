@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli
-from mambo_nmpc.sil.cli import faults
+from mambo_nmpc.codegen.command import load
+from mambo_nmpc.sil.cli.faults import FILES
+from tests.support.command import run
 
 
 @pytest.fixture(autouse=True)
@@ -15,26 +15,16 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
-def run(*arguments: str, code: int = 0) -> tuple[str, str]:
-    """Run the command, demand its exit code, and return stdout and stderr."""
-    app = cli.root()
-    cli.register(app)
-    faults.register(app)
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == code, (result.output, result.exception)
-    return result.stdout, result.stderr
-
-
 @pytest.mark.long
 def test_faults_leave_table_picture_and_json(tmp_path: Path) -> None:
     """CSV, PNG, SVG and the summary, which stdout repeats; with the scalar type that was asked for."""
     said, _ = run("faults", "table1", "--scalar", "fixed", "--json", "-o", "out")
     out = tmp_path / "out"
-    assert {path.name for path in out.iterdir()} == {*faults.FAULT_FILES, "summary.json"}
+    assert {path.name for path in out.iterdir()} == {*FILES, "summary.json"}
     assert (out / "faults.png").read_bytes().startswith(b"\x89PNG")
     assert said == (out / "summary.json").read_text("utf-8")
     summary = json.loads(said, parse_constant=pytest.fail)
-    assert summary["settings"] == cli.load("table1", "fixed").digest
+    assert summary["settings"] == load("table1", "fixed").digest
     flights = summary["flights"]
     lines = (out / "faults.csv").read_text("utf-8").splitlines()
     assert len(lines) == 1 + len(flights)

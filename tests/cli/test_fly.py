@@ -11,9 +11,8 @@ import pytest
 
 from mambo_nmpc.codegen.errors import INTERRUPTED
 from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.report import table2_text
 from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
-from mambo_nmpc.sil.paper.table2 import Claim, Row, Table2
+from mambo_nmpc.sil.paper.table2 import Claim, Table2Row, Table2Summary, table2_text
 
 
 def command(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -269,9 +268,9 @@ def test_table2_refuses_an_unknown_scalar_type(sensors: list[str], tmp_path: Pat
 
 def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     """Ratios are named, and a claim that does not hold is the paper's."""
-    row = Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
-    claims = (Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %"))
-    text = table2_text(Table2((row,), claims, {}))
+    row = Table2Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
+    claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
+    text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
     above, header = text.splitlines()[:2]
     assert above.index("PD over NMPC") > header.index("ITAE")
     assert header.split()[3:] == ["IAE", "ISE", "ITSE", "ITAE"] * 2

@@ -5,13 +5,11 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli
-from mambo_nmpc.sil.cli import verify
-from mambo_nmpc.sil.verify.check import Outcome, Result
-from mambo_nmpc.sil.verify.checks import CHECKS, Entry
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.checks import CHECKS
 from mambo_nmpc.sil.verify.report import Verified, closing, verdict
+from tests.support.command import run
 from tests.support.tools import require
 
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
@@ -28,19 +26,12 @@ def _no_tool(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monke
     monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("bin")))
 
 
-def run(*arguments: str, code: int = 0) -> tuple[str, str]:
-    """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
-    app = cli.root()
-    cli.register(app)
-    verify.register(app)
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == code, (result.output, result.exception)
-    return result.stdout, result.stderr
-
-
 def ended(*outcomes: Outcome) -> list[Verified]:
     """Return checks that ended so."""
-    return [Verified(entry, Result(one, "")) for entry, one in zip(CHECKS, outcomes, strict=False)]
+    return [
+        Verified(entry.name, entry.about, one, "", {}, {})
+        for entry, one in zip(CHECKS, outcomes, strict=False)
+    ]
 
 
 def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
@@ -139,4 +130,4 @@ def test_checks_have_names_and_order() -> None:
     order = [*first, "work", "parity", "signs", "faults"]
     names = [entry.name for entry in CHECKS]
     assert names == [name for name in order if name in names]
-    assert all(isinstance(entry, Entry) and "\n" not in entry.about for entry in CHECKS)
+    assert all(callable(entry.check) and "\n" not in entry.about for entry in CHECKS)

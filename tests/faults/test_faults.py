@@ -21,9 +21,9 @@ from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.faults.flights import End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.injection import (
     Applied,
+    ControllerInput,
     Fault,
     FaultyController,
-    Inputs,
     LevellingCaller,
     ReweightedController,
     WeightChange,
@@ -38,7 +38,7 @@ from mambo_nmpc.sil.faults.injection import (
     yaw_wrapped,
 )
 from mambo_nmpc.sil.faults.report import table
-from mambo_nmpc.sil.faults.scenarios import Scenario, scenarios
+from mambo_nmpc.sil.faults.scenarios import FaultScenario, scenarios
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
@@ -52,8 +52,8 @@ from tests.support.tools import require
 MAMBO = presets.load("mambo")
 EIGHT = next(iter(CASES.values()))
 DOCS = Path(__file__).parents[2] / "docs" / "faults.md"
-NOW = Inputs(np.arange(1.0, 8.0), np.arange(4.0), 9.81)
-BEGAN = Inputs(-NOW.state, -NOW.target, 1.0)
+NOW = ControllerInput(np.arange(1.0, 8.0), np.arange(4.0), 9.81)
+BEGAN = ControllerInput(-NOW.state, -NOW.target, 1.0)
 FLOWN_S = 1.5
 
 
@@ -215,10 +215,10 @@ def test_a_levelling_caller_levels_out_when_its_patience_ends() -> None:
 
 
 CHOSEN = (
-    Scenario("outage", 1.0, state_set_to(0, math.nan), answers=frozenset({Status.BAD_STATE})),
-    Scenario("moved", math.inf, target_moved(3.0), moved_m=3.0),
-    Scenario("wrapped", math.inf, yaw_wrapped, turning=True),
-    Scenario("wrongly refused", 1.0, answers=frozenset({Status.BAD_STATE})),
+    FaultScenario("outage", 1.0, state_set_to(0, math.nan), answers=frozenset({Status.BAD_STATE})),
+    FaultScenario("moved", math.inf, target_moved(3.0), moved_m=3.0),
+    FaultScenario("wrapped", math.inf, yaw_wrapped, turning=True),
+    FaultScenario("wrongly refused", 1.0, answers=frozenset({Status.BAD_STATE})),
 )
 
 
@@ -230,7 +230,7 @@ def test_verdicts_say_what_was_flown() -> None:
         (course, one.name) for course in ("eight", "hover") for one in CHOSEN
     ]
     outage, moved, wrapped, wrong = verdicts[:4]
-    assert outage.statuses == (Status.BAD_STATE,)
+    assert outage.statuses == ("BAD_STATE",)
     assert outage.expected
     assert outage.end is End.BACK
     assert outage.recovery_s > 0.5
@@ -245,7 +245,7 @@ VERDICT = Verdict(
     course="eight",
     fault="state NaN, 1 s",
     turning=False,
-    statuses=(Status.BAD_STATE,),
+    statuses=("BAD_STATE",),
     expected=True,
     largest_command_rad=0.3,
     largest_tilt_rad=0.4,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.sil.controllers.pd import PdController, PdOutcome
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.loop import Flight, Start, fly
+from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import (
@@ -120,7 +120,7 @@ def test_hover_start_has_rotors_at_hover_speed() -> None:
 
 def test_take_off_reaches_the_reference_height_before_the_clock_starts() -> None:
     """From the ground at t = -5 s: constant thrust for 1 s, then the altitude loop; the target rests."""
-    trace = fly(Flight(FIGURE_OF_EIGHT, duration_s=1.0, start=Start.TAKE_OFF), PdController())
+    trace = fly(Flight(FIGURE_OF_EIGHT, duration_s=1.0, start="take-off"), PdController())
     assert trace.time_s[0] == -5.0
     assert trace.time_s[500] == 0.0
     np.testing.assert_array_equal(trace.position_m[0, 0], 0.0)

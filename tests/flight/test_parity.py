@@ -12,7 +12,7 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.flight.loop import Flight, Start, fly
+from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
@@ -25,7 +25,7 @@ CASE = Bernoulli(2.0, 0.5)
 CONDITIONS = {
     "hover start": Flight(CASE, duration_s=20.0),
     "take-off, turned, in wind": Flight(
-        CASE, duration_s=10.0, start=Start.TAKE_OFF, yaw_rad=0.8, vehicle=Vehicle(wind_m_s2=(0.5, -0.3))
+        CASE, duration_s=10.0, start="take-off", yaw_rad=0.8, vehicle=Vehicle(wind_m_s2=(0.5, -0.3))
     ),
 }
 

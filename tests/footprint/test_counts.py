@@ -25,7 +25,7 @@ from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.footprint.counts import (
     HARNESS,
     CountingController,
-    Inputs,
+    InputSequence,
     count_instructions,
     in_flight,
     spread,
@@ -120,7 +120,7 @@ def crazyflie(tmp_path: Path) -> Path:
     return build_guest(MAMBO, board_builder("crazyflie"), tmp_path)
 
 
-def costs(elf: Path, inputs: Inputs) -> list[int]:
+def costs(elf: Path, inputs: InputSequence) -> list[int]:
     """Count consecutive steps of one controller on the Cortex-M4."""
     controller = CountingController(MAMBO, elf, "cortex-m4")
     rows = zip(inputs.state, inputs.target, inputs.thrust, strict=True)
@@ -232,7 +232,7 @@ def test_the_search_never_returns_less_than_it_was_given(crazyflie: Path) -> Non
     given = max(costs(crazyflie, inputs))
     found = [count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, steps).most for steps in (0, 10, 40)]
     assert given == found[0] <= found[1] <= found[2]
-    calm = Inputs(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
+    calm = InputSequence(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
     before, after = (count_instructions(MAMBO, crazyflie, "cortex-m4", calm, steps).most for steps in (0, 60))
     assert before < after
 
@@ -244,7 +244,7 @@ def test_refused_inputs_are_not_counted(crazyflie: Path) -> None:
     state[3::4, 0] = np.nan
     refused = replace(inputs, state=state)
     kept = np.isfinite(state[:, 0])
-    good = Inputs(inputs.state[kept], inputs.target[kept], inputs.thrust[kept])
+    good = InputSequence(inputs.state[kept], inputs.target[kept], inputs.thrust[kept])
     alone, among = (count_instructions(MAMBO, crazyflie, "cortex-m4", i, 10) for i in (good, refused))
     assert alone == among
     assert alone.steps < 12 + 10

@@ -22,7 +22,13 @@ from mambo_nmpc.sil.controllers.compiled import compiled_digest
 from mambo_nmpc.sil.controllers.emulated import GUEST, emulated_digest
 from mambo_nmpc.sil.controllers.extension import load_extension
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, builder, clang_builder
-from mambo_nmpc.sil.footprint.same_bits import BOARD_COMPILERS, HOST_COMPILERS, REFERENCE, builds, same_bits
+from mambo_nmpc.sil.footprint.same_bits import (
+    BOARD_COMPILERS,
+    HOST_COMPILERS,
+    REFERENCE,
+    builds,
+    run_everywhere,
+)
 from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require, toolchain
 
@@ -56,7 +62,7 @@ def check_every_build(names: tuple[str, ...], scalar: str) -> None:
         require_compiler(name)
     settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
     chosen = [boards.load(name) for name in names]
-    found = list(same_bits(settings, chosen, 3))
+    found = list(run_everywhere(settings, chosen, 3))
     expected = [(REFERENCE, "NumPy", "")]
     expected += [("host", compiler, flag) for compiler in HOST_COMPILERS for flag in OPTIMISATIONS]
     for board in chosen:
@@ -153,7 +159,7 @@ def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
 def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What did not run has no digest and says why; the reference always runs."""
     monkeypatch.setenv("PATH", str(tmp_path))
-    found = list(same_bits(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
+    found = list(run_everywhere(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
     assert found[0].digest == f"0x{self_test_digest(Design(MAMBO), 1):08X}"
     reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
     assert all(one.digest is None for one in found[1:])

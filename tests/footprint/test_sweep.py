@@ -8,14 +8,13 @@ from dataclasses import astuple, replace
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import boards, cli
+from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.cli import boards as cli_boards
 from mambo_nmpc.sil.footprint.plots import draw_sweep
-from mambo_nmpc.sil.footprint.sweep import Grid, Point, largest_fit, sweep, write_points
+from mambo_nmpc.sil.footprint.sweep import Grid, Point, largest_fit, measure_grid, write_points
+from tests.support.command import run
 from tests.support.tools import board_builder, require
 
 POINT = Point(
@@ -36,15 +35,6 @@ UNMEASURED = replace(POINT, stack_bytes=math.nan, instructions=math.nan, time_ms
 @pytest.fixture(autouse=True)
 def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-
-
-def run(*arguments: str, code: int = 0) -> tuple[str, str]:
-    """Run mambo-nmpc, demand its exit code, and return stdout and stderr."""
-    app = cli.root()
-    cli_boards.register(app)
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == code, (result.output, result.exception)
-    return result.stdout, result.stderr
 
 
 def require_compiler(name: str) -> None:
@@ -167,7 +157,7 @@ def test_a_sweep_yields_the_points_in_order() -> None:
     """Two by two: more of anything takes more flash and instructions, more moves more RAM too."""
     require_compiler("crazyflie")
     grid = Grid(prediction=(5, 8), control=(1, 2), iterations=(3,))
-    points = list(sweep(presets.load("mambo"), boards.load("crazyflie"), grid))
+    points = list(measure_grid(presets.load("mambo"), boards.load("crazyflie"), grid))
     assert [(p.prediction, p.control, p.iterations) for p in points] == grid.points()
     assert all(p.fits and math.isfinite(p.iae_m_s) for p in points)
     for less, more in ((0, 1), (0, 2), (1, 3), (2, 3)):
@@ -185,7 +175,7 @@ def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
     document["ram_bytes"]["value"] = 65_536
     document["budget"] |= {"flash_bytes": 131_072, "ram_bytes": 32_768}
     grid = Grid(prediction=(50,), control=(50,), iterations=(1,))
-    (found,) = sweep(presets.load("mambo"), Board.model_validate(document), grid)
+    (found,) = measure_grid(presets.load("mambo"), Board.model_validate(document), grid)
     assert found.ram_bytes <= 32_768
     assert found.stack_bytes > 0
     assert math.isnan(found.time_ms)
@@ -197,6 +187,6 @@ def test_a_small_controller_fits_the_mega() -> None:
     """Five steps, one move, three iterations: half of the period is enough for them."""
     board_builder("mega")
     grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
-    (found,) = sweep(presets.load("mambo"), boards.load("mega"), grid)
+    (found,) = measure_grid(presets.load("mambo"), boards.load("mega"), grid)
     assert found.time_ms < 5
     assert found.fits

@@ -3,8 +3,8 @@
 import pytest
 
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.paper.sensed import PRESETS, VIEWS, fly_sensed, text
-from mambo_nmpc.sil.paper.table2 import PD
 
 
 @pytest.mark.long

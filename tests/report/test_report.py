@@ -10,18 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli
-from mambo_nmpc.sil.cli import app as cli_app
-from mambo_nmpc.sil.cli import boards as cli_boards
-from mambo_nmpc.sil.cli import report as cli_report
 from mambo_nmpc.sil.files.folders import SUMMARY
+from mambo_nmpc.sil.flight.animation import LONGEST_S, animate
 from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.footprint import report as footprint_report
-from mambo_nmpc.sil.report.summaries import read_summary
-from mambo_nmpc.sil.show.animation import LONGEST_S, animate
-from mambo_nmpc.sil.verify import report as verify_report
+from mambo_nmpc.sil.report.kinds import read_summary
+from mambo_nmpc.sil.show.page import render_page
+from tests.support import command
 from tests.support.results import FOLDERS, HOSTILE, campaign_folder, fly_folder, trace
 from tests.support.tools import board_builder
 
@@ -71,19 +66,14 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 def run(*arguments: str, code: int = 0) -> str:
     """Run the command, demand its exit code, and return all that it says."""
-    app = cli.root()
-    cli.register(app)
-    cli_report.register(app)
-    result = CliRunner().invoke(app, ["report", *arguments])
-    assert result.exit_code == code, (result.output, result.exception)
-    return result.output
+    return "".join(command.run("report", *arguments, code=code))
 
 
-def made(command: str) -> str:
+def made(kind: str) -> str:
     """Make a result folder in the working folder, and return its name."""
-    Path(command).mkdir()
-    FOLDERS[command](Path(command))
-    return command
+    Path(kind).mkdir()
+    FOLDERS[kind](Path(kind))
+    return kind
 
 
 def page_of(*folders: str) -> str:
@@ -117,12 +107,12 @@ def demand_sound(page: str) -> None:
             assert attributes["aria-label"]
 
 
-@pytest.mark.parametrize("command", FOLDERS)
-def test_a_folder_of_each_command_is_shown(command: str) -> None:
+@pytest.mark.parametrize("kind", FOLDERS)
+def test_a_folder_of_each_command_is_shown(kind: str) -> None:
     """What it found is on the page, in markup that holds, and hostile names are text."""
-    page = page_of(made(command))
+    page = page_of(made(kind))
     demand_sound(page)
-    for word in SEEN[command]:
+    for word in SEEN[kind]:
         assert word in page
     assert "<img" not in page
     assert "&lt;img src=x" in page
@@ -302,13 +292,14 @@ def test_an_output_that_cannot_be_written_is_named() -> None:
 
 def test_pages_of_footprint_and_verify_have_the_same_look() -> None:
     """Both alone and in a report: one style, one policy."""
-    for command, page in (("footprint", footprint_report.page), ("verify", verify_report.page)):
-        alone = page(json.loads((Path(made(command)) / SUMMARY).read_text("utf-8")))
+    for name, template in (("footprint", "footprint.html.j2"), ("verify", "verify.html.j2")):
+        summary = read_summary(Path(made(name)))
+        alone = render_page(template, {"summary": summary})
         demand_sound(alone)
-        together = page_of(command)
+        together = page_of(name)
         style = re.compile("<style>.*</style>", re.DOTALL)
         assert style.findall(alone) == style.findall(together)
-        assert read_summary(Path(command)).generator in alone
+        assert summary.generator in alone
 
 
 def test_what_moves_is_what_was_flown() -> None:
@@ -366,9 +357,6 @@ def test_colours_are_told_from_the_paper_by_weak_eyes_too() -> None:
 def test_what_the_commands_write_is_read() -> None:
     """The commands whose summaries no function writes, for real, and one page of their folders."""
     board_builder("crazyflie")
-    app = cli.root()
-    for module in (cli_app, cli_boards):
-        module.register(app)
     small = ["--prediction", "5", "--control", "1", "--iterations", "5"]
     for line in (
         ["fly", "--duration-s", "12", "-o", "fly"],
@@ -376,8 +364,7 @@ def test_what_the_commands_write_is_read() -> None:
         ["footprint", "--board", "crazyflie", "-o", "footprint"],
         ["sweep", "--board", "crazyflie", *small, "-o", "sweep"],
     ):
-        result = CliRunner().invoke(app, line)
-        assert result.exit_code == 0, (line, result.output)
+        command.run(*line)
     page = page_of("fly", "pd", "footprint", "sweep")
     demand_sound(page)
     assert "Not shown" not in page

@@ -1,35 +1,34 @@
-"""Result folders of every command, small: written by the commands' own writers where they have one."""
+"""Result folders of every command, small: written as the records that the commands write."""
 
 import copy
 import json
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.cli.replay import COMMAND
+from mambo_nmpc.sil.campaign.report import CampaignSummary, Drawn, WorstFlight
+from mambo_nmpc.sil.campaign.statistics import Distributions, Improvement, Proportion
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.faults import report as fault_report
-from mambo_nmpc.sil.faults.flights import End, Verdict
-from mambo_nmpc.sil.files.folders import SUMMARY, summary_text
+from mambo_nmpc.sil.faults.flights import End, FaultsSummary, Verdict
 from mambo_nmpc.sil.firmware.sizes import Added, Memory, Parts
 from mambo_nmpc.sil.flight import report
 from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.report import FlySummary, ReplaySummary
 from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.flight.traces import Trace, write_npz
 from mambo_nmpc.sil.footprint import report as footprint_report
 from mambo_nmpc.sil.footprint.measure import Footprint
-from mambo_nmpc.sil.footprint.sweep import Point, budgets
-from mambo_nmpc.sil.paper.sensed import SensedRow
-from mambo_nmpc.sil.paper.table2 import CASES, PD, Claim, Row
+from mambo_nmpc.sil.footprint.sweep import Point, SweepSummary, budgets
+from mambo_nmpc.sil.paper.sensed import SensedRow, SensedSummary
+from mambo_nmpc.sil.paper.table2 import CASES, Claim, Table2Row, Table2Summary
 from mambo_nmpc.sil.verify import report as verify_report
-from mambo_nmpc.sil.verify.check import Outcome, Result
+from mambo_nmpc.sil.verify.check import Outcome
 from mambo_nmpc.sil.verify.checks import CHECKS
 
 HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
@@ -56,47 +55,48 @@ def fly_folder(folder: Path, *, lost: bool = False) -> None:
     """Write a flight of a controller with a hostile name."""
     flown = trace(lost=lost)
     write_npz(flown, folder / "trace.npz")
-    summary = {
-        "controller": "nmpc",
-        "board": "crazyflie",
-        "same_bits_as_host": True,
-        "source": HOSTILE,
-        "settings": Settings().digest,
-        "trajectory": HOSTILE,
-        "size_m": 2.0,
-        "rate_rad_s": 0.5,
-        "yaw_rad": 0.0,
-        "wind_m_s2": (0.0, 0.0),
-        "wind_speed_m_s": 3.0,
-        "sensors": "none",
-        "motor_lag_s": 0.0,
-        "start": "hover",
-        "duration_s": DURATION_S,
-        **report.found(flown, Settings()),
-    }
-    _write(folder, "fly", summary | {"refusals": [HOSTILE]})
+    FlySummary(
+        controller="nmpc",
+        board="crazyflie",
+        same_bits_as_host=True,
+        source=HOSTILE,
+        settings=Settings().digest,
+        update_period_s=0.01,
+        trajectory=HOSTILE,
+        trajectory_sha256=None,
+        size_m=2.0,
+        rate_rad_s=0.5,
+        yaw_rad=0.0,
+        wind_m_s2=(0.0, 0.0),
+        wind_speed_m_s=3.0,
+        sensors="none",
+        seed=0,
+        motor_lag_s=0.0,
+        start="hover",
+        duration_s=DURATION_S,
+        **report.judge(flown, Settings()) | {"refusals": [HOSTILE]},
+    ).write(folder)
 
 
 def replay_folder(folder: Path) -> None:
     """Write a recorded flight flown again, not bit for bit."""
     flown = trace()
     write_npz(flown, folder / "trace.npz")
-    summary = {
-        "replay": HOSTILE,
-        "same_bits_as_recorded": False,
-        "same_bits_as_host": None,
-        "controller": "pd",
-        "scenario": Scenario().model_dump(mode="json"),
-        "settings": Settings().digest,
-        **report.found(flown, Settings()),
-    }
-    _write(folder, COMMAND, summary)
+    ReplaySummary(
+        replay=HOSTILE,
+        same_bits_as_recorded=False,
+        same_bits_as_host=None,
+        controller="pd",
+        scenario=Scenario(),
+        settings=Settings().digest,
+        **report.judge(flown, Settings()),
+    ).write(folder)
 
 
 def sensed_folder(folder: Path) -> None:
     """Write Table II through sensors, with one row."""
     row = SensedRow(HOSTILE, "mambo", 20, 1, (7.123, 0.5, 40.0, np.nan), (6.0, 0.4, 30.0, 900.0), 8.5, 0.77)
-    _write(folder, "table2 --sensors", {"rows": [asdict(row)]})
+    SensedSummary(scalar=None, rows=[row]).write(folder)
 
 
 def table2_folder(folder: Path) -> None:
@@ -105,14 +105,12 @@ def table2_folder(folder: Path) -> None:
     write_npz(flown, folder / "pd.npz")
     write_npz(flown, folder / "mambo.npz")
     rows = [
-        Row(case, name, (7.123, 0.5, 40.0, 1234.5), None if name == PD else (2.5, 3.0, 4.0, 5.0))
+        Table2Row(case, name, (7.123, 0.5, 40.0, 1234.5), None if name == PD else (2.5, 3.0, 4.0, 5.0))
         for case in CASES
         for name in (PD, "mambo", HOSTILE)
     ]
     claims = [Claim(f"holds, says {HOSTILE}", True, "as shown"), Claim("does not", False, "as shown")]
-    _write(
-        folder, "table2", {"rows": [asdict(row) for row in rows], "claims": [asdict(one) for one in claims]}
-    )
+    Table2Summary(scalar=None, cases=list(CASES), rows=rows, claims=claims).write(folder)
 
 
 def footprint_folder(folder: Path) -> None:
@@ -133,7 +131,7 @@ def footprint_folder(folder: Path) -> None:
         )
         for name, flash in (("crazyflie", 3000), ("mega", 10**6))
     ]
-    _write(folder, "footprint", footprint_report.summary(measured, HOSTILE, Settings()))
+    footprint_report.summarise(measured, HOSTILE, Settings()).write(folder)
 
 
 def sweep_folder(folder: Path) -> None:
@@ -146,44 +144,37 @@ def sweep_folder(folder: Path) -> None:
         for control in (1, 2)
     ]
     points.append(Point(15, 1, 5, 3015, 100, np.nan, np.nan, np.nan, np.nan, False))
-    summary = {
-        "source": HOSTILE,
-        "settings": Settings().digest,
-        "board": HOSTILE,
-        "budget": budgets(boards.load("crazyflie"), 0.01),
-        "points": [asdict(point) for point in points],
-        "largest_fit": asdict(points[2]),
-    }
-    _write(folder, "sweep", summary)
+    SweepSummary(
+        source=HOSTILE,
+        settings=Settings().digest,
+        board=HOSTILE,
+        budget=budgets(boards.load("crazyflie"), 0.01),
+        points=points,
+        largest_fit=points[2],
+    ).write(folder)
 
 
 def faults_folder(folder: Path) -> None:
     """Write two faults on two courses, one of which crashes."""
-    answers = (int(Status.OK), int(Status.BAD_STATE))
     verdicts = [
-        Verdict(course, fault, False, answers, True, 0.35, 0.3, error, 0.07, back, end)
+        Verdict(course, fault, False, ("OK", "BAD_STATE"), True, 0.35, 0.3, error, 0.07, back, end)
         for course in ("eight", "hover")
         for fault, error, back, end in (
             (HOSTILE, 0.06, 0.0, End.BACK),
             ("state NaN to the end", 2376.5, np.nan, End.CRASHED),
         )
     ]
-    summary = {
-        "source": HOSTILE,
-        "settings": Settings().digest,
-        "flights": fault_report.records(verdicts),
-    }
-    _write(folder, "faults", summary)
+    FaultsSummary(source=HOSTILE, settings=Settings().digest, flights=verdicts).write(folder)
 
 
 def verify_folder(folder: Path) -> None:
     """Write a verification of which one check passed and one could not run."""
-    results = (
-        Result(Outcome.PASSED, f"nothing but {HOSTILE}"),
-        Result(Outcome.INCOMPLETE, "cppcheck is missing"),
-    )
-    found = [verify_report.Verified(entry, result) for entry, result in zip(CHECKS, results, strict=False)]
-    _write(folder, "verify", verify_report.summary(found, HOSTILE, Settings()))
+    ended = ((Outcome.PASSED, f"nothing but {HOSTILE}"), (Outcome.INCOMPLETE, "cppcheck is missing"))
+    found = [
+        verify_report.Verified(entry.name, entry.about, outcome, evidence, {}, {})
+        for entry, (outcome, evidence) in zip(CHECKS, ended, strict=False)
+    ]
+    verify_report.summarise(found, HOSTILE, Settings()).write(folder)
 
 
 def campaign_folder(folder: Path, *, finished: bool = True) -> None:
@@ -208,27 +199,20 @@ def campaign_folder(folder: Path, *, finished: bool = True) -> None:
     if not finished:
         return
 
-    def share(count: int) -> dict[str, float]:
-        return {"count": count, "flights": 4, "share": count / 4, "low": 0.0, "high": 0.6}
+    def share(count: int) -> Proportion:
+        return Proportion(count, 4, count / 4, 0.0, 0.6)
 
-    quantiles = {"iae_m_s": {"0.05": 4.0, "0.5": 5.0, "0.95": 6.0, "1": np.inf}}
-    found = {"refused_an_input": share(0), "quantiles": quantiles}
-    worst = {
-        "flight": 3,
-        "crashed": True,
-        "iae_m_s": np.nan,
-        "max_error_m": 9.5,
-        "record": f"flights/{HOSTILE}",
-    }
-    improvement = {"controller": "mambo", "index": "iae_m_s", "median": 12.0, "low": 11.0, "high": 13.0}
-    summary = {
-        "campaign": document,
-        "flights": 4,
-        "controllers": {"pd": {"crashed": share(0), **found}, "mambo": {"crashed": share(1), **found}},
-        "improvements": [{**improvement, "better": share(3)}],
-        "worst": {"mambo": [worst]},
-    }
-    _write(folder, "campaign", summary)
+    def found(crashed: int) -> Distributions:
+        return Distributions(share(crashed), share(0), {"iae_m_s": quantiles})
+
+    quantiles = {"0.05": 4.0, "0.5": 5.0, "0.95": 6.0, "1": np.inf}
+    CampaignSummary(
+        campaign=Drawn.model_validate(document),
+        flights=4,
+        controllers={"pd": found(0), "mambo": found(1)},
+        improvements=[Improvement("mambo", "iae_m_s", 4, 12.0, 11.0, 13.0, share(3))],
+        worst={"mambo": [WorstFlight(3, True, np.nan, 9.5, f"flights/{HOSTILE}")]},
+    ).write(folder)
 
 
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
@@ -243,7 +227,3 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "campaign": campaign_folder,
 }
 """A folder of every command."""
-
-
-def _write(folder: Path, command: str, summary: dict[str, Any]) -> None:
-    (folder / SUMMARY).write_text(summary_text(command, summary), "utf-8")

@@ -10,7 +10,7 @@ from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli
+from mambo_nmpc.codegen import cli, command
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings.model import Settings
@@ -32,7 +32,7 @@ USUAL_WORK = 10_000
 @pytest.fixture(scope="module")
 def app() -> typer.Typer:
     """Build the command with the sub-commands of codegen."""
-    app = cli.root()
+    app = command.root()
     cli.register(app)
     return app
 

@@ -19,7 +19,7 @@ from mambo_nmpc.sil.cli.tune import tune
 from mambo_nmpc.sil.errors import StudyError
 from mambo_nmpc.sil.tuning import file
 from mambo_nmpc.sil.tuning.front import IAE_ALLOWANCE, chosen, pareto_front
-from mambo_nmpc.sil.tuning.study import CRASH_ERROR_M, Judged, judge, judged, open_study, search
+from mambo_nmpc.sil.tuning.study import CRASH_ERROR_M, FinishedTrial, judge, judged, open_study, search
 from tests.support.tools import require_module
 
 TRIALS = 3
@@ -59,7 +59,7 @@ def search_on_threads(
     *,
     storage: str | None = None,
     progress: Callable[[int], None] = lambda _: None,
-) -> list[Judged]:
+) -> list[FinishedTrial]:
     """Run a study on two threads of this process; return the finished trials."""
     tuning = file.read(source)
     with open_study(tuning, folder, storage) as study, ThreadPoolExecutor(2) as threads:
@@ -67,7 +67,7 @@ def search_on_threads(
         return judged(study)
 
 
-def found_in(folder: Path, source: Path, storage: str | None = None) -> list[Judged]:
+def found_in(folder: Path, source: Path, storage: str | None = None) -> list[FinishedTrial]:
     """Return the finished trials of a study."""
     with open_study(file.read(source), folder, storage) as study:
         return judged(study)
@@ -79,9 +79,9 @@ def command(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(line, capture_output=True, text=True, check=False, timeout=120)
 
 
-def one(number: int, iae_m_s: float, variation_rad: float) -> Judged:
+def one(number: int, iae_m_s: float, variation_rad: float) -> FinishedTrial:
     """Return a trial."""
-    return Judged(number, {"cost.effort_weight": 1.0}, iae_m_s, variation_rad, 0)
+    return FinishedTrial(number, {"cost.effort_weight": 1.0}, iae_m_s, variation_rad, 0)
 
 
 def row(iae_m_s: float, variation_rad: float, crashed: int = 0) -> dict[str, float | str]:

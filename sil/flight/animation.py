@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.paper.table2 import PD
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 LONGEST_S: Final = 200.0

@@ -1,0 +1,40 @@
+"""A campaign on a page, finished or not."""
+
+from pathlib import Path
+
+from mambo_nmpc.sil.campaign.file import PD
+from mambo_nmpc.sil.campaign.plots import distribution_panels
+from mambo_nmpc.sil.campaign.report import CampaignSummary, UnfinishedCampaign
+from mambo_nmpc.sil.campaign.store import TABLE
+from mambo_nmpc.sil.campaign.table import read_table
+from mambo_nmpc.sil.flight.report import named
+from mambo_nmpc.sil.show.section import Section
+
+
+def campaign_section(folder: Path, summary: CampaignSummary | UnfinishedCampaign) -> Section:
+    """Return the section of a campaign; raises ResultsError for a table that cannot be read."""
+    finished = summary if isinstance(summary, CampaignSummary) else None
+    drawn = summary.campaign if isinstance(summary, CampaignSummary) else summary
+    path, names = folder / TABLE, [controller.name for controller in drawn.controllers]
+    table = read_table(path) if path.is_file() else {}
+    found = finished.controllers if finished else {}
+    content = {
+        "drawn": drawn,
+        "summary": finished,
+        "folder": str(folder),
+        "pictures": distribution_panels(table, names),
+        "indices": {
+            name: [(*named(index), values) for index, values in one.quantiles.items()]
+            for name, one in found.items()
+        },
+        "improvements": [(named(one.index)[0], one) for one in (finished.improvements if finished else [])],
+    }
+    if finished is None:
+        so_far = len(next(iter(table.values()), ()))
+        finding, good = f"not finished, {so_far} flights so far; the same command goes on", None
+    else:
+        crashes = ", ".join(f"{one.crashed.count} with {name}" for name, one in found.items())
+        finding = f"{finished.flights} flights; crashed: {crashes}"
+        good = all(one.crashed.count == 0 for name, one in found.items() if name != PD)
+    missing = [] if path.is_file() else [TABLE]
+    return Section("campaign", f"Campaign, {drawn.flight.trajectory}", good, finding, content, missing)

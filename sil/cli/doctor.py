@@ -1,0 +1,16 @@
+"""The command `doctor`: which tools are here."""
+
+import json
+from dataclasses import asdict
+
+import typer
+
+from mambo_nmpc.sil.cli.options import AsJson
+
+
+def doctor(*, as_json: AsJson = False) -> None:
+    """Say which compilers, emulators and analysers are here, and what a missing one would bring."""
+    from mambo_nmpc.sil.firmware.doctor import doctor_text, examine
+
+    findings = examine()
+    typer.echo(json.dumps([asdict(one) for one in findings], indent=2) if as_json else doctor_text(findings))

@@ -1,0 +1,192 @@
+"""What `fly` does with its options: the flight they describe, on whom they name."""
+
+import hashlib
+import math
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import typer
+
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.representation import TARGET
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.cli.options import FlyOptions, load, show
+from mambo_nmpc.sil.cli.progress import progress_bar
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.emulated import EmulatedController, build_guest
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.errors import FlightError, TrajectoryError
+from mambo_nmpc.sil.files.folders import new_results
+from mambo_nmpc.sil.firmware.build import builder
+from mambo_nmpc.sil.flight.loop import Flight, PositionController
+from mambo_nmpc.sil.flight.loop import fly as simulate
+from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, flight_text, judge
+from mambo_nmpc.sil.flight.traces import Trace, write_csv, write_npz
+from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectory, Waypoints
+from mambo_nmpc.sil.plant.disturbances import Disturbances
+from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.sensors.instruments import Sensors
+
+GUSTS = "gusts"
+LONGEST_FLIGHT_S = 3600.0
+LARGEST_SEED = 2**63 - 1
+FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
+
+
+def fly_once(options: FlyOptions) -> None:
+    """Fly what the options say; exit 1 if the flight does not end well.
+
+    Raises FlightError, TrajectoryError and what loading settings or boards and building the C raises.
+    """
+    settings = load(options.source, options.scalar)
+    name, period_s = echo(options.source), settings.horizon.update_period_s
+    curve = _trajectory(options)
+    wind_m_s2 = (0.0, 0.0) if options.wind == GUSTS else _wind(options.wind)
+    wind_speed_m_s = LIGHT_M_S if options.wind == GUSTS else 0.0
+    _within("--yaw-rad", options.yaw_rad, -1000.0, 1000.0)
+    _within("--motor-lag-s", options.motor_lag_s, 0.0, 1.0)
+    _within("--duration-s", options.duration_s, period_s, LONGEST_FLIGHT_S)
+    _within("--seed", options.seed, 0, LARGEST_SEED)
+    try:
+        flight = Flight(
+            curve,
+            duration_s=options.duration_s,
+            start=options.start,
+            yaw_rad=options.yaw_rad,
+            vehicle=Vehicle(motor_lag_s=options.motor_lag_s, wind_m_s2=wind_m_s2),
+            update_period_s=period_s,
+            seeds=(options.seed,),
+            disturbances=Disturbances(wind_speed_m_s=wind_speed_m_s),
+            sensors=None
+            if options.sensors == "none"
+            else Sensors(derotated=options.sensors == "mambo-derotated"),
+        )
+    except FlightError as error:
+        raise FlightError(
+            f"{name}: horizon.{error}; only the simulation, whose stock loops run at 200 Hz, asks for this"
+        ) from error
+    if options.controller != "pd":
+        _check_ranges(flight, settings, options.trajectory)
+    with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
+        controller = _controller(options, settings) if options.on is None else _on_board(options, settings)
+        with progress_bar("flying") as progress:
+            trace = simulate(flight, controller, progress)
+        same_bits = (
+            None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
+        )
+        write_flight(trace, PD if options.controller == "pd" else f"NMPC, {name}", folder)
+        waypoints = Path(options.trajectory) if isinstance(curve, Waypoints) else None
+        summary = FlySummary(
+            **vars(options)
+            | {
+                "board": options.on,
+                "same_bits_as_host": same_bits,
+                "settings": settings.digest,
+                "update_period_s": period_s,
+                "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
+                "wind_m_s2": wind_m_s2,
+                "wind_speed_m_s": wind_speed_m_s,
+                **judge(trace, settings),
+            }
+        )
+        summary.write(folder)
+    finish(summary, options, FLIGHT_FILES)
+
+
+def write_flight(trace: Trace, title: str, folder: Path) -> None:
+    """Write `FLIGHT_FILES`."""
+    from mambo_nmpc.sil.flight.plots import draw_flights  # loaded when drawing
+
+    write_csv(trace, folder / "trace.csv")
+    write_npz(trace, folder / "trace.npz")
+    draw_flights({title: trace}, folder / "flight")
+
+
+def finish(summary: FlightSummary, options: FlyOptions, files: tuple[str, ...]) -> None:
+    """Print what was found and written; exit 1 if the flight does not end well."""
+    show(summary, flight_text(summary), as_json=options.as_json)
+    typer.echo(f"{echo(str(options.output))}: {', '.join(files)}", err=True)
+    if not summary.good:
+        raise typer.Exit(1)
+
+
+def _controller(options: FlyOptions, settings: Settings) -> PositionController:
+    match options.controller:
+        case "pd":
+            return PdController()
+        case "reference":
+            return ReferenceController(Design(settings))
+        case "nmpc":
+            return CompiledController(settings)
+
+
+def _on_board(options: FlyOptions, settings: Settings) -> EmulatedController:
+    """Build the C for a board and put it on the board's emulated core."""
+    board = str(options.on)
+    if options.controller != "nmpc":
+        raise FlightError(f"--on {echo(board)} runs the C: it goes with --controller nmpc alone")
+    chosen = boards.load(board)
+    core = chosen.emulated_core.value
+    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
+        return EmulatedController(settings, build_guest(settings, builder(chosen), Path(work)), core)
+
+
+def _trajectory(options: FlyOptions) -> Trajectory:
+    _within("--size-m", options.size_m, -1000.0, 1000.0)
+    _within("--rate-rad-s", options.rate_rad_s, -100.0, 100.0)
+    for name, curve in CURVES.items():
+        if name == options.trajectory:
+            return curve(options.size_m, options.rate_rad_s)
+    if not options.trajectory.lower().endswith(".csv"):
+        raise TrajectoryError(
+            f"--trajectory {echo(options.trajectory)} must be {', '.join(CURVES)} or a file ending in .csv"
+        )
+    return Waypoints.read(Path(options.trajectory))
+
+
+def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
+    """Raise FlightError if the controller would refuse a target, compared in its own scalar type."""
+    design, ranges = Design(settings), settings.ranges
+    numbers, limits = design.numbers, design.limits
+    given = np.abs(flight.targets()[:, :1]).max(axis=0)
+    x, y, vx, vy = numbers.quantize(given, TARGET)[0]
+    for what, refused, largest, unit, key, limit in (
+        ("position", max(x, y) > limits.position, given[0, :2].max(), "m", "position_m", ranges.position_m),
+        (
+            "speed",
+            max(vx, vy) > limits.velocity,
+            given[0, 2:].max(),
+            "m/s",
+            "velocity_m_s",
+            ranges.velocity_m_s,
+        ),
+    ):
+        if refused:
+            raise FlightError(
+                f"--trajectory {echo(trajectory)}: the target's {what} along an axis, up to {largest:g} "
+                f"{unit}, exceeds ranges.{key} = {limit:g}; the controller would refuse it"
+            )
+
+
+def _wind(text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(word) for word in text.split(","))
+    except ValueError:
+        raise FlightError(f"--wind {echo(text)} must be two numbers, as in 0.5,0, or {GUSTS}") from None
+    _within("--wind", x, -100.0, 100.0)
+    _within("--wind", y, -100.0, 100.0)
+    return x, y
+
+
+def _within(option: str, value: float, low: float, high: float) -> None:
+    """Raise FlightError unless the value of an option is a number from `low` to `high`."""
+    if not math.isfinite(value):
+        raise FlightError(f"{option} = {value} must be a finite number; it must lie in {low:g}..{high:g}")
+    if not low <= value <= high:
+        raise FlightError(f"{option} = {value} must lie in {low:g}..{high:g}")

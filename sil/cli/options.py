@@ -1,0 +1,113 @@
+"""What commands share: types of options, one record of options as a command, and how results are printed."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+
+import typer
+
+from mambo_nmpc.codegen.command import AsJson, Scalar, Source, load
+from mambo_nmpc.sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
+
+if TYPE_CHECKING:
+    from mambo_nmpc.codegen.boards import Board
+    from mambo_nmpc.sil.files.summary import Summary
+
+__all__ = ["AsJson", "Scalar", "Source", "load"]
+
+_OUTPUT: Final = typer.Option(
+    "--output", "-o", help="Folder for the results; earlier ones there are overwritten."
+)
+Results = Annotated[Path, _OUTPUT]
+OptionalResults = Annotated[Path | None, _OUTPUT]
+Workers = Annotated[
+    int | None,
+    typer.Option(help="Processes on this machine; one for each processor by default.", min=1, max=1024),
+]
+
+BOARD_NAMES: Final = tuple(
+    sorted(
+        file.name.removesuffix(".toml")
+        for file in (files("mambo_nmpc.codegen") / "data" / "boards").iterdir()
+    )
+)
+
+Options = TypeVar("Options")
+
+
+@dataclass(frozen=True)
+class FlyOptions:
+    """The parameters of `fly`; `context` knows which of them were given."""
+
+    context: typer.Context
+    source: Source = "mambo"
+    output: Results = Path("flight")
+    controller: Annotated[
+        ControllerName, typer.Option(help="The generated C (nmpc), the stock PD, or the reference in Python.")
+    ] = "nmpc"
+    trajectory: Annotated[
+        str,
+        typer.Option(help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m."),
+    ] = "bernoulli"
+    size_m: Annotated[float, typer.Option(help="Half-width, radius or step of the curve, in m.")] = 2.0
+    rate_rad_s: Annotated[float, typer.Option(help="Angular rate of the curve, in rad/s.")] = 0.5
+    yaw_rad: Annotated[float, typer.Option(help="Heading, in rad, held throughout.")] = 0.0
+    wind: Annotated[
+        str,
+        typer.Option(
+            help="Steady push of the wind along x (north), y (east), in m/s^2; or `gusts`: moving air, "
+            "light turbulence towards north.",
+            metavar="X,Y|gusts",
+        ),
+    ] = "0,0"
+    sensors: Annotated[
+        SensorsName,
+        typer.Option(
+            help="What controller and stock loops see the state through: the truth, or the Mambo's sensors "
+            "and estimators, without or with the rotation taken out of the optical flow."
+        ),
+    ] = "none"
+    seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.")] = 0
+    motor_lag_s: Annotated[float, typer.Option(help="Time constant of the motors, in s.")] = 0.0
+    start: Annotated[Start, typer.Option(help="In the air, or 5 s earlier on the ground.")] = "hover"
+    duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0
+    scalar: Scalar = None
+    on: Annotated[
+        str | None,
+        typer.Option(
+            help="Board on whose emulated core the C runs; the same flight on this machine follows."
+        ),
+    ] = None
+    replay: Annotated[
+        Path | None,
+        typer.Option(
+            help="Record of a flight to fly again, with the optimizer's inner steps.", metavar="FILE"
+        ),
+    ] = None
+    as_json: AsJson = False
+
+
+def command_of(options: type[Options], run: Callable[[Options], None]) -> Callable[..., None]:
+    """Return `run` as a command whose parameters are the fields of the dataclass `options`."""
+
+    def command(**given: Any) -> None:
+        run(options(**given))
+
+    command.__signature__ = inspect.signature(options)  # type: ignore[attr-defined] # where typer reads them
+    command.__doc__ = run.__doc__
+    return command
+
+
+def load_boards(name: str) -> "Sequence[Board]":
+    """Return the board called `name`, or every board for `all`."""
+    from mambo_nmpc.codegen import boards
+
+    return [boards.load(one) for one in (boards.names() if name == "all" else (name,))]
+
+
+def show(summary: "Summary", text: str, *, as_json: bool) -> None:
+    """Print a summary as JSON, or else its text."""
+    typer.echo(summary.text() if as_json else text, nl=not as_json)

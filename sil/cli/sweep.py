@@ -1,0 +1,100 @@
+"""The command `sweep`: footprint and tracking over a grid of horizons and iterations."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
+from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, Source, load, show
+
+FILES = ("sweep.csv", "sweep.png", "sweep.svg")
+
+
+def sweep(
+    source: Source = "mambo",
+    *,
+    scalar: Scalar = None,
+    board: Annotated[str, typer.Option(help="Board, or its TOML file.")] = "crazyflie",
+    prediction: Annotated[
+        str, typer.Option(help="Prediction horizons.", metavar="FIRST:LAST[:STEP]")
+    ] = "5:30:5",
+    control: Annotated[str, typer.Option(help="Control horizons.", metavar="FIRST:LAST")] = "1:3",
+    iterations: Annotated[str, typer.Option(help="Iterations.", metavar="N,N")] = "3,5,10",
+    fit: Annotated[
+        bool,
+        typer.Option("--fit", help="Answer with the largest horizon within the board's budget.", metavar=""),
+    ] = False,
+    output: Results = Path("sweep"),
+    as_json: AsJson = False,
+) -> None:
+    """Measure footprint and tracking over a grid of horizons and iterations."""
+    from mambo_nmpc.codegen import boards
+    from mambo_nmpc.sil.cli.progress import progress_bar
+    from mambo_nmpc.sil.files.folders import new_results
+    from mambo_nmpc.sil.footprint.plots import draw_sweep
+    from mambo_nmpc.sil.footprint.sweep import (
+        Grid,
+        Point,
+        SweepSummary,
+        budgets,
+        largest_fit,
+        measure_grid,
+        point_text,
+        write_points,
+    )
+
+    settings = load(source, scalar)
+    chosen = boards.load(board)
+    grid = Grid(
+        _numbers("--prediction", prediction, 50),
+        _numbers("--control", control, 50),
+        _numbers("--iterations", iterations, 100),
+    )
+    total = len(grid.points())
+    if total == 0:
+        raise InvalidSettingsError(
+            (f"--control {echo(control)} must be at most --prediction {echo(prediction)}",)
+        )
+    points: list[Point] = []
+    with new_results(output, SweepSummary.command, FILES) as folder:
+        with progress_bar(f"sweeping {total} controllers") as progress:
+            for point in measure_grid(settings, chosen, grid):
+                points.append(point)
+                progress(len(points) / total)
+        write_points(points, folder / "sweep.csv")
+        draw_sweep(points, chosen, settings.horizon.update_period_s, folder / "sweep")
+        best = largest_fit(points)
+        summary = SweepSummary(
+            source=source,
+            settings=settings.digest,
+            board=chosen.name,
+            budget=budgets(chosen, settings.horizon.update_period_s),
+            points=points,
+            largest_fit=best,
+        )
+        summary.write(folder)
+    shown = ([] if best is None else [best]) if fit else points
+    text = "\n".join(map(point_text, shown)) or f"nothing fits {chosen.title}"
+    show(summary, text, as_json=as_json)
+    typer.echo(f"{echo(str(output))}: {', '.join(FILES)}", err=True)
+    if fit and best is None:
+        raise typer.Exit(1)
+
+
+def _numbers(option: str, text: str, most: int) -> tuple[int, ...]:
+    """Read 5:30, 5:30:5 or 1,3,5; raises InvalidSettingsError."""
+    try:
+        if ":" in text:
+            first, last, *step = (int(word) for word in text.split(":"))
+            (each,) = step or (1,)
+            numbers = tuple(range(first, min(last, most + 1) + 1, each)) if first > 0 else ()
+        else:
+            numbers = tuple(int(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if not numbers or min(numbers) < 1 or max(numbers) > most:
+        raise InvalidSettingsError(
+            (f"{option} {echo(text)} must be numbers in 1..{most}, as 5:30, 5:30:5 or 1,3,5",)
+        )
+    return numbers

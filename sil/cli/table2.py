@@ -1,0 +1,66 @@
+"""The command `table2`: Table II of the paper, flown again."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, load, show
+
+PICTURES = ("figure3.png", "figure3.svg")
+SENSED_TABLE = "sensors.md"
+
+
+def table2(
+    *,
+    output: Results = Path("table2"),
+    sensors: Annotated[
+        bool,
+        typer.Option(
+            "--sensors", help="Fly the Table II case through the Mambo's sensors and estimators instead."
+        ),
+    ] = False,
+    scalar: Scalar = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly Table II of the paper with PD and every preset, and judge its claims."""
+    from mambo_nmpc.codegen.settings import presets
+    from mambo_nmpc.sil.cli.progress import progress_bar
+    from mambo_nmpc.sil.files.folders import new_results
+    from mambo_nmpc.sil.flight.names import PD
+    from mambo_nmpc.sil.flight.plots import draw_flights
+    from mambo_nmpc.sil.flight.traces import write_npz
+    from mambo_nmpc.sil.paper.table2 import Table2Summary, fly_table2, judge_table2, table2_text
+
+    if sensors:
+        _through_sensors(output, scalar, as_json=as_json)
+        return
+    settings = {name: load(name, scalar) for name in presets.names()}
+    files = {name: f"{name.lower()}.npz" for name in (PD, *settings)}
+    with new_results(output, Table2Summary.command, (*files.values(), *PICTURES)) as folder:
+        with progress_bar("flying Table II") as progress:
+            traces = fly_table2(settings, progress)
+        for name, trace in traces.items():
+            write_npz(trace, folder / files[name])
+        draw_flights({PD: traces[PD], "NMPC, mambo": traces["mambo"]}, folder / "figure3")
+        summary = judge_table2(traces, scalar)
+        summary.write(folder)
+    show(summary, table2_text(summary), as_json=as_json)
+    typer.echo(f"{echo(str(output))}: {', '.join(PICTURES)} and the traces", err=True)
+
+
+def _through_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
+    from mambo_nmpc.sil.cli.progress import progress_bar
+    from mambo_nmpc.sil.files.folders import new_results
+    from mambo_nmpc.sil.paper.sensed import PRESETS, SensedSummary, fly_sensed, text
+
+    settings = {name: load(name, scalar) for name in PRESETS}
+    with new_results(output, SensedSummary.command, (SENSED_TABLE,)) as folder:
+        with progress_bar("flying Table II with sensors") as progress:
+            summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
+        table = text(summary.rows)
+        (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
+        summary.write(folder)
+    show(summary, table, as_json=as_json)
+    typer.echo(f"{echo(str(output))}: {SENSED_TABLE}", err=True)

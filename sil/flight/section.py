@@ -1,0 +1,94 @@
+"""Flights on a page: what was flown, how it tracked, pictures and animation."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mambo_nmpc.sil.flight.animation import animate
+from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.plots import flight_columns
+from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, ReplaySummary, named
+from mambo_nmpc.sil.flight.scenario import Scenario
+from mambo_nmpc.sil.flight.traces import Trace, read_npz
+from mambo_nmpc.sil.show.section import Section
+
+
+def fly_section(folder: Path, summary: FlySummary) -> Section:
+    """Return the section of a flight; raises TraceError."""
+    name = PD if summary.controller == "pd" else f"NMPC, {summary.source}"
+    bits = "" if summary.same_bits_as_host is not True else ", bit for bit as on the desk"
+    facts = {
+        **_course(summary),
+        "controller": f"{summary.controller}, settings {summary.settings[:16]} of {summary.source}",
+        "start": f"{summary.start}, heading {summary.yaw_rad:g} rad",
+        "disturbance": "push of {:g}, {:g} m/s²".format(*summary.wind_m_s2)
+        + f"; moving air {summary.wind_speed_m_s:g} m/s; motor lag {summary.motor_lag_s:g} s",
+    }
+    if summary.board is not None:
+        facts["flown on"] = f"the emulated core of {summary.board}{bits}"
+    bad = []
+    if summary.same_bits_as_host is False:
+        bad = [f"the trace of {summary.board} differs from that of the desk"]
+    return _flight(folder, summary, (name, f"Flight: {name}, {summary.trajectory}"), facts, bad)
+
+
+def replay_section(folder: Path, summary: ReplaySummary) -> Section:
+    """Return the section of a flight that was flown again; raises TraceError."""
+    name = PD if summary.controller == "pd" else "NMPC"
+    facts = {
+        "record": summary.replay,
+        **_course(summary.scenario),
+        "controller": f"{summary.controller}, settings {summary.settings[:16]}",
+        "seed": str(summary.scenario.seed),
+    }
+    bad = ["the trace differs from the recorded one"] if summary.same_bits_as_recorded is False else []
+    return _flight(folder, summary, (name, f"Flown again: {name}, {summary.replay}"), facts, bad)
+
+
+def traces(folder: Path, files: Mapping[str, str]) -> tuple[dict[str, Trace], list[str]]:
+    """Return the traces that are there by title, and the files that are not; raises TraceError."""
+    here = {path.name: path for path in folder.iterdir()}
+    flights = {title: read_npz(here[name]) for title, name in files.items() if name in here}
+    return flights, [name for name in files.values() if name not in here]
+
+
+def pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
+    """Return the moving and the still pictures of flights, if there are any."""
+    return {
+        "animation": animate(flights) if flights else None,
+        "columns": flight_columns(flights) if flights else [],
+    }
+
+
+def _course(flown: FlySummary | Scenario) -> dict[str, str]:
+    shape = "" if flown.trajectory.endswith(".csv") else f", {flown.size_m:g} m, {flown.rate_rad_s:g} rad/s"
+    return {
+        "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",
+        "seen through": "the truth" if flown.sensors == "none" else f"sensors {flown.sensors}",
+    }
+
+
+def _flight(
+    folder: Path, summary: FlightSummary, names: tuple[str, str], facts: dict[str, str], bad: list[str]
+) -> Section:
+    """Return the section of a flight; `names` are of drone and section, `bad` says what is wrong."""
+    flights, missing = traces(folder, {names[0]: "trace.npz"})
+    if summary.lost:
+        bad = [*bad, "the vehicle left the world before the end of the flight"]
+    elif summary.mostly_refused:
+        bad = [*bad, "the controller refused more than half of its inputs"]
+    columns = summary.columns
+    tracked = {"rms error": summary.metrics.get("rms_error_m"), "largest": summary.metrics.get("max_error_m")}
+    content = {
+        "facts": facts,
+        "refusals": summary.refusals,
+        "titles": list(columns),
+        "metrics": [
+            (*named(key), [values.get(key) for values in columns.values()]) for key in summary.metrics
+        ],
+        **pictures(flights),
+    }
+    finding = "; ".join(bad) or ", ".join(
+        f"{words} {value:.3g} m" for words, value in tracked.items() if value
+    )
+    return Section("fly", names[1], not bad, finding, content, missing, moves=bool(flights))

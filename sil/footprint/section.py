@@ -1,0 +1,30 @@
+"""Footprints and sweeps on a page."""
+
+from pathlib import Path
+
+from mambo_nmpc.sil.footprint.plots import sweep_panels
+from mambo_nmpc.sil.footprint.report import FootprintSummary
+from mambo_nmpc.sil.footprint.sweep import SweepSummary
+from mambo_nmpc.sil.show.section import Section
+
+
+def footprint_section(_folder: Path, summary: FootprintSummary) -> Section:
+    """Return the section of footprints on boards."""
+    fits = sum(board.fits for board in summary.boards)
+    finding = f"fits {fits} of {len(summary.boards)} boards"
+    title = f"Footprint of {summary.source}"
+    return Section("footprint", title, fits == len(summary.boards), finding, summary)
+
+
+def sweep_section(_folder: Path, summary: SweepSummary) -> Section:
+    """Return the section of a sweep."""
+    best = summary.largest_fit
+    finding = (
+        "nothing fits"
+        if best is None
+        else f"largest that fits: prediction {best.prediction}, {best.control} moves, "
+        f"{best.iterations} iterations"
+    )
+    pictures = sweep_panels(summary.points, summary.budget) if summary.points else []
+    title = f"Sweep of {summary.source} on {summary.board}"
+    return Section("sweep", title, best is not None, finding, {"summary": summary, "pictures": pictures})
