@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 from benchmarks.peers_programs import Cost
 from benchmarks.peers_setups import GRAVITY_M_S2
-from benchmarks.searches import Array, Model, Problems
+from benchmarks.searches import Array, CostModel, Problems
 from mambo_nmpc.codegen.settings.model import Settings
 
 
@@ -19,7 +19,7 @@ def problems(settings: Settings, inputs: Array) -> Problems:
     """Write out what the controller of `settings` minimises for `inputs` (n, 6)."""
     x, vx, y, vy, roll, pitch = inputs.T
     level = np.zeros(len(inputs))
-    return Model(settings).problems(
+    return CostModel(settings).problems(
         np.column_stack([x, y, vx, vy, roll, pitch, level]),
         np.zeros((len(inputs), 4)),
         level + GRAVITY_M_S2,

@@ -62,7 +62,7 @@ SENSED_HEAD: Final = (
 
 
 @dataclass(frozen=True)
-class Entrant:
+class Variant:
     """Settings that fly as they are, or with a search that is no setting."""
 
     settings: Settings
@@ -76,7 +76,7 @@ class Entrant:
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlownVariant:
     """What became of the flights of a world; `seen_iae_m_s` (n,) is as the estimators show it."""
 
     metrics: Metrics
@@ -84,26 +84,26 @@ class Flown:
     crashed: int
 
 
-def entrants(preset: str) -> dict[str, Entrant]:
+def entrants(preset: str) -> dict[str, Variant]:
     """Return a preset with every search, by title."""
     settings = presets.load(preset)
     kept = settings.optimizer.warm_start
     other = next(start for start in STARTS if start != kept)
 
-    def tried(iterations: int, searching: Searching | None = None, start: str = kept) -> Entrant:
+    def tried(iterations: int, searching: Searching | None = None, start: str = kept) -> Variant:
         started = with_option(settings, "optimizer.warm_start", start)
-        return Entrant(with_option(started, "optimizer.iterations", iterations), searching)
+        return Variant(with_option(started, "optimizer.iterations", iterations), searching)
 
     return {
         **{f"{k} iterations, from the {STARTS[kept]}": tried(k) for k in (5, 10, 20)},
         **{f"{k}, the best plan met": tried(k, best_iterate) for k in (5, 20)},
         **{f"{k}, from the {STARTS[other]}": tried(k, start=other) for k in (5, 20)},
         **{f"{k}, from level": tried(k, from_level) for k in (5, 20)},
-        EXACT: Entrant(settings, optimum),
+        EXACT: Variant(settings, optimum),
     }
 
 
-def weighted() -> dict[tuple[str, str], Entrant]:
+def weighted() -> dict[tuple[str, str], Variant]:
     """Return `mambo` with every effort weight, and `mambo-robust`, searched more and more, by two titles."""
     mambo = presets.load("mambo")
     several = {
@@ -113,20 +113,20 @@ def weighted() -> dict[tuple[str, str], Entrant]:
     found = {}
     for title, settings in several.items():
         for k in (settings.optimizer.iterations, 20):
-            found[title, f"{k} iterations"] = Entrant(with_option(settings, "optimizer.iterations", k))
-        found[title, EXACT] = Entrant(settings, optimum)
+            found[title, f"{k} iterations"] = Variant(with_option(settings, "optimizer.iterations", k))
+        found[title, EXACT] = Variant(settings, optimum)
     return found
 
 
-def fly_world(entrant: Entrant, world: Sequence[Scenario]) -> Flown:
+def fly_world(entrant: Variant, world: Sequence[Scenario]) -> FlownVariant:
     """Fly all flights of a world at once."""
     flight = flight_of(world, entrant.settings.horizon.update_period_s)
     trace = fly(flight, entrant.controller(len(world)))
     seen = trace.as_seen() if isinstance(trace, SensedTrace) else trace
-    return Flown(measure(trace), measure(seen).iae_m_s, int(crashed(trace).sum()))
+    return FlownVariant(measure(trace), measure(seen).iae_m_s, int(crashed(trace).sum()))
 
 
-def instructions(entrant: Entrant) -> str:
+def instructions(entrant: Variant) -> str:
     """Count the instructions of a step on the board, of what has C."""
     if entrant.searching is not None:
         return "-"
@@ -144,7 +144,7 @@ def _mean(values: FloatArray) -> str:
     return f"{_digits(values.mean())} ± {error:.2g}"
 
 
-def truth_cells(flown: Flown) -> list[str]:
+def truth_cells(flown: FlownVariant) -> list[str]:
     """Spell the flights of `TRUTH`."""
     found, beside = flown.metrics, len(BESIDE_M)
     iae, variation = found.iae_m_s, found.command_variation_rad
@@ -156,7 +156,7 @@ def truth_cells(flown: Flown) -> list[str]:
     ]
 
 
-def sensed_cells(flown: Flown) -> list[str]:
+def sensed_cells(flown: FlownVariant) -> list[str]:
     """Spell the flights of `SENSED`."""
     found = flown.metrics
     cells = []

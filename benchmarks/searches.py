@@ -81,7 +81,7 @@ class Problems:
         return found
 
 
-class Model:
+class CostModel:
     """Eqs 8-11 of one set of settings; `position_update = "printed"` is not written out."""
 
     def __init__(self, settings: Settings) -> None:
@@ -179,7 +179,7 @@ class SearchingController(ReferenceController):
         float64 = with_option(settings, "code.scalar", "float64")
         super().__init__(Design(float64), n, self._chosen)
         self._searching = searching
-        self._model = Model(settings)
+        self._model = CostModel(settings)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands, and assert that eq 12 here is eq 12 there."""

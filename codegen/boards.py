@@ -76,7 +76,7 @@ Flags = Annotated[tuple[Flag, ...], _MANY]
 Libraries = Annotated[tuple[Library, ...], _MANY]
 
 
-class _Section(BaseModel):
+class _BoardSection(BaseModel):
     """What all sections share: frozen, no unknown keys, no silent conversion, and a source."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -85,13 +85,13 @@ class _Section(BaseModel):
     confidence: Literal["high", "medium", "low"] = Field(description='how sure: "high", "medium" or "low"')
 
 
-class Fact(_Section, Generic[Value]):
+class Fact(_BoardSection, Generic[Value]):
     """One value of a board."""
 
     value: Value = Field(description="the value itself, in the unit that the section's name ends in")
 
 
-class Compiler(_Section):
+class Compiler(_BoardSection):
     """How C is built for a board."""
 
     candidates: Commands = Field(min_length=1, description="commands, the first that is there is taken")
@@ -109,14 +109,14 @@ class Compiler(_Section):
         return self.candidates[0]
 
 
-class Cycles(_Section):
+class Cycles(_BoardSection):
     """A clock cycle estimate from an instruction count, for caches and prefetch buffers that are warm."""
 
     per_instruction: float = Field(gt=0, le=100, description="clock cycles an instruction, on average")
     error_share: Share = Field(description="half-width of the estimate's band, as a share of it")
 
 
-class Budget(_Section):
+class Budget(_BoardSection):
     """What a controller may take of a board."""
 
     flash_bytes: Bytes = Field(description="code and constants, the compiler's helpers included, in bytes")

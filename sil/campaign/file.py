@@ -39,16 +39,16 @@ _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _LONGEST_LIST: Final = 10
 
 
-class Section(BaseModel):
+class FileSection(BaseModel):
     """A frozen section of a file that rejects unknown keys, conversions of type, infinity and NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
 
-File = TypeVar("File", bound=Section)
+File = TypeVar("File", bound=FileSection)
 
 
-class FlightSection(Section):
+class FlightSection(FileSection):
     """Keys that all flights share."""
 
     trajectory: CurveName = "bernoulli"
@@ -75,12 +75,12 @@ def _drawn(parameter: Parameter) -> Any:
 
 Draws: Any = create_model(
     "Draws",
-    __base__=Section,
+    __base__=FileSection,
     **{name: _drawn(parameter) for name, parameter in PARAMETERS.items()},
 )
 
 
-class CampaignFile(Section):
+class CampaignFile(FileSection):
     """The keys of campaign.toml; a missing key has its value in the default campaign."""
 
     seed: int = Field(0, ge=0, le=2**63 - 1)
@@ -211,7 +211,7 @@ def _entrant(named: str, folder: Path, source: str) -> Entrant:
     return Entrant(name, "nmpc", settings)
 
 
-def _fault(details: ErrorDetails, model: type[Section]) -> str:
+def _fault(details: ErrorDetails, model: type[FileSection]) -> str:
     """Return a message that names a wrong key, its value and the rule."""
     names = [str(part) for part in details["loc"]]
     dotted = echo(".".join(names))
@@ -229,7 +229,7 @@ def _fault(details: ErrorDetails, model: type[Section]) -> str:
             return f"{dotted} = {value} {details['msg'].replace('Input should', 'must')}"
 
 
-def _section(names: Sequence[str], model: type[Section]) -> Any:
+def _section(names: Sequence[str], model: type[FileSection]) -> Any:
     """Return the model of the section to which the key at the path `names` belongs."""
     section: Any = model
     for name in names[:-1]:
@@ -237,7 +237,7 @@ def _section(names: Sequence[str], model: type[Section]) -> Any:
     return section
 
 
-def _unknown(names: Sequence[str], dotted: str, model: type[Section]) -> str:
+def _unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str:
     """Return a message that a key does not exist, with similar keys that do."""
     keys = list(_section(names, model).model_fields)
     near = [key for key in keys if key.startswith(f"{names[-1]}_")]

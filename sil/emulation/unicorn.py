@@ -29,7 +29,7 @@ _ALIGNMENT: Final = 16
 
 
 @dataclass(frozen=True)
-class Model:
+class CoreModel:
     """How one kind of core is made and called."""
 
     architecture: int
@@ -43,8 +43,8 @@ class Model:
     thumb: bool = False
 
 
-def _arm(model: int, *, thumb: bool) -> Model:
-    return Model(
+def _arm(model: int, *, thumb: bool) -> CoreModel:
+    return CoreModel(
         architecture=unicorn.UC_ARCH_ARM,
         mode=unicorn.UC_MODE_THUMB if thumb else unicorn.UC_MODE_ARM,
         model=model,
@@ -62,7 +62,7 @@ MODELS: Final = {
     "cortex-m0": _arm(arm_const.UC_CPU_ARM_CORTEX_M0, thumb=True),
     "cortex-m4": _arm(arm_const.UC_CPU_ARM_CORTEX_M4, thumb=True),
     "cortex-m7": _arm(arm_const.UC_CPU_ARM_CORTEX_M7, thumb=True),
-    "rv32": Model(
+    "rv32": CoreModel(
         architecture=unicorn.UC_ARCH_RISCV,
         mode=unicorn.UC_MODE_RISCV32,
         model=riscv_const.UC_CPU_RISCV32_ANY,

@@ -9,7 +9,7 @@ from typing import Any, Final
 import capstone
 
 from mambo_nmpc.sil.firmware import arm, avr, riscv
-from mambo_nmpc.sil.firmware.elf import Image, Section
+from mambo_nmpc.sil.firmware.elf import ElfSection, Image
 from mambo_nmpc.sil.firmware.instructions import Convention, Instruction
 
 _A32: Final = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_ARM)
@@ -18,7 +18,7 @@ _RISCV: Final = capstone.Cs(capstone.CS_ARCH_RISCV, capstone.CS_MODE_RISCV32 | c
 
 
 @dataclass(frozen=True)
-class Code:
+class Disassembly:
     """Every instruction of a program by its address, and the convention of its calls."""
 
     instructions: dict[int, Instruction]
@@ -30,7 +30,7 @@ def is_readable(image: Image) -> bool:
     return image.machine in {"EM_ARM", "EM_AVR", "EM_RISCV"} and image.address_bits == 32
 
 
-def disassemble(image: Image) -> Code:
+def disassemble(image: Image) -> Disassembly:
     """Return the code of an ARM, AVR or 32-bit RISC-V program; raises FootprintError for other processors."""
     if not is_readable(image):
         name = image.machine.removeprefix("EM_")
@@ -38,10 +38,10 @@ def disassemble(image: Image) -> Code:
             f"code for {name} cannot be read here, only ARM, AVR and 32-bit RISC-V; measure its sizes"
         )
     if image.machine == "EM_AVR":
-        return Code(*avr.disassembled(image))
+        return Disassembly(*avr.disassembled(image))
     if image.machine == "EM_ARM":
-        return Code({instruction.address: instruction for instruction in _arm(image)}, arm.CONVENTION)
-    return Code({instruction.address: instruction for instruction in _riscv(image)}, riscv.CONVENTION)
+        return Disassembly({instruction.address: instruction for instruction in _arm(image)}, arm.CONVENTION)
+    return Disassembly({instruction.address: instruction for instruction in _riscv(image)}, riscv.CONVENTION)
 
 
 def _arm(image: Image) -> Iterator[Instruction]:
@@ -70,7 +70,7 @@ def _riscv(image: Image) -> Iterator[Instruction]:
 
 
 def _decoded(
-    decoder: capstone.Cs, meaning: Callable[[Any], Instruction], section: Section, start: int, end: int
+    decoder: capstone.Cs, meaning: Callable[[Any], Instruction], section: ElfSection, start: int, end: int
 ) -> Iterator[Instruction]:
     """Decode from `start` to `end`; halfwords that are no instruction are left out."""
     decoder.detail = True

@@ -24,7 +24,7 @@ class FootprintError(MamboNmpcError):
 
 
 @dataclass(frozen=True)
-class Section:
+class ElfSection:
     """A section that takes memory while the program runs; `contents` is empty where it starts as zeros."""
 
     name: str
@@ -69,7 +69,7 @@ class Image:
     path: Path
     machine: str
     address_bits: int
-    sections: tuple[Section, ...]
+    sections: tuple[ElfSection, ...]
     symbols: tuple[Symbol, ...]
     modes: tuple[tuple[int, str], ...]
 
@@ -126,7 +126,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
     machine = str(elf.header["e_machine"])
     allocated = {i: s for i, s in enumerate(elf.iter_sections()) if s["sh_flags"] & SH_FLAGS.SHF_ALLOC}
     sections = {
-        index: Section(
+        index: ElfSection(
             name=section.name,
             address=section["sh_addr"],
             size_bytes=section["sh_size"],
@@ -170,7 +170,7 @@ class _Label:
     file: str | None
 
 
-def _labels(table: SymbolTableSection, sections: dict[int, Section], machine: str) -> Iterator[_Label]:
+def _labels(table: SymbolTableSection, sections: dict[int, ElfSection], machine: str) -> Iterator[_Label]:
     """Yield functions, objects, and the untyped labels that hand-written assembly leaves in code."""
     file = None
     for symbol in table.iter_symbols():
@@ -194,7 +194,7 @@ def _labels(table: SymbolTableSection, sections: dict[int, Section], machine: st
             )
 
 
-def _disjoint(labels: list[_Label], section: Section) -> Iterator[Symbol]:
+def _disjoint(labels: list[_Label], section: ElfSection) -> Iterator[Symbol]:
     """Give each byte to the last label before it, as far as its size reaches, or else to the next label."""
     places: dict[int, list[_Label]] = defaultdict(list)
     for label in labels:

@@ -12,7 +12,7 @@ _PARTS: Final[tuple[Part, ...]] = ("own", "helpers", "grown")
 
 
 @dataclass(frozen=True)
-class Memory:
+class SectionBytes:
     """Bytes by section. Initialised variables are in both: in RAM, and in flash to start from."""
 
     flash: dict[str, int]
@@ -43,19 +43,19 @@ class Parts:
 class Added:
     """What a controller adds to a program: by section, by part, and the bytes of each symbol by name."""
 
-    sections: Memory
+    sections: SectionBytes
     flash: Parts
     ram: Parts
     own: dict[str, int]
     helpers: dict[str, int]
 
 
-def sections(image: Image) -> Memory:
+def sections(image: Image) -> SectionBytes:
     """Return the sections of a program that take flash, and those that take RAM whenever it runs.
 
     The flags of a section decide: read-only data is flash, wherever a linker script may put it.
     """
-    return Memory(
+    return SectionBytes(
         flash={section.name: section.size_bytes for section in image.sections if section.in_flash},
         ram={section.name: section.size_bytes for section in image.sections if section.in_ram},
     )
@@ -71,7 +71,7 @@ def added(with_controller: Path, empty: Path, prefix: str) -> Added:
     labels = frozenset(label for symbol in base.symbols for label in symbol.labels)
     parts = {part: [s for s in image.symbols if _part(s, labels, prefix) == part] for part in _PARTS}
     return Added(
-        sections=Memory(_difference(after.flash, before.flash), _difference(after.ram, before.ram)),
+        sections=SectionBytes(_difference(after.flash, before.flash), _difference(after.ram, before.ram)),
         flash=_parts(parts, base.symbols, before.flash, after.flash),
         ram=_parts(parts, base.symbols, before.ram, after.ram),
         own={symbol.name: symbol.size_bytes for symbol in parts["own"]},

@@ -10,7 +10,7 @@ from collections import defaultdict
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
-from mambo_nmpc.sil.firmware.disassembly import Code, disassemble
+from mambo_nmpc.sil.firmware.disassembly import Disassembly, disassemble
 from mambo_nmpc.sil.firmware.elf import Image
 from mambo_nmpc.sil.firmware.instructions import SP, Instruction, Put
 from mambo_nmpc.sil.firmware.knowledge import Knowledge, Value
@@ -83,7 +83,7 @@ class _Walk:
     calls: dict[int, int]
 
 
-def _reachable(image: Image, code: Code, entry: int) -> dict[int, _Walk]:
+def _reachable(image: Image, code: Disassembly, entry: int) -> dict[int, _Walk]:
     walks: dict[int, _Walk] = {}
     waiting = [entry]
     while waiting:
@@ -128,7 +128,7 @@ def _deepest(
 class _Walker:
     """Follows every path through one function, and through the code of others that it jumps into."""
 
-    def __init__(self, image: Image, code: Code, function: int) -> None:
+    def __init__(self, image: Image, code: Disassembly, function: int) -> None:
         self._image, self._code, self._function = image, code, function
         self._functions = {symbol.address for symbol in image.symbols if symbol.kind == "function"}
         self._preserved = self._preserved_by(function)

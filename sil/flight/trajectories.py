@@ -144,7 +144,7 @@ class Hover:
 
 
 @dataclass(frozen=True)
-class Step:
+class PositionStep:
     """The origin, and from `STEP_TIME_S` on the point (x, y); the target velocity is always 0."""
 
     x_m: float
@@ -283,6 +283,6 @@ CURVES: Final[dict[CurveName, Callable[[float, float], Trajectory]]] = {
     "lissajous": Lissajous,
     "circle": Circle,
     "hover": lambda size_m, rate_rad_s: Hover(),  # noqa: ARG005 - has neither size nor rate
-    "step": lambda size_m, rate_rad_s: Step(size_m, 0.0),  # noqa: ARG005 - has no rate
+    "step": lambda size_m, rate_rad_s: PositionStep(size_m, 0.0),  # noqa: ARG005 - has no rate
 }
 """Curve by name, as a function of size (half-width, radius or step in m) and angular rate in rad/s."""

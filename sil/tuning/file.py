@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.settings import controller_toml, presets
 from mambo_nmpc.codegen.settings.keys import KEYS
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
-from mambo_nmpc.sil.campaign.file import Draws, FlightSection, Section, read_as, scenario, spelled
+from mambo_nmpc.sil.campaign.file import Draws, FileSection, FlightSection, read_as, scenario, spelled
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.scenario import flight_of
@@ -46,7 +46,7 @@ class TuningFlight(FlightSection):
     duration_s: float = Field(20.0, ge=1, le=3600)
 
 
-class TuneFile(Section):
+class TuneFile(FileSection):
     """The keys of tune.toml; a missing key has its value in the default study."""
 
     seed: int = Field(1, ge=0, le=2**63 - 1)

@@ -7,7 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from benchmarks.quality import PRESETS, entrants
-from benchmarks.searches import Model, Problems, SearchingController, best_iterate, from_level, optimum, rprop
+from benchmarks.searches import (
+    CostModel,
+    Problems,
+    SearchingController,
+    best_iterate,
+    from_level,
+    optimum,
+    rprop,
+)
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
@@ -56,7 +64,7 @@ def test_rows_have_the_cost_and_slope_of_the_reference(index: int) -> None:
 def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
     """The program's optimum keeps the limit, and beats the controller's plan and any other."""
     settings, rng = presets.load(name), np.random.default_rng(1)
-    controller, model = ReferenceController(Design(settings), N), Model(settings)
+    controller, model = ReferenceController(Design(settings), N), CostModel(settings)
     limit = settings.limits.tilt_rad
     last = np.zeros((N, 2))
     for _ in range(3):
@@ -75,7 +83,7 @@ def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
 def test_searches_are_ordered_by_what_they_find() -> None:
     """The best iterate is never dearer than start or last iterate, and the optimum never dearer than it."""
     settings, rng = presets.load("mambo"), np.random.default_rng(2)
-    problems = Model(settings).problems(*inputs(rng), rng.uniform(-0.2, 0.2, (N, 2)))
+    problems = CostModel(settings).problems(*inputs(rng), rng.uniform(-0.2, 0.2, (N, 2)))
     level = np.zeros((N, settings.horizon.control, 2))
     best_rad = optimum(settings, problems, level)
     for start in (level, best_rad):

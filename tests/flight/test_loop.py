@@ -16,7 +16,7 @@ from mambo_nmpc.sil.flight.trajectories import (
     Circle,
     Gerono,
     Hover,
-    Step,
+    PositionStep,
     Trajectories,
     Trajectory,
 )
@@ -145,7 +145,7 @@ def test_flight_in_a_batch_is_the_flight_alone() -> None:
         FIGURE_OF_EIGHT,
         Circle(1.0, 0.8),
         Gerono(1.0, 0.5),
-        Step(1.0, 0.0),
+        PositionStep(1.0, 0.0),
         Hover(),
     )
     yaws, lags = np.array([0.0, 0.8, -0.5, 3.0, 0.1]), np.array([0.0, 0.03, 0.0, 0.05, 0.02])
@@ -228,7 +228,7 @@ def test_command_accelerates_along_the_heading(
 
 def test_step_of_the_target_is_reached() -> None:
     """The PD moves the drone to a point 1.4 m away and keeps its height."""
-    trace = fly(Flight(Step(1.0, -1.0), duration_s=30.0), PdController())
+    trace = fly(Flight(PositionStep(1.0, -1.0), duration_s=30.0), PdController())
     np.testing.assert_allclose(trace.position_m[-1, 0], [1.0, -1.0, -1.1], atol=0.02)
 
 

@@ -13,7 +13,7 @@ from mambo_nmpc.sil.flight.trajectories import (
     Gerono,
     Hover,
     Lissajous,
-    Step,
+    PositionStep,
     Trajectories,
     Trajectory,
     Waypoints,
@@ -27,7 +27,7 @@ CURVES: list[Trajectory] = [
     Waypoints(((0.0, 0.0, 0.0), (2.0, 1.0, -1.0), (5.0, 1.0, 3.0), (9.0, -2.0, 0.5))),
 ]
 
-ALL: list[Trajectory] = [*CURVES, Hover(), Step(1.0, -0.5)]
+ALL: list[Trajectory] = [*CURVES, Hover(), PositionStep(1.0, -0.5)]
 
 TIMES_S = np.arange(0.005, 20.0, 0.0101)
 
@@ -91,7 +91,7 @@ def test_circle_keeps_its_radius_and_its_speed() -> None:
 
 def test_step_jumps_at_one_second() -> None:
     """The target is the origin before t = 1 s and the other point from then on, always at rest."""
-    targets = Step(1.0, -0.5).target(np.array([0.0, 0.99, 1.0, 50.0]))
+    targets = PositionStep(1.0, -0.5).target(np.array([0.0, 0.99, 1.0, 50.0]))
     np.testing.assert_array_equal(targets[:2], 0.0)
     np.testing.assert_array_equal(targets[2:], [[1.0, -0.5, 0.0, 0.0]] * 2)
 

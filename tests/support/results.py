@@ -15,7 +15,7 @@ from mambo_nmpc.sil.campaign.report import CampaignSummary, Drawn, WorstFlight
 from mambo_nmpc.sil.campaign.statistics import Distributions, Improvement, Proportion
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.faults.flights import End, FaultsSummary, Verdict
-from mambo_nmpc.sil.firmware.sizes import Added, Memory, Parts
+from mambo_nmpc.sil.firmware.sizes import Added, Parts, SectionBytes
 from mambo_nmpc.sil.flight import report
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.names import PD
@@ -121,7 +121,9 @@ def footprint_folder(folder: Path) -> None:
             compiler=HOSTILE,
             optimisation="-O2",
             scalar="float32",
-            added=Added(Memory({}, {}), Parts(flash, 0, 0, 0), Parts(120, 0, 0, 0), {"nmpc_step": flash}, {}),
+            added=Added(
+                SectionBytes({}, {}), Parts(flash, 0, 0, 0), Parts(120, 0, 0, 0), {"nmpc_step": flash}, {}
+            ),
             instance_bytes=120,
             stack=None,
             counts=None,
