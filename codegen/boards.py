@@ -1,8 +1,8 @@
-"""The named boards: TOML files with what a board has, how C is built for it, what a controller may take.
+"""Boards: TOML files with the core, memory, compiler and budget of a board.
 
-Every section of such a file says where its values come from and how sure they are. A file of one's own in the
-same shape is as good as a named board, and need not be trusted: it chooses among compilers on the PATH and
-for which core they build, but can run no other program and name no file.
+Each section states the source of its values and how reliable they are. A file by the user has the same form.
+It need not be trusted: it chooses a compiler on the PATH and flags for core and FPU, but names no other
+program and no file.
 """
 
 import difflib
@@ -33,7 +33,7 @@ Value = TypeVar("Value")
 
 
 def _matching(pattern: str, rule: str) -> AfterValidator:
-    """Refuse text that `pattern` does not match as a whole; `rule` says what it must be."""
+    """Return a validator that refuses text unless `pattern` matches all of it; `rule` ends the message."""
 
     def check(text: str) -> str:
         if not re.fullmatch(pattern, text, re.ASCII):
@@ -44,7 +44,7 @@ def _matching(pattern: str, rule: str) -> AfterValidator:
 
 
 def _printable(text: str) -> str:
-    """Refuse what moves the cursor of a terminal or breaks a line."""
+    """Refuse control characters, which could write to the terminal, and line ends."""
     if not text.isprintable():
         raise PydanticCustomError("text", "must be printable, without line ends and control characters")
     return text
@@ -69,20 +69,20 @@ Library = Annotated[str, _matching(r"-l[\w.+-]+", "a library, as in -lgcc")]
 Bytes = Annotated[int, Field(ge=1, le=2**40)]
 Share = Annotated[float, Field(gt=0, le=1)]
 
-_MANY: Final = Field(strict=False)
-Commands = Annotated[tuple[Command, ...], _MANY]
-Packages = Annotated[tuple[Words, ...], _MANY]
-Flags = Annotated[tuple[Flag, ...], _MANY]
-Libraries = Annotated[tuple[Library, ...], _MANY]
+_LIST: Final = Field(strict=False)
+Commands = Annotated[tuple[Command, ...], _LIST]
+Packages = Annotated[tuple[Words, ...], _LIST]
+Flags = Annotated[tuple[Flag, ...], _LIST]
+Libraries = Annotated[tuple[Library, ...], _LIST]
 
 
 class _BoardSection(BaseModel):
-    """What all sections share: frozen, no unknown keys, no silent conversion, and a source."""
+    """Base of all sections: frozen, without unknown keys and implicit conversion, with a source."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     source: Words = Field(description="where the values of this section come from")
-    confidence: Literal["high", "medium", "low"] = Field(description='how sure: "high", "medium" or "low"')
+    confidence: Literal["high", "medium", "low"] = Field(description='reliability: "high", "medium" or "low"')
 
 
 class Fact(_BoardSection, Generic[Value]):
@@ -92,17 +92,17 @@ class Fact(_BoardSection, Generic[Value]):
 
 
 class Compiler(_BoardSection):
-    """How C is built for a board."""
+    """Compiler and flags for a board."""
 
-    candidates: Commands = Field(min_length=1, description="commands, the first that is there is taken")
-    packages: Packages = Field(min_length=1, description="Debian packages that bring one of the candidates")
-    flags: Flags = Field(description="what compiling and linking add: core, FPU, dialect")
-    link_flags: Flags = Field((), description="what linking for the firmware adds to that")
-    libraries: Libraries = Field(("-lgcc",), description="libraries that hold the compiler's own helpers")
+    candidates: Commands = Field(min_length=1, description="compilers; the first one on the PATH is used")
+    packages: Packages = Field(min_length=1, description="Debian packages that contain one of the candidates")
+    flags: Flags = Field(description="flags for compiling and linking: core, FPU, dialect")
+    link_flags: Flags = Field((), description="further flags for linking the firmware")
+    libraries: Libraries = Field(("-lgcc",), description="libraries of the compiler's helper functions")
 
     @property
     def common(self) -> str:
-        """The candidate that Debian's packages bring, or else the first."""
+        """The candidate that is in Debian's packages, or else the first."""
         for candidate in self.candidates:
             if f"gcc-{candidate.removesuffix('-gcc')}" in self.packages:
                 return candidate
@@ -110,23 +110,23 @@ class Compiler(_BoardSection):
 
 
 class Cycles(_BoardSection):
-    """A clock cycle estimate from an instruction count, for caches and prefetch buffers that are warm."""
+    """Estimate of clock cycles from an instruction count, with warm caches and prefetch buffers."""
 
-    per_instruction: float = Field(gt=0, le=100, description="clock cycles an instruction, on average")
-    error_share: Share = Field(description="half-width of the estimate's band, as a share of it")
+    per_instruction: float = Field(gt=0, le=100, description="mean clock cycles per instruction")
+    error_share: Share = Field(description="half-width of the band around the estimate, as a share of it")
 
 
 class Budget(_BoardSection):
-    """What a controller may take of a board."""
+    """Limits of a controller on a board."""
 
-    flash_bytes: Bytes = Field(description="code and constants, the compiler's helpers included, in bytes")
-    ram_bytes: Bytes = Field(description="static memory, the controller's instance included, in bytes")
+    flash_bytes: Bytes = Field(description="code and constants with the compiler's helpers, in bytes")
+    ram_bytes: Bytes = Field(description="static memory with the controller's instance, in bytes")
     stack_bytes: Bytes = Field(description="stack of one step, in bytes, on top of ram_bytes")
     period_share: Share = Field(description="time of one step, as a share of the update period")
 
 
 class Board(BaseModel):
-    """A board; `name` is the stem of its file."""
+    """A board; its name is the stem of its file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -142,9 +142,9 @@ class Board(BaseModel):
     clock_hz: Fact[Annotated[int, Field(ge=1, le=10**11)]] = Field(description="clock of the core, in hertz")
     flash_bytes: Fact[Bytes] = Field(description="memory for code and constants, in bytes")
     ram_bytes: Fact[Bytes] = Field(description="memory for data and stack, in bytes")
-    compiler: Compiler = Field(description="how C is built for the board")
-    cycles: Cycles = Field(description="clock cycles estimated from instructions")
-    budget: Budget = Field(description="what a controller may take of the board")
+    compiler: Compiler = Field(description="compiler and flags")
+    cycles: Cycles = Field(description="estimate of clock cycles from instructions")
+    budget: Budget = Field(description="limits of a controller on the board")
 
     @field_validator("budget")
     @classmethod
@@ -170,10 +170,10 @@ def names() -> tuple[str, ...]:
 
 
 def load(name_or_path: str) -> Board:
-    """Return a named board, or else the one in the file at a path (./mambo is a file, mambo a board).
+    """Return the board of that name, or else the one in the file at that path (./mambo is a file).
 
-    Raises SourceNotFoundError if there is neither, UnreadableFileError for what is not TOML and
-    InvalidSettingsError with every broken rule.
+    Raises SourceNotFoundError if there is neither, UnreadableFileError if the file is not TOML, and
+    InvalidSettingsError with all broken rules.
     """
     if name_or_path in names():
         text = (_FOLDER / f"{name_or_path}.toml").read_text("utf-8")
@@ -189,11 +189,11 @@ def load(name_or_path: str) -> Board:
 
 
 def _parse(text: str, source: str, name: str) -> Board:
-    """Return the board in `text`; `source` begins every message."""
+    """Return the board in `text`; `source` begins every error message."""
     document = parse_document(text, source)
     if "name" in document:
         raise InvalidSettingsError(
-            (f"{source}: name is not a key of a board, the file's name is; leave it out",)
+            (f"{source}: name is not a key of a board; remove it, the file name is the name",)
         )
     try:
         return Board.model_validate({"name": name, **document})
@@ -203,7 +203,7 @@ def _parse(text: str, source: str, name: str) -> Board:
 
 
 def _fault(details: ErrorDetails) -> str:
-    """Say which key is wrong, with its value, and what to write instead."""
+    """Return a message with key, value and rule."""
     *section, key = details["loc"]
     dotted = echo(".".join(str(part) for part in details["loc"]))
     match details["type"]:
@@ -213,7 +213,7 @@ def _fault(details: ErrorDetails) -> str:
             keys = _fields(section)
             near = difflib.get_close_matches(str(key), keys, n=1)
             return f"{dotted} is not a key of a board; " + (
-                f"did you mean {near[0]}?" if near else f"there are {', '.join(keys)}"
+                f"did you mean {near[0]}?" if near else f"its keys are {', '.join(keys)}"
             )
         case "model_type":
             value = echo_value(details["input"])
@@ -228,7 +228,7 @@ def _fault(details: ErrorDetails) -> str:
 
 
 def _fields(section: Sequence[int | str]) -> dict[str, Any]:
-    """Return the fields that a section has, or a board for no section."""
+    """Return the fields of a section, those of a board if `section` is empty."""
     model: Any = Board
     for part in section:
         model = model.model_fields[part].annotation

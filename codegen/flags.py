@@ -1,9 +1,9 @@
-"""Compiler flags of a bundle, the same in its Makefile and in the software in the loop."""
+"""Flags of compilers and analysers for a bundle, the same in its Makefile and in `sil`."""
 
 from typing import Final
 
 COMPILE_FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off")
-"""Without contraction: a fused multiply-add rounds once where two operations round twice."""
+"""-ffp-contract=off: a fused multiply-add rounds once, two operations round twice."""
 
 WARNING_FLAGS: Final = (
     "-pedantic",
@@ -20,20 +20,20 @@ WARNING_FLAGS: Final = (
 )
 
 PROOF_PREPROCESSING: Final = ("-msse2", "-mfpmath=sse", "-U__GNUC__")
-"""Frama-C takes the sizes of a 32-bit machine; two keep the preprocessor from naming its x87, and without
-__GNUC__ two operations of gcc and clang are spelled out in C."""
+"""Preprocessor flags for Frama-C, which analyses a 32-bit machine: SSE2 instead of x87 (FLT_EVAL_METHOD 0),
+and standard C instead of builtins of GCC and clang."""
 
 PROOFS: Final = {
-    # NaN is an alarm wherever an operation gives it.
+    # Every operation that can result in NaN is an alarm.
     "take_numbers": (
         "-warn-special-float nan",
         "-main take_numbers",
         "-eva",
         "-eva-precision 2",
-        "-eva-split-return auto",  # a range check that says yes and one that says no are told apart
+        "-eva-split-return auto",  # analyse accepted and refused inputs apart
     ),
-    # NaN is a value. No relations between variables: Frama-C 25 takes !(x < y) for x >= y when it draws
-    # conclusions from a stored comparison, which NaN breaks.
+    # NaN is a legal value. Precision 0, without relations between variables: from a stored comparison
+    # Frama-C 25 derives x >= y from !(x < y), which is false for NaN.
     "refuse_nan": (
         "-warn-special-float none",
         "-main refuse_nan",
@@ -41,12 +41,12 @@ PROOFS: Final = {
         "-eva-precision 0",
     ),
 }
-"""What each of the two proofs asks of Frama-C."""
+"""Frama-C's options of each proof, by entry function."""
 
 _WHOLE_NUMBERS: Final = (
     "-warn-signed-overflow",
     "-warn-signed-downcast",
-    "-no-warn-right-shift-negative",  # nmpc_math.h asserts what it does
+    "-no-warn-right-shift-negative",  # nmpc_math.h asserts that it is arithmetic
 )
 FIXED_PROOFS: Final = {
     "take_numbers": (
@@ -65,15 +65,15 @@ FIXED_PROOFS: Final = {
         "-eva-min-loop-unroll 1400",  # all quarter turns of a heading
     ),
 }
-"""The same for fixed point: no NaN, and overflow to look for."""
+"""The same for fixed point: there is no NaN, signed overflow is an alarm."""
 
 PROOF_FLAGS: Final = (
     "-machdep x86_32",
-    "-kernel-warn-key annot:missing-spec=abort",  # no function without a body or a contract
+    "-kernel-warn-key annot:missing-spec=abort",  # every function needs a body or a contract
     "-eva-no-print",
-    "-eva-auto-loop-unroll 128",  # every loop of a controller is shorter
+    "-eva-auto-loop-unroll 128",  # more than any loop of a controller
 )
-"""What all ask."""
+"""Options of all proofs."""
 
 RULE_FLAGS: Final = (
     "--std=c99",
@@ -85,5 +85,5 @@ RULE_FLAGS: Final = (
 
 
 def proofs(scalar: str) -> dict[str, tuple[str, ...]]:
-    """Return the proofs of a scalar type: what each asks of Frama-C, by the function it starts in."""
+    """Return Frama-C's options of each proof for a scalar type, by entry function."""
     return FIXED_PROOFS if scalar == "fixed" else PROOFS

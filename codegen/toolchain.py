@@ -1,4 +1,4 @@
-"""C compilers: found, never assumed, and run with a readable message when they fail."""
+"""Find and run C compilers, with readable messages if they are missing or fail."""
 
 import os
 import shlex
@@ -14,13 +14,13 @@ from mambo_nmpc.codegen.errors import BuildError, echo
 
 @dataclass(frozen=True)
 class Toolchain:
-    """A compiler as a command line, and the optimisation that replaces the bundle's own, if any."""
+    """A compiler's command line, and an optimisation flag that overrides the bundle's."""
 
     command: tuple[str, ...]
     optimisation: str | None = None
 
     def run(self, arguments: Sequence[str], folder: Path) -> None:
-        """Compile or link in `folder`; raises BuildError with the compiler's first words."""
+        """Compile or link in `folder`; raises BuildError with the first lines of the compiler's output."""
         line = [*self.command, *arguments]
         try:
             done = subprocess.run(
@@ -37,18 +37,18 @@ class Toolchain:
                 f"cannot run the C compiler {shlex.join(self.command)}: {error.strerror}"
             ) from error
         if done.returncode != 0:
-            said = _first_lines(done.stderr or done.stdout) or f"exit code {done.returncode}, without a word"
-            raise BuildError(f"{shlex.join(line)} failed:\n{said}")
+            output = _first_lines(done.stderr or done.stdout) or f"exit code {done.returncode}, no output"
+            raise BuildError(f"{shlex.join(line)} failed:\n{output}")
 
     def identity(self) -> str:
-        """Name compiler and version: builds of different compilers are different builds."""
+        """Return the output of --version, which tells builds of different compilers apart."""
         return _version(self.command)
 
 
 def host_toolchain(optimisation: str | None = None) -> Toolchain:
-    """Take the compiler that CC names, else cc, gcc or clang; raises BuildError when there is none.
+    """Return the compiler in CC, else cc, gcc or clang; raises BuildError if there is none.
 
-    A path in CC is relative to the folder of this call, not to that of a build.
+    A path in CC is relative to the current folder, not to that of a build.
     """
     line = os.environ.get("CC", "")
     try:
@@ -62,9 +62,7 @@ def host_toolchain(optimisation: str | None = None) -> Toolchain:
     for name in ("cc", "gcc", "clang"):
         if shutil.which(name):
             return Toolchain((name,), optimisation)
-    raise BuildError(
-        "no C compiler found (cc, gcc, clang); install one, such as Debian's gcc, or name it in CC"
-    )
+    raise BuildError("no C compiler found (cc, gcc, clang); install one (Debian: gcc), or set CC")
 
 
 @lru_cache

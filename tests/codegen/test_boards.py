@@ -1,4 +1,4 @@
-"""Boards: what their files say, whether compilers agree, and what is said about a bad file."""
+"""Boards: contents of their files, agreement with the compilers, messages for invalid files."""
 
 import json
 import shutil
@@ -35,7 +35,7 @@ MACROS: dict[str, dict[str, str | None]] = {
     "rv32": {"__riscv_xlen": "32", "__riscv_mul": "1", "__riscv_compressed": "1", "__riscv_atomic": "1"},
     "teensy41": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
 }
-"""What each board's compiler must define (None: must not), given its flags, for the file to be right."""
+"""Macros that each board's compiler must define with the board's flags (None: must not define)."""
 
 
 def file_of(name: str) -> str:
@@ -43,22 +43,22 @@ def file_of(name: str) -> str:
     return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def changed(old: str, new: str) -> str:
-    """Return the Crazyflie's file with one place changed."""
+def change(old: str, new: str) -> str:
+    """Return the Crazyflie's file with `old`, which occurs once, replaced."""
     text = file_of("crazyflie")
     assert text.count(old) == 1, old
     return text.replace(old, new)
 
 
-def own(folder: Path, text: str) -> str:
-    """Write a board of one's own; returns its path."""
+def write_board(folder: Path, text: str) -> str:
+    """Write the file of a user's board; returns its path."""
     path = folder / "own.toml"
     path.write_text(text, encoding="utf-8")
     return str(path)
 
 
-def compiled(board: Board, folder: Path, *arguments: str) -> str:
-    """Run the board's compiler with its flags on an empty file, warnings fatal; returns what it printed."""
+def compile_empty(board: Board, folder: Path, *arguments: str) -> str:
+    """Compile an empty file with the board's compiler, its flags and -Werror; returns stdout."""
     here = [command for command in board.compiler.candidates if shutil.which(command)]
     command = here[0] if here else require(board.compiler.candidates[-1], board.compiler.packages[0])
     (folder / "empty.c").write_text("", encoding="utf-8")
@@ -74,13 +74,13 @@ def compiled(board: Board, folder: Path, *arguments: str) -> str:
 
 
 def macros_of(board: Board, folder: Path) -> dict[str, str]:
-    """Return the macros that the board's compiler defines by itself."""
-    defined = (line.split(maxsplit=2) for line in compiled(board, folder, "-dM", "-E").splitlines())
+    """Return the predefined macros of the board's compiler."""
+    defined = (line.split(maxsplit=2) for line in compile_empty(board, folder, "-dM", "-E").splitlines())
     return {words[1]: words[2] if len(words) > 2 else "" for words in defined}
 
 
 def fpu_of(macros: dict[str, str]) -> str:
-    """Return the widest format that the compiler leaves to the core: __ARM_FP of ACLE, __riscv_flen."""
+    """Return the widest format that the FPU computes, from __ARM_FP (ACLE) or __riscv_flen."""
     if "__riscv_flen" in macros:
         return {"32": "single", "64": "double"}[macros["__riscv_flen"]]
     formats = int(macros.get("__ARM_FP", "0"), 0)
@@ -88,7 +88,7 @@ def fpu_of(macros: dict[str, str]) -> str:
 
 
 def test_the_boards_are_those_with_a_file() -> None:
-    """Nobody loses a board by accident, and each is called what its file is called."""
+    """Every file is a board, named by the file's stem."""
     assert boards.names() == NAMES
     assert [boards.load(name).name for name in NAMES] == list(NAMES)
 
@@ -99,45 +99,45 @@ def test_the_boards_are_those_with_a_file() -> None:
 def test_no_value_stands_without_source_and_confidence(
     section: str, key: str, name: str, tmp_path: Path
 ) -> None:
-    """A file that forgets where a number comes from is refused, by the key that is missing."""
+    """A file without a source or a confidence is refused, with the name of the missing key."""
     before, header, after = file_of(name).partition(f"[{section}]\n")
     lines = after.splitlines(keepends=True)
     lines.remove(next(line for line in lines if line.startswith(f"{key} =")))
     with pytest.raises(InvalidSettingsError) as caught:
-        boards.load(own(tmp_path, before + header + "".join(lines)))
+        boards.load(write_board(tmp_path, before + header + "".join(lines)))
     assert len(caught.value.faults) == 1
     assert f"own.toml: {section}.{key} is missing; add it: " in caught.value.faults[0]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_sections_are_all_that_a_file_holds(name: str) -> None:
-    """Beside title and sections, whose sources are tested above, a file has no value."""
+    """All values of a file are in sections with a source, except the title."""
     assert set(tomllib.loads(file_of(name))) == {"title", *SECTIONS}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_compiler_accepts_the_flags(name: str, tmp_path: Path) -> None:
-    """An empty file compiles without a word."""
-    compiled(boards.load(name), tmp_path, "-c", "-o", "empty.o")
+    """An empty file compiles without a warning."""
+    compile_empty(boards.load(name), tmp_path, "-c", "-o", "empty.o")
     assert (tmp_path / "empty.o").stat().st_size > 0
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_compiler_confirms_the_core(name: str, tmp_path: Path) -> None:
-    """Architecture and widths are those of the board, not those that the compiler likes best."""
+    """With the board's flags the compiler defines the macros of its architecture and type sizes."""
     macros = macros_of(boards.load(name), tmp_path)
     assert {macro: macros.get(macro) for macro in MACROS[name]} == MACROS[name]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_compiler_confirms_the_fpu(name: str, tmp_path: Path) -> None:
-    """What the file says about floating point is what the flags let the compiler use."""
+    """The FPU in the file is the one that the flags select."""
     board = boards.load(name)
     assert fpu_of(macros_of(board, tmp_path)) == board.fpu.value
 
 
 def test_a_board_cannot_be_changed() -> None:
-    """Nobody moves a limit on the way."""
+    """A loaded board is immutable."""
     board = boards.load("mambo")
     with pytest.raises(ValidationError, match="frozen"):
         board.budget.ram_bytes = 1  # type: ignore[misc] # that it is refused is the point
@@ -145,10 +145,10 @@ def test_a_board_cannot_be_changed() -> None:
 
 
 def test_name_finds_board_and_path_finds_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A bare name is the named board even where a file has that name; ./name is the file."""
+    """A name is a named board even if a file has that name; ./name is the file."""
     monkeypatch.chdir(tmp_path)
-    Path("mambo").write_text(changed("168_000_000", "1_000_000"), encoding="utf-8")
-    Path("small.drone.toml").write_text(changed("168_000_000", "2_000_000"), encoding="utf-8")
+    Path("mambo").write_text(change("168_000_000", "1_000_000"), encoding="utf-8")
+    Path("small.drone.toml").write_text(change("168_000_000", "2_000_000"), encoding="utf-8")
     assert boards.load("mambo").title == "Parrot Mambo"
     assert boards.load("./mambo").clock_hz.value == 1_000_000
     assert boards.load("./mambo").name == "mambo"
@@ -159,7 +159,7 @@ def test_name_finds_board_and_path_finds_file(tmp_path: Path, monkeypatch: pytes
 def test_unknown_board_lists_those_there_are(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever asks for a board that is nowhere is told what there is and how to add one."""
+    """The message for an unknown board lists the named boards and mentions files."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SourceNotFoundError) as caught:
         boards.load(name)
@@ -200,7 +200,11 @@ def test_unknown_board_lists_those_there_are(
         ),
         ("stack_bytes = 1_024\n", "", "budget.stack_bytes is missing; add it: stack of one step, in bytes"),
         ("[clock_hz]", "[clok_hz]", "clok_hz is not a key of a board; did you mean clock_hz?"),
-        ("[cycles]", "[cycles]\nodd = 1", "cycles.odd is not a key of a board; there are source, confidence"),
+        (
+            "[cycles]",
+            "[cycles]\nodd = 1",
+            "cycles.odd is not a key of a board; its keys are source, confidence",
+        ),
         (
             'candidates = ["arm-none-eabi-gcc"]',
             "candidates = []",
@@ -222,14 +226,14 @@ def test_unknown_board_lists_those_there_are(
         (
             "title =",
             'name = "own"\ntitle =',
-            "name is not a key of a board, the file's name is; leave it out",
+            "name is not a key of a board; remove it, the file name is the name",
         ),
         ("title =", "title", "line 3"),
     ],
 )
 def test_bad_file_is_told_key_value_and_rule(old: str, new: str, fault: str, tmp_path: Path) -> None:
     """Every message names the file and what to write instead."""
-    path = own(tmp_path, changed(old, new))
+    path = write_board(tmp_path, change(old, new))
     with pytest.raises((InvalidSettingsError, UnreadableFileError)) as caught:
         boards.load(path)
     lines = str(caught.value).splitlines()
@@ -241,10 +245,10 @@ def test_bad_file_is_told_key_value_and_rule(old: str, new: str, fault: str, tmp
     "command", ["sh", "./gcc", "/tmp/gcc", "rm", "gcc ", "touch", "gcc;id", "gcc\n", "a\0-gcc", "", "-gcc"]
 )
 def test_a_board_runs_compilers_of_the_path_alone(command: str, tmp_path: Path) -> None:
-    """A board's file may come from anywhere: no program beside it is run, and none that is no compiler."""
-    text = changed('candidates = ["arm-none-eabi-gcc"]', f"candidates = [{json.dumps(command)}]")
+    """A candidate must be the name of a GCC or clang on the PATH, since the file may be untrusted."""
+    text = change('candidates = ["arm-none-eabi-gcc"]', f"candidates = [{json.dumps(command)}]")
     with pytest.raises(InvalidSettingsError, match=r"candidates\.0 = .* must be the name of a GCC or Clang"):
-        boards.load(own(tmp_path, text))
+        boards.load(write_board(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -265,16 +269,16 @@ def test_a_board_runs_compilers_of_the_path_alone(command: str, tmp_path: Path) 
     ],
 )
 def test_a_board_s_flags_name_no_file_and_no_program(flag: str, tmp_path: Path) -> None:
-    """They choose core, FPU and dialect: no plug-in, wrapper, linker, specification, include or output."""
+    """Flags that name a plug-in, wrapper, linker, spec file, include or output are refused."""
     for text in (
-        changed('"-mthumb"', json.dumps(flag)),
-        changed('flags = ["-mcpu', f'link_flags = [{json.dumps(flag)}]\nflags = ["-mcpu'),
+        change('"-mthumb"', json.dumps(flag)),
+        change('flags = ["-mcpu', f'link_flags = [{json.dumps(flag)}]\nflags = ["-mcpu'),
     ):
         with pytest.raises(InvalidSettingsError, match=r"flags\.\d = .* must be a flag for core, FPU"):
-            boards.load(own(tmp_path, text))
-    library = changed('flags = ["-mcpu', f'libraries = [{json.dumps(flag)}]\nflags = ["-mcpu')
+            boards.load(write_board(tmp_path, text))
+    library = change('flags = ["-mcpu', f'libraries = [{json.dumps(flag)}]\nflags = ["-mcpu')
     with pytest.raises(InvalidSettingsError, match=r"libraries\.0 = .* must be a library"):
-        boards.load(own(tmp_path, library))
+        boards.load(write_board(tmp_path, library))
 
 
 @pytest.mark.parametrize(
@@ -287,29 +291,29 @@ def test_a_board_s_flags_name_no_file_and_no_program(flag: str, tmp_path: Path) 
     ],
 )
 def test_a_board_s_compiler_may_be_any_of_the_usual(command: str, flags: list[str], tmp_path: Path) -> None:
-    """Cross compilers by their usual names, and the options of their machines."""
-    text = changed('candidates = ["arm-none-eabi-gcc"]', f'candidates = ["{command}"]')
+    """Usual names of cross compilers and their machine options are accepted."""
+    text = change('candidates = ["arm-none-eabi-gcc"]', f'candidates = ["{command}"]')
     text = text.replace('"-mthumb"', ", ".join(json.dumps(flag) for flag in flags))
-    assert set(flags) <= set(boards.load(own(tmp_path, text)).compiler.flags)
+    assert set(flags) <= set(boards.load(write_board(tmp_path, text)).compiler.flags)
 
 
 def test_section_without_keys_is_told_to_be_a_section(tmp_path: Path) -> None:
-    """A bare number where a section belongs shows how the section begins."""
+    """The message for a number instead of a section shows the section's header."""
     document = "clock_hz = 5\n" + file_of("crazyflie").replace("[clock_hz]", "[core.clock]")
     with pytest.raises(InvalidSettingsError, match=r"clock_hz = 5 must be a section; write \[clock_hz\]"):
-        boards.load(own(tmp_path, document))
+        boards.load(write_board(tmp_path, document))
 
 
 def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
-    """Nobody mends a file in ten rounds."""
+    """One error has all missing keys of a file."""
     with pytest.raises(InvalidSettingsError) as caught:
-        boards.load(own(tmp_path, 'title = ""\n'))
+        boards.load(write_board(tmp_path, 'title = ""\n'))
     assert len(caught.value.faults) == 1 + len(SECTIONS)
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * 64_001, b"a = " + b"[" * 60_000])
 def test_file_that_is_no_toml_is_unreadable(content: bytes, tmp_path: Path) -> None:
-    """Wrong encodings, huge files and deep nests are named without a traceback."""
+    """Wrong encodings, huge files and deep nesting are refused with a message."""
     path = tmp_path / "own.toml"
     path.write_bytes(content)
     with pytest.raises(UnreadableFileError, match=r"own\.toml: (line 1: )?is "):
