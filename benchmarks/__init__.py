@@ -1,1 +1,1 @@
-"""Measurements: what is faster than what, in one run on one machine."""
+"""Measurements of time, footprint and plan quality, beside other MPC generators and solvers."""

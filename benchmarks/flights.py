@@ -1,7 +1,7 @@
-"""How long a flight takes: ours, closed loop, beside RotorPy's vehicle alone, in turns.
+"""Time of a simulated flight: our closed loop against RotorPy's vehicle model without a controller.
 
-RotorPy's `Multirotor` takes 10,000 steps of 10 ms with its motors at hover speed, and no controller. Ours
-flies the Table II case for the same 100 s: compiled C at 100 Hz, stock loops and integrator at 200 Hz.
+RotorPy's `Multirotor` takes 10,000 steps of 10 ms at hover speed of its rotors. Ours flies the Table II case
+for the same 100 s: compiled C at 100 Hz, stock loops and integrator at 200 Hz. Both run alternately.
 """
 
 import statistics
@@ -28,7 +28,7 @@ def fly_ours(flights: int) -> None:
 
 
 def fly_rotorpy() -> None:
-    """Let RotorPy's vehicle hover for as long."""
+    """Simulate RotorPy's vehicle at hover for the same time."""
     vehicle = Multirotor(quad_params)
     state = vehicle.initial_state
     control = {"cmd_motor_speeds": state["rotor_speeds"]}
@@ -44,7 +44,7 @@ def seconds(work: Callable[[], None]) -> float:
 
 
 def main() -> None:
-    """Take turns, and print medians and the ratio."""
+    """Run both alternately; print the median times and their ratio."""
     fly_ours(1)  # builds the C
     rounds = [(seconds(lambda: fly_ours(1)), seconds(fly_rotorpy)) for _ in range(ROUNDS)]
     ours, theirs = (statistics.median(column) for column in zip(*rounds, strict=True))

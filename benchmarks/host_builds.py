@@ -1,7 +1,7 @@
-"""The C of the peers and ours as shared libraries for this machine: built alike, loaded, called.
+"""Build the C of peers and ours as shared libraries for this machine, in the same way, and call them.
 
-In a library only `run` is visible, so that the rest is compiled as it would be into one program, and calls to
-the heap go through counters.
+A library exports only `run`, so that compiler and linker can optimise the rest as in one program; heap calls
+are counted.
 """
 
 import ctypes
@@ -24,7 +24,7 @@ PORTABLE: Final = ("-O2",)
 NATIVE: Final = ("-O3", "-march=native")
 _COMMON: Final = ("-w", "-fPIC", "-fvisibility=hidden", "-ffunction-sections", "-fdata-sections")
 _ALLOCATORS: Final = ("malloc", "calloc", "realloc", "_Znwm", "_Znam")
-"""Of C, and operators new of C++."""
+"""Allocators of C, and operators new of C++."""
 _COUNTERS: Final = """#include <stddef.h>
 
 __attribute__((visibility("default"))) unsigned long heap_calls;
@@ -46,7 +46,7 @@ _RAM: Final = (".data", ".bss")
 
 @dataclass(frozen=True)
 class Sizes:
-    """Bytes of a library: code with its constants, and static variables."""
+    """Bytes of a library: code with constants, and static variables."""
 
     code: int
     ram: int
@@ -55,8 +55,7 @@ class Sizes:
 def build(program: Program, folder: Path, flags: tuple[str, ...], library: Path) -> Path:
     """Build `program`, whose C is in `folder`, as the shared library `library`; raises NotHereError.
 
-    Peers may fuse multiplication and addition where `flags` name a machine that can; ours and the roll-out
-    keep to their bits.
+    Peers may use fused multiply-add if `flags` allow it; ours and the roll-out do not, to keep their bits.
     """
     work = library.with_suffix("")
     work.mkdir(parents=True)
@@ -82,7 +81,7 @@ def build(program: Program, folder: Path, flags: tuple[str, ...], library: Path)
 
 
 def sizes(library: Path) -> Sizes:
-    """Measure a library, the counters of the heap included."""
+    """Measure a library, including its heap counters."""
     with library.open("rb") as stream:
         found = [(s.name, s["sh_size"]) for s in ELFFile(stream).iter_sections()]
     code, ram = (
@@ -93,16 +92,16 @@ def sizes(library: Path) -> Sizes:
 
 
 def silence() -> None:
-    """Let what the process prints on stdout vanish: some peers report every solve."""
+    """Discard the stdout of this process, since some peers print every solve."""
     with Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
 
 
 def plans(library: Path, inputs: Array, *, follows: bool) -> tuple[Array, Array, list[int]]:
-    """Plan for each of `inputs` (n, 6), error and last command, one after the other.
+    """Plan for each of `inputs` (n, 6), error and last command, in order.
 
-    If it `follows`, the last command is the one given out before, from level on. Returns the last commands
-    (n, 2), the plans (n, 4), and how often each call asked for heap.
+    If `follows`, the last command is that of the previous plan, initially 0. Returns the last commands
+    (n, 2), the plans (n, 4), and the number of heap calls of each update.
     """
     loaded = ctypes.CDLL(str(library))
     heap = ctypes.c_ulong.in_dll(loaded, "heap_calls")

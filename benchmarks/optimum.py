@@ -1,7 +1,7 @@
-"""How good a plan is: its cost over the least there is for the same input, which SciPy finds.
+"""Quality of a plan: its cost relative to the optimum for the same input, computed by SciPy.
 
-An input (6,) is the error x, vx, y, vy and the last command, which is also the tilt that a lag starts from,
-at heading 0 and a thrust of 9.81 m/s2: with `ours.peers_model` the problem of `benchmarks/peers_setups.py`.
+An input (6,) is the error x, vx, y, vy and the last command, which is also the initial tilt of a lag, at
+heading 0 and a thrust of 9.81 m/s2. With `ours.peers_model` this is the problem of `peers_setups`.
 """
 
 from typing import Any
@@ -16,7 +16,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 
 def problems(settings: Settings, inputs: Array) -> Problems:
-    """Write out what the controller of `settings` minimises for `inputs` (n, 6)."""
+    """Return the optimisation problems of the controller of `settings` for `inputs` (n, 6)."""
     x, vx, y, vy, roll, pitch = inputs.T
     level = np.zeros(len(inputs))
     return CostModel(settings).problems(
@@ -36,8 +36,8 @@ def costs(kind: Cost, settings: Settings, inputs: Array, moves: Array) -> Array:
     return squares
 
 
-def best(kind: Cost, settings: Settings, inputs: Array) -> Array:
-    """Return the plans (n, 4) within the limit that cost least for `inputs` (n, 6)."""
+def solve(kind: Cost, settings: Settings, inputs: Array) -> Array:
+    """Return the optimal plans (n, 4) within the tilt limit for `inputs` (n, 6)."""
     found = problems(settings, inputs)
     if kind == "1-norm":
         return found.optima().reshape(len(inputs), -1)
@@ -49,17 +49,17 @@ def best(kind: Cost, settings: Settings, inputs: Array) -> Array:
     return np.array(plans)
 
 
-def above(kind: Cost, settings: Settings, inputs: Array, plans: Array) -> Array:
-    """Return by what share (n,) the cost of `plans` (n, 4), cut to the limit, is above the least."""
+def excess(kind: Cost, settings: Settings, inputs: Array, plans: Array) -> Array:
+    """Return the excess (n,) of the cost of `plans` (n, 4), clipped to the tilt limit, over the optimum."""
     inputs, plans = inputs.astype(np.float64), plans.astype(np.float64)
     limit_rad = settings.limits.tilt_rad
-    least = costs(kind, settings, inputs, best(kind, settings, inputs))
+    least = costs(kind, settings, inputs, solve(kind, settings, inputs))
     found: Array = costs(kind, settings, inputs, np.clip(plans, -limit_rad, limit_rad)) / least - 1
     return found
 
 
 def _weights(settings: Settings) -> Array:
-    """Return the weight of every row: a square counts by it once, where a size has it as a factor."""
+    """Return the weight of every row; a weighted square is (w e)^2 / w."""
     horizon, cost = settings.horizon, settings.cost
     errors = np.full(2 * horizon.prediction, cost.tracking_weight)
     return np.concatenate([errors, np.full(2 * horizon.control, cost.effort_weight)])

@@ -1,7 +1,7 @@
-"""Our controller, called as the peers are, `run(error, last, moves)`, and the same by plain roll-out.
+"""Our controller and a plain roll-out of it, with the interface of the peers: `run(error, last, moves)`.
 
-A caller that hands back the command it was given, flies on: the plan is kept, if the settings keep it. Any
-other last command makes it start over from there.
+If `last` is the command of the previous call, the controller continues, warm start included; any other value
+resets it to that command.
 """
 
 import math
@@ -20,7 +20,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 _GLUE: Final = (
     '#include "nmpc.h"\n\nstatic nmpc_t controller;\nstatic float given[2];\nstatic int is_set;\n\n'
-    + HEAD.replace("%", "%%")
+    + HEAD
     + """{
     nmpc_state_t state = {{0, 0}, {0, 0}, 0, 0, 0};
     const nmpc_target_t target = {{0, 0}, {0, 0}};
@@ -49,7 +49,7 @@ _GLUE: Final = (
 }
 """
 )
-_ROLLOUT: Final = """/* What benchmarks/rollout.c wants to know beyond nmpc_config.h. */
+_ROLLOUT: Final = """/* Constants of benchmarks/rollout.c that nmpc_config.h does not have. */
 #define ROLLOUT_HAS_LAG {has_lag}
 #define ROLLOUT_KEEPS_PLAN {keeps_plan}
 #define ROLLOUT_DECAY {{{decay}}}
@@ -59,12 +59,12 @@ _ROLLOUT: Final = """/* What benchmarks/rollout.c wants to know beyond nmpc_conf
 
 
 def peers_model() -> Settings:
-    """Return the settings that are the problem of the peers: preset table1 with their prediction step."""
+    """Return the settings of the peers' problem: preset table1 with their prediction step."""
     return with_option(presets.load("table1"), "horizon.prediction_step_s", problem.STEP_S)
 
 
 def bundle_program(title: str, settings: Settings) -> Program:
-    """Return how the bundle of `settings` is built and called."""
+    """Return the program of the bundle of `settings`."""
     bits = Design(settings).numbers.bits or {}
     quantities = ("position", "velocity", "angle", "thrust")
     factors = {name: real(math.ldexp(1, bits.get(name, 0)), "float32") for name in quantities}
@@ -74,20 +74,20 @@ def bundle_program(title: str, settings: Settings) -> Program:
 
 
 def rollout_program(title: str, settings: Settings) -> Program:
-    """Return how the plain roll-out with the model and the optimizer of `settings` is built and called."""
+    """Return the program of the plain roll-out with the model and optimizer of `settings`."""
     glue = resources.files("benchmarks").joinpath("rollout.c").read_text("utf-8")
     return Program("rollout", title, "1-norm", settings.code.scalar, (), (".", "include"), glue)
 
 
 def place_bundle(settings: Settings, folder: Path) -> None:
-    """Write the bundle of `settings` below `folder`."""
+    """Write the bundle of `settings` into `folder`."""
     for path, text in render(settings).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
 
 
 def place_rollout(settings: Settings, folder: Path) -> None:
-    """Write the headers of the roll-out, which knows rprop+ and the exact position update alone."""
+    """Write the headers of the roll-out, which supports only rprop+ and the exact position update."""
     place_bundle(settings, folder)
     step_s, model = settings.horizon.prediction_step_s, settings.model
     decay, speed_lack, shift_lack = [], [], []

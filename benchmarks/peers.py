@@ -1,14 +1,14 @@
-"""What the generated C of peers takes of a Crazyflie, measured as ours is, for one problem.
+"""Footprint of the peers' generated C on a Crazyflie, measured like ours, for one problem.
 
     python -m benchmarks.peers                          # the peers are installed beside us
     python -m benchmarks.peers --python DIR/bin/python  # the peers are installed elsewhere
 
-The peers are `pip install osqp casadi cvxpygen` and `pip install --no-deps tinympc`, which below Python 3.13
-asks for a SciPy that the others refuse, and imports none. Their C, unlike ours, wants a C library: newlib
-(Debian: libnewlib-arm-none-eabi and, for TinyMPC's C++, libstdc++-arm-none-eabi-newlib). A peer that cannot
-be generated or built gets a row that says why.
+Install the peers with `pip install osqp casadi cvxpygen` and `pip install --no-deps tinympc`, since below
+Python 3.13 tinympc requires a SciPy that conflicts with the others and does not import it. Their C needs a C
+library, newlib (Debian: libnewlib-arm-none-eabi and, for TinyMPC's C++, libstdc++-arm-none-eabi-newlib). The
+row of a peer that cannot be generated or built states the reason.
 
-`benchmarks/peers_setups.py` is the problem and how each peer is set up; docs/peers.md has the results.
+`benchmarks/peers_setups.py` has the problem and the set-ups, docs/peers.md the results.
 """
 
 import argparse
@@ -28,6 +28,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from benchmarks import peers_setups as problem
+from benchmarks.markdown import table
 from benchmarks.ours import bundle_program, peers_model
 from benchmarks.peers_c import NotHereError, definitions, generate, run_tool, sources
 from benchmarks.peers_programs import Program, programs
@@ -39,13 +40,13 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
 from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
-from mambo_nmpc.sil.firmware.gate import forbidden
-from mambo_nmpc.sil.firmware.sizes import added, sections
-from mambo_nmpc.sil.firmware.stack import worst_case
+from mambo_nmpc.sil.firmware.gate import find_forbidden
+from mambo_nmpc.sil.firmware.sizes import measure_added, measure_sections
+from mambo_nmpc.sil.firmware.stack import bound_stack
 
 _BOARD: Final = "crazyflie"
 _VEHICLE: Final = "mambo"
-"""The board under whose flags and compiler the C shall build without a warning."""
+"""The board with whose compiler and flags the C is compiled under -Wall -Werror."""
 _C_ONLY: Final = ("-Wstrict-prototypes", "-Wmissing-prototypes", "-Wunsuffixed-float-constants")
 _STRICT: Final = (*WARNING_FLAGS, "-Wunsuffixed-float-constants")
 _NEWLIB: Final = (
@@ -57,15 +58,15 @@ _NEWLIB: Final = (
     "-Wl,--build-id=none",
     "-Wl,--defsym=__dso_handle=0",
 )
-"""The C library as the Crazyflie's firmware links it, without start-up code; of that, C++ misses one name."""
+"""The C library as the Crazyflie's firmware links it, without start-up code, whose __dso_handle C++ needs."""
 _EMPTY: Final = "void run(void);\n\nvoid run(void)\n{\n}\n"
 _CLOCK_S: Final = 1.1
-"""Between two runs of a generator, so that what writes the time writes another."""
+"""Pause between two runs of a generator, so that a time of day in its output differs."""
 
 
 @dataclass(frozen=True)
 class _Row:
-    """One line of the table; `absent` is the reason why there is none."""
+    """One row of the table; `absent` is the reason if nothing was measured."""
 
     title: str
     cost: str
@@ -85,12 +86,12 @@ class _Row:
 
 
 def _compiler(program: Program, command: str) -> str:
-    """Return the compiler for the language of `program` beside the one for C."""
+    """Return the compiler for the language of `program`, given the one for C."""
     return re.sub(r"gcc$", "g++", command) if program.language == "c++" else command
 
 
 def _link(program: Program, found: Builder, folder: Path, work: Path) -> tuple[Path, Path, frozenset[str]]:
-    """Return the program, the same without the peer, and the names that the peer's own objects define."""
+    """Link programs with and without the peer; returns both, and the symbols of the peer's objects."""
     compiler = _compiler(program, found.toolchain.command[0])
     dialect = [program.dialect, *COMPILE_FLAGS[1:]]
     suffix = "cpp" if program.language == "c++" else "c"
@@ -106,7 +107,7 @@ def _link(program: Program, found: Builder, folder: Path, work: Path) -> tuple[P
     with_peer, without = work / "program.elf", work / "empty.elf"
     _compile([compiler, *flags, *map(str, objects), *tail, str(with_peer)])
     _compile([found.toolchain.command[0], *flags[1:], str(empty), *tail, str(without)])
-    return with_peer, without, frozenset(name for path in objects for name in _defined(path))
+    return with_peer, without, frozenset(name for path in objects for name in _defined_symbols(path))
 
 
 def _compile(line: list[str]) -> None:
@@ -118,7 +119,7 @@ def _compile(line: list[str]) -> None:
         raise NotHereError(re.sub(r"^\S*/", "", first))
 
 
-def _defined(path: Path) -> set[str]:
+def _defined_symbols(path: Path) -> set[str]:
     """Return the symbols that an object file defines."""
     with path.open("rb") as stream:
         table = ELFFile(stream).get_section_by_name(".symtab")
@@ -126,33 +127,26 @@ def _defined(path: Path) -> set[str]:
         return {s.name for s in table.iter_symbols() if s.name and s["st_shndx"] != "SHN_UNDEF"}
 
 
-def _own_flash(image: Image, own: frozenset[str]) -> int:
-    flash = sections(image).flash
+def _measure_own_flash(image: Image, own: frozenset[str]) -> int:
+    flash = measure_sections(image).flash
     return sum(s.size_bytes for s in image.symbols if s.section in flash and own.intersection(s.labels))
 
 
 def _warnings(program: Program, compiler: str, flags: tuple[str, ...], folder: Path) -> int:
-    """Count the places that our own warning flags object to."""
+    """Count the distinct warnings under our own warning flags."""
     strict = [flag for flag in _STRICT if program.language == "c" or flag not in _C_ONLY]
     dialect = [program.dialect, *COMPILE_FLAGS[1:]]
     places = set()
     for source in sources(program, folder):
-        line = [
-            _compiler(program, compiler),
-            *dialect,
-            *flags,
-            *strict,
-            *definitions(program, folder),
-            "-c",
-            str(source),
-        ]
-        said = subprocess.run([*line, "-o", "/dev/null"], capture_output=True, text=True, check=False).stderr
-        places |= {text for text in said.splitlines() if ": warning: " in text}
+        line = [_compiler(program, compiler), *dialect, *flags, *strict, *definitions(program, folder)]
+        line += ["-c", str(source), "-o", "/dev/null"]
+        output = subprocess.run(line, capture_output=True, text=True, check=False).stderr
+        places |= {text for text in output.splitlines() if ": warning: " in text}
     return len(places)
 
 
-def _under_vehicle_flags(program: Program, folder: Path) -> str:
-    """Say how many of the sources the vehicle's own compiler takes under its own flags, -Wall and -Werror."""
+def _check_vehicle_flags(program: Program, folder: Path) -> str:
+    """Say whether all sources compile with the Mambo's compiler and flags, -Wall and -Werror."""
     if program.language == "c++":
         return "no: C++"
     try:
@@ -168,8 +162,8 @@ def _under_vehicle_flags(program: Program, folder: Path) -> str:
     return "yes" if not refused else f"no: {refused} of {len(files)} files"
 
 
-def _differing(first: Path, second: Path) -> str:
-    """Compare what two runs wrote; what differs by the time of day alone is counted as such."""
+def _compare_runs(first: Path, second: Path) -> str:
+    """Compare the output of two runs; count files that differ only in a time of day, and others."""
     names = sorted(
         {str(p.relative_to(folder)) for folder in (first, second) for p in folder.rglob("*") if p.is_file()}
     )
@@ -185,9 +179,9 @@ def _timeless(path: Path) -> bytes:
 
 
 def _stack(image: Image) -> str:
-    """Return the proven bound of the stack, or the function that has none."""
+    """Return the stack bound in bytes, or the function that has none."""
     try:
-        return f"{worst_case(image, ENTRY).bytes:,}"
+        return f"{bound_stack(image, ENTRY).bytes:,}"
     except FootprintError as error:
         return f"no bound: {str(error).removeprefix(f'{image.path.name}: ').partition(':')[0].split()[0]}"
 
@@ -203,50 +197,41 @@ def _measure(program: Program, python: str, found: Builder, work: Path) -> _Row:
         generate(python, program, folder)
         row = replace(row, versions=", ".join(f"{name} {version}" for name, version in versions.items()))
         elf, empty, own = _link(program, found, folder, work)
-        sizes, image = added(elf, empty, program.name), load(elf)
+        sizes, image = measure_added(elf, empty, program.name), load(elf)
         return replace(
             row,
             flash=sizes.flash.total,
-            flash_libraries=sizes.flash.total - _own_flash(image, own),
+            flash_libraries=sizes.flash.total - _measure_own_flash(image, own),
             ram=sizes.ram.total,
-            stack=_stack(image),
-            **_linked(image),
-            vehicle=_under_vehicle_flags(program, folder),
-            warnings=_warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
-            same=_differing(first, folder),
+            **_checks(program, image, found, first, folder),
         )
     except (NotHereError, BuildError) as error:
         return replace(row, absent=str(error))
 
 
-def _linked(image: Image) -> dict[str, Any]:
-    """Return the columns about what is linked: heap, double precision, libm and printf."""
-    found = forbidden(image, "float32")
-    kinds = {
-        kind: [f.symbol for f in found if f.kind == kind]
-        for kind in ("heap", "double precision", "libm", "printf")
-    }
+def _checks(program: Program, image: Image, found: Builder, first: Path, folder: Path) -> dict[str, Any]:
+    """Return the columns from stack to `same`, given the C of two runs in `first` and `folder`."""
+    linked = find_forbidden(image, "float32")
+    kinds = {one.kind for one in linked}
     return {
-        "heap": "yes" if kinds["heap"] else "no",
-        "double": len(kinds["double precision"]),
-        "libm_printf": " ".join(kind for kind in ("libm", "printf") if kinds[kind]) or "-",
+        "stack": _stack(image),
+        "heap": "yes" if "heap" in kinds else "no",
+        "double": sum(one.kind == "double precision" for one in linked),
+        "libm_printf": " ".join(kind for kind in ("libm", "printf") if kind in kinds) or "-",
+        "vehicle": _check_vehicle_flags(program, folder),
+        "warnings": _warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
+        "same": _compare_runs(first, folder),
     }
 
 
 def _ours(title: str, settings: Settings, found: Builder, work: Path) -> _Row:
-    """Measure ours: the least firmware, and the same checks as for the peers."""
+    """Measure ours: the minimal firmware, and the same checks as for the peers."""
     files = render(settings)
-    sizes = added(found.firmware(files, work), found.firmware(files, work, empty=True), PREFIX)
+    sizes = measure_added(found.firmware(files, work), found.firmware(files, work, empty=True), PREFIX)
     first, folder = work / "first", work / "c"
     settings_file = work / "controller.toml"
     settings_file.write_text(files["controller.toml"], "utf-8")
-    line = [
-        sys.executable,
-        "-c",
-        "from mambo_nmpc.sil.cli.app import main; main()",
-        "generate",
-        str(settings_file),
-    ]
+    line = [sys.executable, "-m", "mambo_nmpc", "generate", str(settings_file)]
     run_tool([*line, "-o", str(folder)])
     folder.rename(first)
     time.sleep(_CLOCK_S)
@@ -260,49 +245,25 @@ def _ours(title: str, settings: Settings, found: Builder, work: Path) -> _Row:
         flash=sizes.flash.total,
         flash_libraries=sizes.flash.helpers,
         ram=sizes.ram.total,
-        stack=_stack(image),
-        **_linked(image),
-        vehicle=_under_vehicle_flags(program, folder),
-        warnings=_warnings(program, found.toolchain.command[0], found.board.compiler.flags, folder),
-        same=_differing(first, folder),
+        **_checks(program, image, found, first, folder),
     )
 
 
 def _table(rows: list[_Row]) -> str:
     head = (
-        "generator",
-        "cost",
-        "scalar",
-        "flash",
-        "libraries",
-        "RAM",
-        "stack",
-        "heap",
-        "double helpers",
-        "libm, printf",
-        "Mambo's flags",
-        "warnings",
-        "same again",
+        *("generator", "cost", "scalar", "flash", "libraries", "RAM", "stack", "heap", "double helpers"),
+        *("libm, printf", "Mambo's flags", "warnings", "same again"),
     )
-    lines = [head, ("---",) * len(head)]
+    lines = []
     for r in rows:
+        line = (r.title, r.cost, r.scalar)
         if r.absent:
-            lines.append((r.title, r.cost, r.scalar, f"not measured: {r.absent}", *[""] * (len(head) - 4)))
+            lines.append((*line, f"not measured: {r.absent}", *[""] * (len(head) - 4)))
             continue
-        sizes = (f"{r.flash:,}", f"{r.flash_libraries:,}", f"{r.ram:,}", r.stack, r.heap, str(r.double))
-        lines.append(
-            (
-                r.title,
-                r.cost,
-                r.scalar,
-                *sizes,
-                r.libm_printf,
-                r.vehicle,
-                f"{r.warnings:,}",
-                r.same,
-            )
-        )
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        sizes = (f"{r.flash:,}", f"{r.flash_libraries:,}", f"{r.ram:,}", r.stack)
+        checks = (r.heap, str(r.double), r.libm_printf, r.vehicle, f"{r.warnings:,}", r.same)
+        lines.append((*line, *sizes, *checks))
+    return table(head, lines)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""The C that a peer generates: let it be written, and find what a compiler needs of it."""
+"""Generate the C of a peer, and find its sources, macros and include folders."""
 
 import json
 import shutil
@@ -13,7 +13,7 @@ class NotHereError(Exception):
 
 
 def run_tool(line: list[str], folder: Path | None = None) -> str:
-    """Run a command; returns its stdout, raises NotHereError with its last words."""
+    """Run a command; returns its stdout, raises NotHereError with the last line of its output."""
     done = subprocess.run(
         line,
         cwd=folder,
@@ -30,9 +30,9 @@ def run_tool(line: list[str], folder: Path | None = None) -> str:
 
 
 def generate(python: str, program: Program, folder: Path) -> dict[str, str]:
-    """Let the peer in the Python `python` write into `folder`; returns the versions that wrote it.
+    """Generate C into `folder` with the peer installed in `python`; returns the versions of its packages.
 
-    What generating built beside text is deleted. Raises NotHereError.
+    Deletes binaries that the peer builds. Raises NotHereError.
     """
     line = [python, "-m", "benchmarks.peers_setups", program.name, str(folder)]
     said = run_tool(line, Path(__file__).parents[1])
@@ -51,5 +51,5 @@ def sources(program: Program, folder: Path) -> list[Path]:
 
 
 def definitions(program: Program, folder: Path) -> list[str]:
-    """Return the macros and include folders that `program` is built with."""
+    """Return the flags for macros and include folders of `program`."""
     return [f"-D{name}" for name in program.defines] + [f"-I{folder / name}" for name in program.includes]

@@ -1,8 +1,8 @@
-"""What a peer's C needs to become a program: which files, how they are built, and the few lines that call it.
+"""How the C of each peer becomes a program: source files, build flags, and the glue code that calls it.
 
-Every program is `run(error, last, moves)`. In: x, vx, y, vy of the drone against its target, and the roll and
-pitch last commanded. Out: roll and pitch of the first and of the second move. Buffers that a caller has to
-hold stand in these lines, and count.
+Every program is `run(error, last, moves)`. Inputs: position and velocity error x, vx, y, vy (m, m/s), and the
+last commanded roll and pitch (rad). Output: roll and pitch of both moves (rad). Buffers that the caller must
+provide are in the glue code and count.
 """
 
 from dataclasses import dataclass, replace
@@ -16,10 +16,10 @@ HEAD: Final = f"{SIGNATURE};\n\n{SIGNATURE}\n"
 
 @dataclass(frozen=True)
 class Program:
-    """How the C of one set-up is built, as the peer's own build files do it.
+    """How the C of one set-up is built, following the peer's own build files.
 
-    `name` is that of a set-up, or of a preset of ours. `sources` are globs in its folder, `includes` folders
-    in it; `products` are what generating leaves there beside text.
+    `name` is that of a set-up, or of one of our presets. `sources` are globs and `includes` folders in the
+    generated folder; `products` are binaries that generating leaves there.
     """
 
     name: str
@@ -35,21 +35,34 @@ class Program:
     products: tuple[str, ...] = ()
 
 
-_DAQP: Final = (
-    '#include "api.h"\n#include "utils.h"\n#include "problem.h"\n\n'
-    "static c_float linear[4], plan[4], multipliers[4];\n"
-    "static c_float upper[4] = {%(tilt)s, %(tilt)s, %(tilt)s, %(tilt)s};\n"
-    "static c_float lower[4] = {-%(tilt)s, -%(tilt)s, -%(tilt)s, -%(tilt)s};\n"
-    "static int sense[4];\n"
-    "static DAQPProblem problem = {4, 4, 4, hessian, linear, NULL, upper, lower, sense};\n"
-    "static DAQPResult result = {plan, multipliers};\n"
-    "static DAQPWorkspace workspace;\n"
-    "static int is_set_up;\n\n"
-    + HEAD.replace("%", "%%")
-    + """{
+def _glue(declarations: str, body: str, move: str) -> str:
+    """Return the C of `run`: `body` solves, `move` is the expression of move i."""
+    return f"""{declarations}
+{HEAD}{{
     int i;
 
-    if (!is_set_up) {
+{body}    for (i = 0; i < 4; i++) {{
+        moves[i] = (float){move};
+    }}
+}}
+"""
+
+
+_DAQP: Final = _glue(
+    """#include "api.h"
+#include "utils.h"
+#include "problem.h"
+
+static c_float linear[4], plan[4], multipliers[4];
+static c_float upper[4] = {TILT, TILT, TILT, TILT};
+static c_float lower[4] = {-TILT, -TILT, -TILT, -TILT};
+static int sense[4];
+static DAQPProblem problem = {4, 4, 4, hessian, linear, NULL, upper, lower, sense};
+static DAQPResult result = {plan, multipliers};
+static DAQPWorkspace workspace;
+static int is_set_up;
+""",
+    """    if (!is_set_up) {
         setup_daqp(&problem, &workspace, NULL);
         is_set_up = 1;
     }
@@ -58,30 +71,26 @@ _DAQP: Final = (
 
         linear[i] = row[0] * error[0] + row[1] * error[1] + row[2] * error[2] + row[3] * error[3];
     }
-    linear[0] -= %(effort)s * last[0];
-    linear[1] -= %(effort)s * last[1];
+    linear[0] -= EFFORT * last[0];
+    linear[1] -= EFFORT * last[1];
     daqp_update_ldp(DAQP_UPDATE_v, &workspace, &problem);
     daqp_solve(&result, &workspace);
-    for (i = 0; i < 4; i++) {
-        moves[i] = (float)plan[i];
-    }
-}
-"""
+""",
+    "plan[i]",
 )
+_DAQP_SLACKS: Final = _glue(
+    """#include "api.h"
+#include "utils.h"
+#include "problem.h"
 
-_DAQP_SLACKS: Final = (
-    '#include "api.h"\n#include "utils.h"\n#include "problem.h"\n\n'
-    "static c_float plan[28], multipliers[76];\n"
-    "static int sense[76];\n"
-    "static DAQPProblem problem = {28, 76, 28, hessian, linear, constraints, upper, lower, sense};\n"
-    "static DAQPResult result = {plan, multipliers};\n"
-    "static DAQPWorkspace workspace;\n"
-    "static int is_set_up;\n\n"
-    + HEAD
-    + """{
-    int i;
-
-    for (i = 0; i < 24; i++) {
+static c_float plan[28], multipliers[76];
+static int sense[76];
+static DAQPProblem problem = {28, 76, 28, hessian, linear, constraints, upper, lower, sense};
+static DAQPResult result = {plan, multipliers};
+static DAQPWorkspace workspace;
+static int is_set_up;
+""",
+    """    for (i = 0; i < 24; i++) {
         const c_float *row = &from_input[6 * i];
 
         upper[28 + i] = row[0] * error[0] + row[1] * error[1] + row[2] * error[2] + row[3] * error[3] +
@@ -95,80 +104,61 @@ _DAQP_SLACKS: Final = (
         daqp_update_ldp(DAQP_UPDATE_d, &workspace, &problem);
     }
     daqp_solve(&result, &workspace);
-    for (i = 0; i < 4; i++) {
-        moves[i] = (float)plan[i];
-    }
-}
-"""
+""",
+    "plan[i]",
 )
+_OSQP_CONDENSED: Final = _glue(
+    """#include "osqp.h"
+#include "workspace.h"
 
-_OSQP_CONDENSED: Final = (
-    '#include "osqp.h"\n#include "workspace.h"\n\n'
-    "static const OSQPFloat from_state[4][4] = {%(gradient)s};\n\n"
-    + HEAD.replace("%", "%%")
-    + """{
-    OSQPFloat q[4];
-    int i;
+static const OSQPFloat from_state[4][4] = {GRADIENT};
+""",
+    """    OSQPFloat q[4];
 
     for (i = 0; i < 4; i++) {
         q[i] = from_state[i][0] * error[0] + from_state[i][1] * error[1] + from_state[i][2] * error[2] +
                from_state[i][3] * error[3];
     }
-    q[0] -= %(effort)s * last[0];
-    q[1] -= %(effort)s * last[1];
+    q[0] -= EFFORT * last[0];
+    q[1] -= EFFORT * last[1];
     osqp_update_data_vec(&solver, q, OSQP_NULL, OSQP_NULL);
     osqp_solve(&solver);
-    for (i = 0; i < 4; i++) {
-        moves[i] = (float)solver.solution->x[i];
-    }
-}
-"""
+""",
+    "solver.solution->x[i]",
 )
+_OSQP_STATES: Final = _glue(
+    """#include "osqp.h"
+#include "workspace.h"
 
-_OSQP_STATES: Final = (
-    '#include "osqp.h"\n#include "workspace.h"\n\n'
-    "static OSQPFloat q[48], lower[48], upper[48];\n\n"
-    + HEAD
-    + """{
-    int i;
-
-    for (i = 44; i < 48; i++) {
-        lower[i] = -%(tilt)s;
-        upper[i] = %(tilt)s;
+static OSQPFloat q[48], lower[48], upper[48];
+""",
+    """    for (i = 44; i < 48; i++) {
+        lower[i] = -TILT;
+        upper[i] = TILT;
     }
     for (i = 0; i < 4; i++) {
         lower[i] = upper[i] = -error[i];
     }
-    q[44] = -%(effort)s * last[0];
-    q[45] = -%(effort)s * last[1];
+    q[44] = -EFFORT * last[0];
+    q[45] = -EFFORT * last[1];
     osqp_update_data_vec(&solver, q, lower, upper);
     osqp_solve(&solver);
-    for (i = 0; i < 4; i++) {
-        moves[i] = (float)solver.solution->x[44 + i];
-    }
-}
-"""
+""",
+    "solver.solution->x[44 + i]",
 )
-
-_CVXPYGEN: Final = (
-    '#include "cpg_workspace.h"\n#include "cpg_solve.h"\n\n'
-    + HEAD
-    + """{
-    int i;
-
-    for (i = 0; i < 4; i++) {
+_CVXPYGEN: Final = _glue(
+    """#include "cpg_workspace.h"
+#include "cpg_solve.h"
+""",
+    """    for (i = 0; i < 4; i++) {
         cpg_update_state(i, error[i]);
     }
     cpg_update_last(0, last[0]);
     cpg_update_last(1, last[1]);
     cpg_solve();
-    for (i = 0; i < 4; i++) {
-        moves[i] = (float)CPG_Result.prim->moves[i];
-    }
-}
-"""
+""",
+    "CPG_Result.prim->moves[i]",
 )
-
 _CLOCK: Final = """#include <time.h>
 
 int clock_gettime(clockid_t clock, struct timespec *now)
@@ -180,16 +170,17 @@ int clock_gettime(clockid_t clock, struct timespec *now)
 }
 
 """
-"""ECOS takes the time for its log, from a clock that newlib leaves to the board."""
+"""ECOS reads a clock for its log; newlib leaves clock_gettime to the board."""
+_CASADI: Final = _glue(
+    """#include "mpc.h"
 
-_CASADI: Final = (
-    '#include "mpc.h"\n\n'
-    "static const casadi_real *arg[mpc_SZ_ARG];\nstatic casadi_real *res[mpc_SZ_RES];\n"
-    "static casadi_int iw[mpc_SZ_IW];\nstatic casadi_real w[mpc_SZ_W], found[4];\n\n"
-    + HEAD
-    + """{
-    casadi_real parameters[6];
-    int i, memory;
+static const casadi_real *arg[mpc_SZ_ARG];
+static casadi_real *res[mpc_SZ_RES];
+static casadi_int iw[mpc_SZ_IW];
+static casadi_real w[mpc_SZ_W], found[4];
+""",
+    """    casadi_real parameters[6];
+    int memory;
 
     for (i = 0; i < 4; i++) {
         parameters[i] = error[i];
@@ -201,114 +192,88 @@ _CASADI: Final = (
     memory = mpc_checkout();
     mpc(arg, res, iw, w, memory);
     mpc_release(memory);
-    for (i = 0; i < 4; i++) {
-        moves[i] = (float)found[i];
-    }
-}
-"""
+""",
+    "found[i]",
 )
-
-_TINYMPC: Final = (
-    '#include "tinympc/tiny_api.hpp"\n#include "tinympc/tiny_data.hpp"\n\nextern "C" '
-    + HEAD.replace(f"\n\n{SIGNATURE}", f'\n\nextern "C" {SIGNATURE}')
-    + """{
-    tinyVector x0(4);
+_TINYMPC: Final = _glue(
+    """#include "tinympc/tiny_api.hpp"
+#include "tinympc/tiny_data.hpp"
+""",
+    """    tinyVector x0(4);
 
     (void)last;
     x0 << error[0], error[1], error[2], error[3];
     tiny_set_x0(&tiny_solver, x0);
     tiny_solve(&tiny_solver);
-    for (int i = 0; i < 4; i++) {
-        moves[i] = (float)tiny_solver.solution->u(i % 2, i / 2);
-    }
-}
-"""
-)
+""",
+    "tiny_solver.solution->u(i % 2, i / 2)",
+).replace("void run", 'extern "C" void run')
 
 
 def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
     """Return the program of every set-up.
 
-    The arguments are literals of C: the tilt limit, twice the effort weight, and the rows of the gradient of
-    the quadratic cost of four level moves, from the state.
+    The arguments are C literals: tilt limit, twice the effort weight, and the 4 x 4 matrix from the state to
+    the gradient of the quadratic cost at zero moves.
     """
-    numbers = {"tilt": tilt, "effort": effort, "gradient": gradient}
-    ecos = "c/solver_code"
+
+    def fill(glue: str) -> str:
+        return glue.replace("TILT", tilt).replace("EFFORT", effort).replace("GRADIENT", gradient)
+
+    daqp = Program(
+        "daqp",
+        "DAQP, four moves, condensed by hand",
+        "quadratic",
+        "float32",
+        sources=("csrc/src/*.c",),
+        includes=("csrc/include", "."),
+        glue=fill(_DAQP),
+        defines=("DAQP_SINGLE_PRECISION",),
+    )
+    osqp = Program(
+        "osqp-condensed",
+        "OSQP, four moves, condensed by hand",
+        "quadratic",
+        "float32",
+        sources=("src/*.c", "workspace.c"),
+        includes=("inc/public", "inc/private", "."),
+        glue=fill(_OSQP_CONDENSED),
+    )
+    casadi = Program(
+        "casadi-qrqp",
+        "CasADi, qrqp",
+        "quadratic",
+        "float32",
+        sources=("mpc.c",),
+        includes=(".",),
+        glue=_CASADI,
+    )
+    solver = "c/solver_code"
+    cvxpygen = ("c/src/cpg_workspace.c", "c/src/cpg_solve.c")
     cvxpygen_osqp = Program(
         "cvxpygen-osqp",
         "CVXPYgen, OSQP",
         "1-norm",
         "float64",
-        sources=(
-            "c/src/cpg_workspace.c",
-            "c/src/cpg_solve.c",
-            "c/solver_code/src/*.c",
-            "c/solver_code/workspace.c",
-        ),
-        includes=(
-            "c/include",
-            "c/solver_code",
-            "c/solver_code/inc/public",
-            "c/solver_code/inc/private",
-        ),
+        sources=(*cvxpygen, f"{solver}/src/*.c", f"{solver}/workspace.c"),
+        includes=("c/include", solver, f"{solver}/inc/public", f"{solver}/inc/private"),
         glue=_CVXPYGEN,
     )
     return (
-        Program(
-            "daqp",
-            "DAQP, four moves, condensed by hand",
-            "quadratic",
-            "float32",
-            sources=("csrc/src/*.c",),
-            includes=("csrc/include", "."),
-            glue=_DAQP % numbers,
-            defines=("DAQP_SINGLE_PRECISION",),
-        ),
-        Program(
-            "daqp-slacks",
-            "DAQP, moves and slacks",
-            "1-norm",
-            "float64",
-            sources=("csrc/src/*.c",),
-            includes=("csrc/include", "."),
+        daqp,
+        replace(
+            daqp,
+            name="daqp-slacks",
+            title="DAQP, moves and slacks",
+            cost="1-norm",
+            scalar="float64",
             glue=_DAQP_SLACKS,
+            defines=(),
         ),
-        Program(
-            "osqp-condensed",
-            "OSQP, four moves, condensed by hand",
-            "quadratic",
-            "float32",
-            sources=("src/*.c", "workspace.c"),
-            includes=("inc/public", "inc/private", "."),
-            glue=_OSQP_CONDENSED % numbers,
-        ),
-        Program(
-            "osqp-states",
-            "OSQP, states and moves",
-            "quadratic",
-            "float32",
-            sources=("src/*.c", "workspace.c"),
-            includes=("inc/public", "inc/private", "."),
-            glue=_OSQP_STATES % numbers,
-        ),
-        Program(
-            "casadi-qrqp",
-            "CasADi, qrqp",
-            "quadratic",
-            "float32",
-            sources=("mpc.c",),
-            includes=(".",),
-            glue=_CASADI,
-        ),
-        Program(
-            "casadi-sqp",
-            "CasADi, sqpmethod on qrqp",
-            "quadratic",
-            "float32",
-            sources=("mpc.c",),
-            includes=(".",),
-            glue=_CASADI,
-        ),
+        osqp,
+        replace(osqp, name="osqp-states", title="OSQP, states and moves", glue=fill(_OSQP_STATES)),
+        casadi,
+        replace(casadi, name="casadi-sqp", title="CasADi, sqpmethod on qrqp"),
         cvxpygen_osqp,
         replace(cvxpygen_osqp, name="cvxpygen-squares", title="CVXPYgen, OSQP, squares", cost="quadratic"),
         Program(
@@ -317,18 +282,17 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
             "1-norm",
             "float64",
             sources=(
-                "c/src/cpg_workspace.c",
-                "c/src/cpg_solve.c",
-                f"{ecos}/external/amd/src/*.c",
-                f"{ecos}/external/ldl/src/ldl.c",
-                f"{ecos}/src/[cekpstw]*.c",
+                *cvxpygen,
+                f"{solver}/external/amd/src/*.c",
+                f"{solver}/external/ldl/src/ldl.c",
+                f"{solver}/src/[cekpstw]*.c",
             ),
             includes=(
                 "c/include",
-                f"{ecos}/include",
-                f"{ecos}/external/SuiteSparse_config",
-                f"{ecos}/external/amd/include",
-                f"{ecos}/external/ldl/include",
+                f"{solver}/include",
+                f"{solver}/external/SuiteSparse_config",
+                f"{solver}/external/amd/include",
+                f"{solver}/external/ldl/include",
             ),
             glue=_CLOCK + _CVXPYGEN,
             defines=("_POSIX_TIMERS", "_POSIX_MONOTONIC_CLOCK"),
@@ -355,7 +319,7 @@ def programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
 
 
 def host_programs(tilt: str, effort: str, gradient: str) -> tuple[Program, ...]:
-    """Return the same, and DAQP and CasADi also in double, their default: in float CasADi often gives up."""
+    """Return `programs`, and DAQP and CasADi also in double, their default: in float CasADi often fails."""
     found = []
     for program in programs(tilt, effort, gradient):
         found.append(program)

@@ -1,7 +1,7 @@
-"""Let each peer write its C for the one problem of the comparison, set up as its own documentation does.
+"""Generate the C of each peer for the problem of the comparison, set up as in the peer's documentation.
 
-Runs in whatever Python holds the peer, and needs nothing of ours:
-`python -m benchmarks.peers_setups NAME FOLDER`. The last line on stdout is JSON, the versions that wrote it.
+`python -m benchmarks.peers_setups NAME FOLDER` runs in the Python that has the peer and imports nothing of
+ours. The last line on stdout is JSON: the versions of the peer's packages.
 
 The problem: eq 8 at psi = 0 with a thrust of 9.81 m/s2 and eq 11 subtracted, so that the state is the error
 x, vx, y, vy of the drone against its target, and a move is roll, pitch:
@@ -11,7 +11,7 @@ x, vx, y, vy of the drone against its target, and a move is roll, pitch:
 over 10 steps of 0.055 s, with two moves, the second of them held (Np 10, Nc 2), and the weights of Table I on
 the position error and on the change of the moves.
 """
-# ruff: noqa: PLC0415 - a set-up imports its own peer, and the others may be missing
+# ruff: noqa: PLC0415 - a set-up imports only its own peer, since others may be missing
 
 import importlib.metadata
 import json
@@ -39,11 +39,11 @@ EFFORT: Final = 1.0
 
 _HALF: Final = STEP_S * STEP_S / 2
 A: Final = np.kron(np.eye(2), np.array([[1.0, STEP_S], [0.0, 1.0]]))
-"""(4, 4) state after a step, from the state before."""
+"""(4, 4) from the state to the next state."""
 B: Final = GRAVITY_M_S2 * np.array([[0.0, -_HALF], [0.0, -STEP_S], [_HALF, 0.0], [STEP_S, 0.0]])
-"""(4, 2) state after a step, from roll and pitch."""
+"""(4, 2) from roll and pitch to the next state."""
 POSITIONS: Final = (0, 2)
-"""Of the state, what the cost weighs."""
+"""Indices of the positions in the state."""
 
 
 def condensed() -> tuple[Matrix, Matrix]:
@@ -60,12 +60,12 @@ def condensed() -> tuple[Matrix, Matrix]:
 
 
 def changes() -> Matrix:
-    """Return (4, 4) the changes of the moves, from the moves; the last command comes off the first two."""
+    """Return the matrix (4, 4) from the moves to their changes; the first two lack the last command."""
     return np.eye(4) - np.eye(4, k=-2)
 
 
 def literals() -> tuple[str, str, str]:
-    """Return literals of C: limit, twice the effort weight, gradient of the quadratic cost from the state."""
+    """Return C literals: tilt limit, twice the effort weight, and the gradient matrix (4, 4) of the state."""
     from_state, from_moves = condensed()
     gradient = 2 * TRACKING * from_moves.T @ from_state
     rows = ("{" + ", ".join(f"{float(np.float32(v))!r}f" for v in row) + "}" for row in gradient)
@@ -73,20 +73,20 @@ def literals() -> tuple[str, str, str]:
 
 
 def hessian() -> Matrix:
-    """Return (4, 4) the Hessian of the quadratic cost of the moves."""
+    """Return the Hessian (4, 4) of the quadratic cost."""
     _, moves = condensed()
     found: Matrix = 2 * (TRACKING * moves.T @ moves + EFFORT * changes().T @ changes())
     return found
 
 
 def daqp_squares(folder: Path) -> None:
-    """Write a QP of the four moves alone for DAQP's C interface: https://darnstrom.github.io/daqp."""
+    """Write a QP in the four moves for DAQP's C interface: https://darnstrom.github.io/daqp."""
     from_state, from_moves = condensed()
     _daqp(folder, {"hessian[16]": hessian(), "from_state[16]": 2 * TRACKING * from_moves.T @ from_state})
 
 
 def daqp_slacks(folder: Path) -> None:
-    """Write the 1-norm for the same: four moves, and a slack for each of the 24 terms, between two rows."""
+    """Write the 1-norm for DAQP: four moves, and a slack with two constraints for each of the 24 terms."""
     from_state, from_moves = condensed()
     rows = np.vstack([from_moves, changes()])
     terms = len(rows)
@@ -109,10 +109,10 @@ def daqp_slacks(folder: Path) -> None:
 
 
 def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
-    """Place DAQP's C, and the problem as `tables` by C declarator.
+    """Write DAQP's C, and the problem as `tables` by C declarator.
 
-    The C is that of the source distribution, which the Makefile keeps beside the Python of the peers; the
-    code generator is not in it.
+    The C is from the source distribution, which the Makefile stores with the Python of the peers; it lacks
+    the code generator.
     """
     (archive,) = Path(sys.prefix, "sdist").glob(f"daqp-{importlib.metadata.version('daqp')}.tar.gz")
     with tarfile.open(archive) as source:
@@ -129,9 +129,9 @@ def _daqp(folder: Path, tables: dict[str, Matrix]) -> None:
 
 
 def osqp_condensed(folder: Path) -> None:
-    """Write a QP of the four moves alone, condensed by hand: https://osqp.org/docs/codegen/python.html.
+    """Write a QP in the four moves, condensed by hand: https://osqp.org/docs/codegen/python.html.
 
-    Generated for vectors only, it keeps its rho: of 0.1, the default, 1, 10, 100 and 1000, this one took the
+    Code generated for vectors cannot adapt rho. Of 0.1 (default), 1, 10, 100 and 1000, rho = 1 takes the
     fewest iterations.
     """
     import osqp
@@ -151,10 +151,10 @@ def osqp_condensed(folder: Path) -> None:
 
 
 def osqp_states(folder: Path) -> None:
-    """Write a QP of states and moves, as https://osqp.org/docs/examples/mpc.html sets one up.
+    """Write a QP in states and moves, like https://osqp.org/docs/examples/mpc.html.
 
-    Of the same rho, this one had an answer to all states. With 0.1 three of four ran out of iterations, up to
-    0.6 rad beyond the limit.
+    Of the same values, only rho = 10 solves all states. With 0.1 three of four states reach the iteration
+    limit, with moves up to 0.6 rad beyond theirs.
     """
     import osqp
     from scipy import sparse
@@ -189,7 +189,7 @@ def osqp_states(folder: Path) -> None:
 
 
 def _cvxpygen(folder: Path, solver: str, measure: str) -> None:
-    """Write the problem for `solver`: https://github.com/cvxgrp/cvxpygen, its MPC example."""
+    """Write the problem for `solver`, like the MPC example of https://github.com/cvxgrp/cvxpygen."""
     import cvxpy
     from cvxpygen import cpg
 
@@ -212,7 +212,7 @@ def _cvxpygen(folder: Path, solver: str, measure: str) -> None:
 
 
 def _casadi(folder: Path, solver: str, real: str) -> None:
-    """Write one QP for qrqp, or sqpmethod on it: https://web.casadi.org/docs/#generating-c-code."""
+    """Write the QP for qrqp, or for sqpmethod with qrqp: https://web.casadi.org/docs/#generating-c-code."""
     import casadi
 
     parameters = casadi.MX.sym("parameters", 6)
@@ -247,9 +247,9 @@ def _casadi(folder: Path, solver: str, real: str) -> None:
 
 
 def tinympc(folder: Path) -> None:
-    """Write the LQR-like problem that TinyMPC has: https://tinympc.org/docs, code generation.
+    """Write TinyMPC's LQR-like problem: https://tinympc.org/docs, code generation.
 
-    It knows no blocked moves and no weight on their change: ten moves, each weighed by itself.
+    It supports neither move blocking nor weights on changes: ten moves, each with its own weight.
     """
     import tinympc
 
@@ -262,7 +262,7 @@ def tinympc(folder: Path) -> None:
     try:
         solver.codegen(str(folder))
     except subprocess.CalledProcessError:
-        # After the C++ it builds a Python module to try it with, for which it clones pybind11.
+        # It has written the C++; building its Python module fails without a network (it clones pybind11).
         if not (folder / "src" / "tiny_data.cpp").exists():
             raise
 
@@ -283,11 +283,11 @@ SETUPS: Final[dict[str, tuple[Callable[[Path], None], tuple[str, ...]]]] = {
     "casadi-sqp-float64": (partial(_casadi, solver="sqpmethod", real="double"), ("casadi",)),
     "tinympc": (tinympc, ("tinympc",)),
 }
-"""Who writes into a folder, and the packages whose versions tell what it wrote."""
+"""Set-ups by name: the function that writes the C, and the packages whose versions are reported."""
 
 
 def main() -> None:
-    """Write the C of the peer on the command line into the folder on it."""
+    """Write the C of the set-up NAME into FOLDER."""
     name, folder = sys.argv[1:]
     write, packages = SETUPS[name]
     write(Path(folder))

@@ -1,8 +1,8 @@
-"""What a better search buys in flight: more iterations, the best iterate, another start, the exact optimum.
+"""Effect of the search on flights: more iterations, the best iterate, other initial plans, the exact optimum.
 
-Prints Markdown tables: each preset seeing the truth, and through sensors; then the optimum with other effort
-weights. Settings fly as compiled C in float32; what is no setting flies as the reference in float64 with a
-search of its own (`benchmarks.searches`). Some six minutes on two processors.
+Prints Markdown tables: each preset with true states and with sensors; then other effort weights. Searches
+that are settings fly as compiled C in float32, others as the reference in float64 with a search of
+`benchmarks.searches`. Takes about six minutes on two processors.
 """
 
 import os
@@ -14,7 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.searches import Searching, SearchingController, best_iterate, from_level, optimum
+from benchmarks.markdown import table
+from benchmarks.searches import Searching, SearchingController, best_iterate, from_zero_moves, optimum
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
@@ -44,26 +45,26 @@ TRUTH: Final = (
     Scenario(wind_m_s2=(0.0, 0.5)),
     Scenario(motor_lag_s=0.03),
 )
-"""100 s: the Table II case, two more that start a millimetre beside, a steady push along x and y, a lag."""
+"""100 s each: the Table II case, two that start 1 mm beside it, steady wind along x and y, a motor lag."""
 SENSED: Final = tuple(
     Scenario(seed=seed, duration_s=SENSED_S, sensors="mambo-derotated", wind_speed_m_s=wind)
     for wind in (0.0, LIGHT_M_S)
     for seed in range(SEEDS)
 )
-"""Noise alone, then noise and gusts of the same seeds."""
+"""Sensor noise, then sensor noise and gusts with the same seeds."""
 
 TRUTH_HEAD: Final = (
-    *("search", "instructions: mean, most", "IAE", "started 1 mm beside", "ISE", "ITAE", "variation"),
-    *("push along x: IAE", "along y", "motor lag: IAE", "variation"),
+    *("search", "instructions: mean, most", "IAE", "started 1 mm off", "ISE", "ITAE", "variation"),
+    *("wind along x: IAE", "along y", "motor lag: IAE", "variation"),
 )
 SENSED_HEAD: Final = (
-    *("search", "noise: IAE", "as seen", "variation", "gusts: IAE", "as seen", "variation", "crashed"),
+    *("search", "noise: IAE", "estimated", "variation", "gusts: IAE", "estimated", "variation", "crashed"),
 )
 
 
 @dataclass(frozen=True)
 class Variant:
-    """Settings that fly as they are, or with a search that is no setting."""
+    """Settings, and a search that replaces the controller's, if any."""
 
     settings: Settings
     searching: Searching | None = None
@@ -77,7 +78,7 @@ class Variant:
 
 @dataclass(frozen=True)
 class FlownVariant:
-    """What became of the flights of a world; `seen_iae_m_s` (n,) is as the estimators show it."""
+    """Results of the flights of a world; `seen_iae_m_s` (n,) is the IAE of the estimated position."""
 
     metrics: Metrics
     seen_iae_m_s: FloatArray
@@ -85,7 +86,7 @@ class FlownVariant:
 
 
 def entrants(preset: str) -> dict[str, Variant]:
-    """Return a preset with every search, by title."""
+    """Return a preset with each search, by title."""
     settings = presets.load(preset)
     kept = settings.optimizer.warm_start
     other = next(start for start in STARTS if start != kept)
@@ -96,15 +97,15 @@ def entrants(preset: str) -> dict[str, Variant]:
 
     return {
         **{f"{k} iterations, from the {STARTS[kept]}": tried(k) for k in (5, 10, 20)},
-        **{f"{k}, the best plan met": tried(k, best_iterate) for k in (5, 20)},
+        **{f"{k}, the best iterate": tried(k, best_iterate) for k in (5, 20)},
         **{f"{k}, from the {STARTS[other]}": tried(k, start=other) for k in (5, 20)},
-        **{f"{k}, from level": tried(k, from_level) for k in (5, 20)},
+        **{f"{k}, from zero moves": tried(k, from_zero_moves) for k in (5, 20)},
         EXACT: Variant(settings, optimum),
     }
 
 
-def weighted() -> dict[tuple[str, str], Variant]:
-    """Return `mambo` with every effort weight, and `mambo-robust`, searched more and more, by two titles."""
+def by_weight() -> dict[tuple[str, str], Variant]:
+    """Return `mambo` with each effort weight and `mambo-robust`, each with three searches, by two titles."""
     mambo = presets.load("mambo")
     several = {
         f"mambo, {weight:g}": with_option(mambo, "cost.effort_weight", weight) for weight in EFFORT_WEIGHTS
@@ -119,7 +120,7 @@ def weighted() -> dict[tuple[str, str], Variant]:
 
 
 def fly_world(entrant: Variant, world: Sequence[Scenario]) -> FlownVariant:
-    """Fly all flights of a world at once."""
+    """Fly all flights of a world as one batch."""
     flight = flight_of(world, entrant.settings.horizon.update_period_s)
     trace = fly(flight, entrant.controller(len(world)))
     seen = trace.as_seen() if isinstance(trace, SensedTrace) else trace
@@ -127,7 +128,7 @@ def fly_world(entrant: Variant, world: Sequence[Scenario]) -> FlownVariant:
 
 
 def instructions(entrant: Variant) -> str:
-    """Count the instructions of a step on the board, of what has C."""
+    """Return mean and most instructions of a step on the board, "-" for a search without C."""
     if entrant.searching is not None:
         return "-"
     counts = measure_footprint(entrant.settings, boards.load(BOARD)).counts
@@ -139,13 +140,13 @@ def _digits(value: float) -> str:
 
 
 def _mean(values: FloatArray) -> str:
-    """Spell a mean and its standard error."""
+    """Format a mean and its standard error."""
     error = values.std(ddof=1) / np.sqrt(len(values))
     return f"{_digits(values.mean())} ± {error:.2g}"
 
 
 def truth_cells(flown: FlownVariant) -> list[str]:
-    """Spell the flights of `TRUTH`."""
+    """Format the results of `TRUTH`."""
     found, beside = flown.metrics, len(BESIDE_M)
     iae, variation = found.iae_m_s, found.command_variation_rad
     return [
@@ -157,7 +158,7 @@ def truth_cells(flown: FlownVariant) -> list[str]:
 
 
 def sensed_cells(flown: FlownVariant) -> list[str]:
-    """Spell the flights of `SENSED`."""
+    """Format the results of `SENSED`."""
     found = flown.metrics
     cells = []
     for case in (slice(0, SEEDS), slice(SEEDS, None)):
@@ -166,17 +167,11 @@ def sensed_cells(flown: FlownVariant) -> list[str]:
     return [*cells, f"{flown.crashed}"]
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Spell a Markdown table."""
-    lines = [" | ".join(head), " | ".join(["---"] * len(head)), *(" | ".join(row) for row in rows)]
-    return "\n".join(f"| {line} |" for line in lines)
-
-
 def main() -> None:
-    """Fly everything in processes of their own, and print."""
+    """Fly everything in parallel processes and print the tables."""
     searched = {preset: entrants(preset) for preset in PRESETS}
     with_every_search = [one for several in searched.values() for one in several.values()]
-    everyone = {*with_every_search, *weighted().values()}
+    everyone = {*with_every_search, *by_weight().values()}
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
         truth = {one: pool.submit(fly_world, one, TRUTH) for one in everyone}
         sensed = {one: pool.submit(fly_world, one, SENSED) for one in everyone}
@@ -186,11 +181,11 @@ def main() -> None:
         count = {one: counting.result() for one, counting in counted.items()}
     for preset, several in searched.items():
         rows = [(title, count[one], *in_truth[one]) for title, one in several.items()]
-        print(f"`{preset}`, seeing the truth:\n\n{table(TRUTH_HEAD, rows)}\n")
+        print(f"`{preset}`, with true states:\n\n{table(TRUTH_HEAD, rows)}\n")
         rows = [(title, *in_noise[one]) for title, one in several.items()]
-        print(f"`{preset}`, through sensors:\n\n{table(SENSED_HEAD, rows)}\n")
+        print(f"`{preset}`, with sensors:\n\n{table(SENSED_HEAD, rows)}\n")
     rows = [
-        (*titles, in_truth[one][0], in_truth[one][4], *in_noise[one]) for titles, one in weighted().items()
+        (*titles, in_truth[one][0], in_truth[one][4], *in_noise[one]) for titles, one in by_weight().items()
     ]
     head = ("preset, effort weight", "search", "IAE", "variation", *SENSED_HEAD[1:])
     print(f"Other effort weights:\n\n{table(head, rows)}")

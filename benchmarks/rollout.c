@@ -1,12 +1,12 @@
-/* The controller written down plainly: every iteration rolls the model out step by step (eqs 8-11), adds up the
- * cost (eq 12), and goes back through the steps for the gradient. No tables, no input check; the C library's
- * sine and cosine. The settings are those of a bundle, in nmpc_config.h; rollout.h has what that lacks:
+/* The controller as a plain roll-out: every iteration predicts the states step by step (eqs 8-11), sums the cost
+ * (eq 12), and computes the gradient by a backward pass. No tables, no input check; the C library's sine and
+ * cosine. The settings are in the bundle's nmpc_config.h, further constants in rollout.h:
  *
- *   ROLLOUT_HAS_LAG      1 if the measured attitude enters the prediction
- *   ROLLOUT_KEEPS_PLAN   1 if a search starts from the last plan, 0 from the last command
- *   ROLLOUT_DECAY        what a step leaves of the angle still to be turned: roll, pitch
- *   ROLLOUT_SPEED_LACK   what the lag takes off the speed gained in a step, in s, by that angle
- *   ROLLOUT_SHIFT_LACK   the same off the way gained, in s^2
+ *   ROLLOUT_HAS_LAG      1 if the prediction models the attitude lag
+ *   ROLLOUT_KEEPS_PLAN   1 if the search starts from the last plan, 0 from the last command
+ *   ROLLOUT_DECAY        exp(-step / lag) of roll and pitch: remaining share of (command - tilt) after a step
+ *   ROLLOUT_SPEED_LACK   s: velocity deficit of a step due to the lag, per unit (command - tilt) and thrust
+ *   ROLLOUT_SHIFT_LACK   s^2: displacement deficit, likewise
  */
 #include <math.h>
 

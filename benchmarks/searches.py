@@ -1,9 +1,8 @@
-"""The problems of eq 12 written out for a linear program, and controllers that search them otherwise.
+"""Eq 12 as a linear program, and controllers that minimise it by other searches.
 
-For a given yaw and thrust the predicted errors are affine in the moves, with attitude lag too. So eq 12 is
-the 1-norm of affine rows: a linear program, which HiGHS solves to the optimum. The rows come from the exact
-discretisation of the model, written down a second time; every step of a controller here asserts that they
-give the reference's own cost.
+For a given yaw and thrust the predicted errors are affine in the moves, with attitude lag too. Eq 12 is then
+the 1-norm of affine rows, a linear program that HiGHS solves exactly. The rows come from an independent
+discretisation of the model (matrix exponential); every step asserts that they give the reference's cost.
 """
 
 from collections.abc import Callable
@@ -26,16 +25,15 @@ from mambo_nmpc.codegen.settings.model import Settings
 Array = NDArray[np.float64]
 
 TOLERANCES: Final = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-"""The tightest that HiGHS takes."""
+"""The smallest that HiGHS accepts."""
 
 
 @dataclass(frozen=True)
 class Problems:
-    """What n controllers minimise in one update: the 1-norm of weighted rows, each move within the limit.
+    """Minimise |slope moves + offset|_1 with |moves| <= limit_rad, for n controllers in one update.
 
-    slope:  (n, rows, 2 * control) rows per rad: errors x, y of each predicted step, then changes of moves.
-    offset: (n, rows) the rows of level moves.
-    limit_rad: of every move.
+    slope:  (n, rows, 2 * control) per rad: weighted errors x, y of each step, then changes of moves.
+    offset: (n, rows) the same at zero moves.
     """
 
     slope: Array
@@ -58,10 +56,10 @@ class Problems:
         return np.abs(rows).sum(axis=1), gradient.reshape(moves_rad.shape)
 
     def optima(self) -> Array:
-        """Return moves (n, control, 2) of least cost, from one program that holds all n side by side.
+        """Return optimal moves (n, control, 2), from one linear program for all n controllers.
 
-        It is the dual: with a price y in -1..1 for each row, offset . y - limit |slope' y|_1 is to be made
-        largest. The moves are the multipliers of its equations, slope' y = over - under.
+        It solves the dual: maximise offset . y - limit |slope' y|_1 over -1 <= y <= 1. The moves are the
+        multipliers of its equations, slope' y = over - under.
         """
         n, rows, moves = self.slope.shape
         signs = np.hstack([-np.eye(moves), np.eye(moves)])
@@ -82,7 +80,7 @@ class Problems:
 
 
 class CostModel:
-    """Eqs 8-11 of one set of settings; `position_update = "printed"` is not written out."""
+    """Eqs 8-11 for given settings; supports `position_update = "exact"` only."""
 
     def __init__(self, settings: Settings) -> None:
         horizon, model = settings.horizon, settings.model
@@ -98,7 +96,7 @@ class CostModel:
         self._change = settings.cost.effort_weight * np.kron(change, np.eye(2))
 
     def _response(self, lag_s: float) -> tuple[Array, Array]:
-        """Return how far a tilt moves the drone under unit thrust: (steps,) held before, (steps, control)."""
+        """Return displacements at unit thrust: per initial tilt (steps,), per move (steps, control)."""
         flow = np.zeros((4, 4))  # position, velocity, angle, command
         flow[0, 1] = flow[1, 2] = 1.0
         if lag_s > 0:
@@ -119,7 +117,7 @@ class CostModel:
     def problems(
         self, state: ArrayLike, target: ArrayLike, thrust: ArrayLike, last_rad: ArrayLike
     ) -> Problems:
-        """Write out one update: state (n, 7), target (n, 4), thrust (n,), last command (n, 2)."""
+        """Return the problems of one update: state (n, 7), target (n, 4), thrust (n,), command (n, 2)."""
         states, last = np.asarray(state, np.float64), np.asarray(last_rad, np.float64)
         offset = states[:, :4] - np.asarray(target, np.float64)
         sine, cosine = np.sin(states[:, 6]), np.cos(states[:, 6])
@@ -139,11 +137,11 @@ class CostModel:
 
 
 Searching = Callable[[Settings, Problems, Array], Array]
-"""Settings, problems and the start of a search (n, control, 2) -> the moves chosen (n, control, 2)."""
+"""(settings, problems, initial moves (n, control, 2)) -> chosen moves (n, control, 2)."""
 
 
 def optimum(settings: Settings, problems: Problems, start_rad: Array) -> Array:
-    """Choose the optimum, wherever the search starts."""
+    """Choose the optimum, whatever the initial moves."""
     del settings, start_rad
     return problems.optima()
 
@@ -153,13 +151,13 @@ def rprop(settings: Settings) -> Rprop:
     return Rprop(settings, arithmetic(Design(settings)))
 
 
-def from_level(settings: Settings, problems: Problems, start_rad: Array) -> Array:
-    """Search with RPROP from level moves, forgetting the last plan."""
+def from_zero_moves(settings: Settings, problems: Problems, start_rad: Array) -> Array:
+    """Search with RPROP from zero moves instead of the last plan."""
     return rprop(settings).minimize(problems.evaluate, np.zeros_like(start_rad)).moves_rad
 
 
 def best_iterate(settings: Settings, problems: Problems, start_rad: Array) -> Array:
-    """Search with RPROP, and choose the cheapest plan met; the last one, too, is evaluated."""
+    """Search with RPROP and choose the plan of least cost among all iterates, the last one included."""
     met: list[tuple[Array, Array]] = []
 
     def evaluate(moves_rad: Array) -> tuple[Array, Array]:
@@ -173,17 +171,17 @@ def best_iterate(settings: Settings, problems: Problems, start_rad: Array) -> Ar
 
 
 class SearchingController(ReferenceController):
-    """n reference controllers in float64 whose moves are chosen by a search of another kind."""
+    """n reference controllers in float64 that choose their moves by `searching`."""
 
     def __init__(self, settings: Settings, n: int, searching: Searching) -> None:
         float64 = with_option(settings, "code.scalar", "float64")
-        super().__init__(Design(float64), n, self._chosen)
+        super().__init__(Design(float64), n, self._choose_moves)
         self._searching = searching
         self._model = CostModel(settings)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
-        """Compute the next commands, and assert that eq 12 here is eq 12 there."""
-        known = np.nan_to_num(np.asarray(state, np.float64))  # a lost flight is refused, whatever is found
+        """Compute the next commands; asserts that `Problems` has the reference's cost."""
+        known = np.nan_to_num(np.asarray(state, np.float64))  # a lost flight is refused anyway
         self._problems = self._model.problems(
             known, target, thrust_acceleration_m_s2, self.memory.command_rad
         )
@@ -192,7 +190,7 @@ class SearchingController(ReferenceController):
         assert np.allclose(step.cost[good], self._problems.cost(step.plan_rad)[good], rtol=1e-9, atol=1e-9)
         return step
 
-    def _chosen(self, _: Rprop, evaluate: Evaluate, start_rad: Array) -> Search:
+    def _choose_moves(self, _: Rprop, evaluate: Evaluate, start_rad: Array) -> Search:
         moves = self._searching(self.settings, self._problems, start_rad)
         cost, gradient = evaluate(moves)
         n = len(moves)

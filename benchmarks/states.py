@@ -1,4 +1,4 @@
-"""The inputs that every contender plans for: errors against the target, and the last command."""
+"""Inputs of the comparison: errors against the target, and the last command."""
 
 from typing import Any, Final
 
@@ -26,7 +26,7 @@ MEANING: Final = {
     "F": "random, within 5 mm and 1 cm/s",
     "C": "100 Hz along the figure of eight of Table II, noise of 1 cm and 5 cm/s",
 }
-"""In the first three the last command is random too, within 0.1 rad; along C it is the contender's own."""
+"""In W, T and F the last command is random within 0.1 rad; along C it is the contender's own."""
 
 
 def state_sets() -> dict[str, Inputs]:
@@ -41,7 +41,7 @@ def state_sets() -> dict[str, Inputs]:
 
 
 def _flown(random: np.random.Generator) -> Inputs:
-    """Fly preset mambo for 10 s, once it has caught up with the target, and add what a sensor would."""
+    """Fly preset mambo for 10 s after it has settled, and add measurement noise."""
     flight = Flight(Bernoulli(2.0, 0.5), duration_s=_SETTLED_S + 0.01 * COUNT)
     trace: Any = fly(flight, CompiledController(presets.load("mambo")))
     error = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2]], -1) - trace.target

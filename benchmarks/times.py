@@ -1,11 +1,11 @@
-"""How long an update takes on this machine, beside the peers and a plain roll-out, and how good its plan is.
+"""Time of an update on this machine and quality of its plan: ours, a plain roll-out and the peers.
 
     python -m benchmarks.times                          # the peers are installed beside us
     python -m benchmarks.times --python DIR/bin/python  # the peers are installed elsewhere
 
-Every contender is generated once, built portably and for this machine, tried in a process of its own, and
-timed in one process: in every round each of them passes through each set of states. The table and the picture
-go to a folder; docs/benchmarks.md says how to read them. What cannot be built gets a row that says why.
+Every contender is generated once, built portably and for this machine, and tried in a process of its own. One
+process then times all of them: in every round each contender passes through each set of states. Table and
+plot go to a folder; docs/benchmarks.md explains them. The row of a contender that fails states the reason.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from benchmarks import peers_setups as problem
 from benchmarks.host_builds import NATIVE, PORTABLE, build, plans, silence, sizes
-from benchmarks.optimum import above
+from benchmarks.optimum import excess
 from benchmarks.ours import bundle_program, peers_model, place_bundle, place_rollout, rollout_program
 from benchmarks.peers_c import NotHereError, generate, run_tool
 from benchmarks.peers_programs import Program, host_programs
@@ -41,27 +41,27 @@ from mambo_nmpc.codegen.toolchain import host_toolchain
 
 Array = NDArray[np.float64]
 Libraries = dict[tuple[str, str], Path]
-"""By contender and flags."""
+"""By contender and name of the flags."""
 
 ROUNDS: Final = 8
 _WARM_UP: Final = 50
 _COLD: Final = 100
-"""Calls that are timed with cold caches."""
+"""Number of calls timed with cold caches."""
 _SLOW_NS: Final = 20_000
 _SLOW_COUNT: Final = 200
-"""Whoever takes longer passes through so many states of each set only."""
+"""Number of states of each set for contenders that take longer than _SLOW_NS."""
 _SWEPT_BYTES: Final = 64 << 20
 _SAMPLE: Final = 5
-"""Of the plans, one in so many is held against the optimum."""
+"""Every _SAMPLE-th plan is compared with the optimum."""
 _SAME_RAD: Final = 1e-6
 _BUILDS: Final = {"portable": PORTABLE, "native": NATIVE}
 
 
 @dataclass(frozen=True)
 class Contender:
-    """What is measured: `write` puts its C into a folder, and returns the versions that wrote it.
+    """A program to measure: `write` puts its C into a folder and returns the versions of its packages.
 
-    Its plans are held against the optimum of the problem of `settings`.
+    Its plans are compared with the optimum of the problem of `settings`.
     """
 
     name: str
@@ -71,7 +71,7 @@ class Contender:
 
 
 def contenders(python: str) -> list[Contender]:
-    """Return ours, the roll-outs and the peers that the Python `python` holds."""
+    """Return ours, the roll-outs, and the peers installed in `python`."""
     alike, mambo = peers_model(), presets.load("mambo")
     variants = {
         "ours": ("mambo-nmpc, the peers' model", alike),
@@ -99,14 +99,14 @@ def _place(place: Callable[[Settings, Path], None], settings: Settings, folder: 
     return {}
 
 
-def _tried(library: Path, sets: dict[str, Inputs]) -> dict[str, Any]:
-    """Plan for W, each by itself, and along C."""
+def _plan_sets(library: Path, sets: dict[str, Inputs]) -> dict[str, Any]:
+    """Plan for the states of W, each on its own, and along C."""
     silence()
     return {name: plans(library, sets[name], follows=name == "C") for name in ("W", "C")}
 
 
-def _prepared(contender: Contender, sets: dict[str, Inputs], work: Path) -> tuple[Row, Libraries, Any]:
-    """Write, build and try a contender: its row without times, its libraries, and its plans by set."""
+def _prepare(contender: Contender, sets: dict[str, Inputs], work: Path) -> tuple[Row, Libraries, Any]:
+    """Generate, build and try a contender; returns its row without times, libraries, and plans by set."""
     program, folder = contender.program, work / contender.name
     row = Row(contender.name, program.title, program.cost, program.scalar)
     try:
@@ -121,15 +121,15 @@ def _prepared(contender: Contender, sets: dict[str, Inputs], work: Path) -> tupl
     library = libraries[contender.name, "portable"]
     try:
         with ProcessPoolExecutor(1) as pool:
-            tried = pool.submit(_tried, library, sets).result()
+            tried = pool.submit(_plan_sets, library, sets).result()
     except BrokenProcessPool:
         return replace(row, absent="crashes"), {}, None
-    excess = {}
+    above = {}
     if program.cost != "quadratic, other problem":
         for name, (last, planned, _) in tried.items():
             inputs = np.concatenate([sets[name][:, :4], last], 1)
-            shares = above(program.cost, contender.settings, inputs[::_SAMPLE], planned[::_SAMPLE])
-            excess[name] = (float(np.median(shares)), float(np.percentile(shares, 99)))
+            shares = excess(program.cost, contender.settings, inputs[::_SAMPLE], planned[::_SAMPLE])
+            above[name] = (float(np.median(shares)), float(np.percentile(shares, 99)))
     heap = tried["W"][2]
     row = replace(
         row,
@@ -137,14 +137,14 @@ def _prepared(contender: Contender, sets: dict[str, Inputs], work: Path) -> tupl
         sizes=sizes(library),
         heap_first=heap[0],
         heap_after=float(np.mean(heap[1:])),
-        above=excess,
+        above=above,
         tilt_rad=max(float(np.abs(planned).max()) for _, planned, _ in tried.values()),
     )
     return row, libraries, {name: planned for name, (_, planned, _) in tried.items()}
 
 
-def _timed(timing: Path, libraries: Libraries, sets: dict[str, Inputs], rounds: int) -> dict[Any, Timing]:
-    """Time every library, and under the name "nothing" a call of nothing; in ns, this process pinned."""
+def _time_all(timing: Path, libraries: Libraries, sets: dict[str, Inputs], rounds: int) -> dict[Any, Timing]:
+    """Time every library, and as "nothing" an empty call, in ns, with this process pinned to one core."""
     silence()
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     measure = ctypes.CDLL(str(timing)).timing_measure
@@ -172,7 +172,7 @@ def _timed(timing: Path, libraries: Libraries, sets: dict[str, Inputs], rounds: 
     timings = {}
     for key, run in calls.items():
         cold = one_pass(run, sets["C"][:_COLD], follows=True, cold=True)
-        by_state = {name: _middle(np.array(passes)) for name, passes in hot[key].items()}
+        by_state = {name: _midmean(np.array(passes)) for name, passes in hot[key].items()}
         timings[key] = Timing(
             {name: (float(np.median(ns)), float(np.percentile(ns, 99))) for name, ns in by_state.items()},
             float(np.median(cold)),
@@ -180,8 +180,8 @@ def _timed(timing: Path, libraries: Libraries, sets: dict[str, Inputs], rounds: 
     return timings
 
 
-def _middle(passes: Array) -> Array:
-    """Return the mean of the middle half of the rounds (rounds, n), for each state (n,)."""
+def _midmean(passes: Array) -> Array:
+    """Return for each state (n,) the mean of the middle half of its rounds (rounds, n)."""
     ordered, quarter = np.sort(passes, axis=0), len(passes) // 4
     middle: Array = ordered[quarter : len(passes) - quarter].mean(axis=0)
     return middle
@@ -191,8 +191,8 @@ def _address(array: NDArray[Any]) -> ctypes.c_void_p:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
-def _same(planned: dict[str, Any], one: str, other: str) -> str:
-    """Say in how many of the tried states two contenders plan the same."""
+def _count_same(planned: dict[str, Any], one: str, other: str) -> str:
+    """Return the number of states in which two contenders have the same plan."""
     if not (planned.get(one) and planned.get(other)):
         return "not compared"
     agree = np.concatenate(
@@ -201,7 +201,7 @@ def _same(planned: dict[str, Any], one: str, other: str) -> str:
     return f"{np.count_nonzero(agree):,} of {len(agree):,}"
 
 
-def _machine(rounds: int, loads: Iterable[float]) -> str:
+def _describe_machine(rounds: int, loads: Iterable[float]) -> str:
     models = [line for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines() if "model name" in line]
     model = models[0].partition(":")[2].strip() if models else "unknown processor"
     load = " and ".join(f"{value:.1f}" for value in loads)
@@ -212,7 +212,7 @@ def _machine(rounds: int, loads: Iterable[float]) -> str:
 
 
 def main() -> None:
-    """Measure ours and every peer; write table, CSV and picture, and print the table."""
+    """Measure ours and every peer; write table, CSV and plot, and print the table."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -228,7 +228,7 @@ def main() -> None:
         work = Path(place)
         print("generating, building, trying", file=sys.stderr)
         with ProcessPoolExecutor() as pool:
-            prepare = partial(_prepared, sets=sets, work=work)
+            prepare = partial(_prepare, sets=sets, work=work)
             prepared = list(pool.map(prepare, contenders(arguments.python)))
         rows = [row for row, _, _ in prepared]
         libraries = {key: path for _, built, _ in prepared for key, path in built.items()}
@@ -240,10 +240,10 @@ def main() -> None:
         before = os.getloadavg()[0]
         try:
             with ProcessPoolExecutor(1) as pool:
-                timings = pool.submit(_timed, timing, libraries, sets, arguments.rounds).result()
+                timings = pool.submit(_time_all, timing, libraries, sets, arguments.rounds).result()
         except BrokenProcessPool:
             sys.exit("a contender crashed while it was timed")
-        machine = _machine(arguments.rounds, (before, os.getloadavg()[0]))
+        machine = _describe_machine(arguments.rounds, (before, os.getloadavg()[0]))
     nothing = timings.pop(("nothing", ""))
     rows = [
         replace(row, times={name: timings[row.name, name].less(nothing) for name in FLAGS})
@@ -252,8 +252,8 @@ def main() -> None:
         for row in rows
     ]
     agreement = {
-        "the peers' model": _same(planned, "ours", "rollout"),
-        "preset mambo": _same(planned, "mambo", "rollout-mambo"),
+        "the peers' model": _count_same(planned, "ours", "rollout"),
+        "preset mambo": _count_same(planned, "mambo", "rollout-mambo"),
     }
     print(write_report(rows, machine, agreement, nothing, arguments.output))
 

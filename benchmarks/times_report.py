@@ -1,4 +1,4 @@
-"""The table, the CSV and the picture of `benchmarks/times.py`."""
+"""Table, CSV file and plot of `benchmarks/times.py`."""
 
 import csv
 from dataclasses import dataclass, field
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from benchmarks.host_builds import Sizes
+from benchmarks.markdown import table
 from mambo_nmpc.sil.show.plots import style
 
 FLAGS: Final = {
@@ -18,20 +19,20 @@ FLAGS: Final = {
 }
 SETS: Final = ("W", "T", "F", "C")
 OURS: Final = "ours"
-"""The row that the others are held against."""
+"""The row that the others are compared with."""
 _COLOURS: Final = {"ours": "#0072B2", "others, 1-norm": "#E69F00", "others, quadratic": "#7f7f7f"}
 _MARKERS: Final = {"W": "o", "T": "s", "F": "^", "C": "D"}
 
 
 @dataclass(frozen=True)
 class Timing:
-    """What an update takes, in ns: median and 99th percentile by set of states, and median when cold."""
+    """Time of an update in ns: median and 99th percentile by set of states, and median with cold caches."""
 
     hot: dict[str, tuple[float, float]]
     cold: float
 
     def less(self, nothing: "Timing") -> "Timing":
-        """Return it without what clock and call take, which `nothing` tells."""
+        """Subtract the medians of `nothing`, an empty call."""
         return Timing(
             {
                 name: (median - nothing.hot[name][0], most - nothing.hot[name][0])
@@ -43,10 +44,10 @@ class Timing:
 
 @dataclass(frozen=True)
 class Row:
-    """A contender; `absent` is the reason why nothing is measured.
+    """Results of a contender; `absent` is the reason if nothing was measured.
 
-    heap_first, heap_after: calls to allocators in the first update, and on average in each after.
-    above: by set, share of the cost above the least, median and 99th percentile.
+    heap_first, heap_after: heap calls in the first update, and mean of the later ones.
+    above: by set, excess of the cost over the optimum, median and 99th percentile.
     """
 
     name: str
@@ -63,13 +64,8 @@ class Row:
     absent: str = ""
 
 
-def _lines(rows: list[tuple[str, ...]]) -> str:
-    head, *rest = rows
-    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rest))
-
-
 def _ratios(row: Row, other: Row, flags: str, sets: tuple[str, ...] = SETS) -> list[float]:
-    """Return how many times as long as the other it takes, by set."""
+    """Return the ratio of the median times, by set."""
     return [row.times[flags].hot[name][0] / other.times[flags].hot[name][0] for name in sets]
 
 
@@ -79,14 +75,13 @@ def _range(ratios: list[float]) -> str:
 
 
 def _aims_table(rows: list[Row]) -> str:
-    """Hold medians against what the project aims at, by set where it says nothing else."""
+    """Compare ratios of medians with the project's aims, over all sets unless stated otherwise."""
     measured = {row.name: row for row in rows if row.times}
     ours = measured[OURS]
     peers = [row for name, row in measured.items() if not name.startswith((OURS, "mambo", "rollout"))]
     same_cost = [row for row in peers if row.cost == "1-norm"]
-    lines: list[tuple[str, ...]] = [
-        ("ratio of medians", "aim", *(f"`{spelled}`" for spelled in FLAGS.values()))
-    ]
+    head = ("ratio of medians", "aim", *(f"`{flags}`" for flags in FLAGS.values()))
+    lines: list[tuple[str, ...]] = []
     for title, aim, one, others, sets in (
         ("ours over its plain roll-out", "0.33", OURS, ("rollout",), SETS),
         ("preset mambo over its plain roll-out", "0.33", "mambo", ("rollout-mambo",), SETS),
@@ -107,13 +102,13 @@ def _aims_table(rows: list[Row]) -> str:
             by_row = [[_ratios(row, ours, flags) for row in group] for flags in FLAGS]
             found = [_range([min(by_set) for by_set in zip(*ratios, strict=True)]) for ratios in by_row]
             lines.append((title, aim, *found))
-    return _lines(lines)
+    return table(head, lines)
 
 
 def _times_table(rows: list[Row], flags: str) -> str:
     ours = next(row for row in rows if row.name == OURS)
     head = ("contender", "cost", "scalar", *SETS, "C, cold", "times ours")
-    lines: list[tuple[str, ...]] = [head]
+    lines: list[tuple[str, ...]] = []
     for row in rows:
         start = (row.title, row.cost, row.scalar)
         if row.absent:
@@ -122,12 +117,12 @@ def _times_table(rows: list[Row], flags: str) -> str:
         timing = row.times[flags]
         cells = tuple(f"{timing.hot[name][0]:,.0f} / {timing.hot[name][1]:,.0f}" for name in SETS)
         lines.append((*start, *cells, f"{timing.cold:,.0f}", _range(_ratios(row, ours, flags))))
-    return _lines(lines)
+    return table(head, lines)
 
 
 def _quality_table(rows: list[Row]) -> str:
     head = ("contender", "above the optimum, W", "along C", "largest tilt", "code", "RAM", "heap")
-    lines: list[tuple[str, ...]] = [head]
+    lines: list[tuple[str, ...]] = []
     for row in rows:
         if row.sizes is None:
             continue
@@ -137,31 +132,31 @@ def _quality_table(rows: list[Row]) -> str:
         )
         sizes = (f"{row.tilt_rad:.4f}", f"{row.sizes.code:,}", f"{row.sizes.ram:,}")
         lines.append((row.title, *shares, *sizes, _heap(row)))
-    return _lines(lines)
+    return table(head, lines)
 
 
 def _heap(row: Row) -> str:
     if row.heap_after > 0:
-        return f"{row.heap_after:.0f} calls an update"
+        return f"{row.heap_after:.0f} calls per update"
     return "set-up only" if row.heap_first else "no"
 
 
 def write_report(
     rows: list[Row], machine: str, agreement: dict[str, str], nothing: Timing, folder: Path
 ) -> str:
-    """Write times.md, times.csv, times.png and times.svg into `folder`; returns the text of the first."""
+    """Write times.md, times.csv, times.png and times.svg into `folder`; returns the Markdown."""
     folder.mkdir(parents=True, exist_ok=True)
     parts = [machine]
     for flags, spelled in FLAGS.items():
-        parts += [f"`{spelled}`, ns an update, median / 99th percentile:", _times_table(rows, flags)]
-    parts += ["Against the aims, from the least to the most over W, T, F and C:", _aims_table(rows)]
-    parts += ["How good the plans are, and what they take (bytes, x86-64, `-O2`):", _quality_table(rows)]
+        parts += [f"`{spelled}`, ns per update, median / 99th percentile:", _times_table(rows, flags)]
+    parts += ["Aims, from the least to the most over W, T, F and C:", _aims_table(rows)]
+    parts += ["Quality of the plans, and memory (bytes, x86-64, `-O2`):", _quality_table(rows)]
     same = "; ".join(f"{title}, {count} states" for title, count in agreement.items())
     versions: dict[str, str] = {}
     for row in rows:
         versions |= row.versions
     parts += [
-        f"Plain roll-out and generated C plan the same, within 1e-6 rad: {same}. Clock and call, taken off: "
+        f"Plans of roll-out and generated C agree within 1e-6 rad: {same}. Clock and call, subtracted: "
         f"{nothing.hot['C'][0]:.0f} ns, cold {nothing.cold:.0f} ns. "
         f"Versions: {', '.join(f'{name} {version}' for name, version in versions.items())}."
     ]
@@ -184,7 +179,7 @@ def _write_csv(rows: list[Row], path: Path) -> None:
 
 
 def _draw(rows: list[Row], stem: Path) -> None:
-    """Draw a panel for each build: a row for each contender, its sets as markers, time on a common scale."""
+    """Draw a panel for each build: a row for each contender, a marker for each set, a common time axis."""
     with style():
         figure = Figure(figsize=(10.5, 0.32 * len(rows) + 1.6), layout="constrained")
         panels = figure.subplots(1, len(FLAGS), sharey=True, sharex=True)
@@ -213,4 +208,4 @@ def _draw_panel(axes: Axes, rows: list[Row], flags: str) -> None:
         label = "C, cold caches" if place == 0 else None
         axes.plot(timing.cold, place, "x", color=colour, markersize=5, linestyle="none", label=label)
     axes.set_xscale("log")
-    axes.set_xlabel("ns an update: median, and line to the 99th percentile")
+    axes.set_xlabel("ns per update: median, and line to the 99th percentile")

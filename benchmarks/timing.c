@@ -1,5 +1,5 @@
-/* Time one contender, call by call. Every reading of the clock waits for what came before it; what the readings
- * and the call itself take is measured with a call of nothing, and not taken off here. */
+/* Time each call of one contender. The clock readings are serialising. The overhead of clock and call is measured
+ * separately, with an empty call, and not subtracted here. */
 #define _POSIX_C_SOURCE 199309L
 
 #include <stddef.h>
@@ -23,7 +23,7 @@ static long long now_ns(void)
     return (now.tv_sec * 1000000000LL) + now.tv_nsec;
 }
 
-/* Read a byte of every cache line, so that nothing else stays in a cache that is smaller. */
+/* Read a byte of every cache line, which evicts everything else from caches smaller than `bytes`. */
 static unsigned char sweep(const volatile unsigned char *room, size_t bytes)
 {
     unsigned char sum = 0;
@@ -35,10 +35,10 @@ static unsigned char sweep(const volatile unsigned char *room, size_t bytes)
     return sum;
 }
 
-/* Run `run`, or nothing if it is null, on `count` inputs of six numbers: error and last command. If `follows`,
- * the last command is that of the call before, from level on, and not the input's. `room`, if any, is swept
- * before each call; clock and inputs are then used once more, so that of all only the contender is cold.
- * `ns` is what each call took, `moves` (count, 4) what it planned. */
+/* Call `run`, or an empty function if it is null, on `count` inputs (6): error and last command. If `follows`, the
+ * last command is that of the previous call, initially 0. If `room` is given, it is swept before each call, then
+ * clock and inputs are used once, so that only the contender's code and data are cold.
+ * Outputs: `ns` (count), the time of each call, and `moves` (count, 4), its plan. */
 void timing_measure(run_t *run, const float *inputs, int count, int follows, const unsigned char *room, size_t bytes,
                     double *ns, float *moves)
 {

@@ -28,7 +28,7 @@ def same_bits(
     """Run the same frozen steps in every build at hand; exit 1 unless all digests are one."""
     from mambo_nmpc.codegen.digest import TICKS, episode_count
     from mambo_nmpc.sil.cli.progress import progress_bar
-    from mambo_nmpc.sil.footprint.same_bits import REFERENCE, BuildDigest, builds, run_everywhere
+    from mambo_nmpc.sil.footprint.same_bits import REFERENCE, BuildDigest, count_builds, run_everywhere
 
     settings = load(source, scalar)
     chosen = [one for name in board.split(",") for one in load_boards(name)]
@@ -37,7 +37,7 @@ def same_bits(
     with progress_bar("comparing builds") as progress:
         for result in run_everywhere(settings, chosen, count):
             found.append(result)
-            progress(len(found) / builds(chosen))
+            progress(len(found) / count_builds(chosen))
             if not as_json:
                 what = result.reason if result.digest is None else result.digest
                 typer.echo(f"{result.where:12}{result.compiler:26}{result.optimisation:5}{what}")

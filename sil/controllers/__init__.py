@@ -1,1 +1,1 @@
-"""Position controllers: whatever has `step()`."""
+"""Position controllers: classes with `step(state, target, thrust)`."""

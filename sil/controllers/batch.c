@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Steps n controllers at once for Python. Compiled together with a bundle, never part of one.
+ * Steps n controllers in one call from Python. Compiled with a bundle, not part of it.
  */
 #include "nmpc.h"
 
-/* Where the outcome of a step goes: an element, or NMPC_MOVES of them, for each controller. */
+/* Output arrays of a step: for each controller one element, of gradient and plan_rad NMPC_MOVES. */
 typedef struct {
     int *status;
     nmpc_command_t *command;

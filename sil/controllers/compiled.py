@@ -1,4 +1,4 @@
-"""The compiled controller: the generated C behind the interface of the reference."""
+"""The compiled controller: the generated C with the interface of the reference controller."""
 
 from collections.abc import Sequence
 from types import ModuleType
@@ -17,18 +17,20 @@ from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
 from mambo_nmpc.sil.controllers.extension import load_extension
 
 
-def plainly_named(settings: Settings) -> Settings:
-    """Return `settings` with the default prefix: names do not change what is computed."""
+def with_default_prefix(settings: Settings) -> Settings:
+    """Return `settings` with the prefix nmpc, which the Python side expects; no computed value changes."""
     return with_option(settings, "code.prefix", "nmpc")
 
 
-def compiled(settings: Settings, toolchain: Toolchain) -> ModuleType:
-    """Generate and build the C of `settings` for this machine."""
-    return load_extension(render(plainly_named(settings), with_digest=False), settings.code.scalar, toolchain)
+def build_extension(settings: Settings, toolchain: Toolchain) -> ModuleType:
+    """Generate the C of `settings` and build it as a Python extension; raises BuildError, CacheError."""
+    return load_extension(
+        render(with_default_prefix(settings), with_digest=False), settings.code.scalar, toolchain
+    )
 
 
-def compiled_digest(extension: ModuleType, episodes: int) -> int:
-    """Return the self-test digest on this machine."""
+def digest_compiled(extension: ModuleType, episodes: int) -> int:
+    """Return the self-test digest, computed by the C on this machine."""
     scratch = extension.ffi.new("nmpc_t *")
     digest = 0
     for episode in range(episodes):
@@ -39,7 +41,7 @@ def compiled_digest(extension: ModuleType, episodes: int) -> int:
 def as_arrays(
     numbers: Representation, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
 ) -> list[NDArray[Any]]:
-    """Return inputs of n controllers as they read them; raises ValueError if a shape is another."""
+    """Return state (n, 7), target (n, 4), thrust (n,) as the C reads them; raises ValueError for shapes."""
     return [
         as_array(numbers, values, quantities, shape)
         for values, quantities, shape in (
@@ -53,7 +55,7 @@ def as_arrays(
 def as_array(
     numbers: Representation, values: ArrayLike, quantities: Sequence[str], shape: tuple[int, ...]
 ) -> NDArray[Any]:
-    """Return `values` as the C reads them, contiguous; raises ValueError if the shape is another."""
+    """Return `values` as a contiguous array of the C's type; raises ValueError unless they have `shape`."""
     given = np.asarray(values)
     if given.shape != shape:
         raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
@@ -62,11 +64,11 @@ def as_array(
 
 
 DIRT = b"\xa5"
-"""What fills the memory of a controller before nmpc_init, as memory of a board is not zero either."""
+"""Fills a controller's memory before nmpc_init, since memory on a board is not zero either."""
 
 
 class CompiledController:
-    """n controllers in generated C, behind the interface of `codegen.reference.ReferenceController`."""
+    """n controllers in generated C, with the interface of `codegen.reference.ReferenceController`."""
 
     def __init__(self, settings: Settings, n: int = 1, extension: ModuleType | None = None) -> None:
         self.settings = settings
@@ -74,18 +76,18 @@ class CompiledController:
         self.scalar = self._numbers.scalar
         self._n = n
         self._moves = (settings.horizon.control, 2)
-        extension = extension or compiled(settings, host_toolchain())
+        extension = extension or build_extension(settings, host_toolchain())
         self._ffi, self._lib = extension.ffi, extension.lib
         self._controllers = self._ffi.new("nmpc_t[]", n)
         self._ffi.buffer(self._controllers)[:] = DIRT * self._ffi.sizeof(self._controllers)
         self._lib.nmpc_batch_init(self._controllers, n)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Start all controllers over from `command_rad` (n, 2), clamped; returns a status (n,)."""
+        """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
         return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad, COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Replace tracking and effort weight by `weights` (n, 2); returns a status (n,)."""
+        """Set tracking and effort weight to `weights` (n, 2); returns a status (n,)."""
         return self._set_each(self._lib.nmpc_set_weights, "nmpc_weights_t", weights, WEIGHTS)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:

@@ -1,8 +1,7 @@
-"""The emulated controller: the C as built for a board, on an emulated core, behind the same interface."""
+"""The emulated controller: the C built for a board, run on an emulated core, with the same interface."""
 
 import math
 from collections.abc import Iterator
-from importlib import resources
 from pathlib import Path
 from typing import Final
 
@@ -15,35 +14,36 @@ from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import OUTCOME
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, plainly_named
+from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, with_default_prefix
+from mambo_nmpc.sil.controllers.extension import batch_source
 from mambo_nmpc.sil.emulation.avr import Long
 from mambo_nmpc.sil.emulation.machine import TIME_LIMIT_S, start
 from mambo_nmpc.sil.errors import EmulatorError
 from mambo_nmpc.sil.firmware.build import Builder
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
-"""Functions of the guest that are called from outside."""
+"""Functions of the emulated program that Python calls."""
 
-_WORK_A_CALL: Final = 2_000
-"""Predicted steps times moves times iterations in one call of the guest, which has to end in time."""
+_MAX_WORK: Final = 2_000
+"""Most prediction steps x moves x iterations in one call, so that it ends within its time limit."""
 
-_SECONDS_A_WORK: Final = 2e-4
-"""What is granted for it on top of TIME_LIMIT_S: ten times what the slowest core takes on a slow machine."""
+_SECONDS_PER_WORK: Final = 2e-4
+"""Time limit for each of these, ten times what the slowest core takes on a slow machine."""
 
-_MOST_PADDING: Final = 16
-"""Bytes that the alignment of an array may take."""
+_MAX_PADDING: Final = 16
+"""Upper bound of the bytes that alignment adds to an array."""
 
 
 def build_guest(settings: Settings, builder: Builder, folder: Path) -> Path:
-    """Build the program for an emulated core: the bundle of `settings` and the loop over n controllers."""
-    glue = resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
-    return builder.guest(render(plainly_named(settings), with_digest=False), glue, GUEST, folder)
+    """Build the program for an emulated core: the bundle of `settings` and a loop over n controllers."""
+    files = render(with_default_prefix(settings), with_digest=False)
+    return builder.guest(files, batch_source(), GUEST, folder)
 
 
 class EmulatedController:
-    """n controllers on one emulated core, in a program that `build_guest` made for it.
+    """n controllers on one emulated core that runs a program of `build_guest`.
 
-    They rest in this process and visit the core a few at a time, so that its memory holds any number of them.
+    The instances are stored in this process and copied to the core in batches that fit its memory.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class EmulatedController:
         self._n = n
         horizon = settings.horizon
         work = _work(settings)
-        limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * max(work, _WORK_A_CALL)
+        limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * max(work, _MAX_WORK)
         self.machine = start(elf, core, limit_s, counting=counting)
         integer = np.dtype(f"<i{self.machine.word_bytes}")
         self._shapes = {
@@ -71,32 +71,32 @@ class EmulatedController:
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
         sizes = [self._instance_bytes, *(width * real.itemsize for width in (7, 4, 1))]
         sizes += [kind.itemsize * math.prod(shape) for kind, shape in self._shapes.values()]
-        self._together = min(n, max(1, _WORK_A_CALL // work), self._room(sizes) // sum(sizes))
-        if self._together < 1:
+        self._batch_size = min(n, max(1, _MAX_WORK // work), self._room(sizes) // sum(sizes))
+        if self._batch_size < 1:
             raise EmulatorError(
-                f"a controller and what it is given take {sum(sizes)} B, "
-                f"of which the emulated core has {self.machine.free_bytes} B free"
+                f"a controller with its inputs and outputs takes {sum(sizes)} B, "
+                f"but the emulated core has only {self.machine.free_bytes} B free"
             )
-        addresses = [self.machine.allocate(self._together * size) for size in sizes]
+        addresses = [self.machine.allocate(self._batch_size * size) for size in sizes]
         self._controller, self._inputs, outputs = addresses[0], addresses[1:4], addresses[4:]
         self._outputs = dict(zip(self._shapes, outputs, strict=True))
         self._outcome = self.machine.allocate(len(outputs) * self.machine.word_bytes)
         self.machine.write(self._outcome, np.array(outputs, f"<u{self.machine.word_bytes}").tobytes())
-        self._resting = bytearray(DIRT * (n * self._instance_bytes))
-        for few in self._visits():
-            self._visit(few, "nmpc_batch_init")
+        self._instances = bytearray(DIRT * (n * self._instance_bytes))
+        for batch in self._batches():
+            self._run_batch(batch, "nmpc_batch_init")
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
         inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
         outcome = {name: np.empty((self._n, *shape), kind) for name, (kind, shape) in self._shapes.items()}
-        for few in self._visits():
+        for batch in self._batches():
             for address, values in zip(self._inputs, inputs, strict=True):
-                self.machine.write(address, values[few].tobytes())
-            self._visit(few, "nmpc_batch_step", *self._inputs, self._outcome)
+                self.machine.write(address, values[batch].tobytes())
+            self._run_batch(batch, "nmpc_batch_step", *self._inputs, self._outcome)
             for name, values in outcome.items():
-                content = self.machine.read(self._outputs[name], values[few].nbytes)
-                values[few] = np.frombuffer(content, values.dtype).reshape(values[few].shape)
+                content = self.machine.read(self._outputs[name], values[batch].nbytes)
+                values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
         for name, quantity in OUTCOME.items():
             outcome[name] = self._numbers.to_si(outcome[name], quantity)
         return Step(
@@ -109,28 +109,26 @@ class EmulatedController:
         )
 
     def _room(self, sizes: list[int]) -> int:
-        """Return the bytes for controllers: what is free less the pointers, and what alignment may take."""
-        return (
-            self.machine.free_bytes - len(sizes) * (self.machine.word_bytes + _MOST_PADDING) - _MOST_PADDING
-        )
+        """Return the free bytes, less the pointers to the outputs and the alignment of every array."""
+        return self.machine.free_bytes - len(sizes) * (self.machine.word_bytes + _MAX_PADDING) - _MAX_PADDING
 
-    def _visits(self) -> Iterator[slice]:
-        """Yield which controllers are on the core together, in turn."""
-        for first in range(0, self._n, self._together):
-            yield slice(first, min(first + self._together, self._n))
+    def _batches(self) -> Iterator[slice]:
+        """Yield the indices of the controllers of each batch."""
+        for first in range(0, self._n, self._batch_size):
+            yield slice(first, min(first + self._batch_size, self._n))
 
-    def _visit(self, few: slice, function: str, *arguments: int) -> None:
-        """Take a few controllers to the core, call `function` on them, and take them back."""
-        size, count = self._instance_bytes, few.stop - few.start
-        place = slice(few.start * size, few.stop * size)
-        self.machine.write(self._controller, bytes(self._resting[place]))
+    def _run_batch(self, batch: slice, function: str, *arguments: int) -> None:
+        """Copy a batch of instances to the core, call `function` on them, and copy them back."""
+        size, count = self._instance_bytes, batch.stop - batch.start
+        place = slice(batch.start * size, batch.stop * size)
+        self.machine.write(self._controller, bytes(self._instances[place]))
         self.machine.call(function, self._controller, count, *arguments)
-        self._resting[place] = self.machine.read(self._controller, count * size)
+        self._instances[place] = self.machine.read(self._controller, count * size)
 
 
-def emulated_digest(settings: Settings, elf: Path, core: str, episodes: int) -> int:
-    """Return the self-test digest on an emulated core, from a program of `build_guest`."""
-    limit_s = TIME_LIMIT_S + _SECONDS_A_WORK * _work(settings) * TICKS
+def digest_emulated(settings: Settings, elf: Path, core: str, episodes: int) -> int:
+    """Return the self-test digest, computed by a program of `build_guest` on an emulated core."""
+    limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * _work(settings) * TICKS
     machine = start(elf, core, limit_s)
     scratch = machine.allocate(machine.call("nmpc_batch_instance_bytes"))
     digest = 0

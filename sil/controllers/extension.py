@@ -1,7 +1,7 @@
-"""Build a rendered bundle as a Python extension, once, and load it.
+"""Build a rendered bundle as a Python extension, cache it, and load it.
 
-cffi's API mode lets the C compiler check every declaration below against the bundle's own headers. The
-extension is linked here rather than by setuptools, whose flags are Python's and not the bundle's.
+In cffi's API mode the C compiler checks the declarations below against the bundle's headers. setuptools would
+compile with Python's flags instead of the bundle's, so compiler and linker are called here.
 """
 
 import hashlib
@@ -73,14 +73,19 @@ _INCLUDES: Final = "".join(
 )
 
 
-def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> ModuleType:
-    """Return the extension of a bundle with prefix nmpc: a module that has cffi's `ffi` and `lib`.
+def batch_source() -> str:
+    """Return the C that loops over n controllers, to compile with a bundle."""
+    return resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
 
-    It is built with `toolchain` unless the cache has it. Raises BuildError and CacheError.
+
+def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> ModuleType:
+    """Return the extension of a bundle with prefix nmpc: a module with cffi's `ffi` and `lib`.
+
+    Builds it with `toolchain` unless it is cached; raises BuildError, CacheError.
     """
-    glue = _INCLUDES + resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
+    glue = _INCLUDES + batch_source()
     suffix = sysconfig.get_config_var("EXT_SUFFIX")
-    made_of = (
+    contents = (
         files,
         glue,
         _DECLARATIONS,
@@ -90,21 +95,21 @@ def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> 
         suffix,
         cffi.__version__,
     )
-    name = f"_nmpc_{hashlib.sha256(repr(made_of).encode()).hexdigest()[:32]}"
+    name = f"_nmpc_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}"
     if name not in sys.modules:
 
         def build(folder: Path) -> Path:
-            _place(files, folder)
+            _write_files(files, folder)
             _emit_glue(name, glue, scalar, folder)
             return _compile(
                 sorted(path for path in files if re.fullmatch(r"src/.*\.c", path)), toolchain, folder
             )
 
-        sys.modules[name] = _loaded(name, cached(f"{name}{suffix}", build))
+        sys.modules[name] = _load(name, cached(f"{name}{suffix}", build))
     return sys.modules[name]
 
 
-def _place(files: dict[str, str], folder: Path) -> None:
+def _write_files(files: dict[str, str], folder: Path) -> None:
     for path, text in files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, "utf-8")
@@ -121,21 +126,21 @@ def _compile(sources: list[str], toolchain: Toolchain, folder: Path) -> Path:
     """Compile the bundle's sources with its own flags, and the glue with Python's headers."""
     headers = Path(sysconfig.get_paths()["include"])
     if not (headers / "Python.h").is_file():
-        raise BuildError(f"no Python.h in {headers}; install Python's headers, such as Debian's python3-dev")
+        raise BuildError(f"no Python.h in {headers}; install Python's headers (Debian: python3-dev)")
     objects = [Path(source).with_suffix(".o").name for source in sources]
     flags = [*COMPILE_FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
     toolchain.run([*flags, "-fPIC", "-Iinclude", "-c", *sources], folder)
     glue_flags = ["-O2", "-ffp-contract=off", "-fPIC", "-Iinclude", "-Isrc", f"-I{headers}"]
     link = ["-shared", *(["-undefined", "dynamic_lookup"] if sys.platform == "darwin" else [])]
     toolchain.run([*glue_flags, *link, "extension.c", *objects, "-o", "extension.so"], folder)
-    made = folder / "extension.so"
-    if not made.is_file():
-        raise BuildError(f"{shlex.join(toolchain.command)} made nothing; is it a C compiler? CC names it")
-    return made
+    built = folder / "extension.so"
+    if not built.is_file():
+        raise BuildError(f"{shlex.join(toolchain.command)} wrote no output; set CC to a C compiler")
+    return built
 
 
-def _loaded(name: str, path: Path) -> ModuleType:
-    """Load the extension at `path`; raises CacheError."""
+def _load(name: str, path: Path) -> ModuleType:
+    """Load the extension at `path`; raises CacheError if that fails."""
     loader = importlib.machinery.ExtensionFileLoader(name, str(path))
     spec = importlib.util.spec_from_file_location(name, path, loader=loader)
     assert spec is not None  # a loader was given
@@ -145,6 +150,6 @@ def _loaded(name: str, path: Path) -> ModuleType:
     except ImportError as error:
         reason = str(error).removeprefix(f"{path}: ")
         raise CacheError(
-            f"cannot load {path}: {reason}; if its folder is mounted noexec, set XDG_CACHE_HOME to another"
+            f"cannot load {path}: {reason}; if its folder is mounted noexec, set XDG_CACHE_HOME elsewhere"
         ) from error
     return module

@@ -1,4 +1,4 @@
-"""The optimizer's inner steps, watched: what each iteration evaluated, and which way it decided to go."""
+"""Record the optimizer's iterations within a control step: plan, cost, gradient, sign decision, step size."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +17,13 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 @dataclass(frozen=True)
 class InnerSteps:
-    """The iterations (i) of one control step of n controllers; what a refused step holds means nothing.
+    """The i iterations of one control step of n controllers; values of refused steps are meaningless.
 
-    plan_rad: (i, n, control, 2) the plan that each iteration evaluated.
+    plan_rad: (i, n, control, 2) plan that each iteration evaluates, rad.
     cost:     (i, n) its cost.
     gradient: (i, n, control, 2) its gradient, per rad.
 
-    With fixed point the numbers are those of the controller, converted exactly to SI units in float64.
+    Fixed-point values are converted to SI units in float64 without rounding.
     """
 
     plan_rad: Real
@@ -31,7 +31,7 @@ class InnerSteps:
     gradient: Real
 
     def decisions(self, settings: Settings) -> NDArray[np.int8]:
-        """Return the sign (i, n, control, 2) by which RPROP updates each move: 0 once the cost is at rest."""
+        """Return the gradient signs (i, n, control, 2) that RPROP uses: all 0 after convergence."""
         numbers = Design(settings).numbers
         tolerance = numbers.to_si(numbers.constant(settings.optimizer.tolerance, "cost"), "cost")
         at_rest = np.zeros(self.cost.shape, np.bool_)
@@ -39,7 +39,7 @@ class InnerSteps:
         return np.where(at_rest[:, :, None, None], 0, sign(self.gradient)).astype(np.int8)
 
     def step_sizes_rad(self, settings: Settings) -> Real:
-        """Return RPROP's step size (i, n, control, 2) after it has heard the sign of each iteration."""
+        """Return RPROP's step sizes (i, n, control, 2) after the update of each iteration."""
         design = Design(settings)
         rprop = Rprop(settings, arithmetic(design))
         size = np.full(self.plan_rad[0].shape, rprop.initial_step)
@@ -54,7 +54,7 @@ class InnerSteps:
 
 
 class WatchedController:
-    """n reference controllers that keep the inner steps of every control step."""
+    """n reference controllers that record the iterations of every control step."""
 
     def __init__(self, settings: Settings, n: int = 1) -> None:
         self.settings = settings
@@ -65,7 +65,7 @@ class WatchedController:
         self._evaluated: list[tuple[Any, Any, Any]] = []
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
-        """Compute the next commands, as `ReferenceController.step`."""
+        """Compute the next commands like `ReferenceController.step`, and append to `steps`."""
         self._evaluated = []
         step = self.controller.step(state, target, thrust_acceleration_m_s2)
         self.steps.append(InnerSteps(*(np.stack(values) for values in zip(*self._evaluated, strict=True))))
@@ -83,14 +83,14 @@ class WatchedController:
         return rprop.minimize(watch, start)
 
 
-def watched_step(
+def step_watched(
     settings: Settings,
     memory: Memory,
     state: ArrayLike,
     target: ArrayLike,
     thrust_acceleration_m_s2: ArrayLike,
 ) -> tuple[Step, InnerSteps]:
-    """Let n reference controllers that remember `memory` step once, and return what they did inside."""
+    """Step n reference controllers once from `memory`; returns the step and its iterations."""
     watched = WatchedController(settings, len(memory.command_rad))
     watched.controller.memory = memory
     step = watched.step(state, target, thrust_acceleration_m_s2)
@@ -98,9 +98,9 @@ def watched_step(
 
 
 def write_inner_steps(watched: WatchedController, path: Path) -> None:
-    """Write all inner steps of a flight as NPZ: arrays (k, i, n, ...) named as in `InnerSteps`.
+    """Write the iterations of k control steps as NPZ: the arrays of `InnerSteps`, and `step_size_rad`.
 
-    `step_size_rad` is beside them.
+    Each has shape (k, i, n, ...).
     """
     with path.open("wb") as file:
         np.savez_compressed(

@@ -1,4 +1,4 @@
-"""The stock position controller of the Mambo: the PD that the paper compares against.
+"""The stock PD position controller of the Mambo, the paper's baseline.
 
 Source: block "XY to angles" of the MathWorks asbQuadcopter example; Kp = 0.24, Kd = 0.1 as in the paper
 (section III), after Pounds et al.
@@ -18,18 +18,16 @@ ERROR_LIMIT_M = 3.0
 
 @dataclass(frozen=True, eq=False)
 class PdOutcome:
-    """Result of one step."""
+    """Result of one step: `command_rad` (n, 2), roll and pitch, and `status` (n,), always 0."""
 
     command_rad: FloatArray
-    """Roll and pitch (n, 2)."""
     status: NDArray[np.int64]
-    """Always 0: there is nothing that a PD could report (n,)."""
 
 
 class PdController:
-    """Angles in proportion to the position error, damped by the velocity.
+    """Tilt = P x position error - D x velocity, in body axes.
 
-    It knows no reference velocity and no limit on the angles; only the error is clamped, per axis.
+    The error is clamped per axis, the tilt is not; the target's velocity is ignored.
     """
 
     def step(
@@ -38,9 +36,9 @@ class PdController:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> PdOutcome:
-        """Return the command for states (n, 7) and targets (n, 4).
+        """Return the commands for states (n, 7) and targets (n, 4) in the world frame.
 
-        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy], in the world frame.
+        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy] in m, m/s and rad.
         """
         sine, cosine = np.sin(state[:, 6]), np.cos(state[:, 6])
         error_x, error_y = target[:, 0] - state[:, 0], target[:, 1] - state[:, 1]

@@ -1,8 +1,7 @@
-"""An emulated core: a program in memory, its functions called by name, its instructions counted.
+"""Emulated cores: load a program, call its functions by name, count its instructions.
 
-Unicorn runs ARM and RISC-V inside this process; AVR, which it has not, runs in a QEMU beside it. Either way
-a guest that dies, hangs or is interrupted leaves nothing behind, and a call that faults or does not return
-within its time limit raises EmulationError.
+Unicorn emulates ARM and RISC-V in this process, QEMU emulates AVR in a process of its own. A call that faults
+or exceeds its time limit raises EmulationError and leaves the machine usable; no process outlives it.
 """
 
 from collections import Counter
@@ -15,14 +14,14 @@ from mambo_nmpc.sil.emulation.unicorn import MODELS, UnicornMachine
 TIME_LIMIT_S: Final = 1.0
 AVR: Final = "avr"
 CORES: Final = (*MODELS, AVR)
-"""The cores that boards name as `emulated_core`. All are little-endian."""
+"""Values of a board's `emulated_core`; all cores are little-endian."""
 
 
 class Machine(Protocol):
-    """A core with the program of an ELF file, a stack, and room for data.
+    """A core with a program, a stack, and memory to allocate.
 
-    `word_bytes` is the width of an int and of a pointer; `free_bytes` what can still be allocated; `stack`
-    the addresses that a call can use, its return address included where a call pushes it.
+    `word_bytes` is the size of int and of a pointer, `free_bytes` the memory left to allocate, `stack` the
+    address range of the stack, including the return address if calls push it.
     """
 
     @property
@@ -33,7 +32,7 @@ class Machine(Protocol):
     def stack(self) -> range: ...  # noqa: D102
 
     def allocate(self, size: int) -> int:
-        """Return the address of `size` bytes of data."""
+        """Allocate `size` bytes; returns their address."""
         ...
 
     def write(self, address: int, content: bytes) -> None:
@@ -45,21 +44,21 @@ class Machine(Protocol):
         ...
 
     def call(self, function: str, *arguments: int) -> int:
-        """Call `function` with ints, pointers and Long's; returns its result, an unsigned long.
+        """Call `function` with arguments of type int, pointer or Long; returns an unsigned long.
 
-        Raises EmulationError if it dies or does not return in time; the next call is none the worse for it.
+        Raises EmulationError if it faults or exceeds the time limit; the machine stays usable.
         """
         ...
 
-    def counted(self) -> Counter[int]:
-        """Return the instructions run since the last time, by the address at which a run of them begins."""
+    def take_counts(self) -> Counter[int]:
+        """Return the instructions executed since the last call, by start address of their basic block."""
         ...
 
 
 def start(elf: Path, core: str, time_limit_s: float = TIME_LIMIT_S, *, counting: bool = False) -> Machine:
-    """Put a program on a core, of which `counted` works only if it is `counting`.
+    """Load a program into an emulated core; `take_counts` needs `counting`.
 
-    Raises EmulatorError if there is no emulator for the core, or the program does not fit into it.
+    Raises EmulatorError if the emulator is missing or the program does not fit into memory.
     """
     if core == AVR:
         return AvrMachine(elf, time_limit_s, counting=counting)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Counts instructions for Python: a plugin for QEMU, whose interface it declares as far as it uses it
- * (QEMU manual, TCG plugins). Its one argument, counts=N, names an open file of 64-bit counts by the word address
- * at which a run of instructions begins.
+ * QEMU plugin that counts instructions (QEMU manual, TCG plugins); it declares the functions of QEMU that it uses.
+ * Its argument counts=N is the descriptor of a file of 64-bit counts, one for each word address of flash: the
+ * instructions executed in the translation blocks that begin there.
  */
 #include <stddef.h>
 #include <stdint.h>
@@ -12,10 +12,10 @@
 
 struct qemu_plugin_tb;
 
-size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb *run);
-uint64_t qemu_plugin_tb_vaddr(const struct qemu_plugin_tb *run);
-void qemu_plugin_register_vcpu_tb_trans_cb(uint64_t id, void (*translated)(uint64_t id, struct qemu_plugin_tb *run));
-void qemu_plugin_register_vcpu_tb_exec_cb(struct qemu_plugin_tb *run, void (*entered)(unsigned int cpu, void *data),
+size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb *block);
+uint64_t qemu_plugin_tb_vaddr(const struct qemu_plugin_tb *block);
+void qemu_plugin_register_vcpu_tb_trans_cb(uint64_t id, void (*callback)(uint64_t id, struct qemu_plugin_tb *block));
+void qemu_plugin_register_vcpu_tb_exec_cb(struct qemu_plugin_tb *block, void (*callback)(unsigned int cpu, void *data),
                                           int flags, void *data);
 int qemu_plugin_install(uint64_t id, const void *info, int argc, char **argv);
 
@@ -23,20 +23,20 @@ int qemu_plugin_version = QEMU_PLUGIN_INTERFACE;
 
 static uint64_t *counts;
 
-/* `data` is the number of instructions, and in its lower half their word address. */
-static void entered(unsigned int cpu, void *data)
+/* `data`: number of instructions in the upper half, word address of the block in the lower. */
+static void count_block(unsigned int cpu, void *data)
 {
     (void)cpu;
     counts[(uintptr_t)data & 0xFFFFFFFFU] += (uintptr_t)data >> 32;
 }
 
-static void translated(uint64_t id, struct qemu_plugin_tb *run)
+static void instrument_block(uint64_t id, struct qemu_plugin_tb *block)
 {
-    const uintptr_t where = (uintptr_t)(qemu_plugin_tb_vaddr(run) / 2U);
-    const uintptr_t count = (uintptr_t)qemu_plugin_tb_n_insns(run);
+    const uintptr_t address = (uintptr_t)(qemu_plugin_tb_vaddr(block) / 2U);
+    const uintptr_t count = (uintptr_t)qemu_plugin_tb_n_insns(block);
 
     (void)id;
-    qemu_plugin_register_vcpu_tb_exec_cb(run, entered, 0, (void *)((count << 32) | where));
+    qemu_plugin_register_vcpu_tb_exec_cb(block, count_block, 0, (void *)((count << 32) | address));
 }
 
 int qemu_plugin_install(uint64_t id, const void *info, int argc, char **argv)
@@ -56,6 +56,6 @@ int qemu_plugin_install(uint64_t id, const void *info, int argc, char **argv)
     if (counts == MAP_FAILED) {
         return 1;
     }
-    qemu_plugin_register_vcpu_tb_trans_cb(id, translated);
+    qemu_plugin_register_vcpu_tb_trans_cb(id, instrument_block);
     return 0;
 }

@@ -1,4 +1,4 @@
-"""ARM and RISC-V cores inside this process: Unicorn, QEMU's core, does the work."""
+"""ARM and RISC-V cores, emulated in this process by Unicorn."""
 
 import bisect
 import time
@@ -15,8 +15,8 @@ from mambo_nmpc.sil.errors import EmulationError
 from mambo_nmpc.sil.firmware.disassembly import disassemble
 from mambo_nmpc.sil.firmware.elf import load
 
-_WATCHED_SLOWDOWN: Final = 30
-"""How much longer a call may take when every run of instructions is reported to Python."""
+_COUNTING_SLOWDOWN: Final = 30
+"""Factor on the time limit when Unicorn reports every basic block to Python."""
 
 _DATA_BYTES: Final = 0x100000
 
@@ -30,7 +30,7 @@ _ALIGNMENT: Final = 16
 
 @dataclass(frozen=True)
 class CoreModel:
-    """How one kind of core is made and called."""
+    """Unicorn's constants of one core: its model, and the registers of its calling convention."""
 
     architecture: int
     mode: int
@@ -77,7 +77,7 @@ MODELS: Final = {
 
 
 class UnicornMachine:
-    """A core with the program of an ELF file, a stack, and room for data."""
+    """A `Machine` in this process."""
 
     word_bytes: Final = 4
 
@@ -97,24 +97,24 @@ class UnicornMachine:
         if "__global_pointer$" in self._symbols:
             self._engine.reg_write(riscv_const.UC_RISCV_REG_GP, self._symbols["__global_pointer$"])
         self._next = _STACK_TOP
-        self._runs: Counter[tuple[int, int]] = Counter()
+        self._block_counts: Counter[tuple[int, int]] = Counter()
         if counting:
             self._starts = sorted(disassemble(load(elf)).instructions)
-            self._time_limit_s *= _WATCHED_SLOWDOWN
-            self._engine.hook_add(unicorn.UC_HOOK_BLOCK, self._ran)
+            self._time_limit_s *= _COUNTING_SLOWDOWN
+            self._engine.hook_add(unicorn.UC_HOOK_BLOCK, self._record_block)
 
     @property
     def free_bytes(self) -> int:
-        """Return how much can still be allocated."""
+        """Return the bytes left to allocate."""
         return _STACK_TOP + _DATA_BYTES - self._next
 
     @property
     def stack(self) -> range:
-        """Return the addresses that a call can use."""
+        """Return the address range of the stack."""
         return range(_RAM_ADDRESS, _STACK_TOP - _ALIGNMENT)
 
     def allocate(self, size: int) -> int:
-        """Return the address of `size` bytes of data."""
+        """Allocate `size` bytes; returns their address."""
         address = self._next
         self._next += -(-size // _ALIGNMENT) * _ALIGNMENT
         assert self.free_bytes >= 0
@@ -128,20 +128,20 @@ class UnicornMachine:
         """Read memory."""
         return bytes(self._engine.mem_read(address, size))
 
-    def counted(self) -> Counter[int]:
-        """Return the instructions run since the last time, by the address at which a run of them begins."""
+    def take_counts(self) -> Counter[int]:
+        """Return the instructions executed since the last call, by start address of their basic block."""
         counts: Counter[int] = Counter()
-        for (address, size), times in self._runs.items():
+        for (address, size), times in self._block_counts.items():
             first, end = (bisect.bisect_left(self._starts, place) for place in (address, address + size))
             counts[address] += times * (end - first)
-        self._runs.clear()
+        self._block_counts.clear()
         return counts
 
-    def _ran(self, _engine: Any, address: int, size: int, _data: Any) -> None:
-        self._runs[address, size] += 1
+    def _record_block(self, _engine: Any, address: int, size: int, _data: Any) -> None:
+        self._block_counts[address, size] += 1
 
     def call(self, function: str, *arguments: int) -> int:
-        """Call `function` with what words fit in registers, the others on the stack; returns its result."""
+        """Call `function` with words in registers, then on the stack; returns its result."""
         core, engine = self._core, self._engine
         in_registers, on_stack = arguments[: len(core.arguments)], arguments[len(core.arguments) :]
         words = b"".join(word.to_bytes(4, "little") for word in on_stack)
@@ -155,7 +155,7 @@ class UnicornMachine:
         return int(engine.reg_read(core.result))
 
     def _run(self, function: str) -> None:
-        """Run until `function` returns; the limit is of processor time, which other processes do not take."""
+        """Run until `function` returns; the limit is processor time, which a busy machine does not use up."""
         engine, program_counter = self._engine, self._core.program_counter
         began_s, place = time.thread_time(), self._symbols[function]
         while place != _RETURN_ADDRESS:
@@ -168,7 +168,7 @@ class UnicornMachine:
                     place | self._core.thumb, _RETURN_ADDRESS, timeout=round(self._time_limit_s * 1e6)
                 )
             except unicorn.UcError as error:
-                raise EmulationError(f"{function} died at {self._where()}: {error}") from error
+                raise EmulationError(f"{function} faulted at {self._where()}: {error}") from error
             place = engine.reg_read(program_counter)
 
     def _where(self) -> str:

@@ -1,1 +1,1 @@
-"""What a controller costs on a board, measured on the linked program: flash, static RAM, worst-case stack."""
+"""Build firmware for a board; measure flash, static RAM and worst-case stack of the linked program."""

@@ -1,4 +1,4 @@
-"""A32 and Thumb instructions, as capstone decodes them, by their effects (ARM DDI 0406C, A8; AAPCS, 6.1)."""
+"""Effects of A32 and Thumb instructions, decoded by Capstone (ARM DDI 0406C, A8; AAPCS, 6.1)."""
 
 from typing import Any, Final
 
@@ -9,15 +9,15 @@ from mambo_nmpc.sil.firmware.instructions import (
     PC,
     SP,
     WORD_BYTES,
+    Add,
+    Assign,
+    Clobber,
     Convention,
     Effect,
     Flow,
-    Forget,
     Instruction,
     Load,
-    Put,
     Store,
-    Sum,
 )
 
 CONVENTION: Final = Convention("lr", frozenset({"r4", "r5", "r6", "r7", "r8", "sb", "sl", "fp"}))
@@ -33,18 +33,18 @@ _MULTIPLE: Final = {
     arm.ARM_INS_POP: ("load", 1, False),
     arm.ARM_INS_PUSH: ("store", -1, True),
 }
-"""Of each move of several registers: direction, sign of the address's steps, whether they come first."""
+"""Multiple loads and stores: direction, sign of the address step, whether it precedes each access."""
 _ALWAYS: Final = {arm.ARM_CC_AL, arm.ARM_CC_INVALID}
 _CALLS: Final = {arm.ARM_INS_BL, arm.ARM_INS_BLX}
 _ENDS: Final = {arm.ARM_INS_UDF, arm.ARM_INS_BKPT}
 
 
-def instruction(insn: Any, *, thumb: bool) -> Instruction:
-    """Return what capstone's `insn` does; an effect that is not modelled makes its registers anything."""
+def model_instruction(insn: Any, *, thumb: bool) -> Instruction:
+    """Return the effects of Capstone's `insn`; registers written in a way not modelled are clobbered."""
     effects = _effects(insn, ahead=4 if thumb else 8)
     written = {effect.register for effect in effects if not isinstance(effect, Store)}
     unknown = {insn.reg_name(register) for register in insn.regs_access()[1]} - written
-    effects = (*effects, *(Forget(register) for register in sorted(unknown)))
+    effects = (*effects, *(Clobber(register) for register in sorted(unknown)))
     jumps = PC in written | unknown or insn.group(capstone.CS_GRP_JUMP)
     flow: Flow = "jump" if jumps else "next"
     if insn.id in _CALLS:
@@ -62,7 +62,7 @@ def instruction(insn: Any, *, thumb: bool) -> Instruction:
 
 
 def _effects(insn: Any, ahead: int) -> tuple[Effect, ...]:
-    """Model what can move the stack pointer, save a register on the stack, or name a place in the program."""
+    """Model changes of the stack pointer, saves of registers, and the computation of addresses of code."""
     here = insn.address + ahead
     if insn.id in _MULTIPLE:
         return _multiple(insn)
@@ -73,9 +73,9 @@ def _effects(insn: Any, ahead: int) -> tuple[Effect, ...]:
     if insn.group(capstone.CS_GRP_JUMP):
         target = insn.operands[-1]
         if target.type == arm.ARM_OP_IMM:
-            return (Put(PC, None, target.imm),)
+            return (Assign(PC, None, target.imm),)
         register = insn.reg_name(target.reg)
-        return (Put(PC, None, here & ~3) if register == PC else Put(PC, register, 0),)
+        return (Assign(PC, None, here & ~3) if register == PC else Assign(PC, register, 0),)
     return _arithmetic(insn, here)
 
 
@@ -91,24 +91,24 @@ def _arithmetic(insn: Any, here: int) -> tuple[Effect, ...]:  # noqa: PLR0911 - 
     sign: Any = {arm.ARM_INS_ADD: 1, arm.ARM_INS_SUB: -1}.get(insn.id)
     match operands:
         case [str(register), int(value)] if insn.id == arm.ARM_INS_MOV:
-            return (Put(register, None, value),)
+            return (Assign(register, None, value),)
         case [str(register), str(base)] if insn.id == arm.ARM_INS_MOV and base != PC:
-            return (Put(register, base, 0),)
+            return (Assign(register, base, 0),)
         case [str(register), int(offset)] if insn.id == arm.ARM_INS_ADR:
-            return (Put(register, None, (here & ~3) + offset),)
+            return (Assign(register, None, (here & ~3) + offset),)
         case [str(register), int(offset)] if sign:
-            return (Put(register, register, sign * offset),)
+            return (Assign(register, register, sign * offset),)
         case [str(register), str(base), int(offset)] if sign and base != PC:
-            return (Put(register, base, sign * offset),)
+            return (Assign(register, base, sign * offset),)
         case [str(register), str(right)] if sign and PC not in {register, right}:
-            return (Sum(register, register, right, sign),)
+            return (Add(register, register, right, sign),)
         case [str(register), str(left), str(right)] if sign and PC not in {left, right}:
-            return (Sum(register, left, right, sign),)
+            return (Add(register, left, right, sign),)
     return ()
 
 
 def _transfer(insn: Any, here: int) -> tuple[Effect, ...]:
-    """Move one register, or two, from or to memory, with the base moved before or after."""
+    """Model a load or store of one or two registers, with pre- or post-indexed base."""
     place = next(index for index, operand in enumerate(insn.operands) if operand.type == arm.ARM_OP_MEM)
     memory, step = insn.operands[place].mem, insn.operands[place + 1 :]
     if memory.index or (step and step[0].type != arm.ARM_OP_IMM):
@@ -117,9 +117,9 @@ def _transfer(insn: Any, here: int) -> tuple[Effect, ...]:
     before: tuple[Effect, ...] = ()
     after: tuple[Effect, ...] = ()
     if step:
-        after = (Put(base, base, -step[0].imm if step[0].subtracted else step[0].imm),)
+        after = (Assign(base, base, -step[0].imm if step[0].subtracted else step[0].imm),)
     elif insn.writeback:
-        before, offset = (Put(base, base, offset),), 0
+        before, offset = (Assign(base, base, offset),), 0
     registers = [insn.reg_name(operand.reg) for operand in insn.operands[:place]]
     if insn.id in {arm.ARM_INS_LDR, arm.ARM_INS_LDRD}:
         moved: tuple[Effect, ...] = tuple(
@@ -139,7 +139,7 @@ def _transfer(insn: Any, here: int) -> tuple[Effect, ...]:
 
 
 def _multiple(insn: Any) -> tuple[Effect, ...]:
-    """Move several registers: push, pop and their general forms."""
+    """Model multiple loads and stores, push and pop included."""
     direction, growth, first = _MULTIPLE[insn.id]
     names = [insn.reg_name(operand.reg) for operand in insn.operands]
     stack = insn.id in {arm.ARM_INS_PUSH, arm.ARM_INS_POP}
@@ -154,15 +154,15 @@ def _multiple(insn: Any) -> tuple[Effect, ...]:
         for index, register in enumerate(registers)
     )
     moves_base = stack or insn.writeback
-    return (Put(start, base, 0), *([Put(base, base, growth * size)] if moves_base else []), *moved)
+    return (Assign(start, base, 0), *([Assign(base, base, growth * size)] if moves_base else []), *moved)
 
 
 def _vector(insn: Any) -> tuple[Effect, ...]:
-    """Move floating-point registers; what they hold is of no interest here, where the base goes is.
+    """Model the base register of floating-point multiple loads and stores.
 
-    capstone lists no base among the registers that these write.
+    Capstone does not list the base among the registers that these write.
     """
     if insn.id not in {arm.ARM_INS_VPUSH, arm.ARM_INS_VPOP}:
-        return (Forget(insn.reg_name(insn.operands[0].reg)),) if "!" in insn.op_str else ()
+        return (Clobber(insn.reg_name(insn.operands[0].reg)),) if "!" in insn.op_str else ()
     size = sum(8 if insn.reg_name(operand.reg).startswith("d") else 4 for operand in insn.operands)
-    return (Put(SP, SP, -size if insn.id == arm.ARM_INS_VPUSH else size),)
+    return (Assign(SP, SP, -size if insn.id == arm.ARM_INS_VPUSH else size),)

@@ -1,7 +1,7 @@
-"""AVR instructions, as avr-objdump spells them, by their effects (DS40002198; avr-gcc, calling convention).
+"""Effects of AVR instructions, decoded by avr-objdump (DS40002198; avr-gcc, calling convention).
 
-A pair of registers holds a value of 16 bits, the even one its lower byte. What is known of a byte is the
-value that it belongs to: two bytes make a stack pointer only if they belong to the same one.
+A register pair holds a 16-bit value, the even register its lower byte. The analysis stores the 16-bit value
+for each register; two bytes form a known stack pointer only if they are halves of the same value.
 """
 
 import itertools
@@ -17,25 +17,25 @@ from mambo_nmpc.sil.firmware.elf import Image
 from mambo_nmpc.sil.firmware.instructions import (
     PC,
     SP,
+    Assign,
+    Clobber,
     Convention,
     Effect,
     Flow,
-    Forget,
     Instruction,
+    JoinHalves,
     Load,
-    Put,
-    Same,
     Store,
 )
 
 _DISASSEMBLER: Final = "avr-objdump"
 _RETURN: Final = "return address"
 _EXCEPTIONS: Final = {"__muldi3_6": frozenset({"r28", "r29"})}
-"""A part of libgcc's product of 64 bits, which adds into registers of its caller (lib1funcs.S)."""
+"""Subroutine of libgcc's 64-bit multiplication, which writes registers of its caller (lib1funcs.S)."""
 _SP_HIGH: Final = "sp, upper byte"
 
-_WIDE: Final = {"6", "106", "107"}
-"""Architectures of GCC with more than 128 KiB of flash: there a return address takes three bytes."""
+_THREE_BYTE_PC: Final = {"6", "106", "107"}
+"""GCC's AVR architectures with more than 128 KiB of flash, whose return addresses have three bytes."""
 
 _ARCHITECTURE: Final = re.compile(r"^architecture: avr:(\d+)", re.MULTILINE)
 _LINE: Final = re.compile(r"^ *([0-9a-f]+):\t((?:[0-9a-f]{2} )+) *\t(\S+)(?:\t([^;\n]*))?", re.MULTILINE)
@@ -44,13 +44,13 @@ _PLACE: Final = re.compile(r"(-?)([XYZ])(\+?)(\d*)")
 _POINTERS: Final = {"X": 26, "Y": 28, "Z": 30}
 _SKIPS: Final = frozenset({"cpse", "sbrc", "sbrs", "sbic", "sbis"})
 _BRANCH: Final = re.compile(r"br\w\w")
-_QUIET: Final = re.compile(r"cp|cpc|cpi|(cl|se)[cnzvshti]|bst|sts|sbi|cbi|nop|break|wdr|sleep")
-"""They change no register: comparisons, flags, stores to fixed addresses."""
-_WRITING: Final = frozenset(
+_NO_EFFECT: Final = re.compile(r"cp|cpc|cpi|(cl|se)[cnzvshti]|bst|sts|sbi|cbi|nop|break|wdr|sleep")
+"""Instructions that change no register: comparisons, flags, stores to fixed addresses."""
+_CLOBBERING: Final = frozenset(
     {"adc", "add", "and", "andi", "asr", "bld", "com", "dec", "eor", "in", "inc", "ldi", "lds", "lsr", "neg"}
     | {"or", "ori", "ror", "sbc", "sbci", "sub", "subi", "swap"}
 )
-"""They change their first register, to nothing that matters here."""
+"""Instructions that write a value unknown to the analysis into their first operand."""
 
 
 @dataclass(frozen=True)
@@ -65,18 +65,18 @@ class _Line:
         return f"{self.mnemonic} {', '.join(self.operands)}".strip()
 
     @property
-    def following(self) -> int:
+    def next_address(self) -> int:
         return self.address + self.size_bytes
 
 
-def disassembled(image: Image) -> tuple[dict[int, Instruction], Convention]:
-    """Return the instructions of a program by address, and the convention of its calls.
+def disassemble(image: Image) -> tuple[dict[int, Instruction], Convention]:
+    """Return the instructions of a program by address, and its calling convention.
 
-    Raises FootprintError, naming the package, if there is no avr-objdump.
+    Raises FootprintError, which names the Debian package, if avr-objdump is missing.
     """
     text = _objdump(image)
     architecture = _ARCHITECTURE.search(text)
-    return_bytes = 3 if architecture and architecture[1] in _WIDE else 2
+    return_bytes = 3 if architecture and architecture[1] in _THREE_BYTE_PC else 2
     lines = [
         _Line(int(address, 16), len(code.split()), mnemonic, _operands(operands))
         for address, code, mnemonic, operands in _LINE.findall(text)
@@ -90,7 +90,7 @@ def disassembled(image: Image) -> tuple[dict[int, Instruction], Convention]:
 def _objdump(image: Image) -> str:
     command = shutil.which(_DISASSEMBLER)
     if command is None:
-        raise image.error(f"no {_DISASSEMBLER} to read its code; Debian's binutils-avr brings it")
+        raise image.error(f"{_DISASSEMBLER}, which decodes AVR code, is missing (Debian: binutils-avr)")
     done = subprocess.run(
         [command, "-f", "-d", "-z", str(image.path)],
         stdin=subprocess.DEVNULL,
@@ -100,7 +100,7 @@ def _objdump(image: Image) -> str:
         check=False,
     )
     if done.returncode != 0:
-        raise image.error(f"{_DISASSEMBLER} cannot read its code: {done.stderr.strip()}")
+        raise image.error(f"{_DISASSEMBLER} cannot decode its code: {done.stderr.strip()}")
     return done.stdout
 
 
@@ -109,24 +109,24 @@ def _operands(text: str) -> tuple[str, ...]:
 
 
 def _instructions(lines: list[_Line], return_bytes: int) -> Iterator[Instruction]:
-    """Yield what the lines do; a subtraction from a pair is one, so that nothing jumps in between."""
+    """Yield the instructions; a 16-bit subtraction (subi, sbci) becomes one, so no jump can split it."""
     merged = False
-    for line, beyond in itertools.zip_longest(lines, lines[1:]):
-        after = beyond if beyond and beyond.address == line.following else None
+    for line, next_line in itertools.zip_longest(lines, lines[1:]):
+        after = next_line if next_line and next_line.address == line.next_address else None
         if merged:
             merged = False
             continue
-        if after and (subtracted := _subtracted(line, after)):
+        if after and (subtracted := _match_subtraction(line, after)):
             low, value = subtracted
             text, size = f"{line.text}; {after.text}", line.size_bytes + after.size_bytes
-            yield Instruction(line.address, size, text, _moved(low, -value))
+            yield Instruction(line.address, size, text, _add_to_pair(low, -value))
             merged = True
             continue
         effects = _effects(line, return_bytes)
         flow: Flow = "next"
         conditional = line.mnemonic in _SKIPS or _BRANCH.fullmatch(line.mnemonic) is not None
         if line.mnemonic in _SKIPS:
-            effects, flow = ((Put(PC, None, after.following),) if after else (Forget(PC),)), "jump"
+            effects, flow = ((Assign(PC, None, after.next_address),) if after else (Clobber(PC),)), "jump"
         elif conditional or line.mnemonic in {"rjmp", "jmp", "ijmp", "eijmp", "ret"}:
             flow = "jump"
         elif line.mnemonic in {"rcall", "call", "icall", "eicall"} and line.operands != (".+0",):
@@ -135,10 +135,10 @@ def _instructions(lines: list[_Line], return_bytes: int) -> Iterator[Instruction
             yield Instruction(line.address, line.size_bytes, line.text, effects, flow, conditional)
 
 
-def _subtracted(line: _Line, after: _Line) -> tuple[int, int] | None:
-    """Return the lower register and the value, with a sign, that two lines subtract from a pair.
+def _match_subtraction(line: _Line, after: _Line) -> tuple[int, int] | None:
+    """Return lower register and signed value if two lines subtract a 16-bit constant from a pair.
 
-    GCC keeps zero in r1 wherever it subtracts that.
+    GCC keeps zero in r1 where `sbc` uses it.
     """
     match line.mnemonic, after.mnemonic, after.operands:
         case "subi", "sbci", (register, upper):
@@ -152,77 +152,77 @@ def _subtracted(line: _Line, after: _Line) -> tuple[int, int] | None:
 
 
 def _effects(line: _Line, return_bytes: int) -> tuple[Effect, ...] | None:  # noqa: C901, PLR0911, PLR0912 - one table
-    """Model what moves the stack pointer, saves a register or names a place; None for anything else."""
+    """Model changes of stack pointer, registers and program counter; None if the mnemonic is unknown."""
     mnemonic, operands = line.mnemonic, line.operands
     match mnemonic, operands:
         case "ret", _:
-            return (Put(PC, _RETURN, 0),)
+            return (Assign(PC, _RETURN, 0),)
         case (("ijmp" | "eijmp" | "icall" | "eicall"), _):
-            return (Forget(PC),)
-        case "rcall", (".+0",):  # how gcc makes room for a return address or less
-            return (Put(SP, SP, -return_bytes), *(Store(None, SP, 1 + i) for i in range(return_bytes)))
+            return (Clobber(PC),)
+        case "rcall", (".+0",):  # GCC allocates a small frame this way
+            return (Assign(SP, SP, -return_bytes), *(Store(None, SP, 1 + i) for i in range(return_bytes)))
         case (("rcall" | "rjmp"), (target,)):
-            return (Put(PC, None, line.following + int(target[1:])),)
+            return (Assign(PC, None, line.next_address + int(target[1:])),)
         case (("call" | "jmp"), (target,)):
-            return (Put(PC, None, int(target, 16)),)
+            return (Assign(PC, None, int(target, 16)),)
         case _, (target,) if _BRANCH.fullmatch(mnemonic):
-            return (Put(PC, None, line.following + int(target[1:])),)
+            return (Assign(PC, None, line.next_address + int(target[1:])),)
         case "push", (register,):
-            return (Put(SP, SP, -1), Store(register, SP, 1))
+            return (Assign(SP, SP, -1), Store(register, SP, 1))
         case "pop", (register,):
-            return (Load(register, SP, 1), Put(SP, SP, 1))
+            return (Load(register, SP, 1), Assign(SP, SP, 1))
         case "in", (register, (("0x3d" | "0x3e") as port)):  # SPL, SPH
-            return (Put(register, SP, 0) if _is_half(register, port) else Forget(register),)
+            return (Assign(register, SP, 0) if _is_half(register, port) else Clobber(register),)
         case "out", ("0x3e", register):
-            return (Put(_SP_HIGH, register, 0) if _is_half(register, "0x3e") else Forget(_SP_HIGH),)
+            return (Assign(_SP_HIGH, register, 0) if _is_half(register, "0x3e") else Clobber(_SP_HIGH),)
         case "out", ("0x3d", register):
-            moved = Same(SP, _SP_HIGH, register) if _is_half(register, "0x3d") else Forget(SP)
-            return (moved, Forget(_SP_HIGH))
+            moved = JoinHalves(SP, _SP_HIGH, register) if _is_half(register, "0x3d") else Clobber(SP)
+            return (moved, Clobber(_SP_HIGH))
         case "movw", (register, source):
             low, base = _number(register), _number(source)
-            return (Put(f"r{low}", f"r{base}", 0), Put(f"r{low + 1}", f"r{base + 1}", 0))
+            return (Assign(f"r{low}", f"r{base}", 0), Assign(f"r{low + 1}", f"r{base + 1}", 0))
         case "mov", (register, source):
             same_half = _number(register) % 2 == _number(source) % 2
-            return (Put(register, source, 0) if same_half else Forget(register),)
+            return (Assign(register, source, 0) if same_half else Clobber(register),)
         case (("adiw" | "sbiw"), (register, value)):
-            return _moved(_number(register), int(value, 0) if mnemonic == "adiw" else -int(value, 0))
+            return _add_to_pair(_number(register), int(value, 0) if mnemonic == "adiw" else -int(value, 0))
         case (("ld" | "ldd"), (register, place)):
-            return _through(place, register, load=True)
+            return _access_indirect(place, register, load=True)
         case (("st" | "std"), (place, register)):
-            return _through(place, register, load=False)
-        case "sts", (place, _) if int(place, 16) in {0x5D, 0x5E}:  # SPL, SPH once more
-            return (Forget(SP),)
+            return _access_indirect(place, register, load=False)
+        case "sts", (place, _) if int(place, 16) in {0x5D, 0x5E}:  # SPL, SPH in data space
+            return (Clobber(SP),)
         case (("lpm" | "elpm"), _):
             register, place = operands or ("r0", "Z")
-            return (Forget(register), *(_moved(_POINTERS["Z"], 1) if place == "Z+" else ()))
-        case _, (register, *_) if mnemonic in _WRITING:
-            return (Forget(register),)
+            return (Clobber(register), *(_add_to_pair(_POINTERS["Z"], 1) if place == "Z+" else ()))
+        case _, (register, *_) if mnemonic in _CLOBBERING:
+            return (Clobber(register),)
         case _, _ if "mul" in mnemonic:
-            return (Forget("r0"), Forget("r1"))
-    return () if _QUIET.fullmatch(mnemonic) or mnemonic == "out" else None
+            return (Clobber("r0"), Clobber("r1"))
+    return () if _NO_EFFECT.fullmatch(mnemonic) or mnemonic == "out" else None
 
 
 def _number(register: str) -> int:
     return int(register[1:])
 
 
-def _moved(low: int, value: int) -> tuple[Effect, ...]:
-    """Add to a pair."""
-    return tuple(Put(f"r{index}", f"r{index}", value) for index in (low, low + 1))
+def _add_to_pair(low: int, value: int) -> tuple[Effect, ...]:
+    """Add a constant to a register pair."""
+    return tuple(Assign(f"r{index}", f"r{index}", value) for index in (low, low + 1))
 
 
 def _is_half(register: str, port: str) -> bool:
-    """Say whether a register is in the place of the half of the stack pointer that `port` is."""
+    """Say whether a register has the parity of the half of the stack pointer at `port`."""
     return _number(register) % 2 == (0 if port == "0x3d" else 1)
 
 
-def _through(place: str, register: str, *, load: bool) -> tuple[Effect, ...]:
-    """Move a byte from or to where a pair points, which moves on before or after."""
+def _access_indirect(place: str, register: str, *, load: bool) -> tuple[Effect, ...]:
+    """Model an indirect load or store through X, Y or Z, with pre-decrement or post-increment."""
     match = _PLACE.fullmatch(place)
     assert match is not None, place
     before, pair, plus, digits = match.groups()
     low, offset = _POINTERS[pair], int(digits or "0")
     access = Load(register, f"r{low}", offset) if load else Store(register, f"r{low}", offset)
-    first = _moved(low, -1) if before else ()
-    last = _moved(low, 1) if plus and not digits else ()
+    first = _add_to_pair(low, -1) if before else ()
+    last = _add_to_pair(low, 1) if plus and not digits else ()
     return (*first, access, *last)

@@ -1,8 +1,8 @@
-"""Build a bundle for a board: the least firmware, the same without the controller, or a guest to emulate.
+"""Build a bundle for a board: a minimal firmware, the same without the controller, or a program to emulate.
 
-Programs are linked statically at a fixed address, without start-up code and without a C library; what the
-compiler calls of one, memset and memcpy, stands in freestanding.c. Clang compiles for most boards too; then
-the board's own compiler links, for its helpers.
+Programs are linked statically to fixed addresses, without start-up code and C library; freestanding.c defines
+memset and memcpy, which compilers call. If clang compiles, the board's GCC links, since its libgcc has the
+arithmetic.
 """
 
 import re
@@ -24,7 +24,7 @@ OPTIMISATIONS: Final = ("-O0", "-O2", "-O3", "-Os")
 
 _COMPILE: Final = ("-ffunction-sections", "-fdata-sections", "-fno-pie")
 _NO_LIBRARY: Final = ("-fno-tree-loop-distribute-patterns",)
-"""Lest memset in freestanding.c becomes a call of itself."""
+"""Without this flag GCC compiles the loop of memset in freestanding.c to a call of memset."""
 _LINK: Final = (
     "-static",
     "-nostartfiles",
@@ -41,14 +41,14 @@ _CLANG_TARGETS: Final = {
     "cortex-m7": "arm-none-eabi",
     "rv32": "riscv32-unknown-elf",
 }
-"""What clang calls the architecture of an emulated core; the rest it reads from the board's flags."""
+"""Clang's target of each emulated core; the board's flags choose core and FPU."""
 _CLANG_NO_LIBRARY: Final = ("-ffreestanding",)
 _PACKAGE: Final = resources.files("mambo_nmpc.sil.firmware")
 
 
 @dataclass(frozen=True)
 class Builder:
-    """The compiler for a board, and the optimisation that replaces the bundle's own; `linker` is a gcc."""
+    """Compiler and linker for a board; the linker is always a GCC."""
 
     board: Board
     toolchain: Toolchain
@@ -57,17 +57,17 @@ class Builder:
 
     @property
     def compiler(self) -> str:
-        """Name and version, as the compiler gives them."""
+        """First line of the compiler's --version."""
         return self.toolchain.identity().partition("\n")[0]
 
     def firmware(self, files: dict[str, str], folder: Path, *, empty: bool = False) -> Path:
-        """Link the least firmware with the bundle `files`, or without it; returns the ELF."""
+        """Link a minimal firmware with the bundle `files`, or without if `empty`; returns the ELF file."""
         main = {"main.c": (_PACKAGE / "firmware.c").read_text("utf-8")}
         place = folder / ("empty" if empty else "firmware")
         return self._link(files | main, (ENTRY,), place, define=["-DEMPTY"] if empty else [])
 
     def guest(self, files: dict[str, str], glue: str, keep: tuple[str, ...], folder: Path) -> Path:
-        """Link the bundle `files` with `glue`, of which `keep` stays callable; returns the ELF."""
+        """Link the bundle `files` with `glue`, C whose functions `keep` stay; returns the ELF file."""
         return self._link(files | {"main.c": glue}, keep, folder / "guest", address=[_GUEST_ADDRESS])
 
     def _link(
@@ -79,7 +79,7 @@ class Builder:
         define: Sequence[str] = (),
         address: Sequence[str] = (),
     ) -> Path:
-        """Compile and link all C in `sources` {path: text}; the symbols `keep` stay, entry first."""
+        """Compile and link the C of `sources` {path: text}; the symbols `keep` stay, the entry first."""
         sources = sources | {"freestanding.c": (_PACKAGE / "freestanding.c").read_text("utf-8")}
         for path, text in sources.items():
             (place / path).parent.mkdir(parents=True, exist_ok=True)
@@ -117,29 +117,29 @@ class Builder:
 
 
 def builder(board: Board, optimisation: str | None = None) -> Builder:
-    """Find the compiler for `board`: the first of its candidates that is here.
+    """Return a builder with the first of the board's compilers on the PATH.
 
-    Raises BuildError naming the packages that bring one.
+    Raises BuildError, which names the Debian packages, if there is none.
     """
     for command in board.compiler.candidates:
         if shutil.which(command):
             toolchain = Toolchain((command,), optimisation)
             return Builder(board, toolchain, toolchain)
     raise BuildError(
-        f"no compiler for {board.title} found ({', '.join(board.compiler.candidates)}); "
-        f"Debian's {' and '.join(board.compiler.packages)} bring one"
+        f"no compiler for {board.title} found: {' or '.join(board.compiler.candidates)} "
+        f"(Debian: {' '.join(board.compiler.packages)})"
     )
 
 
 def clang_builder(board: Board, optimisation: str | None = None) -> Builder:
-    """Find clang for `board`, and the board's own compiler, which links.
+    """Return a builder that compiles with clang and links with the board's GCC.
 
-    Raises BuildError if either is missing, or if clang's name for the board's architecture is not known here.
+    Raises BuildError if either is missing, or if clang does not support the board's core.
     """
     core = board.emulated_core.value
     if core not in _CLANG_TARGETS:
-        raise BuildError(f"{board.title}: nothing known of clang for {core}")
+        raise BuildError(f"{board.title}: clang is not supported for {core}")
     if shutil.which(_CLANG) is None:
-        raise BuildError(f"{_CLANG} is not here; Debian's {_CLANG} brings it")
+        raise BuildError(f"{_CLANG} is missing (Debian: {_CLANG})")
     toolchain = Toolchain((_CLANG, f"--target={_CLANG_TARGETS[core]}"), optimisation)
     return Builder(board, toolchain, builder(board).toolchain, _CLANG_NO_LIBRARY)

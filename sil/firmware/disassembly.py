@@ -1,4 +1,4 @@
-"""Take the code of a program apart, instruction by instruction."""
+"""Disassemble the code of a linked program."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -19,36 +19,40 @@ _RISCV: Final = capstone.Cs(capstone.CS_ARCH_RISCV, capstone.CS_MODE_RISCV32 | c
 
 @dataclass(frozen=True)
 class Disassembly:
-    """Every instruction of a program by its address, and the convention of its calls."""
+    """Instructions of a program by address, and its calling convention."""
 
     instructions: dict[int, Instruction]
     convention: Convention
 
 
 def is_readable(image: Image) -> bool:
-    """Say whether the code of a program can be taken apart here: ARM, AVR or 32-bit RISC-V."""
+    """Say whether `disassemble` supports the processor of a program: ARM, AVR or 32-bit RISC-V."""
     return image.machine in {"EM_ARM", "EM_AVR", "EM_RISCV"} and image.address_bits == 32
 
 
 def disassemble(image: Image) -> Disassembly:
-    """Return the code of an ARM, AVR or 32-bit RISC-V program; raises FootprintError for other processors."""
+    """Disassemble an ARM, AVR or 32-bit RISC-V program; raises FootprintError for other processors."""
     if not is_readable(image):
         name = image.machine.removeprefix("EM_")
         raise image.error(
-            f"code for {name} cannot be read here, only ARM, AVR and 32-bit RISC-V; measure its sizes"
+            f"cannot disassemble code for {name}, only ARM, AVR and 32-bit RISC-V; measure its sizes only"
         )
     if image.machine == "EM_AVR":
-        return Disassembly(*avr.disassembled(image))
+        return Disassembly(*avr.disassemble(image))
     if image.machine == "EM_ARM":
-        return Disassembly({instruction.address: instruction for instruction in _arm(image)}, arm.CONVENTION)
-    return Disassembly({instruction.address: instruction for instruction in _riscv(image)}, riscv.CONVENTION)
+        return Disassembly(
+            {instruction.address: instruction for instruction in _decode_arm(image)}, arm.CONVENTION
+        )
+    return Disassembly(
+        {instruction.address: instruction for instruction in _decode_riscv(image)}, riscv.CONVENTION
+    )
 
 
-def _arm(image: Image) -> Iterator[Instruction]:
-    """Follow the mapping symbols, between which code is A32, Thumb or data (AAELF 2020Q2, 5.5.5)."""
+def _decode_arm(image: Image) -> Iterator[Instruction]:
+    """Decode between mapping symbols, which mark A32, Thumb and data (AAELF 2020Q2, 5.5.5)."""
     decoders = {
-        "a": (_A32, partial(arm.instruction, thumb=False)),
-        "t": (_THUMB, partial(arm.instruction, thumb=True)),
+        "a": (_A32, partial(arm.model_instruction, thumb=False)),
+        "t": (_THUMB, partial(arm.model_instruction, thumb=True)),
     }
     for section in image.sections:
         if section.executable:
@@ -56,23 +60,23 @@ def _arm(image: Image) -> Iterator[Instruction]:
             ends = [at for at, _ in modes[1:]] + [section.address + section.size_bytes]
             for (start, mode), end in zip(modes, ends, strict=True):
                 if mode in decoders:
-                    yield from _decoded(*decoders[mode], section, start, end)
+                    yield from _decode(*decoders[mode], section, start, end)
 
 
-def _riscv(image: Image) -> Iterator[Instruction]:
-    """Start afresh at every symbol, so that data between functions cannot put the decoder out of step."""
+def _decode_riscv(image: Image) -> Iterator[Instruction]:
+    """Restart the decoder at every symbol, since data between functions can misalign it."""
     for section in image.sections:
         if section.executable:
             inside = {s.address for s in image.symbols if s.section == section.name}
             bounds = sorted(inside | {section.address, section.address + section.size_bytes})
             for start, end in itertools.pairwise(bounds):
-                yield from _decoded(_RISCV, riscv.instruction, section, start, end)
+                yield from _decode(_RISCV, riscv.model_instruction, section, start, end)
 
 
-def _decoded(
+def _decode(
     decoder: capstone.Cs, meaning: Callable[[Any], Instruction], section: ElfSection, start: int, end: int
 ) -> Iterator[Instruction]:
-    """Decode from `start` to `end`; halfwords that are no instruction are left out."""
+    """Decode from `start` to `end`, skipping halfwords that are no instruction."""
     decoder.detail = True
     at = start
     while at < end:

@@ -1,4 +1,4 @@
-"""What there is of the tools that the project uses on this machine, and what each missing one would bring."""
+"""Report which tools the project can use on this machine, and what each of them is for."""
 
 import platform
 import re
@@ -18,17 +18,17 @@ from mambo_nmpc.codegen.errors import BuildError, echo
 from mambo_nmpc.codegen.toolchain import host_toolchain
 
 LIBFUZZER: Final = "libFuzzer"
-"""A library of clang's, and no command: what links a fuzzer."""
+"""Clang's library for fuzzing; not a command."""
 
 PATIENCE_S: Final = 5.0
-"""Time that a tool gets to tell its version, in seconds."""
+"""Time limit of one tool's --version, in seconds."""
 
 Registry = Literal["Debian", "PyPI"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One tool, here or missing; `version` is empty if it is missing or does not tell."""
+    """One tool, here or missing; `version` is empty if it is missing or prints none."""
 
     kind: str
     tool: str
@@ -41,7 +41,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class _Need:
-    """A tool that the project uses: commands of which one suffices, or the name of a Python package."""
+    """A tool that the project uses: alternative commands, or the name of a Python package."""
 
     kind: str
     candidates: tuple[str, ...]
@@ -51,14 +51,14 @@ class _Need:
 
 
 def examine() -> tuple[Finding, ...]:
-    """Look for every tool; never raises, and gives none more than PATIENCE_S."""
+    """Look for every tool, each for at most PATIENCE_S; never raises."""
     needs = _needs()
     with ThreadPoolExecutor(len(needs)) as pool:
-        return tuple(pool.map(_look, needs))
+        return tuple(pool.map(_find, needs))
 
 
 def doctor_text(findings: Sequence[Finding]) -> str:
-    """Spell the findings: a tool a line, then the commands that bring the missing ones."""
+    """Return one line for each tool, then the commands that install what is missing."""
     rows = [
         (finding.kind, echo(finding.tool), finding.version or ("here" if finding.here else "missing"))
         for finding in findings
@@ -80,47 +80,51 @@ def doctor_text(findings: Sequence[Finding]) -> str:
             }
         )
         if missing:
-            lines.append(f"to have what is missing from {registry}: {installer} {' '.join(missing)}")
+            lines.append(f"install what is missing from {registry}: {installer} {' '.join(missing)}")
     return "\n".join(lines)
 
 
 def _needs() -> tuple[_Need, ...]:
-    """Return what the project uses today: compilers, emulators, analysers, then what its tests ask for."""
+    """Return the tools that the project uses: compilers, emulators, analysers, a builder."""
     known = [boards.load(name) for name in boards.names()]
     on_avr = [board.name for board in known if board.emulated_core.value == "avr"]
     on_others = [board.name for board in known if board.emulated_core.value != "avr"]
     return (
-        _Need("compiler", _host_compilers(), "flies the C here: fly, table2", "Debian", ("gcc",)),
-        _Need("compiler", ("clang",), "builds for all but the AVR: same-bits, verify", "Debian", ("clang",)),
+        _Need(
+            "compiler", _host_compilers(), "compiles the C for this machine: fly, table2", "Debian", ("gcc",)
+        ),
+        _Need(
+            "compiler", ("clang",), "second compiler: same-bits (except AVR), verify", "Debian", ("clang",)
+        ),
         *_cross_compilers(known),
-        _Need("emulator", ("unicorn",), f"runs the C of {', '.join(on_others)}", "PyPI", ("unicorn",)),
+        _Need("emulator", ("unicorn",), f"emulates {', '.join(on_others)}", "PyPI", ("unicorn",)),
         _Need(
             "emulator",
             ("qemu-system-avr",),
-            f"runs the C of {', '.join(on_avr)}",
+            f"emulates {', '.join(on_avr)}",
             "Debian",
             ("qemu-system-misc",),
         ),
-        _Need("analyser", ("pyelftools",), "measures flash and RAM of a build", "PyPI", ("pyelftools",)),
-        _Need("analyser", ("capstone",), "bounds the stack of a build", "PyPI", ("capstone",)),
-        _Need("analyser", ("nm",), "lets make test check the symbols of a build", "Debian", ("binutils",)),
+        _Need("analyser", ("pyelftools",), "footprint: flash and RAM", "PyPI", ("pyelftools",)),
+        _Need("analyser", ("capstone",), "footprint: stack bound", "PyPI", ("capstone",)),
+        _Need("analyser", ("nm",), "make test: symbols of a build", "Debian", ("binutils",)),
         _Need(
             "analyser",
             ("frama-c",),
-            "verify: proves the absence of run-time errors",
+            "verify: proof of absence of run-time errors",
             "Debian",
             ("frama-c-base",),
         ),
-        _Need("analyser", ("cppcheck",), "verify: checks MISRA C:2012", "Debian", ("cppcheck",)),
-        _Need("analyser", ("g++",), "verify: warnings of C++", "Debian", ("g++",)),
+        _Need("analyser", ("cppcheck",), "verify: MISRA C:2012", "Debian", ("cppcheck",)),
+        _Need("analyser", ("g++",), "verify: warnings as C++", "Debian", ("g++",)),
         _Need("analyser", (LIBFUZZER,), "verify: fuzzing", "Debian", ("clang", "libclang-rt-14-dev")),
-        _Need("analyser", ("gcov",), "verify: counts what the tests reach", "Debian", ("gcc",)),
-        _Need("builder", ("cmake",), "lets make test build a bundle with CMake", "Debian", ("cmake",)),
+        _Need("analyser", ("gcov",), "verify: test coverage", "Debian", ("gcc",)),
+        _Need("builder", ("cmake",), "make test: build of a bundle with CMake", "Debian", ("cmake",)),
     )
 
 
 def _host_compilers() -> tuple[str, ...]:
-    """Return the compiler that a flight would take, or else those that it would look for."""
+    """Return the compiler that `host_toolchain` chooses; if there is none, those that it tries."""
     try:
         return (shlex.join(host_toolchain().command),)
     except (BuildError, ValueError):
@@ -128,7 +132,7 @@ def _host_compilers() -> tuple[str, ...]:
 
 
 def _cross_compilers(known: Sequence[Board]) -> tuple[_Need, ...]:
-    """Return one need for each compiler, whatever the number of boards it builds for."""
+    """Return one need for each cross compiler, with the boards that it builds for."""
     served: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
     for board in known:
         served.setdefault((board.compiler.candidates, board.compiler.packages), []).append(board.name)
@@ -138,8 +142,8 @@ def _cross_compilers(known: Sequence[Board]) -> tuple[_Need, ...]:
     )
 
 
-def _look(need: _Need) -> Finding:
-    """Return the first candidate that is here, or all of them as missing."""
+def _find(need: _Need) -> Finding:
+    """Return a finding for the first candidate that is here; if none is, one that names all."""
     for candidate in need.candidates:
         version = _package_version(candidate) if need.registry == "PyPI" else command_version(candidate)
         if version is not None:
@@ -156,30 +160,30 @@ def _package_version(package: str) -> str | None:
 
 
 def command_version(candidate: str) -> str | None:
-    """Return the version that the command tells, "" if it tells none in time, None if it is missing."""
+    """Return the version that the command prints, "" if it prints none in time, None if it is missing."""
     if candidate == LIBFUZZER:
         return _libfuzzer_version()
     command = shlex.split(candidate)
     if shutil.which(command[0]) is None:
         return None
-    said = _said([*command, "--version"])
-    first_line = (said or "").partition("\n")[0]
+    output = _capture_stdout([*command, "--version"])
+    first_line = (output or "").partition("\n")[0]
     number = re.search(r"\d+(\.\d+)+", re.sub(r"\([^)]*\)", "", first_line))
     return number[0] if number else ""
 
 
 def _libfuzzer_version() -> str | None:
-    """Return the version of the clang that has the library, None if none has."""
+    """Return the version of clang if it has the library, else None."""
     clang = shutil.which("clang")
     if clang is None:
         return None
     name = f"libclang_rt.fuzzer-{platform.machine()}.a"
-    library = _said([clang, f"-print-file-name={name}"])
+    library = _capture_stdout([clang, f"-print-file-name={name}"])
     return command_version("clang") if library and Path(library.strip()).is_file() else None
 
 
-def _said(command: Sequence[str]) -> str | None:
-    """Return what a command prints, None if it cannot be run or does not end in time."""
+def _capture_stdout(command: Sequence[str]) -> str | None:
+    """Return the stdout of a command, None if it cannot run or does not end within PATIENCE_S."""
     try:
         done = subprocess.run(
             command,

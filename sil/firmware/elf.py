@@ -1,4 +1,4 @@
-"""Read a linked program: its sections, and functions and objects that share no byte."""
+"""Read sections and symbols of a linked program (ELF); no byte belongs to two symbols."""
 
 import bisect
 import itertools
@@ -20,12 +20,12 @@ _KINDS: Final[dict[str, Literal["function", "object"]]] = {"STT_FUNC": "function
 
 
 class FootprintError(MamboNmpcError):
-    """A program cannot be measured, or its worst case cannot be proven."""
+    """A program cannot be measured, or its stack bound cannot be proven."""
 
 
 @dataclass(frozen=True)
 class ElfSection:
-    """A section that takes memory while the program runs; `contents` is empty where it starts as zeros."""
+    """An allocated section; `contents` is empty if it is zero-initialised."""
 
     name: str
     address: int
@@ -39,10 +39,10 @@ class ElfSection:
 
 @dataclass(frozen=True)
 class Symbol:
-    """A function or an object, and the bytes from its address that no later one begins.
+    """A function or object; its bytes end where the next symbol begins.
 
     `name` is unique in its program; `aliases` are the other labels at the same address. `file` is the source
-    file of a symbol that is local to it.
+    file of a local symbol, None for a global one.
     """
 
     name: str
@@ -55,15 +55,15 @@ class Symbol:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """All its names."""
+        """Name and aliases."""
         return (self.name, *self.aliases)
 
 
 @dataclass(frozen=True)
 class Image:
-    """A linked program, for the processor `machine` of an ELF header with addresses of `address_bits`.
+    """A linked program; `machine` is e_machine of its ELF header.
 
-    `modes` are the places where ARM code becomes A32 (a), Thumb (t) or data (d).
+    `modes` are the ARM mapping symbols: addresses where A32 (a), Thumb (t) or data (d) begins.
     """
 
     path: Path
@@ -74,18 +74,18 @@ class Image:
     modes: tuple[tuple[int, str], ...]
 
     def error(self, problem: str) -> FootprintError:
-        """Return the error that names this program."""
+        """Return a FootprintError that names this program."""
         return FootprintError(f"{self.path.name}: {problem}")
 
     def symbol(self, label: str) -> Symbol:
-        """Return the symbol that has `label` as a name; raises FootprintError if there is none."""
+        """Return the symbol named `label`; raises FootprintError if there is none."""
         for symbol in self.symbols:
             if label in symbol.labels:
                 return symbol
-        raise self.error(f"no function or object {label}; was it linked, or collected as unused?")
+        raise self.error(f"no function or object {label}; not linked, or removed by --gc-sections?")
 
     def name_of(self, address: int) -> str:
-        """Name an address of code: a function, or a place in one."""
+        """Return an address of code as function, or as function+offset."""
         index = bisect.bisect(self.symbols, address, key=lambda symbol: symbol.address) - 1
         if index < 0:
             return f"{address:#x}"
@@ -93,7 +93,7 @@ class Image:
         return symbol.name if symbol.address == address else f"{symbol.name}+{address - symbol.address:#x}"
 
     def constant(self, address: int) -> int | None:
-        """Read a little-endian word of memory that nothing writes; None for any other memory."""
+        """Return the little-endian 32-bit word at `address` in read-only memory; None elsewhere."""
         for section in self.sections:
             start = address - section.address
             if not section.in_ram and 0 <= start <= len(section.contents) - 4:
@@ -102,20 +102,20 @@ class Image:
 
 
 def load(path: Path) -> Image:
-    """Read a program that is linked statically to fixed addresses and keeps its symbols.
+    """Read a little-endian program, statically linked to fixed addresses, not stripped.
 
-    Raises FootprintError for anything else.
+    Raises FootprintError for any other file.
     """
     try:
         with path.open("rb") as stream:
-            return _image(path, ELFFile(stream))
+            return _read_image(path, ELFFile(stream))
     except OSError as error:
         raise FootprintError(f"{path}: cannot be read: {error.strerror}") from error
     except ELFError as error:
         raise FootprintError(f"{path.name}: not a program in ELF format: {error}") from error
 
 
-def _image(path: Path, elf: ELFFile) -> Image:
+def _read_image(path: Path, elf: ELFFile) -> Image:
     if elf.header["e_type"] != "ET_EXEC" or elf.get_section_by_name(".dynamic"):
         raise FootprintError(f"{path.name}: not linked to fixed addresses; link with -static -no-pie")
     if not elf.little_endian:
@@ -143,7 +143,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
     symbols = [
         symbol
         for index, section in sections.items()
-        for symbol in _disjoint([label for label in labels if label.section == index], section)
+        for symbol in _split_by_label([label for label in labels if label.section == index], section)
     ]
     modes = {
         (symbol["st_value"], symbol.name[1])
@@ -155,7 +155,7 @@ def _image(path: Path, elf: ELFFile) -> Image:
         machine=machine,
         address_bits=elf.elfclass,
         sections=tuple(sections.values()),
-        symbols=_uniquely_named(symbols),
+        symbols=_make_names_unique(symbols),
         modes=tuple(sorted(modes)),
     )
 
@@ -171,7 +171,7 @@ class _Label:
 
 
 def _labels(table: SymbolTableSection, sections: dict[int, ElfSection], machine: str) -> Iterator[_Label]:
-    """Yield functions, objects, and the untyped labels that hand-written assembly leaves in code."""
+    """Yield functions, objects, and untyped labels in code, which hand-written assembly has."""
     file = None
     for symbol in table.iter_symbols():
         kind = symbol["st_info"]["type"]
@@ -194,8 +194,8 @@ def _labels(table: SymbolTableSection, sections: dict[int, ElfSection], machine:
             )
 
 
-def _disjoint(labels: list[_Label], section: ElfSection) -> Iterator[Symbol]:
-    """Give each byte to the last label before it, as far as its size reaches, or else to the next label."""
+def _split_by_label(labels: list[_Label], section: ElfSection) -> Iterator[Symbol]:
+    """Yield one symbol for each address; it ends at the next label, or before, where all stated sizes end."""
     places: dict[int, list[_Label]] = defaultdict(list)
     for label in labels:
         places[label.address].append(label)
@@ -217,8 +217,8 @@ def _disjoint(labels: list[_Label], section: ElfSection) -> Iterator[Symbol]:
         )
 
 
-def _uniquely_named(symbols: list[Symbol]) -> tuple[Symbol, ...]:
-    """Return the symbols by address; names used twice get their file in front, or else their address."""
+def _make_names_unique(symbols: list[Symbol]) -> tuple[Symbol, ...]:
+    """Return the symbols by address; names used twice get their file as prefix, or else their address."""
     by_address = sorted(symbols, key=lambda symbol: symbol.address)
     used = Counter(symbol.name for symbol in by_address)
     in_files = [replace(s, name=f"{s.file}:{s.name}") if used[s.name] > 1 else s for s in by_address]

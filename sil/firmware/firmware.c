@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * The least program that flies a controller, and with EMPTY the same without: what the linker makes of the two
- * differs by the controller.
+ * Minimal firmware with one controller; with EMPTY defined, without. The difference of the two linked programs is
+ * the size of the controller.
  */
 #ifdef EMPTY
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * What a compiler may call on a board without a C library.
+ * Functions that compilers call even without a C library.
  */
 #include <stddef.h>
 

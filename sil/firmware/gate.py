@@ -1,4 +1,4 @@
-"""Find what a controller must not link: the heap, printf, libm, arithmetic wider than its scalar type."""
+"""Find functions that a controller must not link: heap, printf, libm, arithmetic of a wider type."""
 
 import re
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Final
 
 from mambo_nmpc.sil.firmware.disassembly import is_readable
 from mambo_nmpc.sil.firmware.elf import Image, Symbol
-from mambo_nmpc.sil.firmware.stack import direct_callers
+from mambo_nmpc.sil.firmware.stack import find_callers
 
 _LIBM: Final = (
     "acos|acosh|asin|asinh|atan|atan2|atanh|cbrt|ceil|copysign|cos|cosh|erf|erfc|exp|exp2|expm1|fabs|fdim|floor|"
@@ -14,7 +14,7 @@ _LIBM: Final = (
     "modf|nan|nearbyint|nextafter|nexttoward|pow|remainder|remquo|rint|round|scalbln|scalbn|sin|sincos|sinh|"
     "sqrt|tan|tanh|tgamma|trunc"
 )
-"""ISO/IEC 9899:1999, 7.12, and sincos, which compilers make of a sine and a cosine."""
+"""ISO/IEC 9899:1999, 7.12, and sincos, by which compilers replace a sine and a cosine."""
 _ALWAYS: Final = {
     "heap": (
         r"_*((re|m|c|aligned_)alloc|free|(posix_)?memalign|s?brk)(_r)?"
@@ -44,21 +44,21 @@ _WIDER: Final = {
 
 @dataclass(frozen=True)
 class Forbidden:
-    """A function that must not be there, what kind it is, and the functions that call it by name."""
+    """A function that must not be linked, its kind, and its direct callers."""
 
     symbol: str
     kind: str
     callers: tuple[str, ...]
 
 
-def forbidden(image: Image, scalar: str) -> tuple[Forbidden, ...]:
-    """Return every function that a controller of scalar type float32 or float64 must not link.
+def find_forbidden(image: Image, scalar: str) -> tuple[Forbidden, ...]:
+    """Return every linked function that a controller of type `scalar` must not link.
 
-    Callers are found in ARM, AVR and RISC-V code only; a function that is called through a pointer has none.
+    Callers are known in ARM, AVR and RISC-V code only, and only if they call directly.
     """
     rules = _ALWAYS | _WIDER[scalar]
     found = {symbol: kind for symbol in image.symbols if (kind := _kind(symbol, rules))}
-    callers = direct_callers(image) if found and is_readable(image) else {}
+    callers = find_callers(image) if found and is_readable(image) else {}
     return tuple(
         Forbidden(symbol.name, kind, tuple(c for c in callers.get(symbol.name, ()) if c != symbol.name))
         for symbol, kind in found.items()
@@ -66,7 +66,7 @@ def forbidden(image: Image, scalar: str) -> tuple[Forbidden, ...]:
 
 
 def _kind(symbol: Symbol, rules: dict[str, str]) -> str | None:
-    """Return the first kind that one of the names of a function has."""
+    """Return the first kind whose pattern matches a name of the function, None if there is none."""
     for kind, pattern in rules.items():
         if symbol.kind == "function" and any(re.fullmatch(pattern, label) for label in symbol.labels):
             return kind

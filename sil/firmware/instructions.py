@@ -1,7 +1,7 @@
-"""What an instruction does to the stack pointer and to where the program goes, whatever the processor.
+"""Processor-independent effects of instructions on registers, stack and control flow, for the stack analysis.
 
-The program counter is a register like any other, `pc`: an instruction that jumps or calls puts its target
-there. Registers that no effect names keep their value.
+The program counter is the register `pc`: jumps and calls assign their target to it. Registers without an
+effect keep their value.
 """
 
 from collections.abc import Mapping
@@ -14,8 +14,8 @@ WORD_BYTES: Final = 4
 
 
 @dataclass(frozen=True)
-class Put:
-    """Register becomes base plus offset; without a base, the offset is a constant."""
+class Assign:
+    """register = base + offset; the constant `offset` if `base` is None."""
 
     register: str
     base: str | None
@@ -23,8 +23,8 @@ class Put:
 
 
 @dataclass(frozen=True)
-class Sum:
-    """Register becomes left plus right, or left minus right where `sign` is -1."""
+class Add:
+    """register = left + sign * right."""
 
     register: str
     left: str
@@ -34,7 +34,7 @@ class Sum:
 
 @dataclass(frozen=True)
 class Load:
-    """Register becomes the word at base plus offset; without a base, the offset is the address."""
+    """register = memory[base + offset]; memory[offset] if `base` is None."""
 
     register: str
     base: str | None
@@ -43,7 +43,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Store:
-    """The word at base plus offset becomes what the register holds; without a register, anything."""
+    """memory[base + offset] = register; an unknown value if `register` is None."""
 
     register: str | None
     base: str
@@ -51,8 +51,8 @@ class Store:
 
 
 @dataclass(frozen=True)
-class Same:
-    """Register becomes what two others both hold, the halves of one value; anything if they differ."""
+class JoinHalves:
+    """register = the 16-bit value whose halves are in `first` and `second`; unknown if these differ."""
 
     register: str
     first: str
@@ -60,20 +60,20 @@ class Same:
 
 
 @dataclass(frozen=True)
-class Forget:
-    """Register becomes anything."""
+class Clobber:
+    """The value of the register becomes unknown."""
 
     register: str
 
 
-Effect = Put | Sum | Load | Store | Same | Forget
+Effect = Assign | Add | Load | Store | JoinHalves | Clobber
 Flow = Literal["next", "jump", "call", "stop"]
-"""After the effects: go on, go to `pc`, call `pc` and go on, or end here."""
+"""After the effects: continue, jump to `pc`, call `pc` and continue, or stop."""
 
 
 @dataclass(frozen=True)
 class Instruction:
-    """One instruction; a conditional one may also be skipped, effects and flow."""
+    """One machine instruction; a conditional one may also be skipped, with all effects."""
 
     address: int
     size_bytes: int
@@ -84,20 +84,20 @@ class Instruction:
 
     @property
     def target(self) -> int | None:
-        """Where it jumps to or what it calls, if it says so itself."""
+        """Target address of a direct jump or call, else None."""
         for effect in self.effects:
-            if isinstance(effect, Put) and effect.register == PC and effect.base is None:
+            if isinstance(effect, Assign) and effect.register == PC and effect.base is None:
                 return effect.offset
         return None
 
 
 @dataclass(frozen=True)
 class Convention:
-    """The registers of a calling convention: where a call leaves the return address, what it preserves.
+    """Calling convention: the register `link` receives the return address, callees restore `preserved`.
 
-    Where a call itself pushes the return address, that takes `return_bytes`, and `link` names what is there
-    as if it were a register. Registers are saved on the stack in places of `word_bytes`. `exceptions` names
-    functions that change some of `preserved` all the same, and which.
+    If a call pushes the return address, it takes `return_bytes`, and `link` is a pseudo-register that holds
+    it. Registers are saved in stack slots of `word_bytes`. `exceptions` lists functions that change some of
+    `preserved`, and which.
     """
 
     link: str
@@ -106,6 +106,6 @@ class Convention:
     return_bytes: int = 0
     exceptions: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
-    def preserved_by(self, function: str) -> frozenset[str]:
-        """Return the registers that a function leaves as they were."""
+    def registers_preserved_by(self, function: str) -> frozenset[str]:
+        """Return the registers that a function restores."""
         return self.preserved - self.exceptions.get(function, frozenset())

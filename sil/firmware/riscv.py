@@ -1,4 +1,4 @@
-"""RISC-V instructions, as capstone decodes them, by their effects (ISA manual 20191213; psABI 1.0, 1.1)."""
+"""Effects of RISC-V instructions, decoded by Capstone (ISA manual 20191213; psABI 1.0, 1.1)."""
 
 from typing import Any, Final
 
@@ -7,15 +7,15 @@ from capstone import riscv_const as riscv
 from mambo_nmpc.sil.firmware.instructions import (
     PC,
     WORD_BYTES,
+    Add,
+    Assign,
+    Clobber,
     Convention,
     Effect,
     Flow,
-    Forget,
     Instruction,
     Load,
-    Put,
     Store,
-    Sum,
 )
 
 CONVENTION: Final = Convention("ra", frozenset(f"s{index}" for index in range(12)))
@@ -27,8 +27,8 @@ _JUMPS: Final = frozenset({"j", "jr", "ret"})
 _ENDS: Final = frozenset({"unimp", "ebreak"})
 
 
-def instruction(insn: Any) -> Instruction:
-    """Return what capstone's `insn` does; an effect that is not modelled makes its register anything."""
+def model_instruction(insn: Any) -> Instruction:
+    """Return the effects of Capstone's `insn`; a register written in a way not modelled is clobbered."""
     mnemonic = insn.mnemonic.removeprefix("c.")
     flow: Flow = "next"
     if mnemonic in _BRANCHES | _JUMPS or (mnemonic in {"jal", "jalr"} and _link(insn) == "zero"):
@@ -48,7 +48,7 @@ def instruction(insn: Any) -> Instruction:
 
 
 def _operands(insn: Any) -> list[str | int]:
-    """Return registers by name, constants as they are, a place in memory as offset and base."""
+    """Return the operands: registers by name, immediates, and memory as offset then base."""
     operands: list[str | int] = []
     for operand in insn.operands:
         if operand.type == riscv.RISCV_OP_REG:
@@ -61,7 +61,7 @@ def _operands(insn: Any) -> list[str | int]:
 
 
 def _link(insn: Any) -> str:
-    """Name the register that a jal or jalr leaves its return address in; ra where it goes without saying."""
+    """Return the link register of a jal or jalr, ra if the operands do not state it."""
     match _operands(insn):
         case [str(register), _, *_]:
             return register
@@ -69,32 +69,32 @@ def _link(insn: Any) -> str:
 
 
 def _effects(insn: Any, mnemonic: str) -> tuple[Effect, ...]:  # noqa: C901, PLR0911, PLR0912 - one table
-    """Model what can move the stack pointer, save a register on the stack, or name a place in the program."""
+    """Model changes of the stack pointer, saves of registers, and the computation of addresses of code."""
     operands = _operands(insn)
     match mnemonic, operands:
         case "ret", []:
-            return (Put(PC, CONVENTION.link, 0),)
+            return (Assign(PC, CONVENTION.link, 0),)
         case (("jr" | "jalr"), [str(base)]):
-            return (Put(PC, base, 0),)
+            return (Assign(PC, base, 0),)
         case "jalr", [str(link), str(base), int(offset)]:
-            return (Put(PC, base, offset), Forget(link))
+            return (Assign(PC, base, offset), Clobber(link))
         case "jal", [str(link), int(offset)] if link != CONVENTION.link:
-            return (Forget(PC), Forget(link))
+            return (Clobber(PC), Clobber(link))
         case _, [*_, int(offset)] if mnemonic in _BRANCHES | {"j", "jal"}:
-            return (Put(PC, None, insn.address + offset),)
+            return (Assign(PC, None, insn.address + offset),)
         case (("addi" | "addi16sp" | "addi4spn"), [str(register), *base, int(offset)]):
             return (_put(register, str(base[0]) if base else register, offset),)
         case "li", [str(register), int(value)]:
-            return (Put(register, None, value),)
+            return (Assign(register, None, value),)
         case "mv", [str(register), str(base)]:
             return (_put(register, base, 0),)
         case "lui", [str(register), int(upper)]:
-            return (Put(register, None, upper << 12),)
+            return (Assign(register, None, upper << 12),)
         case "auipc", [str(register), int(upper)]:
-            return (Put(register, None, insn.address + (upper << 12)),)
+            return (Assign(register, None, insn.address + (upper << 12)),)
         case (("add" | "sub"), [str(register), *left, str(right)]):
             first = str(left[0]) if left else register
-            return (Sum(register, first, right, 1 if mnemonic == "add" else -1),)
+            return (Add(register, first, right, 1 if mnemonic == "add" else -1),)
         case (("lw" | "lwsp"), [str(register), int(offset), str(base)]):
             return (Load(register, base, offset),)
         case (("sw" | "swsp"), [str(register), int(offset), str(base)]):
@@ -104,9 +104,9 @@ def _effects(insn: Any, mnemonic: str) -> tuple[Effect, ...]:  # noqa: C901, PLR
         case _, [str(), int(offset), str(base)] if mnemonic in _STORES:
             return (Store(None, base, offset),)
         case _, [str(register), *_] if mnemonic not in _STORES | _BRANCHES:
-            return (Forget(register),)
+            return (Clobber(register),)
     return ()
 
 
-def _put(register: str, base: str, offset: int) -> Put:
-    return Put(register, None if base == "zero" else base, offset)
+def _put(register: str, base: str, offset: int) -> Assign:
+    return Assign(register, None if base == "zero" else base, offset)

@@ -1,4 +1,4 @@
-"""Measure flash and static RAM, and what a controller adds to a program without one."""
+"""Measure flash and static RAM of a program, and how much a controller adds to them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _PARTS: Final[tuple[Part, ...]] = ("own", "helpers", "grown")
 
 @dataclass(frozen=True)
 class SectionBytes:
-    """Bytes by section. Initialised variables are in both: in RAM, and in flash to start from."""
+    """Bytes by section; initialised variables count in RAM and, as initial values, in flash."""
 
     flash: dict[str, int]
     ram: dict[str, int]
@@ -21,11 +21,11 @@ class SectionBytes:
 
 @dataclass(frozen=True)
 class Parts:
-    """What an addition is made of, in bytes.
+    """Bytes that a controller adds, by owner.
 
-    `own` is the controller's; `helpers` whatever else was not there before, such as the compiler's
-    arithmetic; `grown` what the rest gained or lost, such as the caller; `unnamed` belongs to no symbol:
-    padding, strings and constants of the compiler.
+    `own`: the controller's symbols. `helpers`: other new symbols, such as the compiler's arithmetic.
+    `grown`: change of symbols that both programs have, such as the caller. `unnamed`: bytes without a
+    symbol: padding, strings, the compiler's constants.
     """
 
     own: int
@@ -35,13 +35,13 @@ class Parts:
 
     @property
     def total(self) -> int:
-        """All of it."""
+        """Sum of the parts."""
         return self.own + self.helpers + self.grown + self.unnamed
 
 
 @dataclass(frozen=True)
 class Added:
-    """What a controller adds to a program: by section, by part, and the bytes of each symbol by name."""
+    """Bytes that a controller adds to a program: by section, by owner, and by symbol."""
 
     sections: SectionBytes
     flash: Parts
@@ -50,10 +50,10 @@ class Added:
     helpers: dict[str, int]
 
 
-def sections(image: Image) -> SectionBytes:
-    """Return the sections of a program that take flash, and those that take RAM whenever it runs.
+def measure_sections(image: Image) -> SectionBytes:
+    """Return the bytes of the sections in flash and in RAM.
 
-    The flags of a section decide: read-only data is flash, wherever a linker script may put it.
+    The section flags decide: read-only data counts as flash, wherever the linker script places it.
     """
     return SectionBytes(
         flash={section.name: section.size_bytes for section in image.sections if section.in_flash},
@@ -61,39 +61,39 @@ def sections(image: Image) -> SectionBytes:
     )
 
 
-def added(with_controller: Path, empty: Path, prefix: str) -> Added:
-    """Compare a program with the same without the controller, whose symbols and files begin with `prefix`.
+def measure_added(with_controller: Path, empty: Path, prefix: str) -> Added:
+    """Compare a program with and without the controller, whose symbols and files begin with `prefix`.
 
-    Raises FootprintError if one of them cannot be read.
+    Raises FootprintError if a program cannot be read.
     """
     image, base = load(with_controller), load(empty)
-    before, after = sections(base), sections(image)
+    before, after = measure_sections(base), measure_sections(image)
     labels = frozenset(label for symbol in base.symbols for label in symbol.labels)
-    parts = {part: [s for s in image.symbols if _part(s, labels, prefix) == part] for part in _PARTS}
+    parts = {part: [s for s in image.symbols if _classify(s, labels, prefix) == part] for part in _PARTS}
     return Added(
         sections=SectionBytes(_difference(after.flash, before.flash), _difference(after.ram, before.ram)),
-        flash=_parts(parts, base.symbols, before.flash, after.flash),
-        ram=_parts(parts, base.symbols, before.ram, after.ram),
+        flash=_account(parts, base.symbols, before.flash, after.flash),
+        ram=_account(parts, base.symbols, before.ram, after.ram),
         own={symbol.name: symbol.size_bytes for symbol in parts["own"]},
         helpers={symbol.name: symbol.size_bytes for symbol in parts["helpers"]},
     )
 
 
-def _part(symbol: Symbol, labels: frozenset[str], prefix: str) -> Part:
-    """Say whose a symbol is; what is local to a file, such as a table, belongs to the file."""
+def _classify(symbol: Symbol, labels: frozenset[str], prefix: str) -> Part:
+    """Return the owner of a symbol; a local one, such as a table, belongs to the owner of its file."""
     if labels.intersection(symbol.labels):
         return "grown"
     beginnings = (f"{prefix}_", f"{prefix}.c")
     return "own" if (symbol.file or symbol.name).startswith(beginnings) else "helpers"
 
 
-def _parts(
+def _account(
     parts: dict[Part, list[Symbol]],
     base: Iterable[Symbol],
     before: dict[str, int],
     after: dict[str, int],
 ) -> Parts:
-    """Account for the difference of one memory, given its sections before and after."""
+    """Return the growth of one memory by owner, given its sections before and after."""
     own, helpers, shared = (_total(parts[part], after) for part in _PARTS)
     grown = shared - _total(base, before)
     difference = sum(after.values()) - sum(before.values())
@@ -105,7 +105,7 @@ def _total(symbols: Iterable[Symbol], memory: dict[str, int]) -> int:
 
 
 def _difference(after: dict[str, int], before: dict[str, int]) -> dict[str, int]:
-    """Subtract section by section, those included that only one program has; equal ones are left out."""
+    """Return the difference of each section; a section absent from one program counts 0 there."""
     names = dict.fromkeys([*after, *before])
     changes = {name: after.get(name, 0) - before.get(name, 0) for name in names}
     return {name: change for name, change in changes.items() if change}

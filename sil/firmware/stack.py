@@ -1,27 +1,27 @@
-"""Bound the stack of a function: the deepest way down the call graph of the linked program.
+"""Bound the worst-case stack of a function: the deepest path through the call graph of the linked program.
 
-Every path through a function is followed from its first instruction, with the stack pointer and the registers
-as far as they are known. What cannot be followed - recursion, a call or a jump to a place that only run time
-knows, a stack pointer that depends on data - is refused, never guessed. One thing is taken on trust: nobody
-writes through a pointer over a register that the function has saved on its stack.
+An abstract interpretation of the machine code follows every path through a function and keeps the symbolic
+values of stack pointer and registers. Recursion, calls and jumps to addresses known only at run time, and a
+stack pointer that depends on data raise FootprintError; nothing is estimated. The analysis assumes that no
+store through a pointer overwrites a register saved on the stack.
 """
 
 from collections import defaultdict
 from dataclasses import dataclass
 from typing import Final, NoReturn
 
+from mambo_nmpc.sil.firmware.abstract_state import AbstractState, SymbolicValue
 from mambo_nmpc.sil.firmware.disassembly import Disassembly, disassemble
 from mambo_nmpc.sil.firmware.elf import Image
-from mambo_nmpc.sil.firmware.instructions import SP, Instruction, Put
-from mambo_nmpc.sil.firmware.knowledge import Knowledge, Value
+from mambo_nmpc.sil.firmware.instructions import SP, Assign, Instruction
 
-_MOST_DEPTHS: Final = 32
-"""Depths of the stack at one instruction, from which on a loop is taken to grow it."""
+_MAX_DEPTHS: Final = 32
+"""Distinct stack depths at one instruction; more than these mean that a loop grows the stack."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The bytes that a function holds while the next one runs; of the last function, all it ever holds."""
+    """Bytes that a function holds while it calls the next on the path; for the last, its largest frame."""
 
     function: str
     bytes: int
@@ -29,13 +29,11 @@ class Frame:
 
 @dataclass(frozen=True)
 class StackReport:
-    """The worst case of `entry`: `bytes` below the stack pointer that it is called with.
+    """Worst-case stack of `entry`: `bytes` below its stack pointer at the call, without interrupts.
 
-    Its own frame counts, and in that its return address: where it saves it on ARM and RISC-V, whose calls
-    leave it in a register; always on AVR, whose calls push it. Interrupts come on top.
-
-    `path` is a way down to `bytes`, its frames add up to it. `frames` has the most that each reachable
-    function ever holds itself, `depths` the same with all that it calls.
+    The return address counts where it is stored: on ARM and RISC-V if a function saves its link register, on
+    AVR always, since calls push it. The frames of `path`, one deepest call path, add up to `bytes`. By
+    function, `frames` has its own largest frame in bytes and `depths` that frame with everything it calls.
     """
 
     entry: str
@@ -45,28 +43,41 @@ class StackReport:
     depths: dict[str, int]
 
 
-def worst_case(image: Image, entry: str) -> StackReport:
+def bound_stack(image: Image, entry: str) -> StackReport:
     """Bound the stack of the function `entry`.
 
-    Raises FootprintError, naming function and instruction, for what has no provable bound.
+    Raises FootprintError, which names function and instruction, if no bound can be proven.
     """
-    walks = _reachable(image, disassemble(image), image.symbol(entry).address)
+    code = disassemble(image)
+    uses: dict[int, _StackUse] = {}
     depths: dict[int, int] = {}
-    for address in _callees_first(image, walks):
-        walk = walks[address]
-        depths[address] = max([walk.frame, *(held + depths[callee] for callee, held in walk.calls.items())])
-    start = next(iter(walks))
+    active: list[int] = []
+
+    def depth_of(function: int) -> int:
+        if function in active:
+            cycle = [*active[active.index(function) :], function]
+            names = " -> ".join(image.name_of(address) for address in cycle)
+            raise image.error(f"{names} is recursive and has no stack bound; use a loop")
+        if function not in depths:
+            active.append(function)
+            use = uses[function] = _FunctionAnalysis(image, code, function).analyse()
+            calls = (held + depth_of(callee) for callee, held in use.calls.items())
+            depths[function] = max([use.frame, *calls])
+            active.pop()
+        return depths[function]
+
+    start = image.symbol(entry).address
     return StackReport(
         entry=image.name_of(start),
-        bytes=depths[start],
-        path=_deepest(image, walks, depths, start),
-        frames={image.name_of(address): walk.frame for address, walk in walks.items()},
-        depths={image.name_of(address): depths[address] for address in walks},
+        bytes=depth_of(start),
+        path=_find_deepest_path(image, uses, depths, start),
+        frames={image.name_of(address): use.frame for address, use in uses.items()},
+        depths={image.name_of(address): depths[address] for address in uses},
     )
 
 
-def direct_callers(image: Image) -> dict[str, tuple[str, ...]]:
-    """Name, for each function, those that call it or jump to it by its address, in order of address."""
+def find_callers(image: Image) -> dict[str, tuple[str, ...]]:
+    """Return the functions that call or jump to each function directly, in order of address."""
     callers: dict[str, dict[str, None]] = defaultdict(dict)
     for instruction in disassemble(image).instructions.values():
         if instruction.target is not None:
@@ -76,155 +87,132 @@ def direct_callers(image: Image) -> dict[str, tuple[str, ...]]:
 
 
 @dataclass(frozen=True)
-class _Walk:
-    """The most bytes that a function holds, and the most it holds at its calls, by address of the callee."""
+class _StackUse:
+    """Largest frame of a function in bytes, and the bytes it holds at its calls, by address of the callee."""
 
     frame: int
     calls: dict[int, int]
 
 
-def _reachable(image: Image, code: Disassembly, entry: int) -> dict[int, _Walk]:
-    walks: dict[int, _Walk] = {}
-    waiting = [entry]
-    while waiting:
-        address = waiting.pop()
-        if address not in walks:
-            walks[address] = _Walker(image, code, address).walked()
-            waiting += walks[address].calls
-    return walks
-
-
-def _callees_first(image: Image, walks: dict[int, _Walk]) -> list[int]:
-    """Order functions so that each comes after all it calls; refuses recursion."""
-    order: list[int] = []
-    active: list[int] = []
-
-    def visit(address: int) -> None:
-        if address in active:
-            cycle = [*active[active.index(address) :], address]
-            names = " -> ".join(image.name_of(function) for function in cycle)
-            raise image.error(f"{names} is recursive: its stack has no bound; use a loop")
-        if address not in order:
-            active.append(address)
-            for callee in walks[address].calls:
-                visit(callee)
-            active.pop()
-            order.append(address)
-
-    visit(next(iter(walks)))
-    return order
-
-
-def _deepest(
-    image: Image, walks: dict[int, _Walk], depths: dict[int, int], address: int
+def _find_deepest_path(
+    image: Image, uses: dict[int, _StackUse], depths: dict[int, int], address: int
 ) -> tuple[Frame, ...]:
-    name, walk = image.name_of(address), walks[address]
-    for callee, held in walk.calls.items():
+    name, use = image.name_of(address), uses[address]
+    for callee, held in use.calls.items():
         if held + depths[callee] == depths[address]:
-            return (Frame(name, held), *_deepest(image, walks, depths, callee))
-    return (Frame(name, walk.frame),)
+            return (Frame(name, held), *_find_deepest_path(image, uses, depths, callee))
+    return (Frame(name, use.frame),)
 
 
-class _Walker:
-    """Follows every path through one function, and through the code of others that it jumps into."""
+class _FunctionAnalysis:
+    """Abstract interpretation of one function, and of shared code that it jumps into."""
 
     def __init__(self, image: Image, code: Disassembly, function: int) -> None:
         self._image, self._code, self._function = image, code, function
         self._functions = {symbol.address for symbol in image.symbols if symbol.kind == "function"}
-        self._preserved = self._preserved_by(function)
-        self._known: dict[int, dict[int, Knowledge]] = defaultdict(dict)
+        self._preserved = self._find_preserved(function)
+        self._states: dict[int, dict[int, AbstractState]] = defaultdict(dict)
         self._waiting: list[tuple[int, int]] = []
         self._frame = code.convention.return_bytes
         self._calls: dict[int, int] = {}
 
-    def walked(self) -> _Walk:
-        """Return what the function holds, itself and at its calls."""
-        self._arrive(self._function, Knowledge.on_entry(self._code.convention))
+    def analyse(self) -> _StackUse:
+        """Propagate states along every path until a fixed point; returns the stack use."""
+        self._propagate(self._function, AbstractState.at_entry(self._code.convention))
         while self._waiting:
             address, depth = self._waiting.pop()
-            self._step(self._at(address), self._known[address][depth])
-        return _Walk(self._frame, self._calls)
+            self._execute(self._instruction_at(address), self._states[address][depth])
+        return _StackUse(self._frame, self._calls)
 
-    def _at(self, address: int) -> Instruction:
+    def _instruction_at(self, address: int) -> Instruction:
         instruction = self._code.instructions.get(address)
         if instruction is None:
             function, place = self._image.name_of(self._function), self._image.name_of(address)
-            raise self._image.error(f"{function} runs into {place}, where no instruction can be read")
+            raise self._image.error(f"{function} runs into {place}, where no instruction can be decoded")
         return instruction
 
-    def _arrive(self, address: int, knowledge: Knowledge) -> None:
-        """Follow a path on to `address`, unless nothing new is known there; depths are kept apart."""
-        here, depth = self._known[address], knowledge.depth
+    def _propagate(self, address: int, state: AbstractState) -> None:
+        """Join `state` into those at `address`, one for each stack depth; queue the address if it changed."""
+        here, depth = self._states[address], state.depth
         before = here.get(depth)
-        here[depth] = before.common(knowledge) if before else knowledge
+        here[depth] = before.join(state) if before else state
         if here[depth] != before:
             self._waiting.append((address, depth))
-        if len(here) > _MOST_DEPTHS:
+        if len(here) > _MAX_DEPTHS:
             self._refuse(
-                self._at(address), "is reached with ever more stack: a loop that grows it has no bound"
+                self._instruction_at(address),
+                "is reached with a growing stack: a loop that pushes has no bound",
             )
 
-    def _step(self, instruction: Instruction, before: Knowledge) -> None:
+    def _execute(self, instruction: Instruction, before: AbstractState) -> None:
         following = instruction.address + instruction.size_bytes
         if instruction.conditional:
-            self._arrive(following, before)
+            self._propagate(following, before)
         after = before
         for effect in instruction.effects:
-            after = after.after(effect, self._image)
+            after = after.apply(effect, self._image)
             if not after.knows_depth:
                 self._refuse(
                     instruction,
-                    "moves the stack pointer to where only run time knows; "
-                    "alloca and arrays of variable length have no bound",
+                    "sets the stack pointer to a value known only at run time; "
+                    "alloca and variable-length arrays have no bound",
                 )
             self._frame = max(self._frame, after.depth)
-        target, after = after.departed()
+        target, after = after.split_target()
         if instruction.flow == "jump":
             self._jump(instruction, target, after)
         elif instruction.flow == "call":
-            self._call(self._place(instruction, target), following, after)
+            self._call(self._resolve(instruction, target), following, after)
         elif instruction.flow == "next":
-            self._arrive(following, after)
+            self._propagate(following, after)
 
-    def _jump(self, instruction: Instruction, target: Value | None, after: Knowledge) -> None:
-        """Return, call a function as the last act, or go on elsewhere."""
+    def _jump(self, instruction: Instruction, target: SymbolicValue | None, after: AbstractState) -> None:
+        """Handle a jump: a return, a tail call, or a branch."""
         convention = self._code.convention
-        finished = after.unchanged(SP, *self._preserved)
-        if target == Value(convention.link, 0):
+        finished = after.holds_entry_values(SP, *self._preserved)
+        if target == SymbolicValue(convention.link, 0):
             if not finished:
-                self._refuse(instruction, "returns without the stack pointer and registers that it came with")
+                self._refuse(instruction, "returns without restoring the stack pointer and saved registers")
             return
-        place = self._place(instruction, target)
-        other = place in self._functions - {self._function} and self._preserved <= self._preserved_by(place)
-        if finished and after.unchanged(convention.link) and other:
-            self._note(place, 0)
+        target_address = self._resolve(instruction, target)
+        is_other = target_address in self._functions - {self._function}
+        if (
+            is_other
+            and finished
+            and after.holds_entry_values(convention.link)
+            and self._preserved <= self._find_preserved(target_address)
+        ):
+            self._record_call(target_address, 0)
         else:
-            self._arrive(place, after)
+            self._propagate(target_address, after)
 
-    def _call(self, place: int, following: int, after: Knowledge) -> None:
-        """Call a function; a call into the midst of one is a jump, for what is there may not come back."""
+    def _call(self, target_address: int, following: int, after: AbstractState) -> None:
+        """Handle a call. A target inside a function is treated as a jump, since it need not return."""
         convention = self._code.convention
-        if place in self._functions:
-            self._note(place, after.depth)
-            self._arrive(following, after.after_call(self._preserved_by(place)))
+        if target_address in self._functions:
+            self._record_call(target_address, after.depth)
+            self._propagate(following, after.apply_call(self._find_preserved(target_address)))
         else:
-            for effect in (Put(convention.link, None, following), Put(SP, SP, -convention.return_bytes)):
-                after = after.after(effect, self._image)
-            self._arrive(place, after)
+            for effect in (
+                Assign(convention.link, None, following),
+                Assign(SP, SP, -convention.return_bytes),
+            ):
+                after = after.apply(effect, self._image)
+            self._propagate(target_address, after)
 
-    def _preserved_by(self, function: int) -> frozenset[str]:
-        return self._code.convention.preserved_by(self._image.name_of(function))
+    def _find_preserved(self, function: int) -> frozenset[str]:
+        return self._code.convention.registers_preserved_by(self._image.name_of(function))
 
-    def _note(self, callee: int, held: int) -> None:
+    def _record_call(self, callee: int, held: int) -> None:
         self._calls[callee] = max(held, self._calls.get(callee, 0))
 
-    def _place(self, instruction: Instruction, target: Value | None) -> int:
-        """Return the address of a target that is known before run time."""
+    def _resolve(self, instruction: Instruction, target: SymbolicValue | None) -> int:
+        """Return the address of a jump or call target; raises FootprintError if it is not constant."""
         if target is None or target.register is not None:
             self._refuse(
                 instruction,
-                "goes to where only run time knows; "
-                "call functions by name, and compile with -fno-jump-tables",
+                "jumps to an address known only at run time; "
+                "call functions directly, and compile with -fno-jump-tables",
             )
         return target.offset % 2**32 & ~1
 

@@ -1,4 +1,4 @@
-"""Exact instruction counts of one control step on an emulated core, and a search for the worst input."""
+"""Exact instruction counts of control steps on an emulated core, and a search for the worst case."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -24,12 +24,12 @@ HARNESS: Final = (
     "nmpc_last_iterations",
     "nmpc_has_converged",
 )
-"""Functions that run around a step and are not part of it."""
+"""Functions of the test harness, which are not part of a step."""
 
 
 @dataclass(frozen=True)
 class InputSequence:
-    """Inputs of consecutive steps of one controller: state (k, 7), target (k, 4), thrust (k,)."""
+    """Inputs of k consecutive steps of one controller: state (k, 7), target (k, 4), thrust (k,), m/s2."""
 
     state: FloatArray
     target: FloatArray
@@ -45,7 +45,7 @@ class InputSequence:
 
 @dataclass(frozen=True)
 class InstructionCounts:
-    """Instructions of the good steps among those counted."""
+    """Instructions of the accepted steps; `by_function` has the mean of each function, largest first."""
 
     steps: int
     least: int
@@ -56,7 +56,7 @@ class InstructionCounts:
 
 
 class CountingController:
-    """One emulated controller whose instructions are counted, step by step."""
+    """One emulated controller that counts the instructions of each step."""
 
     def __init__(self, settings: Settings, elf: Path, core: str) -> None:
         self._emulated = EmulatedController(settings, elf, core, counting=True)
@@ -64,19 +64,19 @@ class CountingController:
         self._name_of = lru_cache(None)(image.name_of)
 
     def step(self, state: FloatArray, target: FloatArray, thrust: float) -> tuple[int, Counter[str]]:
-        """Step once; returns the status and the instructions by function."""
-        self._emulated.machine.counted()
+        """Step once with state (7,), target (4,), thrust; returns the status and the counts by function."""
+        self._emulated.machine.take_counts()
         outcome = self._emulated.step(state[None], target[None], [thrust])
         by_function: Counter[str] = Counter()
-        for address, instructions in self._emulated.machine.counted().items():
+        for address, instructions in self._emulated.machine.take_counts().items():
             name = self._name_of(address).partition("+")[0]
             if name not in HARNESS:
                 by_function[name] += instructions
         return int(outcome.status[0]), by_function
 
 
-def in_flight(trace: Trace, every: int) -> InputSequence:
-    """Take every so many-th input that the first flight of a trace gave its controller."""
+def sample_flight(trace: Trace, every: int) -> InputSequence:
+    """Return every `every`-th controller input of the first flight of a trace."""
     chosen = slice(0, None, every)
     state = np.concatenate(
         [trace.position_m[chosen, 0, :2], trace.velocity_m_s[chosen, 0, :2], trace.euler_rad[chosen, 0]],
@@ -85,8 +85,8 @@ def in_flight(trace: Trace, every: int) -> InputSequence:
     return InputSequence(state, trace.target[chosen, 0], trace.thrust_acceleration_m_s2[chosen, 0])
 
 
-def spread(settings: Settings, count: int) -> InputSequence:
-    """Draw inputs from millimetres off the target to the ends of all ranges, heading anywhere."""
+def draw_inputs(settings: Settings, count: int) -> InputSequence:
+    """Draw random inputs: errors from millimetres to the input ranges, on a log scale, and any heading."""
     rng = np.random.default_rng(0)
     ranges = settings.ranges
     scale = 10.0 ** rng.uniform(-3, 3, (count, 1))
@@ -101,10 +101,10 @@ def spread(settings: Settings, count: int) -> InputSequence:
 def count_instructions(
     settings: Settings, elf: Path, core: str, inputs: InputSequence, search_steps: int
 ) -> InstructionCounts:
-    """Count the steps of `inputs`, then climb from the most expensive one for `search_steps` more.
+    """Count the steps of `inputs`, then search from the most expensive for `search_steps` more.
 
-    The climb changes one input at a time and keeps what costs more, or as much: the maximum is searched
-    for, not met by chance. Refused inputs, which cost next to nothing, do not count.
+    The search (hill climbing) changes one state component at a time and keeps inputs that cost at least as
+    much. Refused inputs return early and are excluded.
     """
     controller = CountingController(settings, elf, core)
     totals: list[int] = []

@@ -1,4 +1,4 @@
-"""What a controller takes of a board: flash, RAM, stack, instructions, time; and where it goes."""
+"""Measure the footprint of a controller on a board: flash, RAM, stack, instructions, time."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import plainly_named
+from mambo_nmpc.sil.controllers.compiled import with_default_prefix
 from mambo_nmpc.sil.controllers.emulated import build_guest
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.errors import EmulatorError
@@ -21,25 +21,25 @@ from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
 from mambo_nmpc.sil.firmware.disassembly import is_readable
 from mambo_nmpc.sil.firmware.elf import load
-from mambo_nmpc.sil.firmware.gate import Forbidden, forbidden
-from mambo_nmpc.sil.firmware.sizes import Added, added
-from mambo_nmpc.sil.firmware.stack import StackReport, worst_case
+from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
+from mambo_nmpc.sil.firmware.sizes import Added, measure_added
+from mambo_nmpc.sil.firmware.stack import StackReport, bound_stack
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.footprint.counts import InstructionCounts, count_instructions, in_flight, spread
+from mambo_nmpc.sil.footprint.counts import InstructionCounts, count_instructions, draw_inputs, sample_flight
 
 COUNTED_STEPS: Final = 300
-"""Steps that are counted: a sixth in flight, a third from everywhere, half in search of the worst."""
+"""Steps to count: a sixth from a flight, a third random, half in the search for the most expensive."""
 _FEWEST_STEPS: Final = 6
 _USUAL_WORK: Final = 1000
-"""Predicted steps times moves times iterations up to which all steps are counted."""
+"""Prediction steps x moves x iterations above which fewer steps are counted."""
 _FLIGHT_S: Final = 20.0
 
 
 @dataclass(frozen=True)
 class Limit:
-    """One measured value against its budget; `unit` is of both."""
+    """A measured value and its budget, both in `unit`."""
 
     name: str
     value: Number
@@ -67,11 +67,10 @@ class Limit:
 
 @dataclass(frozen=True)
 class Footprint:
-    """The measured controller on one board.
+    """Footprint of one controller on one board.
 
-    `added` is what it adds to a program without it, its instance in static memory included. `stack` is None
-    where the code of the processor cannot be taken apart here, `counts` where it cannot be emulated, and then
-    `uncounted` says why.
+    `added` is the difference between programs with and without the controller and its instance. `stack` is
+    None if the code cannot be disassembled, `counts` if it cannot be emulated, for the reason `uncounted`.
     """
 
     board: Board
@@ -88,7 +87,7 @@ class Footprint:
 
     @property
     def cycles(self) -> tuple[float, float] | None:
-        """An estimate of the clock cycles of the most expensive step: least and most."""
+        """Estimated clock cycles of the most expensive step, lower and upper end of the band."""
         if self.counts is None:
             return None
         cycles, error = self.board.cycles.per_instruction * self.counts.most, self.board.cycles.error_share
@@ -96,13 +95,13 @@ class Footprint:
 
     @property
     def time_s(self) -> tuple[float, float] | None:
-        """An estimate of the time of the most expensive step, in seconds: least and most."""
+        """Estimated time of the most expensive step in seconds, lower and upper end of the band."""
         clock_hz = self.board.clock_hz.value
         return None if self.cycles is None else (self.cycles[0] / clock_hz, self.cycles[1] / clock_hz)
 
     @property
     def limits(self) -> tuple[Limit, ...]:
-        """Every measured value that has a budget."""
+        """All measured values that have a budget; time in ms, upper end of the band."""
         budget = self.board.budget
         limits = [
             Limit("flash", self.added.flash.total, budget.flash_bytes, "B"),
@@ -118,16 +117,16 @@ class Footprint:
 
     @property
     def complete(self) -> bool:
-        """Tell whether everything that has a budget was measured."""
+        """Whether everything that has a budget was measured."""
         return self.stack is not None and self.counts is not None
 
     @property
     def fits(self) -> bool:
-        """Tell whether all that was measured is within budget, and nothing is linked that must not be."""
+        """Whether all measured values are within budget and nothing forbidden is linked."""
         return not self.forbidden and all(limit.share <= 1 for limit in self.limits)
 
     def largest(self, count: int) -> list[tuple[str, int]]:
-        """Return the largest symbols of flash and RAM, own and the compiler's."""
+        """Return the `count` largest symbols in flash and RAM with their bytes, the compiler's included."""
         everything = self.added.own | self.added.helpers
         return sorted(everything.items(), key=lambda item: -item[1])[:count]
 
@@ -137,16 +136,16 @@ def measure_footprint(
 ) -> Footprint:
     """Build the C of `settings` for `board` and measure it.
 
-    Raises BuildError if there is no compiler, FootprintError if the stack has no provable bound.
+    Raises BuildError if the compiler is missing or fails, FootprintError if no stack bound can be proven.
     """
     found = builder(board, optimisation)
-    files = render(plainly_named(settings), with_digest=False)
+    files = render(with_default_prefix(settings), with_digest=False)
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
         folder = Path(work)
         firmware = found.firmware(files, folder)
         image = load(firmware)
         readable = is_readable(image)
-        sizes = added(firmware, found.firmware(files, folder, empty=True), PREFIX)
+        sizes = measure_added(firmware, found.firmware(files, folder, empty=True), PREFIX)
         counts, uncounted = _counts(settings, found, folder, counted_steps)
         return Footprint(
             board=board,
@@ -155,31 +154,31 @@ def measure_footprint(
             scalar=settings.code.scalar,
             added=sizes,
             instance_bytes=image.symbol("nmpc_controller").size_bytes,
-            stack=worst_case(image, ENTRY) if readable else None,
+            stack=bound_stack(image, ENTRY) if readable else None,
             counts=counts,
             uncounted=uncounted,
-            forbidden=forbidden(image, settings.code.scalar),
+            forbidden=find_forbidden(image, settings.code.scalar),
             update_period_s=settings.horizon.update_period_s,
         )
 
 
 @lru_cache(maxsize=1)
 def _flight() -> Trace:
-    """Fly the figure of eight with the PD: what a controller meets in flight, tracking well or not."""
+    """Fly the figure of eight with the PD, whose tracking errors are larger than those of the NMPC."""
     return fly(Flight(Bernoulli(2.0, 0.5), duration_s=_FLIGHT_S), PdController())
 
 
 def _counts(
     settings: Settings, found: Builder, folder: Path, steps: int
 ) -> tuple[InstructionCounts | None, str]:
-    """Count steps in flight, steps from everywhere, and steps in search of the worst; fewer of long ones.
+    """Count steps from a flight, random ones, and those of the search; fewer if one step takes long.
 
-    Returns None, and why, where the board cannot be emulated here.
+    Returns None and the reason if the board cannot be emulated.
     """
     work = settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
     steps = max(_FEWEST_STEPS, min(steps, steps * _USUAL_WORK // work))
     trace = _flight()
-    inputs = in_flight(trace, every=len(trace.time_s) * 6 // steps) + spread(settings, steps // 3)
+    inputs = sample_flight(trace, every=len(trace.time_s) * 6 // steps) + draw_inputs(settings, steps // 3)
     elf = build_guest(settings, found, folder)
     try:
         return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2), ""

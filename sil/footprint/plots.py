@@ -23,11 +23,11 @@ _SWEPT: Final = {
     "time_ms": "time of a step, ms (upper estimate)",
     "iae_m_s": "IAE, m s",
 }
-"""What a sweep measures and its picture shows, with labels."""
+"""Quantities of a `Point` that are plotted, and their axis labels."""
 
 
 def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, Path]:
-    """Draw each limit as a bar per board, as a share of its budget; write stem.png and stem.svg."""
+    """Draw every measured value as a share of its budget, a bar each; write stem.png and stem.svg."""
     with style(), mpl.rc_context({"text.parse_math": False}):  # a board's name is no formula
         figure = Figure(figsize=(7.2, 1.2 + 1.0 * len(footprints)), layout="constrained")
         axes = figure.subplots()
@@ -37,7 +37,7 @@ def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, 
                 labels.append(f"{footprint.board.name}  {limit.name}")
                 shares.append(100 * limit.share)
                 colours.append(FLOWN if limit.share <= 1 else COMMAND)
-                texts.append(f" {_spelled(limit.value)} of {_spelled(limit.budget)} {limit.unit}")
+                texts.append(f" {_format(limit.value)} of {_format(limit.budget)} {limit.unit}")
         bars = axes.barh(labels, shares, color=colours, zorder=2)
         axes.bar_label(bars, texts, fontsize=7)
         axes.axvline(100, color="#444444", linewidth=0.8)
@@ -49,17 +49,16 @@ def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, 
         return save(figure, stem)
 
 
-def _spelled(value: float) -> str:
+def _format(value: float) -> str:
     return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def draw_sweep(
     points: Sequence[Point], board: Board, update_period_s: float, stem: Path
 ) -> tuple[Path, Path]:
-    """Draw flash, RAM, time and tracking against the prediction horizon; write stem.png and stem.svg.
+    """Draw flash, RAM, time and IAE against the prediction horizon; write stem.png and stem.svg.
 
-    A colour for each control horizon, a line style for each number of iterations; filled dots fit the budget,
-    which is the dashed line.
+    Colour: control horizon. Line style: iterations. Dots: within budget. Dashed grey line: the budget.
     """
     with style():
         figure = Figure(figsize=(9.0, 7.0), layout="constrained")

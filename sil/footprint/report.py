@@ -74,7 +74,7 @@ def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) 
 
 
 def text(footprints: Sequence[Footprint]) -> str:
-    """Spell a table of all boards; of a single one also its functions; then what is over budget."""
+    """Return a table of the boards, the functions if there is one board, and notes on what fails."""
     rows = [_HEAD, *(_row(footprint) for footprint in footprints)]
     lines = _columns(rows)
     if len(footprints) == 1:
@@ -146,12 +146,12 @@ def _functions(footprint: Footprint) -> list[FunctionFootprint]:
 
 
 def _notes(footprint: Footprint) -> list[str]:
-    """Say what is over budget or must not be linked, and what was not measured."""
+    """Return a line for each value over budget, forbidden function, and missing measurement."""
     name, notes = footprint.board.name, []
     for limit in footprint.limits:
         if limit.share > 1:
             value, budget, over = (
-                _spelled(number, limit.unit)
+                _format(number, limit.unit)
                 for number in (limit.value, limit.budget, limit.value - limit.budget)
             )
             notes.append(f"{name}: {limit.name} {value} is over its budget of {budget} by {over}")
@@ -163,13 +163,13 @@ def _notes(footprint: Footprint) -> list[str]:
         notes.append(f"{name}: {found.symbol} ({found.kind}) must not be linked; called by {callers}")
     if footprint.stack is None:
         core = footprint.board.core.value
-        notes.append(f"{name}: stack is not measured, there is no way yet for {core}")
+        notes.append(f"{name}: stack is not measured: {core} cannot be disassembled")
     if footprint.counts is None:
         notes.append(f"{name}: instructions and time are not measured: {footprint.uncounted}")
     return notes
 
 
-def _spelled(value: float, unit: str) -> str:
+def _format(value: float, unit: str) -> str:
     return f"{value:.0f} {unit}" if unit == "B" else f"{value:.4g} {unit}"
 
 

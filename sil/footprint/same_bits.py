@@ -1,4 +1,4 @@
-"""Same bits: the self-test digest from every build at hand."""
+"""Compare the self-test digest of every available build: compilers, optimisations, boards."""
 
 import shutil
 import tempfile
@@ -13,8 +13,8 @@ from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.controllers.compiled import compiled, compiled_digest
-from mambo_nmpc.sil.controllers.emulated import build_guest, emulated_digest
+from mambo_nmpc.sil.controllers.compiled import build_extension, digest_compiled
+from mambo_nmpc.sil.controllers.emulated import build_guest, digest_emulated
 from mambo_nmpc.sil.errors import EmulatorError
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, Builder, builder, clang_builder
 
@@ -25,7 +25,7 @@ REFERENCE: Final = "reference"
 
 @dataclass(frozen=True)
 class BuildDigest:
-    """The digest of one build, in C's spelling; None, and why, where there is none."""
+    """The digest of one build as a C literal; None if it could not run, for `reason`."""
 
     where: str
     compiler: str
@@ -35,8 +35,8 @@ class BuildDigest:
 
 
 def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
-    """Yield the digest of the reference first, then of every build on this machine and on `boards`."""
-    yield BuildDigest(REFERENCE, "NumPy", "", _spelled(self_test_digest(Design(settings), episodes)))
+    """Yield the digest of the reference, then of every build for this machine and for `boards`."""
+    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(Design(settings), episodes)))
     for name in HOST_COMPILERS:
         for optimisation in OPTIMISATIONS:
             yield _on_host(settings, name, optimisation, episodes)
@@ -46,16 +46,16 @@ def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -
                 yield _on_board(settings, board, name, optimisation, episodes)
 
 
-def builds(boards: Sequence[Board]) -> int:
-    """Count what `run_everywhere` yields."""
+def count_builds(boards: Sequence[Board]) -> int:
+    """Return the number of digests that `run_everywhere` yields."""
     return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(BOARD_COMPILERS) * len(boards))
 
 
 def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int) -> BuildDigest:
     if shutil.which(compiler) is None:
-        return BuildDigest("host", compiler, optimisation, None, f"{compiler} is not here")
-    extension = compiled(settings, Toolchain((compiler,), optimisation))
-    return BuildDigest("host", compiler, optimisation, _spelled(compiled_digest(extension, episodes)))
+        return BuildDigest("host", compiler, optimisation, None, f"{compiler} is missing")
+    extension = build_extension(settings, Toolchain((compiler,), optimisation))
+    return BuildDigest("host", compiler, optimisation, _format(digest_compiled(extension, episodes)))
 
 
 def _on_board(
@@ -65,11 +65,11 @@ def _on_board(
         found = BOARD_COMPILERS[compiler](board, optimisation)
         with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
             elf = build_guest(settings, found, Path(work))
-            digest = emulated_digest(settings, elf, board.emulated_core.value, episodes)
+            digest = digest_emulated(settings, elf, board.emulated_core.value, episodes)
     except (BuildError, EmulatorError) as error:
         return BuildDigest(board.name, compiler, optimisation, None, str(error))
-    return BuildDigest(board.name, found.toolchain.command[0], optimisation, _spelled(digest))
+    return BuildDigest(board.name, found.toolchain.command[0], optimisation, _format(digest))
 
 
-def _spelled(digest: int) -> str:
+def _format(digest: int) -> str:
     return f"0x{digest:08X}"

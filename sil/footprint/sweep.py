@@ -1,4 +1,4 @@
-"""Sweep horizons and iterations: what each takes of a board, and how well it tracks the Table II case."""
+"""Sweep horizons and iterations: footprint on a board, and tracking of the Table II case."""
 
 import csv
 import math
@@ -25,14 +25,14 @@ COUNTED_STEPS: Final = 60
 
 @dataclass(frozen=True)
 class Grid:
-    """What is swept: prediction horizons, control horizons, iterations."""
+    """Values to sweep: prediction horizons, control horizons, iterations."""
 
     prediction: tuple[int, ...]
     control: tuple[int, ...]
     iterations: tuple[int, ...]
 
     def points(self) -> list[tuple[int, int, int]]:
-        """Return every combination with a control horizon within the prediction."""
+        """Return every combination whose control horizon is at most its prediction horizon."""
         return [
             (prediction, control, iterations)
             for prediction, control, iterations in product(self.prediction, self.control, self.iterations)
@@ -42,7 +42,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class Point:
-    """One controller of the grid on the board; what is not measured is NaN, and then it does not fit."""
+    """One controller of the grid on the board; NaN where not measured, and then `fits` is False."""
 
     prediction: int
     control: int
@@ -73,11 +73,11 @@ def measure_grid(settings: Settings, board: Board, grid: Grid) -> Iterator[Point
     """Yield the points of the grid in order, measured on all processors of this machine."""
     jobs = [(settings.model_dump(), board.model_dump(), *point) for point in grid.points()]
     with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
-        yield from pool.map(_measured, jobs)
+        yield from pool.map(_measure_point, jobs)
 
 
 def budgets(board: Board, update_period_s: float) -> dict[str, float]:
-    """Return what a controller may take of the board, by the names of `Point`."""
+    """Return the budget of the board by field of `Point`."""
     budget = board.budget
     return {
         "flash_bytes": budget.flash_bytes,
@@ -87,21 +87,21 @@ def budgets(board: Board, update_period_s: float) -> dict[str, float]:
 
 
 def largest_fit(points: Sequence[Point]) -> Point | None:
-    """Return the largest horizon that fits and flies: longest prediction, most moves, then best tracking."""
+    """Return the fitting point that is not lost with the longest prediction, then most moves, least IAE."""
     fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
     return max(fitting, key=lambda p: (p.prediction, p.control, -p.iae_m_s), default=None)
 
 
 def write_points(points: Sequence[Point], path: Path) -> None:
-    """Write a CSV file, a point a line."""
+    """Write a CSV file with one line for each point."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
         writer.writeheader()
         writer.writerows(asdict(point) for point in points)
 
 
-def _measured(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Point:
-    """Measure one point, in a process of its own: plain values come in, for generic models do not pickle."""
+def _measure_point(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Point:
+    """Measure one point in a worker process; `job` is plain data, since generic models do not pickle."""
     document, board_document, prediction, control, iterations = job
     board = Board.model_validate(board_document)
     document["horizon"] |= {"prediction": prediction, "control": control}

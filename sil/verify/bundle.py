@@ -3,7 +3,7 @@
 import re
 
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.controllers.extension import load_extension
 from mambo_nmpc.sil.verify.check import Subject
 
@@ -24,6 +24,6 @@ def controller(subject: Subject, n: int) -> CompiledController:
     """
     settings = subject.settings
     if settings.code.prefix != "nmpc":
-        return CompiledController(settings, n, compiled(settings, host_toolchain()))
+        return CompiledController(settings, n, build_extension(settings, host_toolchain()))
     extension = load_extension(library(subject), settings.code.scalar, host_toolchain())
     return CompiledController(settings, n, extension)

@@ -18,7 +18,7 @@ from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, watched_step
+from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, step_watched
 from mambo_nmpc.sil.flight.loop import Flight, Outcome, fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.traces import Trace
@@ -143,7 +143,7 @@ def _steps(settings: Settings, moments: Moments) -> tuple[Any, InnerSteps]:
         command_rad=numbers.quantize(moments.command_rad, COMMAND).astype(numbers.computed),
         plan_rad=numbers.quantize(moments.plan_rad, COMMAND).astype(numbers.computed),
     )
-    return watched_step(settings, memory, moments.state, moments.target, moments.thrust_acceleration_m_s2)
+    return step_watched(settings, memory, moments.state, moments.target, moments.thrust_acceleration_m_s2)
 
 
 def _spread(values: NDArray[np.float64]) -> tuple[float, float, float]:

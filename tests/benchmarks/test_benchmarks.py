@@ -1,4 +1,4 @@
-"""What the benchmarks compare: one controller written twice, one problem stated three times."""
+"""The benchmarks compare equal controllers and equal problems."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,19 +18,19 @@ from tests.support.tools import require
 
 
 def random_inputs(n: int) -> Array:
-    """Return errors and last commands (n, 6), a third each far, near and very near."""
+    """Return errors and last commands (n, 6) of three magnitudes."""
     scale = np.array([0.5, 1.0, 0.5, 1.0, 0.1, 0.1]) * 10.0 ** -(np.arange(n) % 3)[:, None]
     inputs: Array = np.random.default_rng(0).uniform(-1, 1, (n, 6)) * scale
     return inputs
 
 
-def planned(
+def plan_all(
     settings: Settings,
     place: Callable[[Settings, Path], None],
     program: Callable[[str, Settings], Program],
     folder: Path,
 ) -> list[Array]:
-    """Return the plans (n, 4) of a build, started over for each input, and flying on."""
+    """Return the plans (n, 4) of a build, with a reset before each input, and without."""
     place(settings, folder)
     library = build(program("", settings), folder, ("-O0",), folder / "library.so")
     return [plans(library, random_inputs(600), follows=follows)[1] for follows in (False, True)]
@@ -38,18 +38,18 @@ def planned(
 
 @pytest.mark.parametrize("preset", ["table1", "mambo"])
 def test_plain_roll_out_plans_what_the_generated_c_plans(preset: str, tmp_path: Path) -> None:
-    """Without tables, with and without lag, cold and warm: in double, no sign falls otherwise."""
+    """In double both have the same plans, with and without lag, with and without warm start."""
     require("gcc", "gcc")
     settings = with_option(presets.load(preset), "code.scalar", "float64", "test")
-    ours = planned(settings, place_bundle, bundle_program, tmp_path / "ours")
-    plain = planned(settings, place_rollout, rollout_program, tmp_path / "plain")
+    ours = plan_all(settings, place_bundle, bundle_program, tmp_path / "ours")
+    plain = plan_all(settings, place_rollout, rollout_program, tmp_path / "plain")
     for mine, theirs in zip(ours, plain, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-6)
         assert np.ptp(mine, axis=0).min() > 0.1
 
 
 def test_optimum_is_of_the_problem_of_the_peers() -> None:
-    """The errors and changes that it weighs are those that the peers condense."""
+    """Its rows are the weighted errors and changes of the peers' condensed problem."""
     inputs = random_inputs(30)
     found = optimum.problems(peers_model(), inputs)
     from_state, from_moves = peers_setups.condensed()
@@ -67,9 +67,9 @@ def test_optimum_is_of_the_problem_of_the_peers() -> None:
 @pytest.mark.parametrize("kind", ["1-norm", "quadratic"])
 @pytest.mark.parametrize("settings", [peers_model(), presets.load("mambo")], ids=["no lag", "lag"])
 def test_no_neighbour_of_the_optimum_costs_less(kind: Cost, settings: Settings) -> None:
-    """Both costs are convex: what no step improves, near the limit too, is the least there is."""
+    """Both costs are convex, so a plan that no small step within the limit improves is optimal."""
     inputs = random_inputs(30)
-    best = optimum.best(kind, settings, inputs)
+    best = optimum.solve(kind, settings, inputs)
     least = optimum.costs(kind, settings, inputs, best)
     steps = np.random.default_rng(1).choice([-1e-3, 0.0, 1e-3], (100, *best.shape))
     for step in steps:

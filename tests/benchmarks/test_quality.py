@@ -1,4 +1,4 @@
-"""The linear program of `benchmarks.quality` is the controller's own problem, and solved."""
+"""The linear program of `benchmarks.quality` equals the controller's problem, and its solution is optimal."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from benchmarks.searches import (
     Problems,
     SearchingController,
     best_iterate,
-    from_level,
+    from_zero_moves,
     optimum,
     rprop,
 )
@@ -29,7 +29,7 @@ DRAWN = [index for index in range(30) if settings_case(index, "float64").model.p
 
 
 def inputs(rng: np.random.Generator, farthest_m: float = 1.0) -> Inputs:
-    """Draw states, targets and thrusts, a thousandth of the way to all of it apart, at any heading."""
+    """Draw states, targets and thrusts, with errors of 0.001 to 1 times `farthest_m`, at any heading."""
     target = rng.normal(0, 1, (N, 4))
     apart = farthest_m * 10.0 ** rng.uniform(-3, 0, (N, 1)) * rng.normal(0, 1, (N, 4))
     attitude = rng.uniform(-1, 1, (N, 3)) * [0.4, 0.4, 3.0]
@@ -39,7 +39,7 @@ def inputs(rng: np.random.Generator, farthest_m: float = 1.0) -> Inputs:
 
 @pytest.mark.parametrize("index", DRAWN)
 def test_rows_have_the_cost_and_slope_of_the_reference(index: int) -> None:
-    """Eq 12 written out in rows is eq 12 of the reference, for any settings, plan and last command."""
+    """Cost and gradient of the rows equal the reference's, for any settings, plan and last command."""
     rng = np.random.default_rng(index)
     seen: list[Problems] = []
 
@@ -62,7 +62,7 @@ def test_rows_have_the_cost_and_slope_of_the_reference(index: int) -> None:
 
 @pytest.mark.parametrize("name", ["table1", "mambo", "mambo-robust"])
 def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
-    """The program's optimum keeps the limit, and beats the controller's plan and any other."""
+    """The optimum is within the limit and costs no more than the controller's plan and nearby plans."""
     settings, rng = presets.load(name), np.random.default_rng(1)
     controller, model = ReferenceController(Design(settings), N), CostModel(settings)
     limit = settings.limits.tilt_rad
@@ -81,7 +81,7 @@ def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
 
 
 def test_searches_are_ordered_by_what_they_find() -> None:
-    """The best iterate is never dearer than start or last iterate, and the optimum never dearer than it."""
+    """The best iterate costs no more than first and last, the optimum no more than the best iterate."""
     settings, rng = presets.load("mambo"), np.random.default_rng(2)
     problems = CostModel(settings).problems(*inputs(rng), rng.uniform(-0.2, 0.2, (N, 2)))
     level = np.zeros((N, settings.horizon.control, 2))
@@ -92,13 +92,13 @@ def test_searches_are_ordered_by_what_they_find() -> None:
         assert np.all(best <= np.minimum(last, problems.cost(start)))
         assert np.all(problems.cost(best_rad) <= best * (1 + 1e-8))
         assert np.any(best < last) == (start is best_rad)
-    from_best = from_level(settings, problems, best_rad)
+    from_best = from_zero_moves(settings, problems, best_rad)
     np.testing.assert_array_equal(from_best, rprop(settings).minimize(problems.evaluate, level).moves_rad)
 
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_the_first_row_is_the_preset_as_it_is(name: str) -> None:
-    """Everything is compared with the preset itself; of the rest only the search differs."""
+    """The first row is the preset unchanged; the others differ from it only in the search."""
     first, *others = entrants(name).values()
     assert first.settings == presets.load(name)
     assert first.searching is None

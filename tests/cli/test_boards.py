@@ -144,7 +144,7 @@ def test_a_missing_emulator_is_named(
     board_builder("mega")
     monkeypatch.setenv("PATH", only(tmp_path_factory.mktemp("bin"), "avr-*"))
     said, talk = run(*command, code=2 if command[0] == "fly" else 0)
-    assert "no qemu-system-avr found to emulate an ATmega2560; Debian's qemu-system-misc" in said + talk
+    assert "qemu-system-avr, needed to emulate an ATmega2560, is missing" in said + talk
 
 
 @pytest.mark.parametrize(

@@ -221,7 +221,11 @@ def test_unknown_board_lists_those_there_are(
             f"value{'.a' * 2_000} = 1",
             "fpu.value = a value too long to repeat must be 'none', 'single' or 'double'",
         ),
-        ("title =", "fpu_bits = 32\ntitle =", "fpu_bits is not a key of a board; there are title, core, fpu"),
+        (
+            "title =",
+            "fpu_bits = 32\ntitle =",
+            "fpu_bits is not a key of a board; its keys are title, core, fpu",
+        ),
         ("title =", "core = 5\ntitle =", "Cannot overwrite a value; write each section and key once: [core]"),
         (
             "title =",

@@ -1,6 +1,5 @@
-"""The emulated controller: the reference's bits on every core, and a guest that fails says so."""
+"""The emulated controller: the reference's bits on every core, and errors of the emulated program."""
 
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,21 +12,14 @@ from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
-from mambo_nmpc.sil.emulation.machine import CORES as KNOWN_CORES
+from mambo_nmpc.sil.controllers.extension import batch_source
+from mambo_nmpc.sil.emulation.machine import CORES as EMULATED_CORES
 from mambo_nmpc.sil.emulation.machine import Machine, start
 from mambo_nmpc.sil.errors import EmulationError
 from tests.support.cases import SCALARS, settings_case
 from tests.support.parity import Run, differences, inputs_of_steps
-from tests.support.tools import board_builder
+from tests.support.tools import CORES, board_builder
 
-CORES = {
-    "mambo": "arm926",
-    "rp2040": "cortex-m0",
-    "crazyflie": "cortex-m4",
-    "teensy41": "cortex-m7",
-    "rv32": "rv32",
-    "mega": "avr",
-}
 QUICK_CASES = {
     "mambo": (0, 5, 4),
     "rp2040": (1, 9, 6),
@@ -35,10 +27,10 @@ QUICK_CASES = {
     "teensy41": (4, 5, 0),
     "rv32": (2, 6, 8),
 }
-"""Settings of each board in a quick run, one for each scalar type: corners of the horizon, random ones."""
+"""Quick cases of each board, one for each scalar type: extreme and random horizons."""
 LONG_CASES = range(12)
 AVR_CASES = {case: case in {0, 6} for case in range(12) if case != 4}
-"""Settings that fit the Mega, whose double is no double, and whether a run is quick."""
+"""Cases that fit the Mega, without float64, and whether they are quick."""
 
 BAD_GUEST = """
 #ifdef __AVR__
@@ -63,17 +55,17 @@ long weigh(int a, int b, int c, int d, int e, int f, int g, int h, int i, int j)
     return a + 2 * b + 3 * c + 4 * d + 5 * e + 6 * f + 7 * g + 8 * h + 9 * i + 10 * j;
 }
 """
-"""Functions that end well, die of data (on AVR, of what is no instruction), die of code, and never end."""
+"""Functions that return, fault on data (AVR: illegal instruction), fault on code, and never return."""
 
 
-def emulated(name: str, settings: Settings, folder: Path, n: int) -> EmulatedController:
-    """Build n controllers for a board and put them on its core."""
+def start_emulated(name: str, settings: Settings, folder: Path, n: int) -> EmulatedController:
+    """Build n controllers for a board and start them on its core."""
     elf = build_guest(settings, board_builder(name), folder)
     return EmulatedController(settings, elf, boards.load(name).emulated_core.value, n)
 
 
 def cases() -> list[object]:
-    """Return boards, scalars and settings; most of them are for a long run."""
+    """Return boards, scalar types and settings; most are marked long."""
     chosen = [
         (name, scalar, index, QUICK_CASES[name][column] == index)
         for name in QUICK_CASES
@@ -93,26 +85,26 @@ def cases() -> list[object]:
 
 @pytest.fixture(params=CORES)
 def bad_guest(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
-    """Put the functions that fail on a core."""
+    """Start the faulty functions on a core."""
     keep = ("fine", "die", "stray", "spin", "weigh")
     elf = board_builder(request.param).guest({}, BAD_GUEST, keep, tmp_path)
     return start(elf, CORES[request.param], 0.2)
 
 
 def test_every_board_has_a_core() -> None:
-    """The cores below are those that the boards name, and all that there are."""
+    """CORES has the core of every board, and every core that can be emulated."""
     assert {name: boards.load(name).emulated_core.value for name in boards.names()} == CORES
-    assert set(KNOWN_CORES) == set(CORES.values())
+    assert set(EMULATED_CORES) == set(CORES.values())
 
 
 @pytest.mark.parametrize(("name", "scalar", "index"), cases())
 def test_every_core_has_the_bits_of_the_reference(name: str, scalar: str, index: int, tmp_path: Path) -> None:
-    """Over consecutive steps of random inputs, corners and refused ones, whatever the settings."""
+    """Bits are equal over consecutive steps with random, extreme and refused inputs, for random settings."""
     settings = settings_case(index, scalar)
     n, steps = 30, 4
     inputs = inputs_of_steps(settings, n, steps, seed=index)
     inputs[2].state[::7, index % 7] = np.nan
-    controllers = emulated(name, settings, tmp_path, n), ReferenceController(Design(settings), n)
+    controllers = start_emulated(name, settings, tmp_path, n), ReferenceController(Design(settings), n)
     ours, theirs = (
         Run([], [controller.step(case.state, case.target, case.thrust) for case in inputs])
         for controller in controllers
@@ -123,9 +115,9 @@ def test_every_core_has_the_bits_of_the_reference(name: str, scalar: str, index:
 
 
 def test_memory_is_dirty_before_init(tmp_path: Path) -> None:
-    """Without nmpc_init a refused input is answered with what was in memory, which is not zero."""
+    """Without nmpc_init a refused input returns the command in the instance's memory, which is not zero."""
     settings = presets.load("mambo")
-    glue = resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
+    glue = batch_source()
     assert glue.count("nmpc_init(&controllers[i]);") == 1
     idle = glue.replace("nmpc_init(&controllers[i]);", "(void)controllers[i];")
     elf = board_builder("crazyflie").guest(render(settings, with_digest=False), idle, GUEST, tmp_path)
@@ -142,8 +134,8 @@ def test_memory_is_dirty_before_init(tmp_path: Path) -> None:
 def test_another_shape_is_refused(
     state: tuple[int, ...], target: tuple[int, ...], thrust: tuple[int, ...], tmp_path: Path
 ) -> None:
-    """Nothing is written beside the inputs in the memory of the core."""
-    controller = emulated("crazyflie", presets.load("mambo"), tmp_path, 2)
+    """An array of a wrong shape would be written beyond the inputs in the core's memory."""
+    controller = start_emulated("crazyflie", presets.load("mambo"), tmp_path, 2)
     with pytest.raises(ValueError, match=r"expected an array of shape \(2,"):
         controller.step(np.zeros(state), np.zeros(target), np.zeros(thrust))
 
@@ -156,16 +148,17 @@ def test_arguments_beyond_the_registers_arrive(bad_guest: Machine) -> None:
 
 @pytest.mark.parametrize("function", ["die", "stray"])
 def test_a_guest_that_dies_is_named(function: str, bad_guest: Machine) -> None:
-    """Bad data or a bad jump: function, place and cause; the next call is none the worse for it."""
+    """A fault is reported with function, address and cause; the machine stays usable."""
     with pytest.raises(
-        EmulationError, match=rf"^{function} died at address 0x[0-9a-f]+: .*(UC_ERR_\w+|no such instruction)"
+        EmulationError,
+        match=rf"^{function} faulted at address 0x[0-9a-f]+: .*(UC_ERR_\w+|illegal instruction)",
     ):
         bad_guest.call(function)
     assert bad_guest.call("fine") == 70007
 
 
 def test_a_guest_that_never_returns_is_named(bad_guest: Machine) -> None:
-    """An endless loop ends with its time: function, time, place; the next call is none the worse."""
+    """An endless loop is reported with function, time limit and address; the machine stays usable."""
     with pytest.raises(
         EmulationError, match=r"^spin did not return within 0\.2 s, at address 0x1[0-9a-f]{4}"
     ):
@@ -174,10 +167,10 @@ def test_a_guest_that_never_returns_is_named(bad_guest: Machine) -> None:
 
 
 def test_the_longest_step_has_its_time(tmp_path: Path) -> None:
-    """Fifty moves and predicted steps, 100 iterations, doubles without an FPU: that is no endless loop."""
+    """The time limit suffices for 50 moves, 50 predicted steps and 100 iterations in soft float64."""
     document = settings_case(4, "float64").model_dump()
     document["optimizer"] |= {"iterations": 100, "tolerance": 0.0}
     settings = Settings.model_validate(document)
     inputs = inputs_of_steps(settings, 1, 1, seed=0)[0]
-    step = emulated("rp2040", settings, tmp_path, 1).step(inputs.state, inputs.target, inputs.thrust)
+    step = start_emulated("rp2040", settings, tmp_path, 1).step(inputs.state, inputs.target, inputs.thrust)
     assert (step.status[0], step.iterations[0]) == (0, 100)

@@ -11,7 +11,7 @@ import pytest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.errors import CacheError
 from mambo_nmpc.sil.files.cache import cache_folder, cached
 from tests.support.tools import require
@@ -103,8 +103,10 @@ def test_a_damaged_build_is_built_anew(empty_cache: Path) -> None:
 def test_what_cannot_be_loaded_is_refused(empty_cache: Path) -> None:
     """The message names the folder, and what to set if it may hold no programs."""
     script = 'case "$*" in *extension.so) echo no library > extension.so;; esac'
-    with pytest.raises(CacheError, match=rf"cannot load {empty_cache}/.*noexec, set XDG_CACHE_HOME"):
-        compiled(MAMBO, Toolchain(("sh", "-c", script, "cc")))
+    with pytest.raises(
+        CacheError, match=rf"cannot load {empty_cache}/.*noexec, set XDG_CACHE_HOME elsewhere"
+    ):
+        build_extension(MAMBO, Toolchain(("sh", "-c", script, "cc")))
 
 
 def test_what_killed_builds_left_is_cleared(empty_cache: Path) -> None:
@@ -169,8 +171,8 @@ def test_the_named_compiler_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("true", "true made nothing; is it a C compiler"),
-        ("false", r"(?s)^false .*failed:\nexit code 1, without a word"),
+        ("true", "true wrote no output; set CC to a C compiler"),
+        ("false", r"(?s)^false .*failed:\nexit code 1, no output"),
         ("gcc '", "CC = gcc ' must be a command: no closing quotation"),
     ],
 )
@@ -201,7 +203,7 @@ def test_a_refusing_compiler_is_quoted() -> None:
     """A flag that the compiler does not know: its own words, and nothing cached."""
     require("gcc", "gcc")
     with pytest.raises(BuildError, match=r"(?s)failed:.*--no-such-flag"):
-        compiled(MAMBO, Toolchain(("gcc", "--no-such-flag")))
+        build_extension(MAMBO, Toolchain(("gcc", "--no-such-flag")))
 
 
 def test_wrong_shapes_are_refused() -> None:

@@ -27,7 +27,7 @@ def test_velocity_is_damped() -> None:
 
 
 def test_error_is_clamped_to_three_metres() -> None:
-    """Each axis stops at 3 m on its own; the angle itself has no limit."""
+    """Each axis is clamped to 3 m; the angle has no limit."""
     np.testing.assert_allclose(command([0.0] * 7, [9.0, 1.0, 0.0, 0.0]), [0.24, -0.72], rtol=1e-15)
     np.testing.assert_allclose(command([0.0] * 7, [1.0, -9.0, 0.0, 0.0]), [-0.72, -0.24], rtol=1e-15)
     fast = [0.0, 0.0, 20.0, 0.0, 0.0, 0.0, 0.0]
@@ -42,7 +42,7 @@ def test_target_velocity_is_unknown_to_the_pd() -> None:
 
 @pytest.mark.parametrize("yaw_rad", [0.8, -2.0, np.pi / 2])
 def test_heading_turns_error_and_velocity_into_the_body_frame(yaw_rad: float) -> None:
-    """A scene turned together with the vehicle gives the same command."""
+    """If position, velocity, target and yaw rotate together, the command stays the same."""
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     position, velocity, target = np.array([0.2, -0.4]), np.array([0.3, 0.1]), np.array([4.0, 0.7])
@@ -52,7 +52,7 @@ def test_heading_turns_error_and_velocity_into_the_body_frame(yaw_rad: float) ->
 
 
 def test_flights_of_a_batch_do_not_touch_each_other() -> None:
-    """Every row is answered as if it were alone, and reports status 0."""
+    """Every row has the command of a single step, and status 0."""
     rng = np.random.default_rng(4)
     states, targets = rng.normal(0.0, 2.0, (30, 7)), rng.normal(0.0, 2.0, (30, 4))
     outcome = PdController().step(states, targets, np.full(30, 9.81))

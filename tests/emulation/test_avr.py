@@ -1,10 +1,9 @@
-"""Eight bits: the self-test on an emulated ATmega2560, an emulator that leaves nothing behind, odd stacks."""
+"""AVR: self-test on an emulated ATmega2560, life of the emulator process, stack analysis of AVR code."""
 
 import os
 import select
 import subprocess
 import sys
-from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -14,15 +13,16 @@ from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest, emulated_digest
+from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest, digest_emulated
+from mambo_nmpc.sil.controllers.extension import batch_source
 from mambo_nmpc.sil.emulation.avr import AvrMachine, Long
 from mambo_nmpc.sil.emulation.machine import Machine, start
 from mambo_nmpc.sil.errors import EmulationError, EmulatorError
 from mambo_nmpc.sil.firmware.build import Builder
 from mambo_nmpc.sil.firmware.elf import FootprintError, load
-from mambo_nmpc.sil.firmware.stack import StackReport, worst_case
+from mambo_nmpc.sil.firmware.stack import StackReport, bound_stack
 from tests.support.cases import settings_case
-from tests.support.linking import BOARDS, Board, linked
+from tests.support.linking import BOARDS, Board, link
 from tests.support.tools import board_builder, only
 
 AVR = BOARDS["avr"]
@@ -35,21 +35,20 @@ long run(void) { return nmpc_self_test(&scratch); }
 EFFORT = (
     "return nmpc_tracking_cost(weight.tracking, distance_m) + nmpc_effort_cost(weight.effort, variation_rad);"
 )
-HARMED = "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
+WRONG = "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
 ABANDONED = """
 import sys
-from importlib import resources
 from pathlib import Path
 from mambo_nmpc.sil.emulation.machine import start
 machine = start(Path(sys.argv[1]), "avr")
 print(machine._stub._process.pid, flush=True)
 sys.stdin.read()
 """
-"""A program that holds an emulator until it is ended."""
+"""A Python program that starts an emulator and waits."""
 
 
 def self_test(files: dict[str, str], folder: Path) -> Machine:
-    """Put a bundle with its self-test on the core."""
+    """Start a bundle with its self-test on the core."""
     return start(board_builder("mega").guest(files, SELF_TEST, ("run",), folder), "avr")
 
 
@@ -62,17 +61,17 @@ def mega() -> Builder:
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 @pytest.mark.parametrize("preset", ["mambo", "table1"])
 def test_the_self_test_passes_on_eight_bits(preset: str, scalar: str, tmp_path: Path) -> None:
-    """Every step of it has the bits of the reference: zero, no first difference."""
+    """Every step has the bits of the reference: the self-test returns 0."""
     settings = with_option(presets.load(preset), "code.scalar", scalar, "test")
     assert self_test(render(settings, with_digest=False), tmp_path).call("run") == 0
 
 
-def test_the_self_test_sees_a_harmed_controller_on_eight_bits(tmp_path: Path) -> None:
-    """A cost with a millimetre too much differs in the first step."""
+def test_the_self_test_detects_a_wrong_controller_on_eight_bits(tmp_path: Path) -> None:
+    """An error of a millimetre in the cost is found in the first step."""
     files = render(presets.load("mambo"), with_digest=False)
     assert files["src/nmpc_cost.c"].count(EFFORT) == 1
-    harmed = files | {"src/nmpc_cost.c": files["src/nmpc_cost.c"].replace(EFFORT, HARMED)}
-    assert self_test(harmed, tmp_path).call("run") == 1
+    wrong = files | {"src/nmpc_cost.c": files["src/nmpc_cost.c"].replace(EFFORT, WRONG)}
+    assert self_test(wrong, tmp_path).call("run") == 1
 
 
 @pytest.mark.parametrize(
@@ -81,14 +80,14 @@ def test_the_self_test_sees_a_harmed_controller_on_eight_bits(tmp_path: Path) ->
 def test_frozen_steps_have_their_digest_on_eight_bits(
     preset: str, scalar: str, mega: Builder, tmp_path: Path
 ) -> None:
-    """Two episodes of it, as the reference has them."""
+    """The digest of two episodes equals that of the reference."""
     settings = with_option(presets.load(preset), "code.scalar", scalar, "test")
     elf = build_guest(settings, mega, tmp_path)
-    assert emulated_digest(settings, elf, "avr", 2) == self_test_digest(Design(settings), 2)
+    assert digest_emulated(settings, elf, "avr", 2) == self_test_digest(Design(settings), 2)
 
 
 def test_memory_holds_what_is_written(mega: Builder, tmp_path: Path) -> None:
-    """More than one packet of it, beside the program's own variables, which start as they were linked."""
+    """Data larger than a packet reads back, and initialised variables have their values."""
     elf = mega.guest({}, "long seen = 3; long run(void); long run(void) { return seen; }", ("run",), tmp_path)
     machine = start(elf, "avr")
     content = bytes(range(256)) * 12
@@ -99,7 +98,7 @@ def test_memory_holds_what_is_written(mega: Builder, tmp_path: Path) -> None:
 
 
 def test_long_arguments_arrive_whole(mega: Builder, tmp_path: Path) -> None:
-    """Among ints, in registers and on the stack: each has its 32 bits."""
+    """Between ints, in registers and on the stack, a long has 32 bits."""
     text = """
 unsigned long run(int a, unsigned long b, int c, unsigned long d, unsigned long e, unsigned long f);
 unsigned long run(int a, unsigned long b, int c, unsigned long d, unsigned long e, unsigned long f)
@@ -113,8 +112,8 @@ unsigned long run(int a, unsigned long b, int c, unsigned long d, unsigned long 
     assert machine.call("run", 2, b, 4, d, e, f) == expected
 
 
-def test_a_stack_that_runs_into_the_data_is_said_to(mega: Builder, tmp_path: Path) -> None:
-    """A function that fills more than there is does not return as if nothing had happened."""
+def test_a_stack_overflow_is_reported(mega: Builder, tmp_path: Path) -> None:
+    """A call that overwrites the guard below the stack raises an error."""
     text = """
 long run(void);
 long run(void)
@@ -126,12 +125,12 @@ long run(void)
 }
 """
     machine = start(mega.guest({}, text, ("run",), tmp_path), "avr")
-    with pytest.raises(EmulationError, match="run took more than the 2048 B of stack"):
+    with pytest.raises(EmulationError, match="run overflowed its stack of 2048 B"):
         machine.call("run")
 
 
-def test_an_emulator_that_ends_is_said_to(mega: Builder, tmp_path: Path) -> None:
-    """Whoever kills it, the next call is an error, not a wait."""
+def test_a_killed_emulator_is_reported(mega: Builder, tmp_path: Path) -> None:
+    """The next call raises an error instead of waiting."""
     machine = start(mega.guest({}, "long run(void); long run(void) { return 1; }", ("run",), tmp_path), "avr")
     assert isinstance(machine, AvrMachine)
     machine._stub._process.kill()
@@ -141,7 +140,7 @@ def test_an_emulator_that_ends_is_said_to(mega: Builder, tmp_path: Path) -> None
 
 
 def test_the_emulator_dies_with_its_owner(mega: Builder, tmp_path: Path) -> None:
-    """Killed without warning, a process leaves no emulator behind."""
+    """If the Python process is killed, its emulator ends too."""
     elf = mega.guest({}, "long run(void); long run(void) { return 1; }", ("run",), tmp_path)
     with subprocess.Popen(
         [sys.executable, "-c", ABANDONED, str(elf)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
@@ -161,27 +160,27 @@ def test_the_emulator_dies_with_its_owner(mega: Builder, tmp_path: Path) -> None
 def test_a_missing_tool_is_named(
     here: str, tool: str, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the package that brings it."""
+    """The message names tool and Debian package."""
     program = "long run(void); long run(void) { return 1; }"
     elf = board_builder("mega").guest({}, program, ("run",), tmp_path / "guest")
     (tmp_path / "bin").mkdir()
     monkeypatch.setenv("PATH", only(tmp_path / "bin", here))
-    with pytest.raises(EmulatorError, match=f"no {tool} found .* Debian's {package} brings it"):
+    with pytest.raises(EmulatorError, match=rf"^{tool}, .*is missing \(Debian: {package}\)"):
         start(elf, "avr")
 
 
 def test_a_missing_disassembler_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the package that brings it."""
-    image = load(linked(AVR, "int run(void) { return 1; }", tmp_path))
+    """The message names tool and Debian package."""
+    image = load(link(AVR, "int run(void) { return 1; }", tmp_path))
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(
-        FootprintError, match=r"guest\.elf: no avr-objdump .* Debian's binutils-avr brings it"
+        FootprintError, match=r"guest\.elf: avr-objdump, .*is missing \(Debian: binutils-avr\)"
     ):
-        worst_case(image, "run")
+        bound_stack(image, "run")
 
 
 def test_a_controller_too_large_for_the_ram_is_refused(mega: Builder, tmp_path: Path) -> None:
-    """Fifty moves over fifty steps: how much it takes, and how much there is."""
+    """The message has the size of the data and of the RAM."""
     settings = settings_case(4, "float32")
     assert (settings.horizon.prediction, settings.horizon.control) == (50, 50)
     with pytest.raises(EmulatorError, match=r"^\d{5} B of data and 2048 B of stack do not fit the 8192 B of"):
@@ -189,35 +188,32 @@ def test_a_controller_too_large_for_the_ram_is_refused(mega: Builder, tmp_path: 
 
 
 def test_a_guest_that_leaves_no_room_is_refused(mega: Builder, tmp_path: Path) -> None:
-    """What a controller takes with its inputs and its outcome must not run into the stack."""
+    """A controller with inputs and outputs must fit between data and stack."""
     settings = presets.load("mambo")
-    glue = (
-        resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
-        + "char nmpc_ballast[5750] = {1};"
-    )
+    glue = batch_source() + "char nmpc_ballast[5750] = {1};"
     elf = mega.guest(render(settings, with_digest=False), glue, (*GUEST, "nmpc_ballast"), tmp_path)
-    with pytest.raises(EmulatorError, match=r"^a controller .* take \d{3} B, of which .* has \d+ B free$"):
+    with pytest.raises(EmulatorError, match=r"^a controller .* takes \d{3} B, but .* has only \d+ B free$"):
         EmulatedController(settings, elf, "avr")
 
 
 def test_a_program_for_another_part_is_refused(tmp_path: Path) -> None:
-    """An ATmega328 has return addresses of two bytes: its stack is bounded, but nothing here emulates it."""
+    """A program for an ATmega328 has a stack bound (return addresses of 2 B), but is not emulated."""
     board_builder("mega")
     text = "volatile int seen; long run(void) { return seen; }"
-    elf = linked(Board("uno", AVR.compiler, AVR.package, ("-mmcu=atmega328p",)), text, tmp_path)
-    assert worst_case(load(elf), "run").bytes == 2
+    elf = link(Board("uno", AVR.compiler, AVR.package, ("-mmcu=atmega328p",)), text, tmp_path)
+    assert bound_stack(load(elf), "run").bytes == 2
     with pytest.raises(EmulatorError, match=r"guest\.elf: not built for an ATmega2560"):
         start(elf, "avr")
 
 
-def bound_of(assembly: str, folder: Path) -> StackReport:
-    """Link a run() of instructions alone, between other() and its end, and bound its stack."""
+def bound_assembly(assembly: str, folder: Path) -> StackReport:
+    """Link run() written in assembly, with a function other(), and bound its stack."""
     lines = assembly.replace(";", "\\n")
     text = (
         "__attribute__((noinline)) int other(int of) { volatile int a = of; return a; }"
         f'__attribute__((naked)) int run(void) {{ __asm volatile ("{lines}"); }}'
     )
-    return worst_case(load(linked(AVR, text, folder)), "run")
+    return bound_stack(load(link(AVR, text, folder)), "run")
 
 
 @pytest.mark.parametrize(
@@ -246,40 +242,43 @@ def bound_of(assembly: str, folder: Path) -> StackReport:
         "saved from a helper",
     ],
 )
-def test_what_the_stack_pointer_goes_through_is_followed(assembly: str, held: int, tmp_path: Path) -> None:
-    """The most bytes at any time, the return address of three bytes included."""
-    assert bound_of(assembly, tmp_path).bytes == held
+def test_changes_of_the_stack_pointer_are_followed(assembly: str, held: int, tmp_path: Path) -> None:
+    """The bound is the largest depth, including the return address of 3 bytes."""
+    assert bound_assembly(assembly, tmp_path).bytes == held
 
 
 @pytest.mark.parametrize(
     ("assembly", "message"),
     [
-        ("push r0; ret", "`ret` .* returns without the stack pointer"),
-        ("push r28; pop r29; ret", "`ret` .* returns without the stack pointer"),
-        ("ldi r16, 1; ret", "`ret` .* returns without the stack pointer and registers"),
+        ("push r0; ret", "`ret` .* returns without restoring the stack pointer"),
+        ("push r28; pop r29; ret", "`ret` .* returns without restoring the stack pointer"),
+        ("ldi r16, 1; ret", "`ret` .* returns without restoring the stack pointer and saved registers"),
         ("push r16; std Y+1, r0; ldi r16, 0; pop r17; ret", "`ret` .* returns without"),
-        ("call __muldi3_6; ret", "run: `ret` .* returns without the stack pointer and registers"),
-        ("jmp __muldi3_6", "run: `ret` .* returns without the stack pointer and registers"),
-        ("1: push r0; rjmp 1b", "ever more stack"),
-        ("in r28, 0x3d; in r29, 0x3e; out 0x3d, r28; ret", "`out 0x3d, r28` .* only run time knows"),
-        ("in r28, 0x3d; push r0; in r29, 0x3e; out 0x3e, r29; out 0x3d, r28", "only run time knows"),
-        ("in r29, 0x3d; in r28, 0x3e; out 0x3e, r28; out 0x3d, r29", "only run time knows"),
-        ("in r30, 0x3d; in r31, 0x3e; add r30, r24; out 0x3e, r31; out 0x3d, r30", "only run time knows"),
-        ("sts 0x5d, r24", "`sts 0x005D, r24` .* only run time knows"),
-        ("eicall", "`eicall` .* call functions by name"),
-        ("ijmp", "`ijmp` .* call functions by name"),
-        (".word 0xFFFF", "no instruction can be read"),
-        ("rjmp 1f; subi r24, 1; 1: sbci r25, 0; ret", "no instruction can be read"),
+        (
+            "call __muldi3_6; ret",
+            "run: `ret` .* returns without restoring the stack pointer and saved registers",
+        ),
+        ("jmp __muldi3_6", "run: `ret` .* returns without restoring the stack pointer and saved registers"),
+        ("1: push r0; rjmp 1b", "growing stack"),
+        ("in r28, 0x3d; in r29, 0x3e; out 0x3d, r28; ret", "`out 0x3d, r28` .* known only at run time"),
+        ("in r28, 0x3d; push r0; in r29, 0x3e; out 0x3e, r29; out 0x3d, r28", "known only at run time"),
+        ("in r29, 0x3d; in r28, 0x3e; out 0x3e, r28; out 0x3d, r29", "known only at run time"),
+        ("in r30, 0x3d; in r31, 0x3e; add r30, r24; out 0x3e, r31; out 0x3d, r30", "known only at run time"),
+        ("sts 0x5d, r24", "`sts 0x005D, r24` .* known only at run time"),
+        ("eicall", "`eicall` .* call functions directly"),
+        ("ijmp", "`ijmp` .* call functions directly"),
+        (".word 0xFFFF", "no instruction can be decoded"),
+        ("rjmp 1f; subi r24, 1; 1: sbci r25, 0; ret", "no instruction can be decoded"),
     ],
 )
-def test_what_has_no_bound_is_refused(assembly: str, message: str, tmp_path: Path) -> None:
-    """Named with the instruction, never guessed."""
+def test_code_without_a_bound_is_refused(assembly: str, message: str, tmp_path: Path) -> None:
+    """The error names the instruction."""
     with pytest.raises(FootprintError, match=message):
-        bound_of(assembly, tmp_path)
+        bound_assembly(assembly, tmp_path)
 
 
 def test_a_tail_call_adds_nothing(tmp_path: Path) -> None:
-    """What is jumped to has the return address of who jumps."""
-    report = bound_of("jmp other", tmp_path)
+    """The callee of a tail call reuses the return address."""
+    report = bound_assembly("jmp other", tmp_path)
     assert [frame.function for frame in report.path] == ["run", "other"]
     assert report.bytes == report.frames["other"] == sum(frame.bytes for frame in report.path)

@@ -1,4 +1,4 @@
-"""The doctor: it finds what is here, says what is missing and why one would want it, and always answers."""
+"""The doctor reports installed and missing tools, their purpose and their packages."""
 
 import json
 import shutil
@@ -17,34 +17,34 @@ ENDLESS = "while :; do :; done"
 
 @pytest.fixture
 def bare(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Make a machine whose only commands are those put into the returned folder."""
+    """Make a PATH with only the returned folder."""
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
     return tmp_path
 
 
 def put(folder: Path, tool: str, content: str) -> None:
-    """Put an executable file into `folder`."""
+    """Write an executable file into `folder`."""
     path = folder / tool
     path.write_text(content, encoding="utf-8")
     path.chmod(0o755)
 
 
 def finding_of(tool: str) -> Finding:
-    """Return what the doctor found out about a tool."""
+    """Return the doctor's finding on a tool."""
     return next(finding for finding in examine() if tool in finding.tool.split(" or "))
 
 
 def test_every_board_has_a_compiler_and_an_emulator() -> None:
-    """No board is forgotten: one line tells what builds for it, another what runs it."""
+    """Each board is named by one compiler and one emulator."""
     for kind in ("compiler", "emulator"):
         promises = " ".join(finding.enables for finding in examine() if finding.kind == kind)
         words = promises.replace(",", " ").split()
         assert [words.count(name) for name in boards.names()] == [1] * len(boards.names())
 
 
-def test_what_is_here_is_found_with_its_version() -> None:
-    """The doctor agrees with the machine that it runs on."""
+def test_installed_tools_are_found_with_their_version() -> None:
+    """The findings agree with this machine."""
     for finding in examine():
         if finding.registry == "PyPI":
             installed = {distribution.name for distribution in metadata.distributions()}
@@ -57,8 +57,8 @@ def test_what_is_here_is_found_with_its_version() -> None:
         assert not finding.version or finding.version[0].isdigit()
 
 
-def test_a_bare_machine_is_told_what_to_install(bare: Path) -> None:
-    """Every missing tool has a line that says what it is for, and a package in the last lines."""
+def test_missing_tools_are_listed_with_purpose_and_package(bare: Path) -> None:
+    """Every missing tool has a line with its purpose, and its package is in the install command."""
     assert not list(bare.iterdir())
     findings = examine()
     text = doctor_text(findings)
@@ -73,8 +73,8 @@ def test_a_bare_machine_is_told_what_to_install(bare: Path) -> None:
         assert set(finding.packages) <= set(install.split())
 
 
-def test_a_complete_machine_is_told_to_install_nothing() -> None:
-    """Without a gap there is no advice."""
+def test_a_complete_machine_gets_no_install_command() -> None:
+    """The text has only the line of the tool."""
     here = Finding("compiler", "cc", True, "12.2.0", "flies", "Debian", ("gcc",))
     assert doctor_text([here]) == "compiler  cc  12.2.0  flies"
 
@@ -92,7 +92,7 @@ def test_a_complete_machine_is_told_to_install_nothing() -> None:
     ],
 )
 def test_a_version_is_read_from_the_first_line(said: str, version: str, bare: Path) -> None:
-    """What distributions write in brackets is not the version."""
+    """Text of distributions in brackets is not the version."""
     put(bare, "cmake", f"#!/bin/sh\necho '{said}'\necho 99.9\n")
     found = finding_of("cmake")
     assert (found.here, found.version) == (True, version)
@@ -102,7 +102,7 @@ def test_a_version_is_read_from_the_first_line(said: str, version: str, bare: Pa
 def test_a_broken_tool_is_here_without_version(
     content: str, bare: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A tool that hangs, or that cannot run at all, spoils nothing."""
+    """A tool that hangs or cannot run is reported as here, without a version."""
     monkeypatch.setattr(doctor, "PATIENCE_S", 0.2)
     put(bare, "cmake", content)
     found = finding_of("cmake")
@@ -112,7 +112,7 @@ def test_a_broken_tool_is_here_without_version(
 
 
 def test_the_first_candidate_that_is_here_counts(bare: Path) -> None:
-    """A second compiler that does as well makes the first one dispensable."""
+    """One installed candidate suffices; the first one installed is reported."""
     put(bare, "arm-linux-gnueabi-gcc", "#!/bin/sh\necho 12.2.0\n")
     assert finding_of("arm-linux-gnueabi-gcc").tool == "arm-linux-gnueabi-gcc"
     put(bare, "arm-none-linux-gnueabi-gcc", "#!/bin/sh\necho 4.6.3\n")
@@ -120,7 +120,7 @@ def test_the_first_candidate_that_is_here_counts(bare: Path) -> None:
 
 
 def test_a_clang_without_its_library_cannot_fuzz(bare: Path) -> None:
-    """The library has a package of its own: it is here if clang finds its file."""
+    """LibFuzzer has a package of its own; it is here only if clang finds its file."""
     put(bare, "clang", "#!/bin/sh\necho 14.0.6\n")
     assert (finding_of("clang").here, finding_of(LIBFUZZER).here) == (True, False)
     (bare / "fuzzer.a").touch()
@@ -130,7 +130,7 @@ def test_a_clang_without_its_library_cannot_fuzz(bare: Path) -> None:
 
 
 def test_the_compiler_that_cc_names_is_examined(bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What would fly is what is looked at, with its options; a bad name is missing, not fatal."""
+    """The command in CC is examined with its options; an invalid one is reported as missing."""
     put(bare, "mycc", '#!/bin/sh\necho "mycc $1 1.2.3"\n')
     monkeypatch.setenv("CC", "mycc -m64")
     assert finding_of("mycc -m64").version == "1.2.3"
@@ -142,7 +142,7 @@ def test_the_compiler_that_cc_names_is_examined(bare: Path, monkeypatch: pytest.
 
 
 def test_findings_survive_json() -> None:
-    """Machines read the same as people."""
+    """Findings read back from JSON are equal."""
     findings = examine()
     read = json.loads(json.dumps([asdict(finding) for finding in findings]))
     assert tuple(Finding(**{**one, "packages": tuple(one["packages"])}) for one in read) == findings

@@ -1,4 +1,4 @@
-"""Sizes of linked programs: every byte has an owner, and what must not be linked is found."""
+"""Sizes of linked programs: every byte has one owner, and forbidden functions are found."""
 
 import subprocess
 from pathlib import Path
@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.sil.firmware.elf import FootprintError, load
-from mambo_nmpc.sil.firmware.gate import Forbidden, forbidden
-from mambo_nmpc.sil.firmware.sizes import Added, Parts, added, sections
-from tests.support.linking import BOARDS, linked, linked_controller
+from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
+from mambo_nmpc.sil.firmware.sizes import Added, Parts, measure_added, measure_sections
+from tests.support.linking import BOARDS, link, link_controller
 from tests.support.tools import require
 
 IN_FLASH = [name for name in BOARDS if name != "avr"]
-"""Boards that read constants where they lie; on the AVR every table takes RAM too."""
+"""Boards that read constants from flash; on AVR tables take RAM too."""
 EMPTY = "int run(void) { return 0; } int fly(void) { return 0; }"
 SIZES = """
 const int table[10] = {1, 2, 3};
@@ -27,19 +27,19 @@ HELPERS = {
     "m0plus": {"__aeabi_fmul"},
     "rv32imac": {"__mulsf3"},
 }
-"""What multiplies two floats; an FPU leaves nothing to do."""
+"""The helper that multiplies two floats; none with an FPU."""
 
 
 def difference(board: str, folder: Path) -> Added:
-    """Measure what the controller adds on a board to a program that does nothing."""
-    return added(
-        linked_controller(BOARDS[board], folder), linked(BOARDS[board], EMPTY, folder, name="empty"), "nmpc"
+    """Measure the bytes that the controller adds to an empty program."""
+    return measure_added(
+        link_controller(BOARDS[board], folder), link(BOARDS[board], EMPTY, folder, name="empty"), "nmpc"
     )
 
 
 @pytest.mark.parametrize("board", IN_FLASH)
 def test_the_parts_of_a_controller_add_up(board: str, tmp_path: Path) -> None:
-    """Own symbols, helpers, growth of the caller and nameless bytes make the difference of the sections."""
+    """Own, helper, grown and unnamed bytes add up to the difference of the sections."""
     result = difference(board, tmp_path)
     assert result.flash.total == sum(result.sections.flash.values())
     assert result.ram.total == sum(result.sections.ram.values())
@@ -48,8 +48,8 @@ def test_the_parts_of_a_controller_add_up(board: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("board", IN_FLASH)
-def test_owners_are_told_apart(board: str, tmp_path: Path) -> None:
-    """A table local to a file is the controller's own, arithmetic the compiler's, RAM the instance."""
+def test_each_symbol_has_the_right_owner(board: str, tmp_path: Path) -> None:
+    """Local tables are the controller's own, arithmetic is the compiler's, RAM is the instance."""
     result = difference(board, tmp_path)
     assert {"nmpc_step", "nmpc_instance"} <= result.own.keys()
     local = {s.name for s in load(tmp_path / "guest.elf").symbols if s.file and s.file.startswith("nmpc")}
@@ -65,17 +65,17 @@ def test_owners_are_told_apart(board: str, tmp_path: Path) -> None:
 
 def test_a_program_adds_nothing_to_itself(tmp_path: Path) -> None:
     """The difference of a program and itself is empty."""
-    program = linked(BOARDS["m4f"], SIZES, tmp_path)
-    nothing = added(program, program, "nmpc")
+    program = link(BOARDS["m4f"], SIZES, tmp_path)
+    nothing = measure_added(program, program, "nmpc")
     assert nothing.flash == nothing.ram == Parts(own=0, helpers=0, grown=0, unnamed=0)
     assert not nothing.sections.flash
     assert not nothing.own
 
 
 def test_initialised_variables_take_flash_and_ram(tmp_path: Path) -> None:
-    """Sections count where they lie: constants in flash, zeros in RAM, initial values in both."""
-    image = load(linked(BOARDS["m4f"], SIZES, tmp_path))
-    memory = sections(image)
+    """Constants count in flash, zero-initialised variables in RAM, initialised ones in both."""
+    image = load(link(BOARDS["m4f"], SIZES, tmp_path))
+    memory = measure_sections(image)
     assert memory.ram == {".data": 4, ".bss": 100}
     assert memory.flash == {".text": memory.flash[".text"], ".rodata": 40, ".data": 4}
     assert image.symbol("room").size_bytes == 100
@@ -84,8 +84,8 @@ def test_initialised_variables_take_flash_and_ram(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("board", IN_FLASH)
 def test_no_byte_has_two_owners(board: str, tmp_path: Path) -> None:
-    """Labels at one address, and helpers that fall into each other, are counted once."""
-    image = load(linked_controller(BOARDS[board], tmp_path))
+    """Aliases, and helpers that fall through into each other, count once."""
+    image = load(link_controller(BOARDS[board], tmp_path))
     for before, after in zip(image.symbols, image.symbols[1:], strict=False):
         assert before.address + before.size_bytes <= after.address
     for section in image.sections:
@@ -93,8 +93,8 @@ def test_no_byte_has_two_owners(board: str, tmp_path: Path) -> None:
         assert named <= section.size_bytes
 
 
-def test_functions_of_one_name_are_told_apart(tmp_path: Path) -> None:
-    """Two files may each have a function of the same name; the report names the file."""
+def test_equal_function_names_get_their_file(tmp_path: Path) -> None:
+    """If two files have a local function of the same name, the file is part of the symbol's name."""
     for name in ("left", "right"):
         (tmp_path / f"{name}.c").write_text(
             f"static __attribute__((noinline)) int same(volatile int *of) {{ return *of * {len(name)}; }}"
@@ -106,7 +106,7 @@ int right(volatile int *);
 volatile int seen;
 int run(void) { return left(&seen) + right(&seen); }
 """
-    image = load(linked(BOARDS["m4f"], text, tmp_path, "left.c", "right.c"))
+    image = load(link(BOARDS["m4f"], text, tmp_path, "left.c", "right.c"))
     names = [symbol.name for symbol in image.symbols]
     assert len(set(names)) == len(names)
     assert {"left.c:same", "right.c:same"} <= set(names)
@@ -115,25 +115,25 @@ int run(void) { return left(&seen) + right(&seen); }
 @pytest.mark.parametrize("board", IN_FLASH)
 def test_a_float32_controller_links_nothing_forbidden(board: str, tmp_path: Path) -> None:
     """No heap, no printf, no libm, no double precision."""
-    assert forbidden(load(linked_controller(BOARDS[board], tmp_path)), "float32") == ()
+    assert find_forbidden(load(link_controller(BOARDS[board], tmp_path)), "float32") == ()
 
 
 @pytest.mark.parametrize("board", ["arm926", "m4f", "m0plus", "rv32imac"])
-def test_a_double_is_found_with_its_caller(board: str, tmp_path: Path) -> None:
-    """One unsuffixed literal brings the compiler's double arithmetic, which float64 may have."""
+def test_double_arithmetic_is_reported_with_its_caller(board: str, tmp_path: Path) -> None:
+    """One unsuffixed literal links the compiler's double arithmetic, which only float64 may use."""
     text = """
 volatile float x;
 __attribute__((noinline)) float half(float of) { return (float)(of * 0.1); }
 int run(void) { x = half(x); return 0; }
 """
-    image = load(linked(BOARDS[board], text, tmp_path))
-    found = forbidden(image, "float32")
+    image = load(link(BOARDS[board], text, tmp_path))
+    found = find_forbidden(image, "float32")
     widened = {"__extendsfdf2", "__aeabi_f2d"}
     callers = {name: one.callers for one in found for name in image.symbol(one.symbol).labels}
     assert all(one.kind == "double precision" for one in found)
     assert all(callers[name] == ("half",) for name in widened & callers.keys())
     assert widened & callers.keys()
-    assert forbidden(image, "float64") == ()
+    assert find_forbidden(image, "float64") == ()
 
 
 @pytest.mark.parametrize(
@@ -156,13 +156,13 @@ int run(void) { x = half(x); return 0; }
     ],
 )
 def test_a_library_function_is_found(function: str, kind: str, tmp_path: Path) -> None:
-    """Whatever its body, its name gives it away."""
+    """A forbidden function is recognised by its name."""
     text = (
         f"volatile int x; __attribute__((noinline)) int {function}(int of) {{ return of + x; }}"
         f"int run(void) {{ return {function}(x) + 1; }}"
     )
-    image = load(linked(BOARDS["m4f"], text, tmp_path, "-fno-builtin"))
-    assert forbidden(image, "float32") == (Forbidden(function, kind, ("run",)),)
+    image = load(link(BOARDS["m4f"], text, tmp_path, "-fno-builtin"))
+    assert find_forbidden(image, "float32") == (Forbidden(function, kind, ("run",)),)
 
 
 @pytest.mark.parametrize(
@@ -179,21 +179,21 @@ def test_a_library_function_is_found(function: str, kind: str, tmp_path: Path) -
     ],
 )
 def test_other_functions_are_left_alone(function: str, tmp_path: Path) -> None:
-    """Single precision, and names that only begin like a forbidden one."""
+    """Single precision is allowed, and names that only begin like a forbidden one."""
     text = f"int {function}(int of) {{ return of; }} int run(void) {{ return {function}(1); }}"
-    assert forbidden(load(linked(BOARDS["m4f"], text, tmp_path, "-fno-inline")), "float32") == ()
+    assert find_forbidden(load(link(BOARDS["m4f"], text, tmp_path, "-fno-inline")), "float32") == ()
 
 
 def test_programs_that_cannot_be_measured_are_refused(tmp_path: Path) -> None:
-    """Missing, no ELF file, an object that is not linked, a stripped program."""
+    """A missing file, no ELF file, an object that is not linked, a stripped program."""
     with pytest.raises(FootprintError, match=r"nowhere\.elf: cannot be read"):
         load(tmp_path / "nowhere.elf")
     (tmp_path / "text.elf").write_text("no program")
     with pytest.raises(FootprintError, match=r"text\.elf: not a program in ELF format"):
         load(tmp_path / "text.elf")
     with pytest.raises(FootprintError, match=r"guest\.elf: not linked to fixed addresses; link with -static"):
-        load(linked(BOARDS["m4f"], SIZES, tmp_path, "-r"))
-    stripped = linked(BOARDS["m4f"], SIZES, tmp_path)
+        load(link(BOARDS["m4f"], SIZES, tmp_path, "-r"))
+    stripped = link(BOARDS["m4f"], SIZES, tmp_path)
     subprocess.run([require("arm-none-eabi-strip", "binutils-arm-none-eabi"), stripped], check=True)
     with pytest.raises(FootprintError, match=r"guest\.elf: has no symbols"):
         load(stripped)

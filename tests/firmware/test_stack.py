@@ -1,4 +1,4 @@
-"""Worst-case stack: bounds against gcc's own figures and painted stacks, and everything that has no bound."""
+"""Worst-case stack: bounds against gcc's frame sizes and painted stacks; programs without a bound."""
 
 from pathlib import Path
 from typing import Literal
@@ -8,8 +8,8 @@ import pytest
 
 from mambo_nmpc.sil.emulation.machine import start
 from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
-from mambo_nmpc.sil.firmware.stack import Frame, StackReport, direct_callers, worst_case
-from tests.support.linking import BOARDS, Board, linked, linked_controller
+from mambo_nmpc.sil.firmware.stack import Frame, StackReport, bound_stack, find_callers
+from tests.support.linking import BOARDS, Board, link, link_controller
 from tests.support.tools import require
 
 OPTIMISATIONS = ("-O0", "-O1", "-O2", "-O3", "-Os")
@@ -23,15 +23,15 @@ CORES = {
     "rv32imac": "rv32",
     "avr": "avr",
 }
-WITHOUT = ("avr", "float64")
-"""A double of avr-gcc has 32 bits."""
+NOT_BUILT = ("avr", "float64")
+"""avr-gcc's double has 32 bits."""
 PAINT = b"\xa5"
-UNSEEN_BYTES = 16
-"""Bytes that paint may outlast: on paths not taken, and at the bottom of frames that is never written."""
+UNTOUCHED_BYTES = 16
+"""Largest difference of bound and high-water mark: paths not taken, unwritten ends of frames."""
 
 
-class Painted:
-    """A program on an emulated core, and a painted stack."""
+class PaintedStack:
+    """A program on an emulated core with a painted stack."""
 
     def __init__(self, board: Board, image: Image) -> None:
         if board.name == "avr":
@@ -42,22 +42,22 @@ class Painted:
         self._machine.write(self._stack.start, PAINT * len(self._stack))
 
     def call(self, function: str) -> int:
-        """Run a function without arguments to its end; returns what it returns."""
+        """Call a function without arguments; returns its result."""
         return self._machine.call(function)
 
     def write(self, variable: str, content: bytes) -> None:
-        """Set a variable, whole."""
+        """Write all bytes of a variable."""
         symbol = self._image.symbol(variable)
         assert symbol.size_bytes == len(content)
         self._machine.write(symbol.address, content)
 
     def high_water_bytes(self) -> int:
-        """Return how far down the paint is gone."""
+        """Return the depth to which the paint is overwritten."""
         return len(self._machine.read(self._stack.start, len(self._stack)).lstrip(PAINT))
 
 
-def fly(emulator: Painted, steps: int) -> None:
-    """Step through plausible inputs of all sizes, and through bits that mean nothing."""
+def fly(emulator: PaintedStack, steps: int) -> None:
+    """Step with plausible inputs of all magnitudes, and with random bits."""
     rng = np.random.default_rng(7)
     for _ in range(steps):
         inputs = rng.normal(0, 10.0 ** rng.uniform(-4, 1), 12).astype("<f4")
@@ -70,14 +70,14 @@ def fly(emulator: Painted, steps: int) -> None:
 
 
 def gcc_frames(folder: Path) -> dict[str, int]:
-    """Return the bytes of each frame that gcc's -fstack-usage has written down."""
+    """Return the frame sizes that gcc's -fstack-usage has written."""
     rows = [line.split("\t") for path in folder.glob("*.su") for line in path.read_text().splitlines()]
     assert {kind for _, _, kind in rows} == {"static"}
     return {place.rpartition(":")[2]: int(size) for place, size, _ in rows}
 
 
 def grid() -> list[object]:
-    """Return boards and optimisations; most of them are for a long run."""
+    """Return boards and optimisations; most are marked long."""
     return [
         pytest.param(*case, marks=[] if case in QUICK else pytest.mark.long, id=" ".join(case))
         for case in GRID
@@ -86,19 +86,19 @@ def grid() -> list[object]:
 
 @pytest.mark.parametrize(("board", "optimisation"), grid())
 def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: Path) -> None:
-    """No run ever wrote below it, it is close to what was written, and gcc agrees on every frame it knows."""
-    image = load(linked_controller(BOARDS[board], tmp_path, optimisation))
-    report, step = worst_case(image, "run"), worst_case(image, "fly")
+    """The high-water mark is at most the bound and close to it; frames equal gcc's."""
+    image = load(link_controller(BOARDS[board], tmp_path, optimisation))
+    report, step = bound_stack(image, "run"), bound_stack(image, "fly")
 
-    emulator = Painted(BOARDS[board], image)
+    emulator = PaintedStack(BOARDS[board], image)
     assert emulator.call("run") == 0
     seen = emulator.high_water_bytes()
-    assert seen <= report.bytes <= seen + UNSEEN_BYTES
+    assert seen <= report.bytes <= seen + UNTOUCHED_BYTES
 
-    emulator = Painted(BOARDS[board], image)
+    emulator = PaintedStack(BOARDS[board], image)
     fly(emulator, 60)
     seen = emulator.high_water_bytes()
-    assert seen <= step.bytes <= seen + UNSEEN_BYTES
+    assert seen <= step.bytes <= seen + UNTOUCHED_BYTES
 
     known = gcc_frames(tmp_path)
     frames = {name.rpartition(":")[2]: size for name, size in report.frames.items()}
@@ -108,21 +108,21 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
 
 @pytest.mark.parametrize(
     ("board", "scalar"),
-    [(board, scalar) for board in BOARDS for scalar in ("float64", "fixed") if (board, scalar) != WITHOUT],
+    [(board, scalar) for board in BOARDS for scalar in ("float64", "fixed") if (board, scalar) != NOT_BUILT],
 )
-def test_other_scalars_have_a_bound_too(
+def test_other_scalar_types_have_a_bound(
     board: str, scalar: Literal["float64", "fixed"], tmp_path: Path
 ) -> None:
-    """The compiler's long helpers are walked as any other code, those that share registers included."""
-    image = load(linked_controller(BOARDS[board], tmp_path, scalar=scalar))
-    emulator = Painted(BOARDS[board], image)
+    """The analysis covers the compiler's helpers, including those with their own calling convention."""
+    image = load(link_controller(BOARDS[board], tmp_path, scalar=scalar))
+    emulator = PaintedStack(BOARDS[board], image)
     assert emulator.call("run") == 0
-    assert 0 <= worst_case(image, "run").bytes - emulator.high_water_bytes() <= UNSEEN_BYTES
+    assert 0 <= bound_stack(image, "run").bytes - emulator.high_water_bytes() <= UNTOUCHED_BYTES
 
 
 def report_of(board: str, text: str, folder: Path, *flags: str) -> StackReport:
-    """Link a program and bound its run()."""
-    return worst_case(load(linked(BOARDS[board], text, folder, *flags)), "run")
+    """Link a program and bound the stack of run()."""
+    return bound_stack(load(link(BOARDS[board], text, folder, *flags)), "run")
 
 
 LEAF = "int run(void); volatile int seen; int run(void) { return seen; }"
@@ -152,28 +152,28 @@ WIDE = "volatile int seen; int run(void) { volatile long a[3000]; a[seen] = 3; r
 
 @pytest.mark.parametrize("board", BOARDS)
 class TestSmallPrograms:
-    """Shapes of a call graph, each small enough to count by hand."""
+    """Basic shapes of call graphs."""
 
-    def test_a_leaf_needs_nothing(self, board: str, tmp_path: Path) -> None:
-        """A function that keeps everything in registers holds no byte but what its call pushes: on AVR 3."""
+    def test_a_leaf_needs_only_its_return_address(self, board: str, tmp_path: Path) -> None:
+        """A leaf function without a frame needs no stack, except AVR's return address of 3 bytes."""
         assert report_of(board, LEAF, tmp_path).bytes == (3 if board == "avr" else 0)
 
     def test_a_chain_adds_up(self, board: str, tmp_path: Path) -> None:
-        """The path names every function with its bytes, which gcc knows as well."""
+        """The path has every function with its frame as in gcc's -fstack-usage."""
         report = report_of(board, CHAIN, tmp_path, "-fstack-usage")
         known = gcc_frames(tmp_path)
         assert report.path == tuple(Frame(name, known[name]) for name in ("run", "middle", "last"))
         assert report.bytes == sum(frame.bytes for frame in report.path) == report.depths["run"]
 
     def test_a_diamond_takes_its_deeper_side(self, board: str, tmp_path: Path) -> None:
-        """Of two ways to the same function, the thick one counts; the other is reported with its depth."""
+        """Of two paths to the same function the deeper one counts; the other is reported with its depth."""
         report = report_of(board, DIAMOND, tmp_path)
         assert [frame.function for frame in report.path] == ["run", "thick", "last"]
         assert report.depths["thin"] == report.frames["thin"] + report.frames["last"]
         assert report.bytes == report.frames["run"] + report.depths["thick"]
 
-    def test_a_frame_too_wide_for_one_instruction_is_known(self, board: str, tmp_path: Path) -> None:
-        """Constants on their way to the stack pointer are followed through registers."""
+    def test_a_frame_too_large_for_an_immediate_is_known(self, board: str, tmp_path: Path) -> None:
+        """Constants are propagated through registers to the stack pointer."""
         report = report_of(board, WIDE, tmp_path, "-fstack-usage")
         assert report.bytes == gcc_frames(tmp_path)["run"] >= 12000
 
@@ -182,7 +182,7 @@ class TestSmallPrograms:
         [
             (
                 "volatile int seen; int run(void) { volatile int a[seen]; a[0] = 1; return a[seen]; }",
-                r"guest\.elf: run: `(.*sp.*|out 0x3d, r\d+)` at 0x1.* only run time knows; alloca",
+                r"guest\.elf: run: `(.*sp.*|out 0x3d, r\d+)` at 0x1.* known only at run time; alloca",
             ),
             (
                 "int run(void); volatile int seen;"
@@ -192,11 +192,11 @@ class TestSmallPrograms:
             ),
             (
                 "int (*volatile hook)(void); int run(void) { return hook() + 1; }",
-                r"run: `.*((jalr|blx) .*|eicall)` at 0x1.* only run time knows; call functions by name",
+                r"run: `.*((jalr|blx) .*|eicall)` at 0x1.* known only at run time; call functions directly",
             ),
             (
                 "int (*volatile hook)(void); int run(void) { return hook(); }",
-                r"run: `.*((jr|bx|blx) .*|eijmp)` at 0x1.* only run time knows; call functions by name",
+                r"run: `.*((jr|bx|blx) .*|eijmp)` at 0x1.* known only at run time; call functions directly",
             ),
             (
                 "volatile int seen; int run(void) { switch (seen) {"
@@ -207,55 +207,59 @@ class TestSmallPrograms:
         ],
         ids=["variable array", "recursion", "function pointer", "tail call of a pointer", "jump table"],
     )
-    def test_what_has_no_bound_is_refused(self, board: str, text: str, message: str, tmp_path: Path) -> None:
-        """The error names the function, the instruction and a way out."""
+    def test_a_program_without_a_bound_is_refused(
+        self, board: str, text: str, message: str, tmp_path: Path
+    ) -> None:
+        """The error names the function, the instruction and a remedy."""
         with pytest.raises(FootprintError, match=message):
             report_of(board, text, tmp_path, "-fno-tree-switch-conversion")
 
 
 @pytest.mark.parametrize("board", [name for name in BOARDS if name not in {"m0plus", "avr"}])
 def test_a_tail_call_replaces_the_frame(board: str, tmp_path: Path) -> None:
-    """What is given back before the jump does not add to what the callee takes; gcc has none elsewhere."""
+    """The caller frees its frame before the jump; on the other boards gcc makes no tail calls."""
     report = report_of(board, TAIL, tmp_path)
     assert report.path == (Frame("run", 0), Frame("deep", report.frames["deep"]))
     assert report.bytes == report.frames["deep"] > report.frames["run"] > 0
 
 
 def test_a_loop_that_pushes_is_refused(tmp_path: Path) -> None:
-    """A stack pointer that moves on in every turn has no bound."""
+    """A loop that pushes in every iteration has no bound."""
     text = 'volatile int seen; __attribute__((naked)) int run(void) { __asm("1: push {r0}; b 1b"); }'
-    with pytest.raises(FootprintError, match=r"run: `.*` at 0x.* ever more stack: a loop"):
+    with pytest.raises(FootprintError, match=r"run: `.*` at 0x.* growing stack: a loop"):
         report_of("m4f", text, tmp_path)
 
 
 def test_a_return_to_another_place_is_refused(tmp_path: Path) -> None:
-    """A return is one only with the return address and the stack pointer of the call."""
+    """A return must restore the stack pointer and the saved registers."""
     text = '__attribute__((naked)) int run(void) { __asm("push {r4, lr}; bx lr"); }'
-    with pytest.raises(FootprintError, match=r"run: `bx lr` at 0x.* returns without the stack pointer"):
+    with pytest.raises(
+        FootprintError, match=r"run: `bx lr` at 0x.* returns without restoring the stack pointer"
+    ):
         report_of("m4f", text, tmp_path)
 
 
 def test_a_call_in_disguise_is_refused(tmp_path: Path) -> None:
-    """A jump that leaves a return address of its own is no tail call."""
+    """A jump with a changed link register is not a tail call."""
     text = """
 __attribute__((noinline)) int other(int of) { return of * 3; }
 __attribute__((naked)) int run(void) { __asm("mov r4, lr; mov lr, pc; b other; mov pc, r4"); }
 """
-    with pytest.raises(FootprintError, match=r"run: `bx lr` at 0x1.* only run time knows"):
+    with pytest.raises(FootprintError, match=r"run: `bx lr` at 0x1.* known only at run time"):
         report_of("arm926", text, tmp_path)
 
 
 def test_thumb_code_calls_a32_helpers_through_veneers(tmp_path: Path) -> None:
-    """The mode changes at `bx pc`, which goes to a place that is known."""
+    """`bx pc` switches to A32 at a known address."""
     board = Board(
         "arm926 in Thumb", "arm-none-eabi-gcc", "gcc-arm-none-eabi", ("-mcpu=arm926ej-s", "-mthumb")
     )
-    report = worst_case(load(linked_controller(board, tmp_path)), "run")
+    report = bound_stack(load(link_controller(board, tmp_path)), "run")
     assert "____aeabi_fcmplt_from_thumb" in report.frames
 
 
 def test_shared_tails_and_fall_through_count_where_they_run(tmp_path: Path) -> None:
-    """Code that several functions run into belongs to each of them, with what it pushes."""
+    """Code shared by several functions counts in the frame of each."""
     text = """
 __asm(".syntax unified; .text; .thumb; .global first, second; .thumb_func;"
       "first: push {r4, lr}; b 1f; .thumb_func; second: push {r0, r1, r4, lr}; add sp, #8;"
@@ -270,23 +274,23 @@ int run(void) { return first() + second() + seen; }
 
 
 def test_callers_are_named(tmp_path: Path) -> None:
-    """Every function that calls another by its address is listed under it, tail calls included."""
-    image = load(linked(BOARDS["m4f"], DIAMOND, tmp_path))
-    callers = direct_callers(image)
+    """Every direct caller of a function is listed, tail calls included."""
+    image = load(link(BOARDS["m4f"], DIAMOND, tmp_path))
+    callers = find_callers(image)
     assert callers["last"] == ("thin", "thick")
     assert set(callers["thick"]) == set(callers["thin"]) == {"run"}
 
 
 def test_other_processors_are_refused(tmp_path: Path) -> None:
-    """A program for this machine can be measured, but its stack cannot be bounded."""
-    image = load(linked(Board("host", "gcc", "gcc", ()), "int run(void) { return 1; }", tmp_path))
+    """The code of an x86-64 program cannot be disassembled, so its stack has no bound."""
+    image = load(link(Board("host", "gcc", "gcc", ()), "int run(void) { return 1; }", tmp_path))
     with pytest.raises(
-        FootprintError, match=r"guest\.elf: code for .* cannot be read here, only ARM, AVR and"
+        FootprintError, match=r"guest\.elf: cannot disassemble code for .*, only ARM, AVR and"
     ):
-        worst_case(image, "run")
+        bound_stack(image, "run")
 
 
 def test_an_unknown_entry_is_refused(tmp_path: Path) -> None:
-    """The error names the function that is not there."""
+    """The error names the missing function."""
     with pytest.raises(FootprintError, match="no function or object nmpc_step"):
-        worst_case(load(linked(BOARDS["m4f"], LEAF, tmp_path)), "nmpc_step")
+        bound_stack(load(link(BOARDS["m4f"], LEAF, tmp_path)), "nmpc_step")

@@ -10,7 +10,7 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
@@ -48,7 +48,7 @@ def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str
     """All arrays of the trace are equal bit for bit; the closed loop would amplify any difference."""
     settings = with_scalar(presets.load(preset), scalar)
     flight = CONDITIONS[condition]
-    extension = compiled(settings, toolchain("gcc"))
+    extension = build_extension(settings, toolchain("gcc"))
     ours, theirs = ReferenceController(Design(settings)), CompiledController(settings, extension=extension)
     assert_same_bits(fly(flight, ours), fly(flight, theirs))
 
@@ -61,7 +61,7 @@ def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) ->
     flight = Flight(CASE)
     expected = fly(flight, ReferenceController(Design(settings)))
     for compiler in (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2")):
-        extension = compiled(settings, toolchain(*compiler))
+        extension = build_extension(settings, toolchain(*compiler))
         assert_same_bits(expected, fly(flight, CompiledController(settings, extension=extension)))
 
 

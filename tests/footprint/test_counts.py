@@ -1,9 +1,8 @@
-"""Instruction counts: exact, repeatable, and a search that never finds less than it was given."""
+"""Instruction counts are exact and repeatable; the search never returns less than its initial inputs."""
 
 import re
 from collections import Counter
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
+from mambo_nmpc.sil.controllers.extension import batch_source
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.emulation.unicorn import UnicornMachine
 from mambo_nmpc.sil.firmware.disassembly import disassemble
@@ -27,26 +27,18 @@ from mambo_nmpc.sil.footprint.counts import (
     CountingController,
     InputSequence,
     count_instructions,
-    in_flight,
-    spread,
+    draw_inputs,
+    sample_flight,
 )
 from tests.support.cases import settings_case
-from tests.support.tools import board_builder
+from tests.support.tools import CORES, board_builder
 
-CORES = {
-    "mambo": "arm926",
-    "rp2040": "cortex-m0",
-    "crazyflie": "cortex-m4",
-    "teensy41": "cortex-m7",
-    "rv32": "rv32",
-    "mega": "avr",
-}
 IN_PROCESS = [name for name in CORES if name != "mega"]
-"""Boards whose emulator can be asked before every instruction."""
+"""Boards emulated by Unicorn, which can report every instruction."""
 MAMBO = presets.load("mambo")
 
 STRAIGHT = 700
-"""Instructions in a row, more than the emulator translates at once."""
+"""Instructions without a branch, more than one translation block holds."""
 ARM = f"""
     .syntax unified
     .text
@@ -104,14 +96,14 @@ nmpc_known:
     .size nmpc_known, . - nmpc_known
 """
 KNOWN = 1 + 10 * 2 + STRAIGHT + 1 + 2
-"""Instructions of each: the loop ten times, and the data in their midst never."""
+"""Instructions executed by each: ten iterations of the loop; the data words are skipped."""
 SKIPPED = {
     "mambo": ("addne r1, r1, #1",),
     "crazyflie": ("it ne", "addne r1, r1, #1"),
     "teensy41": ("ite ne", "addne r1, r1, #1", "moveq r1, #1"),
     "mega": ("ldi r25, 0", "cpse r24, r1", "nop", "sbrc r1, 0", "call nmpc_step", "sbrs r1, 0", "rjmp ."),
 }
-"""What they have besides where instructions are conditional: one that is skipped is issued, and counts."""
+"""Conditional instructions to insert; skipped ones are issued and count."""
 
 
 @pytest.fixture
@@ -129,7 +121,7 @@ def costs(elf: Path, inputs: InputSequence) -> list[int]:
 
 @pytest.mark.parametrize("name", CORES)
 def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
-    """Instructions of all widths, a loop, a long run, a jump over data; nothing of what calls it."""
+    """The count of a known function is exact: loop, long block, jump over data, conditional instructions."""
     skipped = SKIPPED.get(name, ())
     mode = ".arm" if name == "mambo" else ".thumb\n.thumb_func"
     template = {"rv32": RISCV, "mega": AVR}.get(name, ARM)
@@ -139,7 +131,7 @@ def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) 
         "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
         f"__asm({' '.join(_quoted(line) for line in assembly.splitlines())});\n"
     )
-    glue = resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
+    glue = batch_source()
     assert glue.count("nmpc_step(") == 1
     elf = board_builder(name).guest(
         render(MAMBO, with_digest=False),
@@ -160,9 +152,9 @@ def _quoted(line: str) -> str:
 
 
 def it_blocks(image: Image) -> dict[int, list[int]]:
-    """Return each Thumb-2 `it`, and the instructions that it makes conditional.
+    """Return the instructions in each Thumb-2 IT block by the address of `it`.
 
-    The core issues those that it skips, and the emulator names them nowhere else: in A32 it does.
+    The core issues skipped ones too, but Unicorn's code hook does not report them, as it does in A32.
     """
     instructions = disassemble(image).instructions
     blocks: dict[int, list[int]] = {}
@@ -177,8 +169,8 @@ def it_blocks(image: Image) -> dict[int, list[int]]:
 
 
 @pytest.mark.parametrize("name", IN_PROCESS)
-def test_counting_runs_agrees_with_counting_one_by_one(name: str, tmp_path: Path) -> None:
-    """The emulator, asked before every single instruction, arrives at the same functions and totals."""
+def test_counting_blocks_agrees_with_counting_instructions(name: str, tmp_path: Path) -> None:
+    """Counting by basic block and counting every instruction give the same functions and totals."""
     elf, core = build_guest(MAMBO, board_builder(name), tmp_path), CORES[name]
     image = load(elf)
     blocks = it_blocks(image)
@@ -191,7 +183,7 @@ def test_counting_runs_agrees_with_counting_one_by_one(name: str, tmp_path: Path
     assert isinstance(single.machine, UnicornMachine)
     single.machine._engine.hook_add(unicorn.UC_HOOK_CODE, see)
     runs = CountingController(MAMBO, elf, core)
-    inputs = spread(MAMBO, 2)
+    inputs = draw_inputs(MAMBO, 2)
     for state, target, thrust in zip(inputs.state, inputs.target, inputs.thrust, strict=True):
         seen.clear()
         single.step(state[None], target[None], [thrust])
@@ -208,16 +200,16 @@ def test_counting_runs_agrees_with_counting_one_by_one(name: str, tmp_path: Path
 
 
 def test_the_same_inputs_have_the_same_counts(crazyflie: Path) -> None:
-    """Neither the machine nor the order of anything shows."""
-    inputs = spread(MAMBO, 20)
+    """Two measurements of the same inputs are equal."""
+    inputs = draw_inputs(MAMBO, 20)
     first, second = (count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, 20) for _ in range(2))
     assert first == second
     assert first.least < first.most
 
 
 def test_the_figures_are_those_of_the_steps(crazyflie: Path) -> None:
-    """Number, least, mean and most of what was counted; the functions share the mean."""
-    inputs = spread(MAMBO, 20)
+    """Number, least, mean and most are those of the steps; the functions add up to the mean."""
+    inputs = draw_inputs(MAMBO, 20)
     each = costs(crazyflie, inputs)
     counts = count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, 0)
     assert (counts.steps, counts.least, counts.most) == (20, min(each), max(each))
@@ -227,8 +219,8 @@ def test_the_figures_are_those_of_the_steps(crazyflie: Path) -> None:
 
 
 def test_the_search_never_returns_less_than_it_was_given(crazyflie: Path) -> None:
-    """A longer search finds as much or more, and from a calm start more."""
-    inputs = spread(MAMBO, 10)
+    """A longer search finds at least as much, and more than an initial input at rest."""
+    inputs = draw_inputs(MAMBO, 10)
     given = max(costs(crazyflie, inputs))
     found = [count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, steps).most for steps in (0, 10, 40)]
     assert given == found[0] <= found[1] <= found[2]
@@ -238,8 +230,8 @@ def test_the_search_never_returns_less_than_it_was_given(crazyflie: Path) -> Non
 
 
 def test_refused_inputs_are_not_counted(crazyflie: Path) -> None:
-    """They would pull the least and the mean towards nothing."""
-    inputs = spread(MAMBO, 12)
+    """Refused inputs return early and would reduce least and mean."""
+    inputs = draw_inputs(MAMBO, 12)
     state = inputs.state.copy()
     state[3::4, 0] = np.nan
     refused = replace(inputs, state=state)
@@ -252,9 +244,9 @@ def test_refused_inputs_are_not_counted(crazyflie: Path) -> None:
 
 @pytest.mark.parametrize("index", range(8))
 def test_spread_inputs_are_all_accepted(index: int) -> None:
-    """From millimetres off the target to the ends of the ranges, never beyond."""
+    """Errors range from millimetres to the input ranges, and no input is refused."""
     settings = settings_case(index, "float32")
-    inputs = spread(settings, 200)
+    inputs = draw_inputs(settings, 200)
     steps = ReferenceController(Design(settings), 200).step(inputs.state, inputs.target, inputs.thrust)
     assert not np.any(steps.status)
     errors = np.abs(inputs.state[:, :4] - inputs.target).max(axis=1)
@@ -263,7 +255,7 @@ def test_spread_inputs_are_all_accepted(index: int) -> None:
 
 
 def test_flight_inputs_are_those_of_the_flight() -> None:
-    """Every so many-th: position, speed, attitude, target and thrust that the controller was given."""
+    """Every seventh input equals what the controller received: state, target, thrust."""
     trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), PdController())
     given: list[tuple[Any, ...]] = []
 
@@ -273,7 +265,7 @@ def test_flight_inputs_are_those_of_the_flight() -> None:
             return super().step(*arguments)
 
     fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), Spy())
-    inputs = in_flight(trace, every=7)
+    inputs = sample_flight(trace, every=7)
     assert len(inputs.thrust) == len(given[::7]) == 15
     for row, (state, target, thrust) in enumerate(given[::7]):
         np.testing.assert_array_equal(inputs.state[row], state)

@@ -1,8 +1,6 @@
-"""Same bits: every build has the digest of the reference, and nothing else has."""
+"""Same bits: every build has the digest of the reference; other settings and wrong C have other digests."""
 
 import re
-import shutil
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -18,25 +16,25 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import read
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.compiled import compiled_digest
-from mambo_nmpc.sil.controllers.emulated import GUEST, emulated_digest
-from mambo_nmpc.sil.controllers.extension import load_extension
+from mambo_nmpc.sil.controllers.compiled import digest_compiled
+from mambo_nmpc.sil.controllers.emulated import GUEST, digest_emulated
+from mambo_nmpc.sil.controllers.extension import batch_source, load_extension
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, builder, clang_builder
 from mambo_nmpc.sil.footprint.same_bits import (
     BOARD_COMPILERS,
     HOST_COMPILERS,
     REFERENCE,
-    builds,
+    count_builds,
     run_everywhere,
 )
 from tests.support.cases import SCALARS, settings_case
-from tests.support.tools import require, toolchain
+from tests.support.tools import board_builder, require, toolchain
 
 MAMBO = presets.load("mambo")
 EMULATED = ("mambo", "rp2040", "crazyflie", "teensy41", "rv32")
 GENERATED = Path(__file__).parents[2] / "generated"
 
-HARM = {
+FAULTS = {
     "another order": (
         "src/nmpc_predictor.h",
         "walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m))",
@@ -47,19 +45,12 @@ HARM = {
 """Faults by name: file, the line, what it becomes."""
 
 
-def require_compiler(name: str) -> None:
-    """Skip without a compiler for a board."""
-    compiler = boards.load(name).compiler
-    if not any(shutil.which(command) for command in compiler.candidates):
-        require(compiler.candidates[0], compiler.packages[0])
-
-
 def check_every_build(names: tuple[str, ...], scalar: str) -> None:
-    """Compare the digests of all host compilers and of some boards, by all compilers at all optimisations."""
+    """Check the digests of the host and of some boards, with all compilers and optimisations."""
     for compiler in HOST_COMPILERS:
         require(compiler, compiler)
     for name in names:
-        require_compiler(name)
+        board_builder(name)
     settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
     chosen = [boards.load(name) for name in names]
     found = list(run_everywhere(settings, chosen, 3))
@@ -69,44 +60,44 @@ def check_every_build(names: tuple[str, ...], scalar: str) -> None:
         for compiler in (builder(board).toolchain.command[0], "clang"):
             expected += [(board.name, compiler, flag) for flag in OPTIMISATIONS]
     assert [(one.where, one.compiler, one.optimisation) for one in found] == expected
-    assert len(found) == builds(chosen)
+    assert len(found) == count_builds(chosen)
     assert {one.digest for one in found} == {f"0x{self_test_digest(Design(settings), 3):08X}"}
 
 
 def test_compilers_and_boards_share_one_digest() -> None:
-    """The compilers here and an FPU of single precision, at every optimisation."""
+    """The digests of host and Crazyflie are equal at every optimisation."""
     check_every_build(("crazyflie",), "float32")
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("scalar", SCALARS)
 def test_everything_shares_one_digest(scalar: str) -> None:
-    """All boards that are emulated, with and without an FPU."""
+    """The digests of all emulated boards are equal, with and without an FPU."""
     check_every_build(EMULATED, scalar)
 
 
-@pytest.mark.parametrize(("harm", "compiler"), list(zip(HARM, BOARD_COMPILERS, strict=True)))
-def test_a_harmed_bundle_has_another_digest(harm: str, compiler: str, tmp_path: Path) -> None:
-    """Even the order of an addition shows."""
-    require_compiler("crazyflie")
+@pytest.mark.parametrize(("fault", "compiler"), list(zip(FAULTS, BOARD_COMPILERS, strict=True)))
+def test_a_wrong_bundle_has_another_digest(fault: str, compiler: str, tmp_path: Path) -> None:
+    """A changed order of additions changes the digest."""
+    board_builder("crazyflie")
     require(compiler, compiler)
-    path, line, instead = HARM[harm]
+    path, line, instead = FAULTS[fault]
     files = render(MAMBO, with_digest=False)
     assert files[path].count(line) == 1
-    glue = resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
-    good, harmed = (
+    glue = batch_source()
+    good, wrong = (
         BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2").guest(bundle, glue, GUEST, tmp_path / name)
         for name, bundle in {
             "good": files,
-            "harmed": files | {path: files[path].replace(line, instead)},
+            "wrong": files | {path: files[path].replace(line, instead)},
         }.items()
     )
-    digests = [emulated_digest(MAMBO, elf, "cortex-m4", 2) for elf in (good, harmed)]
+    digests = [digest_emulated(MAMBO, elf, "cortex-m4", 2) for elf in (good, wrong)]
     assert digests[0] == self_test_digest(Design(MAMBO), 2) != digests[1]
 
 
 def test_other_settings_and_other_steps_have_other_digests() -> None:
-    """Whatever is changed, down to the last bit of a weight or a scalar type."""
+    """A change of one bit of a weight, of the optimizer or of the scalar type changes the digest."""
     document = MAMBO.model_dump()
     weight = document["cost"]["tracking_weight"]
     heavier = float(np.nextafter(np.float32(weight), np.float32(np.inf)))
@@ -123,14 +114,14 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", [0, 3, 7, 9])
 def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:
-    """Whatever the settings, the ends of the horizon and narrow ranges among them."""
+    """The digests are equal for extreme horizons and narrow ranges too."""
     settings = settings_case(index, scalar)
     extension = load_extension(render(settings, with_digest=False), scalar, toolchain("gcc"))
-    assert compiled_digest(extension, 5) == self_test_digest(Design(settings), 5)
+    assert digest_compiled(extension, 5) == self_test_digest(Design(settings), 5)
 
 
 def test_self_test_steps_end_in_every_way() -> None:
-    """Near one in thirteen is refused, for each reason; searches rest early, commands reach their limit."""
+    """About one step in thirteen is refused, for each reason; some converge, some reach the tilt limit."""
     episode = np.arange(50, dtype=np.uint32)
     reference = ReferenceController(Design(MAMBO), len(episode))
     steps = [reference.step(*inputs) for inputs in episode_inputs(Design(MAMBO), episode)]
@@ -145,7 +136,7 @@ def test_self_test_steps_end_in_every_way() -> None:
 
 
 def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
-    """Every input of an episode fills its range evenly, and no two episodes share one."""
+    """Inputs are uniformly distributed and uncorrelated, and differ between episodes."""
     inputs = list(episode_inputs(Design(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
     yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
     yaw = yaw[np.abs(yaw) <= 100]
@@ -157,13 +148,13 @@ def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
 
 
 def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What did not run has no digest and says why; the reference always runs."""
+    """A build that cannot run has a reason instead of a digest; the reference always runs."""
     monkeypatch.setenv("PATH", str(tmp_path))
     found = list(run_everywhere(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
     assert found[0].digest == f"0x{self_test_digest(Design(MAMBO), 1):08X}"
     reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
     assert all(one.digest is None for one in found[1:])
-    assert ("host", "clang", "clang is not here") in reasons
+    assert ("host", "clang", "clang is missing") in reasons
     for where, compiler, package in (
         ("crazyflie", "gcc", "gcc-arm-none-eabi"),
         ("crazyflie", "clang", "clang"),
@@ -175,7 +166,7 @@ def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.Monk
 def test_clang_needs_the_compiler_of_the_board_to_link(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Clang alone brings no arithmetic for a board: the package that does is named."""
+    """Clang has no libgcc for a board, so the message names the package that has it."""
     (tmp_path / "clang").symlink_to(require("clang", "clang"))
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(BuildError, match="gcc-arm-none-eabi"):
@@ -184,7 +175,7 @@ def test_clang_needs_the_compiler_of_the_board_to_link(
 
 @pytest.mark.parametrize("name", ["mambo", "mambo-float64", "table1"])
 def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
-    """The C as it lies in generated/, over all steps of its digest; the reference has written that."""
+    """The committed C computes the digest in its header, over all steps."""
     settings = read(GENERATED / name / "controller.toml")
     files = {
         path.relative_to(GENERATED / name).as_posix(): path.read_text("utf-8")
@@ -193,4 +184,4 @@ def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
     stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
     assert stated
     extension = load_extension(files, settings.code.scalar, toolchain(host_toolchain().command[0]))
-    assert compiled_digest(extension, episode_count(settings)) == int(stated[1], 16)
+    assert digest_compiled(extension, episode_count(settings)) == int(stated[1], 16)

@@ -1,9 +1,8 @@
-"""Sweeps: every point of the grid in order, a table that reads back, and the largest that fits."""
+"""Sweeps: points in order, CSV that reads back, the largest controller that fits."""
 
 import csv
 import json
 import math
-import shutil
 from dataclasses import astuple, replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.footprint.plots import draw_sweep
 from mambo_nmpc.sil.footprint.sweep import Grid, Point, largest_fit, measure_grid, write_points
 from tests.support.command import run
-from tests.support.tools import board_builder, require
+from tests.support.tools import board_builder
 
 POINT = Point(
     prediction=10,
@@ -37,20 +36,13 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
-def require_compiler(name: str) -> None:
-    """Skip without a compiler for a board."""
-    compiler = boards.load(name).compiler
-    if not any(shutil.which(candidate) for candidate in compiler.candidates):
-        require(compiler.candidates[0], compiler.packages[0])
-
-
 def point(prediction: int, control: int, iae_m_s: float, *, fits: bool = True) -> Point:
     """Return a point of a grid."""
     return replace(POINT, prediction=prediction, control=control, iae_m_s=iae_m_s, fits=fits)
 
 
 def test_a_grid_has_every_combination_that_is_a_controller() -> None:
-    """In the order of its axes, without moves beyond the prediction."""
+    """Points are in the order of the axes, without control horizons beyond the prediction horizon."""
     grid = Grid(prediction=(1, 3), control=(1, 2), iterations=(5, 3))
     assert grid.points() == [(1, 1, 5), (1, 1, 3), (3, 1, 5), (3, 1, 3), (3, 2, 5), (3, 2, 3)]
 
@@ -75,19 +67,19 @@ def test_a_grid_has_every_combination_that_is_a_controller() -> None:
     ],
 )
 def test_the_largest_fit_follows_its_rule(points: list[Point], best: int) -> None:
-    """Longest prediction within budget, then most moves, then best tracking; a lost flight is none."""
+    """Longest prediction within budget, then most moves, then least IAE; lost flights are excluded."""
     assert largest_fit(points) is points[best]
 
 
 def test_nothing_fits() -> None:
-    """No point, none within budget, or none that flies."""
+    """There is no largest fit without points, within no budget, or if all flights are lost."""
     assert largest_fit([]) is None
     assert largest_fit([point(5, 1, math.nan)]) is None
     assert largest_fit([point(5, 1, 1.0, fits=False), point(6, 1, 1.0, fits=False)]) is None
 
 
 def test_points_read_back(tmp_path: Path) -> None:
-    """A line a point, every digit of it, what was not measured as nan."""
+    """One line for each point with all digits; missing measurements are nan."""
     points = [POINT, replace(UNMEASURED, iae_m_s=0.1 + 0.2, fits=False)]
     write_points(points, tmp_path / "sweep.csv")
     with (tmp_path / "sweep.csv").open(newline="", encoding="utf-8") as file:
@@ -102,14 +94,14 @@ def test_points_read_back(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("points", [[POINT], [UNMEASURED], [POINT, point(20, 2, 1.0, fits=False)]])
 def test_any_points_can_be_drawn(points: list[Point], tmp_path: Path) -> None:
-    """A single one, one of a board without an emulated core, one over budget."""
+    """A single point, one without measured time, one over budget."""
     draw_sweep(points, boards.load("crazyflie"), 0.01, tmp_path / "sweep")
     assert (tmp_path / "sweep.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "sweep.svg").read_text("utf-8")
 
 
 def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
-    """Dollar signs in the title of a board's file are drawn as they are."""
+    """Dollar signs in a board's title are drawn literally."""
     odd = boards.load("crazyflie").model_copy(update={"title": r"$\frac{$ <b>"})
     draw_sweep([POINT], odd, 0.01, tmp_path / "sweep")
     assert r"$\frac{$ &lt;b&gt;" in (tmp_path / "sweep.svg").read_text("utf-8")
@@ -117,7 +109,7 @@ def test_the_title_of_a_board_is_no_formula(tmp_path: Path) -> None:
 
 def test_the_command_writes_table_and_pictures_and_answers_with_the_largest(tmp_path: Path) -> None:
     """A small controller on the Crazyflie, where it fits."""
-    require_compiler("crazyflie")
+    board_builder("crazyflie")
     grid = ["--prediction", "2", "--control", "1", "--iterations", "1"]
     said, _ = run("sweep", *grid, "--fit", "-o", "out")
     assert said.startswith("prediction  2  control  1  iterations   1  ")
@@ -145,7 +137,7 @@ def test_the_command_writes_table_and_pictures_and_answers_with_the_largest(tmp_
     ],
 )
 def test_a_bad_grid_gets_a_message_and_exit_2(options: list[str], message: str, tmp_path: Path) -> None:
-    """One line, no traceback, nothing written."""
+    """The message is one line, and nothing is written."""
     said = run("sweep", *options, code=2)[1]
     assert said.count("\n") == 1
     assert message in said
@@ -154,8 +146,8 @@ def test_a_bad_grid_gets_a_message_and_exit_2(options: list[str], message: str, 
 
 @pytest.mark.long
 def test_a_sweep_yields_the_points_in_order() -> None:
-    """Two by two: more of anything takes more flash and instructions, more moves more RAM too."""
-    require_compiler("crazyflie")
+    """A longer horizon takes more flash and instructions, and no less RAM."""
+    board_builder("crazyflie")
     grid = Grid(prediction=(5, 8), control=(1, 2), iterations=(3,))
     points = list(measure_grid(presets.load("mambo"), boards.load("crazyflie"), grid))
     assert [(p.prediction, p.control, p.iterations) for p in points] == grid.points()
@@ -169,7 +161,7 @@ def test_a_sweep_yields_the_points_in_order() -> None:
 
 @pytest.mark.long
 def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
-    """More tables than the emulated AVR has RAM: no time, and no fit, though the board be generous."""
+    """A controller too large for the emulated AVR has no time, so it does not fit whatever the budget."""
     board_builder("mega")
     document = boards.load("mega").model_dump()
     document["ram_bytes"]["value"] = 65_536
@@ -184,7 +176,7 @@ def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
 
 @pytest.mark.long
 def test_a_small_controller_fits_the_mega() -> None:
-    """Five steps, one move, three iterations: half of the period is enough for them."""
+    """Five predicted steps, one move and three iterations take less than half of the period."""
     board_builder("mega")
     grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
     (found,) = measure_grid(presets.load("mambo"), boards.load("mega"), grid)

@@ -2,6 +2,7 @@
 
 import subprocess
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 from typing import Literal
 
@@ -23,23 +24,6 @@ long fly(void) { return nmpc_step(&nmpc_instance, &state, &target, thrust, &comm
 """
 """A program that runs the self-test, or one step from variables."""
 
-_MEMORY = """
-void *memset(void *to, int value, __SIZE_TYPE__ count)
-{
-    unsigned char *byte = to;
-    while (count--) { *byte++ = (unsigned char)value; }
-    return to;
-}
-void *memcpy(void *to, const void *from, __SIZE_TYPE__ count)
-{
-    unsigned char *byte = to;
-    const unsigned char *source = from;
-    while (count--) { *byte++ = *source++; }
-    return to;
-}
-"""
-"""What a compiler may call even without a library."""
-
 _LINK = (
     "-ffunction-sections",
     "-fdata-sections",
@@ -58,7 +42,7 @@ _LINK = (
 
 @dataclass(frozen=True)
 class Board:
-    """A processor, and the compiler that builds for it."""
+    """A processor and its cross compiler."""
 
     name: str
     compiler: str
@@ -96,10 +80,11 @@ BOARDS = {
 }
 
 
-def linked(board: Board, text: str, folder: Path, *flags: str, name: str = "guest") -> Path:
-    """Compile and link `text`, C whose entry is run(), for `board`; more flags may bring more sources."""
+def link(board: Board, text: str, folder: Path, *flags: str, name: str = "guest") -> Path:
+    """Compile and link `text`, C with the entry run(), for `board`; `flags` may name further sources."""
     compiler = require(board.compiler, board.package)
-    (folder / f"{name}.c").write_text(text + _MEMORY)
+    freestanding = resources.files("mambo_nmpc.sil.firmware").joinpath("freestanding.c").read_text("utf-8")
+    (folder / f"{name}.c").write_text(text + freestanding)
     command = [
         compiler,
         *COMPILE_FLAGS,
@@ -116,13 +101,13 @@ def linked(board: Board, text: str, folder: Path, *flags: str, name: str = "gues
     return folder / f"{name}.elf"
 
 
-def linked_controller(
+def link_controller(
     board: Board, folder: Path, *flags: str, scalar: Literal["float32", "float64", "fixed"] = "float32"
 ) -> Path:
-    """Link the guest with the controller of preset mambo, and leave gcc's figures of the stack beside it."""
+    """Link GUEST with the controller of preset mambo; -fstack-usage writes gcc's frame sizes beside it."""
     settings = with_option(presets.load("mambo"), "code.scalar", scalar)
     for path, text in render(settings, with_digest=False).items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text)
     sources = sorted(str(path.relative_to(folder)) for path in folder.glob("src/*.c"))
-    return linked(board, GUEST, folder, "-fstack-usage", *flags, "-Iinclude", *sources)
+    return link(board, GUEST, folder, "-fstack-usage", *flags, "-Iinclude", *sources)

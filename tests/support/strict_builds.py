@@ -2,7 +2,6 @@
 
 import re
 import subprocess
-from importlib import resources
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -13,6 +12,7 @@ from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
 from mambo_nmpc.codegen.render import render, with_prefix
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.extension import batch_source
 from tests.support.tools import require
 
 _FUNCTIONS: Final = {
@@ -47,7 +47,7 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
     failed assertion.
     """
     prefix, scalar = settings.code.prefix, settings.code.scalar
-    batch = _QUIET + resources.files("mambo_nmpc.sil.controllers").joinpath("batch.c").read_text("utf-8")
+    batch = _QUIET + batch_source()
     files = render(settings, amalgamate=amalgamate, with_digest=False) | {
         "batch.c": with_prefix(batch, prefix)
     }

@@ -12,6 +12,16 @@ from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.firmware.build import Builder, builder
 
+CORES = {
+    "mambo": "arm926",
+    "rp2040": "cortex-m0",
+    "crazyflie": "cortex-m4",
+    "teensy41": "cortex-m7",
+    "rv32": "rv32",
+    "mega": "avr",
+}
+"""The emulated core of each board."""
+
 
 def require(tool: str, package: str) -> str:
     """Return the path of `tool`; without it skip the test, or fail it where CI is true."""
@@ -34,7 +44,7 @@ def _miss(message: str) -> NoReturn:
 
 
 def board_builder(name: str) -> Builder:
-    """Return the builder for a board whose compiler and emulator are here."""
+    """Return the builder for a board; skip, or fail where CI is true, without its compiler or emulator."""
     board = boards.load(name)
     if not any(shutil.which(command) for command in board.compiler.candidates):
         require(board.compiler.candidates[0], " and ".join(board.compiler.packages))

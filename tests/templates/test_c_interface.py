@@ -16,7 +16,7 @@ from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.controllers.extension import load_extension
 from tests.support.parity import Controller
 from tests.support.tools import toolchain
@@ -28,7 +28,7 @@ HOVER_STATE, HOVER_TARGET, HOVER_THRUST = np.zeros(7), np.array([0.5, -0.4, 0.0,
 @cache
 def built(settings: Settings) -> ModuleType:
     """Build the C of `settings`, once for all tests."""
-    return compiled(settings, toolchain("gcc"))
+    return build_extension(settings, toolchain("gcc"))
 
 
 def controller(kind: str, n: int = 1) -> Controller:

@@ -15,7 +15,7 @@ from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
-from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.tools import toolchain
@@ -34,7 +34,7 @@ class SubBlocks:
     """The C of one set of settings, sub-block by sub-block."""
 
     def __init__(self, settings: Settings) -> None:
-        extension: ModuleType = compiled(settings, toolchain("gcc"))
+        extension: ModuleType = build_extension(settings, toolchain("gcc"))
         self.design = Design(settings)
         self.products = arithmetic(self.design)
         self.numbers = self.products.numbers
@@ -157,7 +157,7 @@ def test_steps_equal_the_reference(index: int, scalar: str) -> None:
     inputs = inputs_of_steps(settings, n, steps=4, seed=index)
     expected = run(ReferenceController(Design(settings), n), inputs, index)
     for compiler in ("gcc", "clang"):
-        extension = compiled(settings, toolchain(compiler))
+        extension = build_extension(settings, toolchain(compiler))
         found = run(CompiledController(settings, n, extension), inputs, index)
         assert differences(expected, found) == {}, f"{compiler} for {settings!r}"
 
@@ -169,7 +169,7 @@ def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int,
     """100,000 cases of each of 50 settings: not one differing bit, at every optimisation, gcc and clang."""
     settings = settings_case(index, scalar)
     chunk = 5000
-    extensions = [compiled(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
+    extensions = [build_extension(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
     for seed in range(5):
         inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
         expected = run(ReferenceController(Design(settings), chunk), inputs, seed)
