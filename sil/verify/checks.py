@@ -27,9 +27,6 @@ CHECKS: Final = (
     Entry("proof", "Frama-C: no run-time error, no NaN kept, no wild command, for every input", "proof"),
     Entry("sanitizers", "nothing undefined in thousands of calls, same bits", "sanitizers"),
     Entry("fuzzing", "half a million inputs that a fuzzer found worth trying, same bits", "fuzzing"),
-    Entry("coverage", "every line and branch of the C runs, or is listed with its reason", "coverage"),
-    Entry("mutation", "every small fault of the C shows, or is listed with its reason", "mutation"),
     Entry("work", "a step does the same work whatever it is handed", "work"),
-    Entry("signs", "float64, or float32 for float64, decides alike but for ties, and flies alike", "signs"),
     Entry("faults", "bounded commands and a way back, whatever fails in flight", "faults"),
 )

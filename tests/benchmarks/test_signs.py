@@ -8,15 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.inner_steps import step_watched
-from mambo_nmpc.sil.verify.check import Outcome
-from mambo_nmpc.sil.verify.inputs import random_inputs
-from mambo_nmpc.sil.verify.sign_decisions import (
+from benchmarks.sign_decisions import (
     MANY,
     Disagreement,
     Flown,
@@ -28,7 +20,15 @@ from mambo_nmpc.sil.verify.sign_decisions import (
     with_few,
     with_random_memory,
 )
-from mambo_nmpc.sil.verify.signs import check, judge, text
+from benchmarks.signs import check, judge, text
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.inner_steps import watched_step
+from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.inputs import random_inputs
 from tests.support.subjects import subject
 
 MAMBO = presets.load("mambo")
@@ -57,7 +57,7 @@ def test_watching_changes_no_bit(settings: Settings) -> None:
     for _ in range(2):
         memory = plain.memory
         expected = plain.step(given.state, given.target, given.thrust_acceleration_m_s2)
-        step, inner = step_watched(
+        step, inner = watched_step(
             settings, memory, given.state, given.target, given.thrust_acceleration_m_s2
         )
         for name in ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged"):
@@ -73,7 +73,7 @@ def test_moves_go_where_the_decisions_say(settings: Settings) -> None:
     """A decision that agrees with the one before moves its move against the slope, unless at the limit."""
     given = moments(settings)
     plain = ReferenceController(Design(settings), N)
-    _, inner = step_watched(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
+    _, inner = watched_step(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
     decisions = inner.decisions(settings).astype(np.int64)
     moved = np.sign(np.diff(inner.plan_rad, axis=0))
     first = decisions[0]
@@ -89,7 +89,7 @@ def test_steps_of_the_search_are_as_long_as_they_are_told(settings: Settings) ->
     """The first moves by the first step size, the next by that which the second decision left."""
     given = moments(settings)
     plain = ReferenceController(Design(settings), N)
-    _, inner = step_watched(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
+    _, inner = watched_step(settings, plain.memory, given.state, given.target, given.thrust_acceleration_m_s2)
     sizes, decisions = inner.step_sizes_rad(settings), inner.decisions(settings)
     assert sizes.dtype == inner.plan_rad.dtype
     onward = (decisions[1:-1] * decisions[:-2]) > 0
@@ -104,7 +104,7 @@ def test_a_cost_at_rest_decides_nothing(settings: Settings) -> None:
     """With a huge tolerance all decisions after the first are 0."""
     resting = with_option(settings, "optimizer.tolerance", 1e6)
     given = moments(resting)
-    step, inner = step_watched(
+    step, inner = watched_step(
         resting,
         ReferenceController(Design(resting), N).memory,
         given.state,
@@ -130,7 +130,7 @@ def test_an_edge_is_where_the_next_number_decides_otherwise(settings: Settings) 
     )
     found = []
     for state in (edge.state, beside):
-        step, inner = step_watched(many, memory, state, edge.target, edge.thrust_acceleration_m_s2)
+        step, inner = watched_step(many, memory, state, edge.target, edge.thrust_acceleration_m_s2)
         found.append((step.status, inner.decisions(many)))
     assert len(beside) > N // 10
     changed = (found[0][1] != found[1][1]).any(axis=(0, 2, 3)) | (found[0][0] != found[1][0])

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.sign_decisions import in_scalar
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify import coverage
 from mambo_nmpc.sil.verify.check import Outcome, Result
-from mambo_nmpc.sil.verify.sign_decisions import in_scalar
+from tests.support import coverage
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.sign_decisions import ScalarName, in_scalar
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.verify import mutation
 from mambo_nmpc.sil.verify.check import Outcome
-from mambo_nmpc.sil.verify.mutants import Mutant, mutants
-from mambo_nmpc.sil.verify.mutation import Bench, Fate, Judged, summary
-from mambo_nmpc.sil.verify.mutation_reasons import REASONS
-from mambo_nmpc.sil.verify.sign_decisions import ScalarName, in_scalar
+from tests.support import mutation
+from tests.support.mutants import Mutant, mutants
+from tests.support.mutation import Bench, Fate, Judged, summary
+from tests.support.mutation_reasons import REASONS
 from tests.support.subjects import subject
 from tests.support.tools import require
 

@@ -5,9 +5,9 @@ import pytest
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify import coverage_reasons, mutation_reasons
-from mambo_nmpc.sil.verify.reasons import Reason, plain
+from tests.support import coverage_reasons, mutation_reasons
 from tests.support.cases import SCALARS
+from tests.support.reasons import Reason, plain
 
 
 @pytest.fixture(scope="module")

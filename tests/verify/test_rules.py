@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.sign_decisions import in_scalar
 from mambo_nmpc.codegen.render import DEVIATIONS, render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify.check import Outcome
 from mambo_nmpc.sil.verify.rules import check, deviations
-from mambo_nmpc.sil.verify.sign_decisions import in_scalar
 from tests.support.cases import settings_case
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require

@@ -6,7 +6,7 @@ from typing import Any, Final
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.reasons import Reason
+from tests.support.reasons import Reason
 
 
 def _steps_stay_short(settings: Settings) -> bool:

@@ -6,16 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.faults.flights import STRAY_M
-from mambo_nmpc.sil.files.folders import finite
-from mambo_nmpc.sil.verify.bundle import controller
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
-from mambo_nmpc.sil.verify.inputs import random_inputs
-from mambo_nmpc.sil.verify.sign_decisions import (
+from benchmarks.sign_decisions import (
     MANY,
     Disagreement,
     Flown,
@@ -26,6 +17,16 @@ from mambo_nmpc.sil.verify.sign_decisions import (
     with_few,
     with_random_memory,
 )
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.settings import Settings
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.faults.flights import STRAY_M
+from mambo_nmpc.sil.files.folders import finite
+from mambo_nmpc.sil.verify.bundle import controller
+from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.inputs import random_inputs
 
 RANDOM_STEPS: Final = 100_000
 EDGE_SEEDS: Final = 10_000

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from mambo_nmpc.codegen import literals
-from mambo_nmpc.sil.verify.reasons import Key, plain
+from tests.support.reasons import Key, plain
 
 _TOKEN: Final = re.compile(
     r"""(?P<define>^[ \t]*\#[ \t]*define[ \t]+\w+(\([^)]*\))?(?=[ \t]))

@@ -3,7 +3,7 @@
 from typing import Final
 
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.reasons import Reason
+from tests.support.reasons import Reason
 
 _SELF_TEST: Final = (
     "a build that computes the bits of the reference passes its self-test: it never finds a difference"

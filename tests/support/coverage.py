@@ -11,9 +11,9 @@ from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
-from mambo_nmpc.sil.verify.coverage_reasons import REASONS
-from mambo_nmpc.sil.verify.reasons import plain, reason_for, row
 from mambo_nmpc.sil.verify.tools import missing as missing_tool
+from tests.support.coverage_reasons import REASONS
+from tests.support.reasons import plain, reason_for, row
 
 FLAGS: Final = ("--coverage", "-O0")
 
@@ -121,7 +121,7 @@ def _result(subject: Subject, lines: list[dict[str, Any]], tools: dict[str, str]
     if unexplained:
         log = subject.folder / "unexplained.txt"
         log.write_text(
-            "\n".join(unexplained) + "\n\nrows for sil/verify/coverage_reasons.py:\n" + "".join(rows)
+            "\n".join(unexplained) + "\n\nrows for tests/support/coverage_reasons.py:\n" + "".join(rows)
         )
         evidence += f"; {len(unexplained)} not explained, the first {unexplained[0]}; all in {log}"
     return Result(Outcome.FAILED if unexplained else Outcome.PASSED, evidence, figures=figures, tools=tools)

@@ -19,9 +19,9 @@ from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
-from mambo_nmpc.sil.verify.mutants import Mutant, mutants
-from mambo_nmpc.sil.verify.mutation_reasons import REASONS
-from mambo_nmpc.sil.verify.reasons import reason_for, row
+from tests.support.mutants import Mutant, mutants
+from tests.support.mutation_reasons import REASONS
+from tests.support.reasons import reason_for, row
 
 AT_ONCE: Final = 2
 SLOWER: Final = 20
@@ -207,7 +207,7 @@ def summary(subject: Subject, judged: Sequence[Judged], tools: dict[str, str]) -
             f"{d['where']}: {d['rule']}: {d['key'][2]}\n- {d['right']}\n+ {d['wrong']}\n\n"
             for d in figures["survivors"]
         )
-        + (f"rows for sil/verify/mutation_reasons.py:\n{rows}" if rows else "")
+        + (f"rows for tests/support/mutation_reasons.py:\n{rows}" if rows else "")
     )
     evidence = (
         f"{killed} of {faults} faults caught; of {len(judged)} mutants {counts[Fate.SAME]} are the same "
