@@ -18,7 +18,6 @@ from benchmarks.sign_decisions import (
     with_random_memory,
 )
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.settings import Settings
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController

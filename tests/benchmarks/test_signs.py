@@ -23,7 +23,7 @@ from benchmarks.sign_decisions import (
 from benchmarks.signs import check, judge, text
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.settings import Settings, presets
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.inner_steps import watched_step

@@ -1,7 +1,6 @@
-"""Mutants: every small fault that a rule can make of C source, found by its tokens, none by its text.
+"""Make every small fault (mutant) of C source: the rules change one token, bracket or statement at a time.
 
-Tokens rather than a syntax tree, so that a mutant is a change of the very line a person reads, macros and
-attributes and all. What the compiler then refuses was no fault.
+Working on tokens instead of a syntax tree keeps macros and attributes as they are in the file.
 """
 
 import re
@@ -28,43 +27,25 @@ _TOKEN: Final = re.compile(
 )
 _TYPE: Final = re.compile(r"const|static|inline|void|char|int|unsigned|signed|float|double|struct|\w+_t")
 _CONTROL: Final = frozenset({"if", "for", "while", "switch", "do", "else", "case", "default"})
-_ARITHMETIC: Final = {
-    "+": "-",
-    "-": "+",
-    "*": "+",
-    "/": "*",
-    "%": "*",
-    "&": "|",
-    "|": "&",
-    "<<": ">>",
-    ">>": "<<",
-}
+_ARITHMETIC: Final = {"+": "-", "-": "+", "*": "+", "/": "*", "%": "*", "&": "|", "|": "&"}
+_SHIFTS: Final = {"<<": ">>", ">>": "<<"}
+_COMPARISONS: Final = {"<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<")}
+_OTHERS: Final = {"==": "!=", "!=": "==", "&&": "||", "||": "&&", "++": "--", "--": "++"}
+_ASSIGNMENTS: Final = {"+=": "-=", "-=": "+=", "*=": "+=", "/=": "*="}
+_ALWAYS: Final = _COMPARISONS | {sign: (wrong,) for sign, wrong in (_SHIFTS | _OTHERS | _ASSIGNMENTS).items()}
 _SMALL: Final = 100
-"""From here on a whole number may be of the settings: no key names it."""
-_STEPS: Final = {"++": "--", "--": "++", "+=": "-=", "-=": "+=", "*=": "+=", "/=": "*="}
-_LOGIC: Final = {"&&": "||", "||": "&&"}
-_COMPARISONS: Final = {
-    "<": ("<=", ">="),
-    "<=": ("<", ">"),
-    ">": (">=", "<="),
-    ">=": (">", "<"),
-    "==": ("!=",),
-    "!=": ("==",),
-}
+"""Integers from here on may come from the settings, so keys do not contain them."""
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A fault: in `file`, the text from `start` to `end`, from `line` on, becomes `wrong`."""
+    """A fault: in `file`, the text from `start` to `end` becomes `wrong`, its line `wrong_line`."""
 
     file: str
-    line: int
     start: int
     end: int
     wrong: str
-    rule: str
     key: Key
-    right_line: str
     wrong_line: str
 
     def apply(self, text: str) -> str:
@@ -78,7 +59,7 @@ class _Token:
     text: str
     start: int
     place: str
-    """Where it stands: code of a function, data of an initialiser, define, or nowhere that counts."""
+    """code (of a function), data (of an initialiser), define, or empty: no mutants are made there."""
 
 
 @dataclass(frozen=True)
@@ -86,49 +67,39 @@ class _Change:
     start: int
     end: int
     wrong: str
-    rule: str
     name: str = ""
-    """What to call it; empty where right and wrong text say it all."""
+    """Name of the change in the key; if empty, the key spells the text before and after."""
 
 
-def mutants(file: str, text: str, prefix: str) -> list[Mutant]:
-    """Return every mutant of the C in `text`, in the order of the lines.
+def mutants(file: str, text: str) -> list[Mutant]:
+    """Return every mutant of the C in `text`, ordered by position.
 
-    A key is made of the file, the line and the change, with the default prefix and without the numbers that
-    settings put there, so that it outlives a line that moves; the last part counts equal ones.
+    A key consists of file, line and change; equal changes of equal lines are numbered.
     """
     tokens = _tokens(text)
     partner = _partners(tokens)
-    changes = sorted(
-        {
-            *_of_tokens(tokens),
-            *_of_brackets(text, tokens, partner),
-            *_of_statements(tokens, partner),
-        },
-        key=lambda change: (change.start, change.end, change.wrong),
-    )
+    changes = {
+        *_of_tokens(tokens),
+        *_of_brackets(text, tokens, partner),
+        *_of_statements(tokens, partner),
+    }
     seen: Counter[tuple[str, str]] = Counter()
     found = []
-    for change in changes:
+    for change in sorted(changes, key=lambda change: (change.start, change.end, change.wrong)):
         right = text[change.start : change.end]
-        number = text.count("\n", 0, change.start) + 1
-        line = text[text.rfind("\n", 0, change.start) + 1 :].partition("\n")[0].strip()
-        described = plain(line, prefix), plain(change.name or f"{right} -> {change.wrong}", prefix)
-        name = described[0], f"{described[1]} #{seen[described]}" if seen[described] else described[1]
-        seen[described] += 1
-        key = (plain(file, prefix), *name)
         begin = text.rfind("\n", 0, change.start) + 1
-        after = change.end + len(text[change.end :].partition("\n")[0])
-        lines = (
-            " ".join((text[begin : change.start] + part + text[change.end : after]).split())
-            for part in (right, change.wrong)
-        )
-        found.append(Mutant(file, number, change.start, change.end, change.wrong, change.rule, key, *lines))
+        line = text[begin:].partition("\n")[0]
+        described = plain(line), plain(change.name or f"{right} -> {change.wrong}")
+        repeated = f" #{seen[described]}" if seen[described] else ""
+        seen[described] += 1
+        key = (file, described[0], described[1] + repeated)
+        wrong_line = text[begin : change.start] + change.wrong + text[change.end :].partition("\n")[0]
+        found.append(Mutant(file, change.start, change.end, change.wrong, key, " ".join(wrong_line.split())))
     return found
 
 
 def _tokens(text: str) -> list[_Token]:
-    """Split C into tokens, and tell for each whether it stands in code, in data or in a macro."""
+    """Split C into tokens and find the place of each."""
     raw = [(m.lastgroup or "", m[0], m.start()) for m in _TOKEN.finditer(text)]
     tokens: list[_Token] = []
     braces: list[str] = []
@@ -161,7 +132,7 @@ def _end_of_directive(text: str, start: int) -> int:
 
 
 def _brace(before: Sequence[_Token], place: str) -> str:
-    """Tell what an opening brace opens."""
+    """Return the place of the tokens that follow an opening brace."""
     if place:
         return place
     last = before[-1] if before else None
@@ -178,17 +149,17 @@ def _of_tokens(tokens: Sequence[_Token]) -> Iterator[_Change]:
             continue
         if token.kind in {"real", "integer"}:
             for wrong, name in _numbers(token):
-                yield _Change(token.start, token.start + len(token.text), wrong, "constant", name)
+                yield _Change(token.start, token.start + len(token.text), wrong, name)
         elif token.kind == "sign" and token.place != "data":
             binary = _is_binary(tokens, index, casts)
-            for wrong, rule in _operators(token.text, binary=binary):
-                yield _Change(token.start, token.start + len(token.text), wrong, rule)
+            for wrong in _operators(token.text, binary=binary):
+                yield _Change(token.start, token.start + len(token.text), wrong)
         elif token.text == "-" and token.place == "data":
-            yield _Change(token.start, token.start + 1, "", "sign")
+            yield _Change(token.start, token.start + 1, "")
 
 
 def _numbers(token: _Token) -> Iterator[tuple[str, str]]:
-    """Yield what replaces a constant, and its name: neighbours of a whole number, or of a real."""
+    """Yield replacements of a constant with their names: the neighbours, and the negative of a real."""
     if token.kind == "integer":
         found = re.fullmatch(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)", token.text)
         assert found is not None
@@ -211,17 +182,13 @@ def _numbers(token: _Token) -> Iterator[tuple[str, str]]:
         yield f"(-{token.text})", "negative"
 
 
-def _operators(sign: str, *, binary: bool) -> Iterator[tuple[str, str]]:
-    if sign in _COMPARISONS:
-        yield from ((wrong, "comparison") for wrong in _COMPARISONS[sign])
-    elif sign in _LOGIC:
-        yield _LOGIC[sign], "logic"
-    elif sign in _STEPS:
-        yield _STEPS[sign], "arithmetic"
-    elif binary and sign in _ARITHMETIC:
-        yield _ARITHMETIC[sign], "arithmetic"
-    elif not binary and sign in {"-", "!"}:
-        yield "", "sign" if sign == "-" else "logic"
+def _operators(sign: str, *, binary: bool) -> Sequence[str]:
+    """Return what replaces an operator."""
+    if binary and sign in _ARITHMETIC:
+        return (_ARITHMETIC[sign],)
+    if not binary and sign in {"-", "!"}:
+        return ("",)
+    return _ALWAYS.get(sign, ())
 
 
 def _is_binary(tokens: Sequence[_Token], index: int, casts: frozenset[int]) -> bool:
@@ -234,7 +201,7 @@ def _is_binary(tokens: Sequence[_Token], index: int, casts: frozenset[int]) -> b
 
 
 def _ends_of_casts(tokens: Sequence[_Token]) -> frozenset[int]:
-    """Return the indices of the brackets that close a type in brackets."""
+    """Return the indices of the brackets that close a cast."""
     ends, start = [], -1
     for index, token in enumerate(tokens):
         if token.text == "(":
@@ -248,7 +215,7 @@ def _ends_of_casts(tokens: Sequence[_Token]) -> frozenset[int]:
 
 
 def _of_brackets(text: str, tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterator[_Change]:
-    """Move an index by one, and turn a condition round."""
+    """Change an index by one, and negate a condition."""
     declared = {
         index
         for first, last, is_declaration in _statements(tokens, partner)
@@ -261,18 +228,18 @@ def _of_brackets(text: str, tokens: Sequence[_Token], partner: Mapping[int, int]
         end = tokens[partner[index]].start
         inside = tokens[index + 1 : partner[index]]
         if token.text == "[" and index not in declared and [t.kind for t in inside] != ["integer"]:
-            yield _Change(end, end, " + 1", "index", "index + 1")
-            yield _Change(end, end, " - 1", "index", "index - 1")
+            yield _Change(end, end, " + 1", "index + 1")
+            yield _Change(end, end, " - 1", "index - 1")
         elif token.text == "(" and tokens[index - 1].text == "if":
             turned = f"(!{text[token.start : end + 1]})"
-            yield _Change(token.start, end + 1, turned, "condition", "condition turned round")
+            yield _Change(token.start, end + 1, turned, "condition turned round")
 
 
 def _of_statements(tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterator[_Change]:
     """Leave a statement out."""
     for first, last, is_declaration in _statements(tokens, partner):
         if not is_declaration:
-            yield _Change(tokens[first].start, tokens[last].start, "", "statement", "left out")
+            yield _Change(tokens[first].start, tokens[last].start, "", "left out")
 
 
 def _partners(tokens: Sequence[_Token]) -> dict[int, int]:
@@ -310,5 +277,5 @@ def _statements(tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterato
 
 
 def _declarator_end(tokens: Sequence[_Token], first: int, last: int) -> int:
-    """Return where the initialiser of a declaration begins, or else its end."""
+    """Return where the initialiser of a declaration begins, or its end if it has none."""
     return next((index for index in range(first, last) if tokens[index].text == "="), last)

@@ -1,106 +1,98 @@
-"""Every line and branch of the generated C is run by the cases, or the reason why not is listed."""
+"""The verification cases run every line and branch of the generated C, except those with a reason."""
 
 import json
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from benchmarks.sign_decisions import in_scalar
+from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify.check import Outcome, Result
-from tests.support import coverage
-from tests.support.cases import settings_case
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Subject
+from tests.support.cases import SCALARS, settings_case
+from tests.support.coverage_reasons import REASONS
+from tests.support.reasons import Key, is_explained, plain
 from tests.support.subjects import subject
 from tests.support.tools import require
 
-DEAD = (
-    "src/nmpc.c",
-    "    nmpc_status_t status = NMPC_OK;\n\n    if (!(is_good",
-    "    nmpc_status_t status = NMPC_OK;\n\n    if (status == NMPC_BAD_THRUST) {\n"
-    "        return NMPC_BAD_COMMAND;\n    }\n    if (!(is_good",
-)
-LOOP = "for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {"
+MAMBO = presets.load("mambo")
+SETTINGS = {name: presets.load(name) for name in presets.names()} | {
+    "fixed": with_option(MAMBO, "code.scalar", "fixed", "test"),
+    "case 7": settings_case(7, "float64"),
+}
 
 
-def explained_outside_the_self_test(result: Result) -> list[str]:
-    """Return the lines whose gaps needed a reason."""
-    gaps = (row["gap"] for row in result.figures["explained"])
-    return [gap.partition(": ")[2].partition(": ")[2] for gap in gaps if "self_test" not in gap]
+def counts(its: Subject) -> dict[tuple[str, int], tuple[int, list[int]]]:
+    """Play the cases; return {(file, line number): (runs, how often each branch was taken)}.
 
-
-@pytest.fixture(autouse=True)
-def _tools() -> None:
-    require("gcc", "gcc")
+    Several objects contain the functions of a header: their counts are added.
+    """
     require("gcov", "gcc")
+    tapes, expected = cases(its.settings)
+    replay.write_tapes(its.settings, tapes, its.folder / "tapes.bin")
+    program = replay.build(its, require("gcc", "gcc"), ("--coverage", "-O0"), its.folder)
+    played = replay.play(program, its.folder / "tapes.bin", its.settings, tapes)
+    assert replay.fault(played, expected) is None
+    command = ["gcov", "--json-format", "--branch-probabilities", "--stdout"]
+    objects = [str(path) for path in its.folder.glob("*.gcda")]
+    done = subprocess.run([*command, *objects], cwd=its.folder, capture_output=True, text=True, check=True)
+    lines: dict[tuple[str, int], tuple[int, list[int]]] = {}
+    documents: list[Any] = [json.loads(line) for line in done.stdout.splitlines()]
+    for file in (file for document in documents for file in document["files"]):
+        path = Path(file["file"])
+        if path.is_relative_to(its.bundle) and path.parent.name != "fuzz":
+            name = path.relative_to(its.bundle).as_posix()
+            for line in file["lines"]:
+                taken = [branch["count"] for branch in line["branches"]]
+                runs, before = lines.get((name, line["line_number"]), (0, [0] * len(taken)))
+                summed = [sum(pair) for pair in zip(before, taken, strict=True)]
+                lines[name, line["line_number"]] = (runs + line["count"], summed)
+    return lines
 
 
-def test_every_line_is_run_and_every_branch_taken(tmp_path: Path) -> None:
-    """What no case reaches is explained: beside the self-test, that the bound of a loop is not used up."""
-    result = coverage.check(subject(presets.load("mambo"), tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
-    assert result.figures["branches"] > 100
-    assert json.loads(json.dumps(result.figures)) == result.figures
-    assert explained_outside_the_self_test(result) == [LOOP]
+def gaps(its: Subject) -> Iterator[Key]:
+    """Yield every line that no case runs, and every branch that no case takes."""
+    for (file, number), (runs, branches) in counts(its).items():
+        line = plain((its.bundle / file).read_text("utf-8").splitlines()[number - 1])
+        if runs == 0:
+            yield file, line, "never run"
+        else:
+            yield from (
+                (file, line, f"branch {index} never taken")
+                for index, taken in enumerate(branches)
+                if taken == 0
+            )
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", [*presets.names(), "case 7 of another name"])
-def test_every_line_is_run_whatever_the_settings(name: str, tmp_path: Path) -> None:
-    """Every preset; the reasons are found under another prefix too."""
-    settings = presets.load(name) if name in presets.names() else settings_case(7, "float64")
-    if name not in presets.names():
-        settings = with_option(settings, "code.prefix", "left_wing")
-    result = coverage.check(subject(settings, tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
+@pytest.mark.parametrize("name", SETTINGS)
+def test_every_line_runs_and_every_branch_is_taken(name: str, tmp_path: Path) -> None:
+    """Whatever the settings; the counting build has the bits of the reference."""
+    its = subject(SETTINGS[name], tmp_path)
+    assert [gap for gap in gaps(its) if not is_explained(gap, REASONS, its.settings)] == []
 
 
 @pytest.mark.long
-def test_floats_around_whole_numbers_are_run(tmp_path: Path) -> None:
-    """In fixed point nmpc_float.c is played too; no gap of it needs a reason."""
-    result = coverage.check(subject(in_scalar(presets.load("mambo"), "fixed"), tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
-    assert explained_outside_the_self_test(result) == [LOOP]
+def test_a_dead_line_and_its_branch_are_gaps(tmp_path: Path) -> None:
+    """A condition that no input meets, and what it guards."""
+    guard = "    if (!(is_good"
+    dead = f"    if (status == NMPC_BAD_THRUST) {{\n        return NMPC_BAD_COMMAND;\n    }}\n{guard}"
+    found = {(line, what) for _, line, what in gaps(subject(MAMBO, tmp_path, ("src/nmpc.c", guard, dead)))}
+    assert ("return NMPC_BAD_COMMAND;", "never run") in found
+    assert any(line == "if (status == NMPC_BAD_THRUST) {" for line, _ in found)
 
 
-def test_floats_that_differ_from_their_numbers_fail(tmp_path: Path) -> None:
-    """A scale that is wrong shows in the replay."""
-    fault = (
-        "src/nmpc_float.c",
-        "number_of(state->yaw_rad, NMPC_YAW_SCALE)",
-        "number_of(state->yaw_rad, 1.0f)",
-    )
-    result = coverage.check(subject(in_scalar(presets.load("mambo"), "fixed"), tmp_path, fault))
-    assert result.outcome is Outcome.FAILED
-    assert "the self-test fails" in result.evidence
-
-
-def test_a_dead_line_and_its_branch_fail_by_name(tmp_path: Path) -> None:
-    """The evidence names the first; the file beside it has rows to paste, once they are explained."""
-    made = subject(presets.load("mambo"), tmp_path, DEAD)
-    result = coverage.check(made)
-    assert result.outcome is Outcome.FAILED
-    assert any("never run: return NMPC_BAD_COMMAND;" in gap for gap in result.figures["unexplained"])
-    assert any("never taken: if (status == NMPC_BAD_THRUST)" in gap for gap in result.figures["unexplained"])
-    assert "Reason(" in (made.folder / "unexplained.txt").read_text()
-
-
-def test_counting_must_not_change_a_bit(tmp_path: Path) -> None:
-    """A build that computes something else says nothing about the lines of this one."""
-    fault = (
-        "src/nmpc.c",
-        "self->command_rad[1] = self->plan_rad[1];",
-        "self->command_rad[1] = self->plan_rad[0];",
-    )
-    result = coverage.check(subject(presets.load("mambo"), tmp_path, fault))
-    assert result.outcome is Outcome.FAILED
-    assert "the build that counts" in result.evidence
-
-
-def test_without_gcov_the_check_is_incomplete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It names what to install, and never passes."""
-    made = subject(presets.load("mambo"), tmp_path)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    result = coverage.check(made)
-    assert result.outcome is Outcome.INCOMPLETE
-    assert "Debian's package gcc" in result.evidence
+def test_every_reason_is_of_a_line_that_is_generated() -> None:
+    """A row whose line is gone is removed."""
+    bundles = [
+        render(with_option(presets.load(name), "code.scalar", scalar, "test"), with_digest=False)
+        for name in presets.names()
+        for scalar in SCALARS
+    ]
+    for reason in REASONS:
+        assert any(reason.line in plain(files[reason.file]) for files in bundles), reason.line

@@ -1,25 +1,31 @@
-"""Mutants are made of every line, judged by bits, and none that survives goes unexplained."""
+"""The verification cases notice every small fault of the C, except those with a reason."""
 
-import json
 from pathlib import Path
 
 import pytest
 
-from benchmarks.sign_decisions import ScalarName, in_scalar
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.verify.check import Outcome
-from tests.support import mutation
-from tests.support.mutants import Mutant, mutants
-from tests.support.mutation import Bench, Fate, Judged, summary
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
+from tests.support.mutants import mutants
+from tests.support.mutation import FILES, Bench, Fate
 from tests.support.mutation_reasons import REASONS
+from tests.support.reasons import is_explained
 from tests.support.subjects import subject
 from tests.support.tools import require
+
+MAMBO = presets.load("mambo")
+
+
+def in_scalar(settings: Settings, scalar: str) -> Settings:
+    """Return `settings` with another scalar type."""
+    return with_option(settings, "code.scalar", scalar, "test")
 
 
 def faults(text: str) -> set[str]:
     """Return the lines into which the mutants of some C turn its lines."""
-    return {mutant.wrong_line for mutant in mutants("src/nmpc_x.c", text, "nmpc")}
+    return {mutant.wrong_line for mutant in mutants("src/nmpc_x.c", text)}
 
 
 def in_function(line: str) -> set[str]:
@@ -77,97 +83,50 @@ def test_tables_and_macros_are_mutated_and_declarations_are_not() -> None:
     assert faults('extern "C" {\nint f(void)\n{\n    g();\n}\n}\n') == {";"}
 
 
-def test_keys_are_unique_and_know_neither_prefix_nor_real_numbers() -> None:
-    """A reason holds for one mutant, whatever the name of the controller and its settings."""
+def test_a_key_names_one_mutant_whatever_the_settings() -> None:
+    """Keys of a file are unique, and real numbers are left out."""
     for name in ("src/nmpc.c", "src/nmpc_math.c", "include/nmpc_config.h"):
-        text = render(presets.load("mambo"))[name]
-        keys = [mutant.key for mutant in mutants(name, text, "nmpc")]
+        keys = [mutant.key for mutant in mutants(name, render(MAMBO)[name])]
         assert len(set(keys)) == len(keys)
-    (left,) = mutants("src/left_x.c", "#define LEFT_A 0.0f", "left")
-    (plain,) = mutants("src/nmpc_x.c", "#define NMPC_A 0.0", "nmpc")
-    assert left.key == plain.key
-
-
-def some(path: str, wrong_line: str) -> Mutant:
-    """Return the first mutant of preset mambo that makes a line wrong in this way."""
-    made = mutants(path, render(presets.load("mambo"))[path], "nmpc")
-    return next(mutant for mutant in made if mutant.wrong_line == wrong_line)
+    assert mutants("a.h", "#define A 0.0f")[0].key == mutants("a.h", "#define A 0.0")[0].key
 
 
 def test_mutants_meet_their_fate(tmp_path: Path) -> None:
-    """Caught by bits or by sanitizers alone, refused, or the same after all; and the C is put right."""
+    """Other bits, undefined behaviour, refused, or the same machine code; then the C is restored."""
     require("gcc", "gcc")
-    bench = Bench(subject(presets.load("mambo"), tmp_path))
-    assert bench.original_fault() is None
+    bench = Bench(subject(MAMBO, tmp_path))
     for path, wrong, fate in (
-        ("src/nmpc.c", "self->command_rad[1] = self->plan_rad[2];", Fate.KILLED),
-        ("include/nmpc_config.h", "#define NMPC_POSITION_RANGE_M 1000.00006f", Fate.KILLED),
-        ("src/nmpc.c", "for (k = 0; k <= NMPC_AXES; k++) {", Fate.WATCHED),
-        ("include/nmpc_config.h", "#define NMPC_ITERATIONS 4", Fate.KILLED),
+        ("src/nmpc.c", "self->command_rad[1] = self->plan_rad[2];", Fate.OTHER_BITS),
+        ("include/nmpc_config.h", "#define NMPC_POSITION_RANGE_M 1000.00006f", Fate.OTHER_BITS),
+        ("src/nmpc.c", "for (k = 0; k <= NMPC_AXES; k++) {", Fate.UNDEFINED),
         ("include/nmpc_config.h", "#define NMPC_INSTANCE_BYTES 119", Fate.REFUSED),
         ("include/nmpc_config.h", "#define NMPC_UPDATE_PERIOD_S 0.010000001f", Fate.SAME),
     ):
-        assert bench.judge(some(path, wrong)).fate is fate, wrong
-    assert bench.original_fault() is None
-
-
-def test_a_survivor_without_a_reason_fails_the_check(tmp_path: Path) -> None:
-    """The evidence names it, and the file beside it has its diff and a row to paste."""
-    made = subject(presets.load("mambo"), tmp_path)
-    killed, survivor = mutants("src/nmpc.c", "#define A 1\n", "nmpc")
-    result = summary(made, [Judged(killed, Fate.KILLED), Judged(survivor, Fate.SURVIVED)], {})
-    assert result.outcome is Outcome.FAILED
-    assert "src/nmpc.c:1: #define A 2" in result.evidence
-    assert json.loads(json.dumps(result.figures)) == result.figures
-    listed = (made.folder / "survivors.txt").read_text()
-    assert "- #define A 1\n+ #define A 2\n" in listed
-    assert "Reason(\n        'src/nmpc.c',\n        '#define A 1',\n        '1 -> 2',\n" in listed
-    explained = [Judged(killed, Fate.KILLED), Judged(survivor, Fate.EXPLAINED, "A is not read")]
-    assert summary(made, explained, {}).outcome is Outcome.PASSED
-
-
-def test_unharmed_code_that_differs_is_not_mutated(tmp_path: Path) -> None:
-    """Where the C is wrong to begin with, every mutant would count as caught."""
-    require("gcc", "gcc")
-    fault = (
-        "src/nmpc.c",
-        "self->command_rad[1] = self->plan_rad[1];",
-        "self->command_rad[1] = self->plan_rad[0];",
-    )
-    result = mutation.check(subject(presets.load("mambo"), tmp_path, fault))
-    assert result.outcome is Outcome.FAILED
-    assert "the unharmed C" in result.evidence
+        mutant = next(one for one in bench.mutants_of(path) if one.wrong_line == wrong)
+        assert bench.fate(mutant) is fate, wrong
+    assert bench.difference(("-O1",)) is None
 
 
 def test_every_reason_is_of_a_mutant_that_there_is() -> None:
-    """No row outlives the line that it explains."""
-    mambo, table1 = presets.load("mambo"), presets.load("table1")
-    fixed = (in_scalar(settings, "fixed") for settings in (mambo, table1))
-    chosen = (mambo, table1, in_scalar(mambo, "float64"), *fixed)
-    bundles = [render(settings, with_digest=False) for settings in chosen]
+    """A row whose line is gone is removed."""
+    floats = (MAMBO, presets.load("table1"), in_scalar(MAMBO, "float64"))
+    chosen = (*floats, *(in_scalar(settings, "fixed") for settings in floats[:2]))
     keys = {
         mutant.key
-        for files in bundles
+        for files in (render(settings, with_digest=False) for settings in chosen)
         for path in {reason.file for reason in REASONS} & files.keys()
-        for mutant in mutants(path, files[path], "nmpc")
+        for mutant in mutants(path, files[path])
     }
-    assert {(reason.file, reason.line, reason.what) for reason in REASONS} <= keys
+    assert {reason.key for reason in REASONS} <= keys
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("path", FILES)
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
-def test_every_fault_is_caught_or_explained(tmp_path: Path, scalar: ScalarName) -> None:
-    """All mutants of preset mambo."""
+def test_every_fault_is_noticed_or_explained(tmp_path: Path, scalar: str, path: str) -> None:
+    """All mutants of preset mambo; the message has the keys of those that survive."""
     require("gcc", "gcc")
-    result = mutation.check(subject(in_scalar(presets.load("mambo"), scalar), tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
-    assert result.figures["mutants"] > 500
-
-
-def test_without_gcc_the_check_is_incomplete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It names what to install, and never passes."""
-    made = subject(presets.load("mambo"), tmp_path)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    result = mutation.check(made)
-    assert result.outcome is Outcome.INCOMPLETE
-    assert "Debian's package gcc" in result.evidence
+    bench = Bench(subject(in_scalar(MAMBO, scalar), tmp_path))
+    assert bench.difference(("-O1",)) is None
+    survivors = [mutant.key for mutant in bench.mutants_of(path) if bench.fate(mutant) is Fate.SURVIVED]
+    assert [key for key in survivors if not is_explained(key, REASONS, bench.settings)] == []

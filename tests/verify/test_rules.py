@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.sign_decisions import in_scalar
 from mambo_nmpc.codegen.render import DEVIATIONS, render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
@@ -19,7 +18,7 @@ from tests.support.tools import require
 SETTINGS = (
     {name: presets.load(name) for name in presets.names()}
     | {f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)}
-    | {"fixed": in_scalar(presets.load("mambo"), "fixed")}
+    | {"fixed": with_option(presets.load("mambo"), "code.scalar", "fixed", "test")}
     | {
         f"{steps} steps": with_option(presets.load("mambo"), "horizon.prediction", steps, "test")
         for steps in (2, 33)
