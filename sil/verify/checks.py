@@ -27,6 +27,5 @@ CHECKS: Final = (
     Entry("proof", "Frama-C: no run-time error, no NaN kept, no wild command, for every input", "proof"),
     Entry("sanitizers", "nothing undefined in thousands of calls, same bits", "sanitizers"),
     Entry("fuzzing", "half a million inputs that a fuzzer found worth trying, same bits", "fuzzing"),
-    Entry("work", "a step does the same work whatever it is handed", "work"),
     Entry("faults", "bounded commands and a way back, whatever fails in flight", "faults"),
 )

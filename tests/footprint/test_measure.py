@@ -64,6 +64,14 @@ def test_the_crazyflie_keeps_its_promises() -> None:
     assert footprint.fits
 
 
+@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.12), ("table1", 1.10)])
+def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
+    """Most instructions over least, on the Cortex-M4F."""
+    counts = measured("crazyflie", preset).counts
+    assert counts is not None
+    assert counts.most <= spread * counts.least
+
+
 def test_table_1_runs_on_the_mambo_in_75_000_instructions() -> None:
     """Every step of the paper's controller, all floating point of the ARM926 in software."""
     counts = measure_once("mambo", "table1").counts
