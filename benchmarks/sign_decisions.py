@@ -1,13 +1,15 @@
-"""Where float64 and fewer bits go different ways: RPROP reads signs, and a sign can hang on the last bit.
+"""How often float32 or fixed point decides otherwise than float64, and what becomes of it in flight.
 
-A controller in float32 or fixed point is compared with float64, one in float64 with float32. Both reference
-controllers are given the same numbers, exact in the type of fewer bits, and the same memory, so a decision
-that differs differs by rounding alone. Whole flights say what becomes of it.
+RPROP reads only the signs of a gradient, and a sign can depend on the last bit. Reference controllers in
+both scalar types get the same inputs and the same memory, exact in the type of fewer bits, so that decisions
+differ by rounding alone. Flights of Table II with the C show the effect in closed loop.
+
+`python -m benchmarks.sign_decisions` prints the tables of docs/sign-decisions.md; it takes about a minute.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +17,27 @@ from numpy.typing import NDArray
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, step_watched
 from mambo_nmpc.sil.flight.loop import Flight, Outcome, fly
 from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Trajectories
 from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S
+from mambo_nmpc.sil.verify.inputs import random_inputs
 
-ScalarName = Literal["float32", "float64", "fixed"]
-MANY: Final[ScalarName] = "float64"
-
-Make = Callable[[Settings, int], CompiledController]
-"""Settings and n -> n controllers of their C."""
+RANDOM_STEPS: Final = 100_000
+EDGE_SEEDS: Final = 10_000
+EDGE_SPAN_M: Final = 0.5
+_HALVINGS: Final = 40
+"""Enough to bring two positions in float32 or fixed point next to each other."""
 
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """n control steps about to be made: what the controller is handed and what it remembers.
+    """Inputs and memory of n controllers before a step.
 
     state (n, 7), target (n, 4), thrust_acceleration_m_s2 (n,), command_rad (n, 2), plan_rad (n, control, 2).
     """
@@ -60,17 +63,20 @@ class Moments:
             exact(self.plan_rad, COMMAND),
         )
 
+    def at(self, x_m: NDArray[Any]) -> "Moments":
+        """Return the same moments with other positions along x."""
+        return replace(self, state=np.column_stack([x_m, self.state[:, 1:]]))
+
 
 @dataclass(frozen=True)
 class Disagreement:
-    """How often both scalar types decide differently, over the accepted steps of one kind of input.
+    """How often two scalar types decide differently, over the accepted steps of one kind of input.
 
-    decisions:         signs compared: one for each step, iteration and move.
-    differing:         of these, how many differ.
+    decisions:          signs compared: one for each step, iteration and move.
+    differing:          of these, how many differ.
     first_by_iteration: steps whose first differing sign falls into iteration 1, 2, ...
-    command_rad:       median, 99 % and largest change of the command in steps that differ.
-    rounding_rad:      largest change of the command in steps that agree in every decision.
-    moved:             steps whose command changes by more than half the initial step.
+    command_rad:        median, 99 % and largest change of the command in steps that differ.
+    rounding_rad:       largest change of the command in steps that agree in every decision.
     """
 
     inputs: str
@@ -80,7 +86,6 @@ class Disagreement:
     first_by_iteration: tuple[int, ...]
     command_rad: tuple[float, float, float]
     rounding_rad: float
-    moved: int
 
     @property
     def differing_steps(self) -> int:
@@ -88,143 +93,102 @@ class Disagreement:
         return sum(self.first_by_iteration)
 
 
-@dataclass(frozen=True)
-class Flown:
-    """One case of Table II with both scalar types: IAE, ISE, ITSE, ITAE, and how far apart they flew."""
-
-    case: str
-    few: tuple[float, ...]
-    many: tuple[float, ...]
-    apart_m: float
-    largest_error_m: tuple[float, float]
+def in_float64(settings: Settings) -> Settings:
+    """Return `settings` with the scalar type float64."""
+    return with_option(settings, "code.scalar", "float64")
 
 
-def in_scalar(settings: Settings, scalar: ScalarName) -> Settings:
-    """Return `settings` with another scalar type."""
-    return with_option(settings, "code.scalar", scalar)
-
-
-def with_few(settings: Settings) -> Settings:
-    """Return `settings` with the scalar type of fewer bits that is compared with float64."""
-    return settings if settings.code.scalar == "fixed" else in_scalar(settings, "float32")
-
-
-def disagreement(settings: Settings, inputs: str, moments: Moments) -> Disagreement:
-    """Let both scalar types make the same steps, and compare every decision."""
-    few_settings, many_settings = with_few(settings), in_scalar(settings, MANY)
-    few_step, few = _steps(few_settings, moments)
-    many_step, many = _steps(many_settings, moments)
-    accepted = (few_step.status == Status.OK) & (many_step.status == Status.OK)
-    differs = (few.decisions(few_settings) != many.decisions(many_settings))[:, accepted]
-    differs = differs.reshape(*differs.shape[:2], -1)
-    any_move = differs.any(axis=2)
-    steps_differing = any_move.any(axis=0)
-    first = np.argmax(any_move, axis=0)[steps_differing]
-    change_rad = np.abs(few_step.command_rad.astype(np.float64) - many_step.command_rad).max(axis=1)[accepted]
-    changed_rad = change_rad[steps_differing]
-    return Disagreement(
-        inputs=inputs,
-        steps=int(accepted.sum()),
-        decisions=differs.size,
-        differing=int(differs.sum()),
-        first_by_iteration=tuple(np.bincount(first, minlength=len(differs)).tolist()),
-        command_rad=_spread(changed_rad),
-        rounding_rad=float(change_rad[~steps_differing].max(initial=0.0)),
-        moved=int((change_rad > settings.optimizer.initial_step_rad / 2.0).sum()),
+def random_moments(settings: Settings, n: int, rng: np.random.Generator) -> Moments:
+    """Draw inputs and a random memory; every other command is the first move of its plan."""
+    drawn = random_inputs(settings, n, rng)
+    state, target, thrust = (
+        np.asarray(values, np.float32) for values in (drawn.state, drawn.target, drawn.thrust)
     )
+    limit = settings.limits.tilt_rad
+    plan = rng.uniform(-limit, limit, (n, settings.horizon.control, 2)).astype(np.float32)
+    command = plan[:, 0].copy()
+    command[::2] = rng.uniform(-limit, limit, command[::2].shape)
+    tilt = np.float32(limit)
+    moments = Moments(state, target, thrust, np.clip(command, -tilt, tilt), np.clip(plan, -tilt, tilt))
+    return moments.exact(settings)
+
+
+def at_the_edge(settings: Settings, moments: Moments) -> Moments:
+    """Move each position along x to where float64 decides otherwise at the next number of `settings`.
+
+    Bisection between the position and one EDGE_SPAN_M beside it finds two such neighbours, if the decisions
+    differ between those two; moments without such an edge are left out.
+    """
+    many = in_float64(settings)
+    far = moments.at(moments.state[:, 0] + np.float32(EDGE_SPAN_M)).exact(settings)
+    here = _decisions(many, moments)
+    edged = (here != _decisions(many, far)).any(axis=1)
+    near = Moments(*(getattr(moments, field.name)[edged] for field in fields(Moments)))
+    near_m, far_m, here = near.state[:, 0], far.state[edged, 0], here[edged]
+    for _ in range(_HALVINGS):
+        middle = near.at((near_m + far_m) * np.float32(0.5)).exact(settings)
+        same = (_decisions(many, middle) == here).all(axis=1)
+        near_m = np.where(same, middle.state[:, 0], near_m)
+        far_m = np.where(same, far_m, middle.state[:, 0])
+    return near.at(near_m)
+
+
+def _decisions(settings: Settings, moments: Moments) -> NDArray[np.int8]:
+    """Return status and decisions of every moment as a row."""
+    step, inner = _steps(settings, moments)
+    decisions = np.moveaxis(inner.decisions(settings), 0, 1).reshape(len(moments.state), -1)
+    return np.concatenate([step.status.astype(np.int8)[:, np.newaxis], decisions], axis=1)
 
 
 def _steps(settings: Settings, moments: Moments) -> tuple[Any, InnerSteps]:
     design = Design(settings)
     numbers = design.numbers
-    fresh = ReferenceController(design, len(moments.state)).memory
     memory = replace(
-        fresh,
+        ReferenceController(design, len(moments.state)).memory,
         command_rad=numbers.quantize(moments.command_rad, COMMAND).astype(numbers.computed),
         plan_rad=numbers.quantize(moments.plan_rad, COMMAND).astype(numbers.computed),
     )
     return step_watched(settings, memory, moments.state, moments.target, moments.thrust_acceleration_m_s2)
 
 
-def _spread(values: NDArray[np.float64]) -> tuple[float, float, float]:
-    if not len(values):
-        return 0.0, 0.0, 0.0
-    return float(np.median(values)), float(np.quantile(values, 0.99)), float(values.max())
-
-
-def with_random_memory(settings: Settings, inputs: tuple[Any, Any, Any], rng: np.random.Generator) -> Moments:
-    """Give states, targets and thrusts a random memory; every other command is the first move of its plan.
-
-    All is exact in the type of fewer bits.
-    """
-    state, target, thrust = (np.asarray(values, np.float32) for values in inputs)
-    limit = settings.limits.tilt_rad
-    plan = rng.uniform(-limit, limit, (len(state), settings.horizon.control, 2)).astype(np.float32)
-    command = plan[:, 0].copy()
-    command[::2] = rng.uniform(-limit, limit, command[::2].shape)
-    tilt = np.float32(limit)
-    moments = Moments(state, target, thrust, np.clip(command, -tilt, tilt), np.clip(plan, -tilt, tilt))
-    return moments.exact(with_few(settings))
-
-
-EDGE_SPAN_M: Final = 0.5
-_HALVINGS: Final = 40
-"""More than it takes to bring two positions of float32 or fixed point next to each other."""
-
-
-def at_the_edge(settings: Settings, moments: Moments) -> Moments:
-    """Move each position to where a decision changes: the adversary's inputs.
-
-    Between a position and one EDGE_SPAN_M beside it the decisions of float64 differ somewhere; halving finds
-    two neighbouring numbers of the type of fewer bits between which they do. Moments without such an edge are
-    left out.
-    """
-    few, settings = with_few(settings), in_scalar(settings, MANY)
-    near, far = moments, _moved(moments, moments.state[:, 0] + np.float32(EDGE_SPAN_M)).exact(few)
-    here = _pattern(settings, near)
-    edged = (here != _pattern(settings, far)).any(axis=1)
-    near, far, here = _chosen(near, edged), _chosen(far, edged), here[edged]
-    for _ in range(_HALVINGS):
-        middle = _moved(near, (near.state[:, 0] + far.state[:, 0]) * np.float32(0.5)).exact(few)
-        same = (_pattern(settings, middle) == here).all(axis=1)
-        near = _moved(near, np.where(same, middle.state[:, 0], near.state[:, 0]))
-        far = _moved(far, np.where(same, far.state[:, 0], middle.state[:, 0]))
-    return near
-
-
-def _moved(moments: Moments, x_m: NDArray[Any]) -> Moments:
-    state = moments.state.copy()
-    state[:, 0] = x_m
-    return replace(moments, state=state)
-
-
-def _chosen(moments: Moments, rows: NDArray[np.bool_]) -> Moments:
-    return Moments(
-        moments.state[rows],
-        moments.target[rows],
-        moments.thrust_acceleration_m_s2[rows],
-        moments.command_rad[rows],
-        moments.plan_rad[rows],
+def disagreement(settings: Settings, inputs: str, moments: Moments) -> Disagreement:
+    """Make the same steps in both scalar types and compare every decision."""
+    many_settings = in_float64(settings)
+    few_step, few = _steps(settings, moments)
+    many_step, many = _steps(many_settings, moments)
+    accepted = (few_step.status == Status.OK) & (many_step.status == Status.OK)
+    differs = (few.decisions(settings) != many.decisions(many_settings))[:, accepted]
+    any_move = differs.any(axis=(2, 3))
+    differing = any_move.any(axis=0)
+    change_rad = np.abs(few_step.command_rad.astype(np.float64) - many_step.command_rad).max(axis=1)[accepted]
+    changed_rad = change_rad[differing] if differing.any() else np.zeros(1)
+    return Disagreement(
+        inputs=inputs,
+        steps=int(accepted.sum()),
+        decisions=differs.size,
+        differing=int(differs.sum()),
+        first_by_iteration=tuple(
+            np.bincount(np.argmax(any_move, axis=0)[differing], minlength=len(differs)).tolist()
+        ),
+        command_rad=(
+            float(np.median(changed_rad)),
+            float(np.quantile(changed_rad, 0.99)),
+            float(changed_rad.max()),
+        ),
+        rounding_rad=float(change_rad[~differing].max(initial=0.0)),
     )
 
 
-def _pattern(settings: Settings, moments: Moments) -> NDArray[np.int8]:
-    """Return the decisions of every moment as a row, with the status before them."""
-    step, inner = _steps(settings, moments)
-    decisions = np.moveaxis(inner.decisions(settings), 0, 1).reshape(len(moments.state), -1)
-    return np.concatenate([step.status.astype(np.int8)[:, np.newaxis], decisions], axis=1)
+class _RecordingController:
+    """A compiled controller that records each moment before it steps."""
 
-
-class _Recording:
-    """A controller that writes down each moment before it steps."""
-
-    def __init__(self, controller: CompiledController, settings: Settings, n: int) -> None:
-        self._controller, self._settings = controller, settings
+    def __init__(self, settings: Settings, n: int) -> None:
+        self._controller, self._settings = CompiledController(settings, n), settings
         self._command, self._plan = np.zeros((n, 2)), np.zeros((n, settings.horizon.control, 2))
         self.moments: list[Moments] = []
 
     def step(self, state: Any, target: Any, thrust_acceleration_m_s2: Any) -> Outcome:
-        """Write down, and step."""
+        """Record, and step."""
         moments = Moments(state, target, thrust_acceleration_m_s2, self._command, self._plan)
         self.moments.append(moments.exact(self._settings))
         step = self._controller.step(state, target, thrust_acceleration_m_s2)
@@ -232,45 +196,64 @@ class _Recording:
         return step
 
 
-def fly_both(settings: Settings, make: Make) -> tuple[list[Flown], Moments]:
-    """Fly the cases of Table II with both scalar types.
-
-    Returns what came of it, and the moments of the type of fewer bits.
-    """
-    cases = len(CASES)
+def compare_flights(settings: Settings) -> tuple[str, Moments]:
+    """Fly Table II in both scalar types; return a Markdown table and the moments of the first."""
+    n = len(CASES)
     flight = Flight(
         Trajectories(tuple(CASES.values())),
         duration_s=DURATION_S,
-        flights=cases,
+        flights=n,
         update_period_s=settings.horizon.update_period_s,
     )
-    few, many = with_few(settings), in_scalar(settings, MANY)
-    recording = _Recording(make(few, cases), few, cases)
-    traces = fly(flight, recording), fly(flight, make(many, cases))
-    moments = Moments(
-        *(
-            np.concatenate([getattr(one, field.name) for one in recording.moments])
-            for field in fields(Moments)
-        )
-    )
-    return _compared(*traces), moments
-
-
-def _compared(few: Trace, many: Trace) -> list[Flown]:
+    recording = _RecordingController(settings, n)
+    few, many = fly(flight, recording), fly(flight, CompiledController(in_float64(settings), n))
     apart_m = np.hypot(*np.moveaxis((few.position_m - many.position_m)[..., :2], -1, 0)).max(axis=0)
-    indices: list[Sequence[Sequence[float]]] = []
-    for trace in (few, many):
-        found = measure(trace)
-        values = (found.iae_m_s, found.ise_m2_s, found.itse_m2_s2, found.itae_m_s2)
-        indices.append(np.stack(values, axis=1).tolist())
-    largest = [measure(trace).max_error_m for trace in (few, many)]
-    return [
-        Flown(
-            case=case,
-            few=tuple(indices[0][row]),
-            many=tuple(indices[1][row]),
-            apart_m=float(apart_m[row]),
-            largest_error_m=(float(largest[0][row]), float(largest[1][row])),
-        )
-        for row, case in enumerate(CASES)
+    indices = [(m.iae_m_s, m.ise_m2_s, m.itse_m2_s2, m.itae_m_s2) for m in map(measure, (few, many))]
+    lines = [
+        f"| Table II case | IAE {settings.code.scalar} | IAE float64 | ISE | ITSE | ITAE | paths apart, m |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
+    for row, case in enumerate(CASES):
+        iae, *others = (f"{a[row]:.4g} / {b[row]:.4g}" for a, b in zip(*indices, strict=True))
+        lines.append(f"| {case} | {iae.replace(' / ', ' | ')} | {' | '.join(others)} | {apart_m[row]:.3f} |")
+    moments = Moments(
+        *(np.concatenate([getattr(m, field.name) for m in recording.moments]) for field in fields(Moments))
+    )
+    return "\n".join(lines), moments
+
+
+def decision_table(found: Sequence[Disagreement]) -> str:
+    """Return a Markdown table with a row for each kind of input."""
+    lines = [
+        "| inputs | steps | of these decide otherwise | first in iteration 1, 2, ... "
+        "| decisions that differ | command changes by: median, 99 %, largest, rad | by rounding alone, rad |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for one in found:
+        spread = ", ".join(f"{value:.3f}" for value in one.command_rad) if one.differing_steps else "-"
+        lines.append(
+            f"| {one.inputs} | {one.steps} | {one.differing_steps} | "
+            f"{', '.join(map(str, one.first_by_iteration))} | {one.differing} of {one.decisions} | "
+            f"{spread} | {one.rounding_rad:.1e} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Print both tables for two presets in float32 and in fixed point."""
+    for name in ("mambo", "table1"):
+        for scalar in ("float32", "fixed"):
+            settings = with_option(presets.load(name), "code.scalar", scalar)
+            flights, flown = compare_flights(settings)
+            rng = np.random.default_rng(0)
+            inputs = {
+                "random": random_moments(settings, RANDOM_STEPS, rng),
+                "at an edge": at_the_edge(settings, random_moments(settings, EDGE_SEEDS, rng)),
+                "in flight": flown,
+            }
+            table = decision_table([disagreement(settings, kind, m) for kind, m in inputs.items()])
+            print(f"## Preset {name}, {scalar}\n\n{table}\n\n{flights}\n")
+
+
+if __name__ == "__main__":
+    main()
