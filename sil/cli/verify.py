@@ -36,7 +36,7 @@ def verify(
     from mambo_nmpc.codegen import bundle
     from mambo_nmpc.codegen.render import render
     from mambo_nmpc.sil.files.folders import SUMMARY, new_results
-    from mambo_nmpc.sil.verify.check import Outcome
+    from mambo_nmpc.sil.verify.check import CheckOutcome
     from mambo_nmpc.sil.verify.report import PAGE, VerifySummary, closing, digests, page, summarise
 
     settings = load(source, scalar)
@@ -51,7 +51,7 @@ def verify(
         summary.write(folder)
     show(summary, closing(found), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {PAGE}, {SUMMARY}, {CONTROLLER}, {REPORTS}", err=True)
-    if summary.verdict is not Outcome.PASSED:
+    if summary.verdict is not CheckOutcome.PASSED:
         raise typer.Exit(1)
 
 

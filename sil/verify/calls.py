@@ -32,7 +32,7 @@ NULL_SECOND: Final = 4
 NULL_COMMAND: Final = 8
 
 
-class Function(IntEnum):
+class ApiFunction(IntEnum):
     """Which function is called."""
 
     STEP = 0
@@ -42,18 +42,18 @@ class Function(IntEnum):
 
 
 _POINTERS: Final = {
-    Function.STEP: NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND,
-    Function.RESET: NULL_SELF | NULL_FIRST,
-    Function.SET_WEIGHTS: NULL_SELF | NULL_FIRST,
-    Function.INIT: NULL_SELF,
+    ApiFunction.STEP: NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND,
+    ApiFunction.RESET: NULL_SELF | NULL_FIRST,
+    ApiFunction.SET_WEIGHTS: NULL_SELF | NULL_FIRST,
+    ApiFunction.INIT: NULL_SELF,
 }
 
 
 _QUANTITIES: Final = {
-    Function.STEP: (*STATE, *TARGET, *THRUST),
-    Function.RESET: COMMAND,
-    Function.SET_WEIGHTS: WEIGHTS,
-    Function.INIT: COMMAND,
+    ApiFunction.STEP: (*STATE, *TARGET, *THRUST),
+    ApiFunction.RESET: COMMAND,
+    ApiFunction.SET_WEIGHTS: WEIGHTS,
+    ApiFunction.INIT: COMMAND,
 }
 
 
@@ -78,7 +78,7 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
     )
 
 
-def calls(settings: Settings, function: Function, values: NDArray[Any], nulls: int = 0) -> Tape:
+def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls: int = 0) -> Tape:
     """Return a call of `function` for each row of values (n, 1..12), with `nulls` among its pointers."""
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
@@ -97,7 +97,7 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
     """Run the reference controller through all `tapes` side by side, and return what came of every call."""
     longest = max((len(tape) for tape in tapes), default=0)
     padded = np.zeros((len(tapes), longest), call_type(settings))
-    padded["call"] = Function.RESET | (NULL_SELF << 2)
+    padded["call"] = ApiFunction.RESET | (NULL_SELF << 2)
     for row, tape in zip(padded, tapes, strict=True):
         row[: len(tape)] = tape
     runs = _Runs(settings, len(tapes))
@@ -122,26 +122,26 @@ class _Runs:
         """Make one call for each controller."""
         function = now["call"] & 3
         nulls = (now["call"] >> 2) & 15
-        null = (nulls & np.array([_POINTERS[f] for f in Function])[function]) != 0
+        null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0
         values = now["values"]
 
-        def given(wanted: Function) -> NDArray[Any]:
+        def given(wanted: ApiFunction) -> NDArray[Any]:
             quantities = _QUANTITIES[wanted]
             si = self._numbers.to_si(values[:, : len(quantities)], *quantities)
             return np.where(((function == wanted) & ~null)[:, None], si, np.nan).astype(si.dtype)
 
         outcome = np.zeros(len(now), outcome_type(self._settings))
         with np.errstate(all="ignore"):
-            resets = self._controller.reset(given(Function.RESET))
-            weights = self._controller.set_weights(given(Function.SET_WEIGHTS))
-            step = given(Function.STEP)
+            resets = self._controller.reset(given(ApiFunction.RESET))
+            weights = self._controller.set_weights(given(ApiFunction.SET_WEIGHTS))
+            step = given(ApiFunction.STEP)
             steps = self._controller.step(step[:, 0:7], step[:, 7:11], step[:, 11]).status
-        self._initialise((function == Function.INIT) & ~null)
+        self._initialise((function == ApiFunction.INIT) & ~null)
 
         status = np.choose(function, [steps, resets, weights, np.zeros_like(steps)])
-        outcome["status"] = np.where(null & (function != Function.INIT), Status.NULL_POINTER, status)
+        outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         memory = self._controller.memory
-        writes = (function == Function.STEP) & ((nulls & NULL_COMMAND) == 0)
+        writes = (function == ApiFunction.STEP) & ((nulls & NULL_COMMAND) == 0)
         level = ((nulls & NULL_SELF) != 0)[:, None]
         outcome["command_rad"] = np.where(
             writes[:, None], np.where(level, 0, memory.command_rad), UNWRITTEN_RAD

@@ -20,13 +20,13 @@ from mambo_nmpc.sil.verify.calls import (
     NULL_FIRST,
     NULL_SECOND,
     NULL_SELF,
-    Function,
+    ApiFunction,
     Outcomes,
     Tape,
     answers,
     calls,
 )
-from mambo_nmpc.sil.verify.inputs import Inputs, random_inputs
+from mambo_nmpc.sil.verify.inputs import StepInputs, random_inputs
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]
@@ -71,11 +71,11 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
     weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
     columns = [
-        *(calls(settings, Function.STEP, rows) for rows in steps[:3]),
-        calls(settings, Function.RESET, command),
-        *(calls(settings, Function.STEP, rows) for rows in steps[3:5]),
-        calls(settings, Function.SET_WEIGHTS, weights),
-        *(calls(settings, Function.STEP, rows) for rows in steps[5:]),
+        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[:3]),
+        calls(settings, ApiFunction.RESET, command),
+        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[3:5]),
+        calls(settings, ApiFunction.SET_WEIGHTS, weights),
+        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[5:]),
     ]
     return list(np.stack(columns, axis=1))
 
@@ -100,12 +100,12 @@ def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         for value in _around(settings, quantity, *ends):
             good = _good(settings, rng, 4)
             good[1, index] = value
-            yield calls(settings, Function.STEP, good)
+            yield calls(settings, ApiFunction.STEP, good)
     numbers = Design(settings).numbers
     for function, quantities, lows, highs in (
-        (Function.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit)),
-        (Function.RESET, COMMAND, (-ATTITUDE_LIMIT_RAD,) * 2, (ATTITUDE_LIMIT_RAD,) * 2),
-        (Function.RESET, COMMAND, (-tilt,) * 2, (tilt,) * 2),
+        (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit)),
+        (ApiFunction.RESET, COMMAND, (-ATTITUDE_LIMIT_RAD,) * 2, (ATTITUDE_LIMIT_RAD,) * 2),
+        (ApiFunction.RESET, COMMAND, (-tilt,) * 2, (tilt,) * 2),
     ):
         for index in range(2):
             for value in _around(settings, quantities[index], lows[index], highs[index]):
@@ -118,10 +118,10 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     """Leave out every set of pointers, in every function, and initialise again."""
     every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
     for function, pointers in (
-        (Function.STEP, every),
-        (Function.RESET, NULL_SELF | NULL_FIRST),
-        (Function.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
-        (Function.INIT, NULL_SELF),
+        (ApiFunction.STEP, every),
+        (ApiFunction.RESET, NULL_SELF | NULL_FIRST),
+        (ApiFunction.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
+        (ApiFunction.INIT, NULL_SELF),
     ):
         for nulls in range(pointers + 1):
             made = calls(settings, function, np.array([[0.1, 0.2]]), nulls)
@@ -143,7 +143,7 @@ def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
     for yaw in yaws:
         good = _good(settings, rng, len(eighths))
         good[:, 6] = yaw
-        columns.append(calls(settings, Function.STEP, good))
+        columns.append(calls(settings, ApiFunction.STEP, good))
     return list(np.stack(columns, axis=1))
 
 
@@ -164,7 +164,7 @@ def _at_rest(settings: Settings) -> list[Tape]:
 
     def tapes(weights: Floats, effort: Floats) -> list[Tape]:
         pairs = np.stack([weights, effort], axis=1)
-        columns = calls(settings, Function.SET_WEIGHTS, pairs), calls(settings, Function.STEP, steps)
+        columns = calls(settings, ApiFunction.SET_WEIGHTS, pairs), calls(settings, ApiFunction.STEP, steps)
         return list(np.stack(columns, axis=1))
 
     def between(made: Callable[[Floats], list[Tape]], most: float) -> tuple[Floats, Floats]:
@@ -196,7 +196,7 @@ def _meeting(settings: Settings) -> Iterator[Tape]:
             steps = np.zeros((1, 12))
             steps[0, axis], steps[0, 2 + axis] = -way * advance_m, way
             steps[0, 11] = hover_thrust(settings)
-            yield calls(settings, Function.STEP, steps)
+            yield calls(settings, ApiFunction.STEP, steps)
 
 
 def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
@@ -222,21 +222,24 @@ def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     steps = numbers.to_si(most * rng.choice([-1, 1], (512, 12)), *STATE, *TARGET, *THRUST)
     steps[:, 11] = np.abs(steps[:, 11])
     steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
-    yield from calls(settings, Function.STEP, steps).reshape(-1, 4)
+    yield from calls(settings, ApiFunction.STEP, steps).reshape(-1, 4)
 
     near_rad = settings.limits.tilt_rad - math.ldexp(1, -numbers.bits["angle"])
     signs = np.array(list(itertools.product((-1, 1), repeat=4)))
     pulled = np.zeros((len(signs), 12))
     pulled[:, 0:2] = signs[:, 2:] * min(1.0, settings.ranges.position_m)
     pulled[:, 11] = hover_thrust(settings)
-    columns = calls(settings, Function.RESET, near_rad * signs[:, :2]), calls(settings, Function.STEP, pulled)
+    columns = (
+        calls(settings, ApiFunction.RESET, near_rad * signs[:, :2]),
+        calls(settings, ApiFunction.STEP, pulled),
+    )
     yield from np.stack(columns, axis=1)
 
 
 def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
     """Put a call between good steps, and have it followed by a step that repeats the last command."""
-    steps = calls(settings, Function.STEP, _good(settings, rng, 4))
-    refused = calls(settings, Function.STEP, np.full((1, 12), np.nan))
+    steps = calls(settings, ApiFunction.STEP, _good(settings, rng, 4))
+    refused = calls(settings, ApiFunction.STEP, np.full((1, 12), np.nan))
     return np.concatenate([steps[:2], made, refused, steps[2:]])
 
 
@@ -271,6 +274,6 @@ def _floating(settings: Settings) -> Scalar:
     return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]
 
 
-def _rows(inputs: Inputs) -> Array:
+def _rows(inputs: StepInputs) -> Array:
     """Join state, target and thrust to rows (n, 12)."""
     return np.concatenate([inputs.state, inputs.target, inputs.thrust[:, None]], axis=1)

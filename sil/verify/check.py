@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from mambo_nmpc.codegen.settings.model import Settings
 
 
-class Outcome(StrEnum):
+class CheckOutcome(StrEnum):
     """How a check ended; INCOMPLETE is never as good as PASSED."""
 
     PASSED = "passed"
@@ -40,7 +40,7 @@ class Result:
     tools:    name and version of every tool that took part.
     """
 
-    outcome: Outcome
+    outcome: CheckOutcome
     evidence: str
     figures: Mapping[str, Any] = field(default_factory=dict)
     tools: Mapping[str, str] = field(default_factory=dict)

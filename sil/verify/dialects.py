@@ -8,7 +8,7 @@ from typing import Final
 from mambo_nmpc.codegen.flags import WARNING_FLAGS
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.firmware.doctor import command_version
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 from mambo_nmpc.sil.verify.tools import missing, run
 
 _UNSUFFIXED: Final = "-Wunsuffixed-float-constants"
@@ -65,7 +65,7 @@ def check(subject: Subject) -> Result:
             first = next((line for line in said.splitlines() if "error" in line or "warning" in line), said)
             faults.append(f"{name}: {first or f'exit code {done.returncode}'}")
     (subject.folder / "compilers.txt").write_text("\n".join(log), "utf-8")
-    outcome = Outcome.FAILED if faults else Outcome.INCOMPLETE if gaps else Outcome.PASSED
+    outcome = CheckOutcome.FAILED if faults else CheckOutcome.INCOMPLETE if gaps else CheckOutcome.PASSED
     counted = f"{len(sources)} files, {len(silent)} of {len(DIALECTS)} dialects without a word"
     compilers = sorted({dialect.compiler for dialect in DIALECTS.values()})
     return Result(

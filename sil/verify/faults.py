@@ -14,7 +14,7 @@ from mambo_nmpc.sil.faults.report import table, write_csv
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, scenarios
 from mambo_nmpc.sil.files.folders import finite
 from mambo_nmpc.sil.verify.bundle import controller
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 
 
 def check(subject: Subject) -> Result:
@@ -48,14 +48,14 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
             wrong.append(f"{where}: never came back")
     if wrong:
         outcome, evidence = (
-            Outcome.FAILED,
+            CheckOutcome.FAILED,
             "; ".join(wrong[:3]) + (f"; {len(wrong)} in all" if wrong[3:] else ""),
         )
     elif strays:
-        outcome = Outcome.INCOMPLETE
+        outcome = CheckOutcome.INCOMPLETE
         evidence = f"strays further than {STRAY_M:g} m without a fault, so coming back means nothing"
     else:
-        outcome = Outcome.PASSED
+        outcome = CheckOutcome.PASSED
         evidence = _evidence(verdicts, ending)
     figures = finite({"wrong": wrong, "flights": [asdict(verdict) for verdict in verdicts]})
     return Result(outcome, evidence, figures, {"compiler": host_toolchain().identity().splitlines()[0]})

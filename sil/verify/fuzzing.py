@@ -13,7 +13,7 @@ from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import Tape, answers, call_type, tape_from
 from mambo_nmpc.sil.verify.cases import random_tapes
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 
 RUNS: Final = 500_000
 SEED: Final = 1
@@ -34,14 +34,14 @@ def check(subject: Subject, *, runs: int = RUNS) -> Result:
     tools = {"clang": command_version("clang") or ""}
     gap = replay.missing("clang", FLAGS, subject.folder)
     if gap:
-        return Result(Outcome.INCOMPLETE, gap, tools=tools)
+        return Result(CheckOutcome.INCOMPLETE, gap, tools=tools)
     seeds, corpus = subject.folder / "seeds", subject.folder / "corpus"
     _write_seeds(subject.settings, seeds)
     corpus.mkdir()
     try:
         done = _fuzz(subject, runs)
     except BuildError as error:
-        return Result(Outcome.FAILED, f"the harness does not build: {error}", tools=tools)
+        return Result(CheckOutcome.FAILED, f"the harness does not build: {error}", tools=tools)
     log = done.stderr.decode(errors="replace")
     (subject.folder / "fuzzer.txt").write_text(log)
     files = sorted([*seeds.iterdir(), *corpus.iterdir()])
@@ -59,9 +59,9 @@ def check(subject: Subject, *, runs: int = RUNS) -> Result:
     if finding is None:
         finding = _beside_the_reference(subject, files, tapes)
     if finding is not None:
-        return Result(Outcome.FAILED, finding, figures=figures, tools=tools)
+        return Result(CheckOutcome.FAILED, finding, figures=figures, tools=tools)
     return Result(
-        Outcome.PASSED,
+        CheckOutcome.PASSED,
         f"{made} runs from seed {SEED} broke no promise; {figures['replayed_calls']} calls of the "
         f"{len(files)} tapes kept have the bits of the reference",
         figures=figures,

@@ -1,4 +1,4 @@
-"""Inputs for checks: seeded random values, and the corners that random values miss."""
+"""StepInputs for checks: seeded random values, and the corners that random values miss."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,15 @@ NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
 
 
 @dataclass(frozen=True)
-class Inputs:
-    """Inputs of one step of n controllers: state (n, 7), target (n, 4), thrust (n,)."""
+class StepInputs:
+    """StepInputs of one step of n controllers: state (n, 7), target (n, 4), thrust (n,)."""
 
     state: Array
     target: Array
     thrust: Array
 
 
-def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> Inputs:
+def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepInputs:
     """Draw inputs with errors from 0.1 mm to 10 m, a tenth of them with a corner in one place."""
     ranges = settings.ranges
     scale = 10.0 ** rng.uniform(-4, 1, (n, 1))
@@ -45,7 +45,7 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> Input
 
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _corner(settings, state[row], target[row], thrust[row : row + 1], rng)
-    return Inputs(state, target, thrust)
+    return StepInputs(state, target, thrust)
 
 
 def _corner(settings: Settings, state: Array, target: Array, thrust: Array, rng: np.random.Generator) -> None:

@@ -12,7 +12,7 @@ from typing import Final
 from mambo_nmpc.codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
 from mambo_nmpc.codegen.render import with_prefix
 from mambo_nmpc.sil.firmware.doctor import command_version
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 
 _SHOWN: Final = 5
@@ -36,7 +36,7 @@ def check(subject: Subject) -> Result:
     """Prove the absence of run-time errors and the promises of the driver; every alarm is a failure."""
     absent = missing("frama-c", "frama-c-base")
     if absent:
-        return Result(Outcome.INCOMPLETE, absent)
+        return Result(CheckOutcome.INCOMPLETE, absent)
     tools = {"frama-c": command_version("frama-c") or ""}
     properties: list[Property] = []
     statements = 0
@@ -46,11 +46,13 @@ def check(subject: Subject) -> Result:
         try:
             done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
         except subprocess.TimeoutExpired:
-            return Result(Outcome.INCOMPLETE, f"frama-c did not end within {PATIENCE_S:g} s", tools=tools)
+            return Result(
+                CheckOutcome.INCOMPLETE, f"frama-c did not end within {PATIENCE_S:g} s", tools=tools
+            )
         log = done.stdout + done.stderr
         (subject.folder / f"{name}.txt").write_text(log, "utf-8")
         if done.returncode != 0 or not report.is_file():
-            return Result(Outcome.FAILED, f"frama-c refused the code: {_complaint(log)}", tools=tools)
+            return Result(CheckOutcome.FAILED, f"frama-c refused the code: {_complaint(log)}", tools=tools)
         properties += read_properties(report)
         statements += _number(log, r"(\d+) statements reached")
 
@@ -64,13 +66,16 @@ def check(subject: Subject) -> Result:
         "statements": statements,
     }
     if alarms:
-        return Result(Outcome.FAILED, _alarm_text(alarms), figures, tools)
+        return Result(CheckOutcome.FAILED, _alarm_text(alarms), figures, tools)
     if proven < promised:
         return Result(
-            Outcome.FAILED, f"{promised - proven} of {promised} promises were never reached", figures, tools
+            CheckOutcome.FAILED,
+            f"{promised - proven} of {promised} promises were never reached",
+            figures,
+            tools,
         )
     return Result(
-        Outcome.PASSED,
+        CheckOutcome.PASSED,
         f"no alarm in {statements} statements, whatever the inputs and the order of calls: no run-time "
         f"error, {'no overflow' if fixed else 'no NaN or infinity stored'}, no command beyond the tilt limit",
         figures,

@@ -14,7 +14,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import with_prefix
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.verify.calls import Function, Outcomes, Tape, calls, outcome_type
+from mambo_nmpc.sil.verify.calls import ApiFunction, Outcomes, Tape, calls, outcome_type
 from mambo_nmpc.sil.verify.check import Subject
 from mambo_nmpc.sil.verify.tools import missing as missing_tool
 
@@ -95,7 +95,7 @@ def write_program(prefix: str, folder: Path) -> Path:
 
 def write_tapes(settings: Settings, tapes: Sequence[Tape], path: Path) -> None:
     """Write tapes into one file, an initialisation before each."""
-    init = calls(settings, Function.INIT, np.zeros((1, 1)))
+    init = calls(settings, ApiFunction.INIT, np.zeros((1, 1)))
     path.write_bytes(b"".join(init.tobytes() + tape.tobytes() for tape in tapes))
 
 

@@ -1,6 +1,7 @@
 """What a verification found, as a record, as lines and as a page: the same words, three times."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.files.summary import Summary
 from mambo_nmpc.sil.show.page import render_page
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.checks import CHECKS
 
 PAGE: Final = "verify.html"
@@ -24,7 +25,7 @@ class Verified:
 
     name: str
     about: str
-    outcome: Outcome
+    outcome: CheckOutcome
     evidence: str
     figures: Mapping[str, Any]
     tools: Mapping[str, str]
@@ -38,7 +39,7 @@ class VerifySummary(Summary):
     source: str
     digest: str
     scalar: str
-    verdict: Outcome
+    verdict: CheckOutcome
     not_run: list[str]
     checks: list[Verified]
     tools: dict[str, str]
@@ -46,10 +47,10 @@ class VerifySummary(Summary):
     files: dict[str, str] = Field(default_factory=dict)
 
 
-def verdict(found: Sequence[Verified]) -> Outcome:
+def verdict(found: Sequence[Verified]) -> CheckOutcome:
     """Return the worst outcome: one failure fails all, and what could not run is never passed."""
     outcomes = {one.outcome for one in found}
-    worst_first = (Outcome.FAILED, Outcome.INCOMPLETE, Outcome.PASSED)
+    worst_first = (CheckOutcome.FAILED, CheckOutcome.INCOMPLETE, CheckOutcome.PASSED)
     return next(outcome for outcome in worst_first if outcome in outcomes)
 
 
@@ -60,9 +61,8 @@ def line(one: Verified) -> str:
 
 def closing(found: Sequence[Verified]) -> str:
     """Spell the verdict, and what it does not speak of."""
-    counts = ", ".join(
-        f"{count} {outcome}" for outcome in Outcome if (count := sum(one.outcome is outcome for one in found))
-    )
+    counted = Counter(one.outcome for one in found)
+    counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in CheckOutcome if counted[outcome])
     left_out = _left_out(found)
     return f"verdict: {verdict(found)} ({counts})" + (f"; not run: {', '.join(left_out)}" if left_out else "")
 

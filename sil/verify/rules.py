@@ -10,7 +10,7 @@ from typing import Final
 from mambo_nmpc.codegen.flags import RULE_FLAGS
 from mambo_nmpc.codegen.render import DEVIATIONS
 from mambo_nmpc.sil.firmware.doctor import command_version
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 
 _TEMPLATE: Final = "{file}\t{line}\t{id}\t{message}"
@@ -19,7 +19,7 @@ _SHOWN: Final = 5
 
 
 @dataclass(frozen=True)
-class Finding:
+class RuleViolation:
     """One line that breaks a rule: MISRA's by number, cppcheck's own by name."""
 
     file: str
@@ -38,17 +38,17 @@ def check(subject: Subject) -> Result:
     """Hold the C against MISRA C:2012; a finding that is no listed deviation is a failure."""
     gap = missing("cppcheck", "cppcheck")
     if gap:
-        return Result(Outcome.INCOMPLETE, gap)
+        return Result(CheckOutcome.INCOMPLETE, gap)
     tools = {"cppcheck": command_version("cppcheck") or ""}
     try:
         done = run(["cppcheck", *RULE_FLAGS, f"--template={_TEMPLATE}", "-Iinclude", "src"], subject.bundle)
     except subprocess.TimeoutExpired:
-        return Result(Outcome.INCOMPLETE, f"cppcheck did not end within {PATIENCE_S:g} s", tools=tools)
+        return Result(CheckOutcome.INCOMPLETE, f"cppcheck did not end within {PATIENCE_S:g} s", tools=tools)
     (subject.folder / "cppcheck.txt").write_text(done.stdout + done.stderr, "utf-8")
     found = findings(done.stderr)
     if done.returncode != 0 or not any(one.rule.startswith(_MISRA) for one in found):
         return Result(
-            Outcome.INCOMPLETE,
+            CheckOutcome.INCOMPLETE,
             "cppcheck ran without its addon misra.py; Debian's package cppcheck brings it",
             tools=tools,
         )
@@ -60,21 +60,24 @@ def check(subject: Subject) -> Result:
     if unlisted:
         rest = [f"{len(unlisted) - _SHOWN} more in cppcheck.txt"] if len(unlisted) > _SHOWN else []
         return Result(
-            Outcome.FAILED, "; ".join([*map(str, unlisted[:_SHOWN]), *rest]), figures=figures, tools=tools
+            CheckOutcome.FAILED,
+            "; ".join([*map(str, unlisted[:_SHOWN]), *rest]),
+            figures=figures,
+            tools=tools,
         )
     spelled = ", ".join(f"{rule} ({count})" for rule, count in departed.items())
     return Result(
-        Outcome.PASSED,
+        CheckOutcome.PASSED,
         f"nothing but the deviations listed in {DEVIATIONS}: {spelled}",
         figures=figures,
         tools=tools,
     )
 
 
-def findings(said: str) -> list[Finding]:
+def findings(said: str) -> list[RuleViolation]:
     """Read what cppcheck said, a finding a line."""
     lines = (line.split("\t", 3) for line in said.splitlines())
-    return [Finding(words[0], int(words[1]), words[2], words[3]) for words in lines if len(words) == 4]
+    return [RuleViolation(words[0], int(words[1]), words[2], words[3]) for words in lines if len(words) == 4]
 
 
 def deviations(file: Path) -> set[tuple[str, str]]:

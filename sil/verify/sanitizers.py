@@ -6,7 +6,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.cases import cases
-from mambo_nmpc.sil.verify.check import Outcome, Result, Subject
+from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 
 
 class Watch(NamedTuple):
@@ -62,7 +62,7 @@ def check(subject: Subject) -> Result:
             faults.append(f"{watch.name}: {fault}; {folder / 'report.txt'}")
         else:
             passed.append(watch.name)
-    outcome = Outcome.FAILED if faults else Outcome.INCOMPLETE if gaps else Outcome.PASSED
+    outcome = CheckOutcome.FAILED if faults else CheckOutcome.INCOMPLETE if gaps else CheckOutcome.PASSED
     counted = (
         f"{calls} calls of {len(tapes)} tapes under {len(passed)} of {len(WATCHES)} builds, nothing reported"
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.checks import CHECKS
 from mambo_nmpc.sil.verify.report import Verified, closing, verdict
 from tests.support.command import run
@@ -26,7 +26,7 @@ def _no_tool(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monke
     monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("bin")))
 
 
-def ended(*outcomes: Outcome) -> list[Verified]:
+def ended(*outcomes: CheckOutcome) -> list[Verified]:
     """Return checks that ended so."""
     return [
         Verified(entry.name, entry.about, one, "", {}, {})
@@ -112,12 +112,12 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
 @pytest.mark.parametrize(
     ("outcomes", "whole"),
     [
-        ((Outcome.PASSED, Outcome.PASSED), Outcome.PASSED),
-        ((Outcome.PASSED, Outcome.INCOMPLETE), Outcome.INCOMPLETE),
-        ((Outcome.INCOMPLETE, Outcome.FAILED), Outcome.FAILED),
+        ((CheckOutcome.PASSED, CheckOutcome.PASSED), CheckOutcome.PASSED),
+        ((CheckOutcome.PASSED, CheckOutcome.INCOMPLETE), CheckOutcome.INCOMPLETE),
+        ((CheckOutcome.INCOMPLETE, CheckOutcome.FAILED), CheckOutcome.FAILED),
     ],
 )
-def test_the_verdict_is_the_worst_outcome(outcomes: tuple[Outcome, ...], whole: Outcome) -> None:
+def test_the_verdict_is_the_worst_outcome(outcomes: tuple[CheckOutcome, ...], whole: CheckOutcome) -> None:
     """A failure outweighs a gap, and a gap everything that passed."""
     assert verdict(ended(*outcomes)) is whole
     assert f"verdict: {whole} (" in closing(ended(*outcomes))

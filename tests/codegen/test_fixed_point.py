@@ -21,7 +21,7 @@ from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.verify import replay
-from mambo_nmpc.sil.verify.calls import Function, Tape, answers, calls
+from mambo_nmpc.sil.verify.calls import ApiFunction, Tape, answers, calls
 from tests.support.cases import settings_case
 from tests.support.strategies import Values, toml, valid_values
 from tests.support.subjects import subject
@@ -54,8 +54,8 @@ def extremes(settings: Settings, n: int) -> list[Tape]:
     for step in range(8):
         if step % 3 == 0:
             weights = rng.choice([0.0, 1.0], (n, 2)) * [numbers.tracking_limit, numbers.effort_limit]
-            columns.append(calls(settings, Function.RESET, ends(2) * settings.limits.tilt_rad))
-            columns.append(calls(settings, Function.SET_WEIGHTS, weights))
+            columns.append(calls(settings, ApiFunction.RESET, ends(2) * settings.limits.tilt_rad))
+            columns.append(calls(settings, ApiFunction.SET_WEIGHTS, weights))
         state = ends(6) * bounds
         target = -state[:, :4]
         near = rng.random((n, 1)) < 0.5  # so near that errors change their sign on the way
@@ -63,7 +63,9 @@ def extremes(settings: Settings, n: int) -> list[Tape]:
         target = np.clip(target, -bounds[:4], bounds[:4])
         yaw = rng.uniform(-1, 1, (n, 1)) * rng.choice([1024.0, np.pi], (n, 1))
         thrust = np.full((n, 1), ranges.thrust_acceleration_max_m_s2)
-        columns.append(calls(settings, Function.STEP, np.concatenate([state, yaw, target, thrust], axis=1)))
+        columns.append(
+            calls(settings, ApiFunction.STEP, np.concatenate([state, yaw, target, thrust], axis=1))
+        )
     return list(np.stack(columns, axis=1))
 
 

@@ -44,7 +44,7 @@ from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
 from mambo_nmpc.sil.paper.table2 import CASES
 from mambo_nmpc.sil.plant.link import NOT_CALLED
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.faults import check, judge
 from tests.support.subjects import subject
 from tests.support.tools import require
@@ -259,17 +259,19 @@ VERDICT = Verdict(
 @pytest.mark.parametrize(
     ("change", "outcome", "word"),
     [
-        ({}, Outcome.PASSED, "no crash"),
-        ({"largest_command_rad": 0.3501}, Outcome.FAILED, "a command of 0.3501 rad"),
-        ({"largest_command_rad": math.nan}, Outcome.FAILED, "a command of nan rad"),
-        ({"expected": False}, Outcome.FAILED, "statuses"),
-        ({"end": End.CRASHED}, Outcome.FAILED, "crashed"),
-        ({"end": End.AWAY, "recovery_s": math.nan}, Outcome.FAILED, "never came back"),
-        ({"band_m": 17.0, "end": End.AWAY}, Outcome.INCOMPLETE, "without a fault"),
-        ({"band_m": math.nan, "end": End.CRASHED}, Outcome.INCOMPLETE, "without a fault"),
+        ({}, CheckOutcome.PASSED, "no crash"),
+        ({"largest_command_rad": 0.3501}, CheckOutcome.FAILED, "a command of 0.3501 rad"),
+        ({"largest_command_rad": math.nan}, CheckOutcome.FAILED, "a command of nan rad"),
+        ({"expected": False}, CheckOutcome.FAILED, "statuses"),
+        ({"end": End.CRASHED}, CheckOutcome.FAILED, "crashed"),
+        ({"end": End.AWAY, "recovery_s": math.nan}, CheckOutcome.FAILED, "never came back"),
+        ({"band_m": 17.0, "end": End.AWAY}, CheckOutcome.INCOMPLETE, "without a fault"),
+        ({"band_m": math.nan, "end": End.CRASHED}, CheckOutcome.INCOMPLETE, "without a fault"),
     ],
 )
-def test_a_check_fails_on_what_must_not_happen(change: dict[str, Any], outcome: Outcome, word: str) -> None:
+def test_a_check_fails_on_what_must_not_happen(
+    change: dict[str, Any], outcome: CheckOutcome, word: str
+) -> None:
     """Each rule alone, beside a flight that went well; the figures are JSON."""
     found = judge([VERDICT, replace(VERDICT, **change)], MAMBO)
     assert found.outcome is outcome
@@ -280,7 +282,7 @@ def test_a_check_fails_on_what_must_not_happen(change: dict[str, Any], outcome: 
 def test_a_fault_without_an_end_may_lead_away() -> None:
     """Nobody comes back without a state."""
     gone = replace(VERDICT, fault="state NaN to the end", end=End.AWAY, recovery_s=math.nan)
-    assert judge([VERDICT, gone], MAMBO).outcome is Outcome.PASSED
+    assert judge([VERDICT, gone], MAMBO).outcome is CheckOutcome.PASSED
 
 
 @pytest.mark.long
@@ -288,7 +290,7 @@ def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> Non
     """Faults, statuses and ends are those of the documentation."""
     chosen = subject(MAMBO, tmp_path)
     found = check(chosen)
-    assert found.outcome is Outcome.PASSED, found.evidence
+    assert found.outcome is CheckOutcome.PASSED, found.evidence
     assert words((chosen.folder / "faults.md").read_text("utf-8")) == words(DOCS.read_text("utf-8"))
 
 
@@ -306,7 +308,7 @@ def test_the_check_fails_a_controller_that_does_not_refuse(tmp_path: Path) -> No
     """Without the test of the attitude's range a NaN reaches the plan."""
     right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
     chosen = subject(MAMBO, tmp_path, ("src/nmpc.c", right, "if (!((state != 0)"))
-    assert check(chosen).outcome is Outcome.FAILED
+    assert check(chosen).outcome is CheckOutcome.FAILED
 
 
 def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:

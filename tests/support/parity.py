@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.inputs import Inputs, random_inputs
+from mambo_nmpc.sil.verify.inputs import StepInputs, random_inputs
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
 
@@ -25,7 +25,7 @@ class Controller(Protocol):
         """Compute the next commands."""
 
 
-def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[Inputs]:
+def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[StepInputs]:
     """Draw the inputs of consecutive steps of n controllers."""
     rng = np.random.default_rng(seed)
     return [random_inputs(settings, n, rng) for _ in range(steps)]
@@ -38,7 +38,7 @@ class Run(NamedTuple):
     steps: list[Step]
 
 
-def run(controller: Controller, inputs: list[Inputs], seed: int) -> Run:
+def run(controller: Controller, inputs: list[StepInputs], seed: int) -> Run:
     """Step a fresh controller through `inputs`, reset and reweighted halfway, bad values among the good."""
     rng = np.random.default_rng(seed)
     setters: list[NDArray[np.int64]] = []

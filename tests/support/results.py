@@ -28,7 +28,7 @@ from mambo_nmpc.sil.footprint.sweep import Point, SweepSummary, budgets
 from mambo_nmpc.sil.paper.sensed import SensedRow, SensedSummary
 from mambo_nmpc.sil.paper.table2 import CASES, Claim, Table2Row, Table2Summary
 from mambo_nmpc.sil.verify import report as verify_report
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.checks import CHECKS
 
 HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
@@ -171,7 +171,10 @@ def faults_folder(folder: Path) -> None:
 
 def verify_folder(folder: Path) -> None:
     """Write a verification of which one check passed and one could not run."""
-    ended = ((Outcome.PASSED, f"nothing but {HOSTILE}"), (Outcome.INCOMPLETE, "cppcheck is missing"))
+    ended = (
+        (CheckOutcome.PASSED, f"nothing but {HOSTILE}"),
+        (CheckOutcome.INCOMPLETE, "cppcheck is missing"),
+    )
     found = [
         verify_report.Verified(entry.name, entry.about, outcome, evidence, {}, {})
         for entry, (outcome, evidence) in zip(CHECKS, ended, strict=False)

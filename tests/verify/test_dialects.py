@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.dialects import DIALECTS, check
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
@@ -29,7 +29,7 @@ def test_silent_c_passes(tmp_path: Path) -> None:
     """Every dialect is counted, and what each compiler said is kept."""
     its = subject(presets.load("mambo"), tmp_path)
     result = check(its)
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["silent"] == list(DIALECTS)
     log = (its.folder / "compilers.txt").read_text("utf-8")
     assert log.count("exit code 0") == len(DIALECTS)
@@ -40,5 +40,5 @@ def test_silent_c_passes(tmp_path: Path) -> None:
 def test_a_warning_fails(harm: str, tmp_path: Path) -> None:
     """It is named by dialect, file and line."""
     result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert f"{HARMS[harm].path}:" in result.evidence

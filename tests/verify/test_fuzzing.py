@@ -11,7 +11,7 @@ from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify import fuzzing, replay
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require
@@ -53,7 +53,7 @@ def _compilers() -> None:
 def test_no_call_breaks_a_promise(name: str, tmp_path: Path) -> None:
     """All runs, and every tape kept has the bits of the reference."""
     result = fuzzing.check(subject(presets.load(name), tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["runs"] >= fuzzing.RUNS
 
 
@@ -62,7 +62,7 @@ def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
     """Format and names of the harness follow the settings."""
     settings = with_option(settings_case(1, "float64"), "code.prefix", "left_wing")
     result = fuzzing.check(subject(settings, tmp_path), runs=FEW_RUNS)
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["corpus"] > 50
     assert json.loads(json.dumps(result.figures)) == result.figures
 
@@ -73,7 +73,7 @@ def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
 def test_a_broken_promise_is_found_and_can_be_repeated(fault: str, tmp_path: Path) -> None:
     """The evidence says which promise, its command repeats the finding, and no seed was needed for it."""
     result = fuzzing.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]), runs=FEW_RUNS)
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert "broken promise" in result.evidence or "runtime error" in result.evidence
     command = re.search(r"repeat it with (\S+) (\S+);", result.evidence)
     assert command, result.evidence
@@ -93,7 +93,7 @@ def test_what_the_harness_cannot_know_is_found_by_the_reference(tmp_path: Path) 
         "    self->weights.tracking = NMPC_TRACKING_WEIGHT + (nmpc_real_t)1;",
     )
     result = fuzzing.check(subject(presets.load("mambo"), tmp_path, fault), runs=1000)
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert "reference" in result.evidence
 
 
@@ -104,7 +104,7 @@ def test_the_same_runs_keep_the_same_corpus(tmp_path: Path) -> None:
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
         made = subject(presets.load("mambo"), tmp_path / name)
-        assert fuzzing.check(made, runs=5000).outcome is Outcome.PASSED
+        assert fuzzing.check(made, runs=5000).outcome is CheckOutcome.PASSED
         kept.append(sorted(path.name for path in (made.folder / "corpus").iterdir()))
     assert kept[0] == kept[1]
 
@@ -130,5 +130,5 @@ def test_without_clang_the_check_is_incomplete(tmp_path: Path, monkeypatch: pyte
     made = subject(presets.load("mambo"), tmp_path)
     monkeypatch.setenv("PATH", str(tmp_path))
     result = fuzzing.check(made)
-    assert result.outcome is Outcome.INCOMPLETE
+    assert result.outcome is CheckOutcome.INCOMPLETE
     assert "Debian's package clang" in result.evidence

@@ -8,7 +8,7 @@ import pytest
 from mambo_nmpc.codegen.flags import proofs
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.proof import check, read_properties
 from tests.support.cases import settings_case
 from tests.support.subjects import Harm, subject
@@ -60,7 +60,7 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     """Every promise of the driver holds, and what Frama-C said stays as evidence."""
     its = subject(of_scalar(name, scalar), tmp_path)
     result = check(its)
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["promises"] == result.figures["promises_proven"] == (4 if scalar == "fixed" else 6)
     for proof in proofs(scalar):
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
@@ -85,7 +85,7 @@ FIXED_HARMS = {
 def test_a_fault_of_fixed_point_raises_an_alarm(harm: str, tmp_path: Path) -> None:
     """What overflows in the middle of a step is found as what a caller hands in."""
     result = check(subject(of_scalar("mambo", "fixed"), tmp_path, FIXED_HARMS[harm]))
-    assert result.outcome is Outcome.FAILED, result.evidence
+    assert result.outcome is CheckOutcome.FAILED, result.evidence
 
 
 @pytest.mark.long
@@ -94,7 +94,7 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
     """Horizons, variants, warm starts and limits change; the options of the proof do not."""
     scalar = ("float32", "float64", "fixed")[index % 3]
     result = check(subject(settings_case(index, scalar), tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
 def test_a_fault_raises_an_alarm(harm: str, tmp_path: Path) -> None:
     """Each is what a slip of the hand would make, and none goes through."""
     result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     (alarm, *_) = result.figures["alarms"]
     assert alarm["place"] in result.evidence
     assert ".c:" in alarm["place"] or ".h:" in alarm["place"]
@@ -113,7 +113,7 @@ def test_a_fault_raises_an_alarm(harm: str, tmp_path: Path) -> None:
 def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
     """No report is no proof."""
     result = check(subject(presets.load("mambo"), tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert "frama-c refused the code" in result.evidence
 
 
@@ -123,7 +123,7 @@ def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
 def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: Path) -> None:
     """A driver that ends before its promises, or leaves one out, proves nothing."""
     result = check(subject(presets.load("mambo"), tmp_path, Harm("proof/nmpc_proof.c", right, wrong)))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert "Dead" in result.evidence or "never reached" in result.evidence
 
 

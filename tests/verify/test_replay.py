@@ -15,7 +15,7 @@ from mambo_nmpc.sil.verify.calls import (
     NULL_COMMAND,
     NULL_SELF,
     UNWRITTEN_RAD,
-    Function,
+    ApiFunction,
     answers,
     calls,
     tape_from,
@@ -81,13 +81,13 @@ def test_the_reference_answers_as_the_interface_promises() -> None:
     """Null pointers, refused steps and another initialisation, each call answered in its turn."""
     tape = np.concatenate(
         [
-            calls(MAMBO, Function.STEP, GOOD),
-            calls(MAMBO, Function.STEP, REFUSED),
-            calls(MAMBO, Function.STEP, GOOD, NULL_SELF),
-            calls(MAMBO, Function.STEP, GOOD, NULL_COMMAND),
-            calls(MAMBO, Function.INIT, GOOD),
-            calls(MAMBO, Function.STEP, REFUSED),
-            calls(MAMBO, Function.STEP, GOOD),
+            calls(MAMBO, ApiFunction.STEP, GOOD),
+            calls(MAMBO, ApiFunction.STEP, REFUSED),
+            calls(MAMBO, ApiFunction.STEP, GOOD, NULL_SELF),
+            calls(MAMBO, ApiFunction.STEP, GOOD, NULL_COMMAND),
+            calls(MAMBO, ApiFunction.INIT, GOOD),
+            calls(MAMBO, ApiFunction.STEP, REFUSED),
+            calls(MAMBO, ApiFunction.STEP, GOOD),
         ]
     )
     (made,) = answers(MAMBO, [tape])

@@ -9,7 +9,7 @@ import pytest
 from mambo_nmpc.codegen.render import DEVIATIONS, render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
 from tests.support.subjects import Harm, subject
@@ -50,7 +50,7 @@ def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> No
     """MISRA C:2012 and cppcheck's own findings, whatever the settings."""
     its = subject(SETTINGS[name], tmp_path)
     result = check(its)
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
     rules = {rule.removeprefix("misra-c2012-") for rule, _ in deviations(its.bundle / DEVIATIONS)}
     assert result.figures["deviations"].keys() == rules, "a deviation that never occurs is not listed"
 
@@ -62,7 +62,7 @@ def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> No
 def test_an_unlisted_finding_fails(harm: str, tmp_path: Path) -> None:
     """It is named by rule, file and line."""
     result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert f"rule {harm.split(maxsplit=1)[0]}" in result.evidence
     assert HARMS[harm].path in result.evidence
 
@@ -102,5 +102,5 @@ def test_cppcheck_without_its_addon_is_no_pass(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "cppcheck").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     result = check(subject(presets.load("mambo"), tmp_path))
-    assert result.outcome is Outcome.INCOMPLETE
+    assert result.outcome is CheckOutcome.INCOMPLETE
     assert "addon" in result.evidence

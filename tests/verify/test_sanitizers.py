@@ -7,7 +7,7 @@ import pytest
 
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.verify import sanitizers
-from mambo_nmpc.sil.verify.check import Outcome
+from mambo_nmpc.sil.verify.check import CheckOutcome
 from tests.support.cases import CORNER_HORIZONS, settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require
@@ -36,7 +36,7 @@ def _compilers() -> None:
 def test_nothing_undefined_happens(tmp_path: Path) -> None:
     """All cases under three watching builds: no report, and the bits of the reference."""
     result = sanitizers.check(subject(presets.load("mambo"), tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["calls"] > 15_000
     assert json.loads(json.dumps(result.figures)) == result.figures
     assert len(result.figures["builds"]) == len(sanitizers.WATCHES)
@@ -47,7 +47,7 @@ def test_nothing_undefined_happens(tmp_path: Path) -> None:
 def test_nothing_undefined_happens_whatever_the_settings(name: str, tmp_path: Path) -> None:
     """Every preset, and the corners of the horizon in both scalar types."""
     result = sanitizers.check(subject(SETTINGS[name], tmp_path))
-    assert result.outcome is Outcome.PASSED, result.evidence
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
 @pytest.mark.long
@@ -55,7 +55,7 @@ def test_nothing_undefined_happens_whatever_the_settings(name: str, tmp_path: Pa
 def test_what_is_undefined_is_reported(fault: str, tmp_path: Path) -> None:
     """Faults that parity may not see, for the memory beyond happens to be harmless."""
     result = sanitizers.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert "runtime error" in result.evidence or "AddressSanitizer" in result.evidence
 
 
@@ -64,7 +64,7 @@ def test_memory_that_is_read_before_it_is_written_is_reported(tmp_path: Path) ->
     """A weight that nmpc_init leaves out."""
     fault = ("src/nmpc.c", "    self->weights.effort = NMPC_EFFORT_WEIGHT;\n", "")
     result = sanitizers.check(subject(presets.load("mambo"), tmp_path, fault))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert any("MemorySanitizer" in found for found in result.figures["faults"]), result.evidence
 
 
@@ -77,7 +77,7 @@ def test_other_bits_under_a_sanitizer_are_reported(tmp_path: Path) -> None:
         "self->command_rad[1] = self->plan_rad[0];",
     )
     result = sanitizers.check(subject(presets.load("mambo"), tmp_path, fault))
-    assert result.outcome is Outcome.FAILED
+    assert result.outcome is CheckOutcome.FAILED
     assert "command_rad" in result.evidence
 
 
@@ -86,5 +86,5 @@ def test_without_compilers_the_check_is_incomplete(tmp_path: Path, monkeypatch: 
     made = subject(presets.load("mambo"), tmp_path)
     monkeypatch.setenv("PATH", str(tmp_path))
     result = sanitizers.check(made)
-    assert result.outcome is Outcome.INCOMPLETE
+    assert result.outcome is CheckOutcome.INCOMPLETE
     assert "Debian's package clang" in result.evidence
