@@ -71,6 +71,7 @@ def _run(chosen: "Sequence[Entry]", settings: "Settings", folder: Path, *, aloud
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.verify.check import Subject
     from mambo_nmpc.sil.verify.report import Verified, line
+    from mambo_nmpc.sil.verify.tools import versions
 
     found: list[Verified] = []
     with progress_bar("verifying") as progress:
@@ -79,9 +80,8 @@ def _run(chosen: "Sequence[Entry]", settings: "Settings", folder: Path, *, aloud
             own.mkdir(parents=True)
             result = entry.check(Subject(settings, folder / CONTROLLER, own))
             evidence = result.evidence.replace(f"{folder}/", "")
-            found.append(
-                Verified(entry.name, entry.about, result.outcome, evidence, result.figures, result.tools)
-            )
+            tools = versions(entry.tools) | dict(result.tools)
+            found.append(Verified(entry.name, entry.about, result.outcome, evidence, result.figures, tools))
             progress(len(found) / len(chosen))
             if aloud:
                 typer.echo(line(found[-1]))

@@ -118,7 +118,7 @@ def _needs() -> tuple[_Need, ...]:
         _Need("analyser", ("cppcheck",), "verify: MISRA C:2012", "Debian", ("cppcheck",)),
         _Need("analyser", ("g++",), "verify: warnings as C++", "Debian", ("g++",)),
         _Need("analyser", (LIBFUZZER,), "verify: fuzzing", "Debian", ("clang", "libclang-rt-14-dev")),
-        _Need("analyser", ("gcov",), "verify: test coverage", "Debian", ("gcc",)),
+        _Need("analyser", ("gcov",), "make test: which lines of the C run", "Debian", ("gcc",)),
         _Need("builder", ("cmake",), "make test: build of a bundle with CMake", "Debian", ("cmake",)),
     )
 

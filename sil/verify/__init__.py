@@ -1,1 +1,1 @@
-"""Evidence about the C of one set of settings: proof, rules, run-time checks, coverage, faults."""
+"""Evidence about the C of one controller: warnings, rules, proof, sanitizers, fuzzing, bits, faults."""

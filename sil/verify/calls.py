@@ -1,4 +1,4 @@
-"""Calls of the C interface as bytes: what a fuzzer mutates, what is replayed, and what the reference answers.
+"""Calls of the C interface as bytes, and the outcomes of the reference.
 
 A call is one byte and twelve numbers of the controller's scalar type, as `fuzz/nmpc_fuzz.c` of a bundle
 decodes them. A tape is a sequence of calls of one controller, which is initialised before the first.
@@ -18,13 +18,13 @@ from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WE
 from mambo_nmpc.codegen.settings.model import Settings
 
 Tape = NDArray[Any]
-"""Calls one after the other, an array of `call_type`."""
+"""A sequence of calls, an array of `call_type`."""
 
 Outcomes = NDArray[Any]
-"""What came of every call of a tape, an array of `outcome_type`."""
+"""The outcome of every call of a tape, an array of `outcome_type`."""
 
 UNWRITTEN_RAD: Final = 9.0
-"""What `replay.c` puts into a command before a call."""
+"""The value of a command that no call has written."""
 
 NULL_SELF: Final = 1
 NULL_FIRST: Final = 2
@@ -88,13 +88,13 @@ def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls
 
 
 def tape_from(settings: Settings, content: bytes) -> Tape:
-    """Return the whole calls in `content`; a rest is dropped, as the harness drops it."""
+    """Return the complete calls in `content`; the harness too ignores the bytes after them."""
     layout = call_type(settings)
     return np.frombuffer(content, layout, len(content) // layout.itemsize)
 
 
 def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
-    """Run the reference controller through all `tapes` side by side, and return what came of every call."""
+    """Play all `tapes` on reference controllers side by side, and return the outcomes."""
     longest = max((len(tape) for tape in tapes), default=0)
     padded = np.zeros((len(tapes), longest), call_type(settings))
     padded["call"] = ApiFunction.RESET | (NULL_SELF << 2)
@@ -106,9 +106,9 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
 
 
 class _Runs:
-    """n reference controllers, each of which may be called by another function at a time.
+    """n reference controllers, of which each call may go to another function.
 
-    A controller that is not called is given NaN, which changes nothing.
+    A controller that is not called by a function gets NaN as its input, which changes nothing.
     """
 
     def __init__(self, settings: Settings, n: int) -> None:

@@ -1,4 +1,4 @@
-"""The project's cases: tapes that every run-time check plays, random ones and one for every edge by name."""
+"""The cases that the run-time checks play: random tapes, and tapes for every edge."""
 
 import itertools
 import math
@@ -36,7 +36,7 @@ RANDOM_TAPES: Final = 1000
 
 @lru_cache(maxsize=2)
 def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
-    """Return the tapes of all cases, and what the reference answers to them."""
+    """Return the tapes of all cases, and the outcomes of the reference."""
     rng = np.random.default_rng(0)
     tapes = (
         *random_tapes(settings, RANDOM_TAPES),
@@ -51,9 +51,10 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
 
 
 def random_tapes(settings: Settings, n: int) -> list[Tape]:
-    """Step through random inputs, reset and reweighted on the way; every fourth tape keeps its input.
+    """Step through random inputs, with a reset and new weights on the way.
 
-    Every fifth comes so close that the last bits of the prediction tables count.
+    Every fourth tape keeps its input for two steps. Every fifth is so close to the target that the last
+    bits of the prediction tables matter.
     """
     rng = np.random.default_rng(0)
     draws = [_rows(random_inputs(settings, n, rng)) for _ in range(8)]
@@ -81,9 +82,9 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
 
 
 def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Put one input at the end of its range, a number further in, one further out, or to no number at all.
+    """Set one input to an end of its range, the next number inside or outside, or a special value.
 
-    A good step stands before it, and two after it.
+    A good step precedes it, and two follow.
     """
     ranges, tilt = settings.ranges, settings.limits.tilt_rad
     symmetric = [
@@ -115,7 +116,7 @@ def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
 
 def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Leave out every set of pointers, in every function, and initialise again."""
+    """Pass every combination of null pointers to every function, and initialise again."""
     every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
     for function, pointers in (
         (ApiFunction.STEP, every),
@@ -129,7 +130,7 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
 
 def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
-    """Head for eighths of a turn, near and far, and their neighbours: there sine and cosine change hands."""
+    """Yaw by eighths of a turn and their neighbours: there the quadrant of sine and cosine changes."""
     scalar = _floating(settings)
     eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 4)])
     yaws = [(eighths * (np.pi / 4)).astype(scalar)]
@@ -148,12 +149,12 @@ def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
 
 
 def _at_rest(settings: Settings) -> list[Tape]:
-    """Let the cost change by the tolerance exactly, as near as the numbers come to it.
+    """Let the cost change by exactly the tolerance, as nearly as the numbers allow.
 
     Next to the target the first move overshoots, and the cost changes by about the tracking weight times a
-    constant. The largest weight with which that counts as rest is found by bisection; it and its neighbours
-    are the cases. In fixed point a number of that weight is many of the cost: there the effort weight, whose
-    numbers are finer than those of the cost, is found by bisection as well.
+    constant. Bisection finds the largest weight with which that counts as converged; it and its neighbours
+    are the cases. In fixed point one unit of that weight is many units of the cost, so bisection finds the
+    effort weight too, whose unit is finer than that of the cost.
     """
     n, scalar, numbers = 16, _floating(settings), Design(settings).numbers
     near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
@@ -188,7 +189,7 @@ def _at_rest(settings: Settings) -> list[Tape]:
 
 
 def _meeting(settings: Settings) -> Iterator[Tape]:
-    """Meet the target exactly at the first predicted step, from either side of either axis."""
+    """Meet the target exactly at the first predicted step, from both sides along both axes."""
     scalar = _floating(settings)
     advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
     for axis in range(2):
@@ -200,9 +201,9 @@ def _meeting(settings: Settings) -> Iterator[Tape]:
 
 
 def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Put every input to an end of its range, where numbers of fixed point are as large as they ever get.
+    """Set every input to an end of its range, where numbers of fixed point are largest.
 
-    And start a number from the tilt limit, pulled there: a turn as small as they ever get.
+    Then start one unit from the tilt limit and be pulled towards it: the smallest change of tilt.
     """
     numbers = Design(settings).numbers
     if numbers.bits is None:
@@ -237,7 +238,7 @@ def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
 
 
 def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
-    """Put a call between good steps, and have it followed by a step that repeats the last command."""
+    """Put a call between good steps; a refused step after it repeats the last command."""
     steps = calls(settings, ApiFunction.STEP, _good(settings, rng, 4))
     refused = calls(settings, ApiFunction.STEP, np.full((1, 12), np.nan))
     return np.concatenate([steps[:2], made, refused, steps[2:]])
@@ -255,7 +256,7 @@ def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
 
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
-    """Return both ends of a range, their neighbours among the numbers, and what is no number or no size."""
+    """Return both ends of a range and their neighbours, NaN, infinities, zeros and the smallest numbers."""
     scalar, numbers = _floating(settings), Design(settings).numbers
     ends = np.array([low, high], scalar)
     beyond = np.array([-np.inf, np.inf], scalar)
@@ -270,7 +271,7 @@ def _around(settings: Settings, quantity: str, low: float, high: float) -> Array
 
 
 def _floating(settings: Settings) -> Scalar:
-    """Return the type to look for neighbours in: with fixed point that of the world outside."""
+    """Return the type in which neighbours are found: float64 for fixed point."""
     return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]
 
 

@@ -1,10 +1,10 @@
-"""What a check of the generated C is: a subject in, one result with its evidence out."""
+"""What a check of the generated C is: a function from a subject to a result."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from mambo_nmpc.codegen.settings.model import Settings
 
@@ -22,7 +22,7 @@ class Subject:
     """What is checked.
 
     settings: of the controller.
-    bundle:   folder that holds its generated C, read only.
+    bundle:   folder of its generated C, read only.
     folder:   of this check, empty and writable: reports and logs stay there as evidence.
     """
 
@@ -33,9 +33,9 @@ class Subject:
 
 @dataclass(frozen=True)
 class Result:
-    """The outcome of one check.
+    """How a check ended.
 
-    evidence: a line for people: what was counted, what is wrong, or which package brings what is missing.
+    evidence: a line for people: what was counted, what is wrong, or which package brings a missing tool.
     figures:  the same for programs; JSON types only.
     tools:    name and version of every tool that took part.
     """
@@ -46,9 +46,26 @@ class Result:
     tools: Mapping[str, str] = field(default_factory=dict)
 
 
-class Check(Protocol):
-    """A check: never raises for what it finds, only for what the user must put right before it can start."""
+Check = Callable[[Subject], Result]
+"""A check raises only for what the user must correct before it can start, never for what it finds."""
 
-    def __call__(self, subject: Subject) -> Result:
-        """Run the check on `subject`."""
-        ...
+
+def passed(evidence: str, figures: Mapping[str, Any]) -> Result:
+    """Return the result of a check that found nothing."""
+    return Result(CheckOutcome.PASSED, evidence, figures)
+
+
+def failed(evidence: str, figures: Mapping[str, Any] | None = None) -> Result:
+    """Return the result of a check that found a fault."""
+    return Result(CheckOutcome.FAILED, evidence, figures or {})
+
+
+def incomplete(evidence: str, figures: Mapping[str, Any] | None = None) -> Result:
+    """Return the result of a check that could not run."""
+    return Result(CheckOutcome.INCOMPLETE, evidence, figures or {})
+
+
+def joined(faults: Sequence[str], gaps: Sequence[str], counted: str, figures: Mapping[str, Any]) -> Result:
+    """Return the result of several builds: what is wrong, what is missing, and what was counted."""
+    outcome = CheckOutcome.FAILED if faults else CheckOutcome.INCOMPLETE if gaps else CheckOutcome.PASSED
+    return Result(outcome, "; ".join([*faults, *dict.fromkeys(gaps), counted]), figures)

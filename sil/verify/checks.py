@@ -8,11 +8,13 @@ if TYPE_CHECKING:
 
 
 class Entry(NamedTuple):
-    """A check by name, what it is about in one line, and its module, which is imported when it runs."""
+    """A check by name, what it is about in one line, and the tools whose versions are evidence."""
 
     name: str
     about: str
+    tools: tuple[str, ...]
     module: str
+    """Where the check is; imported when it runs."""
 
     @property
     def check(self) -> "Check":
@@ -21,11 +23,29 @@ class Entry(NamedTuple):
         return check
 
 
+_COMPILERS: Final = ("clang", "gcc")
+
 CHECKS: Final = (
-    Entry("warnings", "every compiler and dialect, all warnings on", "dialects"),
-    Entry("rules", "MISRA C:2012 by cppcheck, less the deviations listed", "rules"),
-    Entry("proof", "Frama-C: no run-time error, no NaN kept, no wild command, for every input", "proof"),
-    Entry("sanitizers", "nothing undefined in thousands of calls, same bits", "sanitizers"),
-    Entry("fuzzing", "half a million inputs that a fuzzer found worth trying, same bits", "fuzzing"),
-    Entry("faults", "bounded commands and a way back, whatever fails in flight", "faults"),
+    Entry("warnings", "no warning in any dialect of C or C++", (*_COMPILERS, "clang++", "g++"), "dialects"),
+    Entry("rules", "MISRA C:2012 by cppcheck, except for the listed deviations", ("cppcheck",), "rules"),
+    Entry(
+        "proof",
+        "Frama-C: no run-time error, no stored NaN, no command beyond the limit, for every input",
+        ("frama-c",),
+        "proof",
+    ),
+    Entry(
+        "sanitizers",
+        "no undefined behaviour in thousands of calls, bits of the reference",
+        _COMPILERS,
+        "sanitizers",
+    ),
+    Entry(
+        "fuzzing",
+        "half a million inputs chosen by a fuzzer: every promise kept, bits of the reference",
+        ("clang",),
+        "fuzzing",
+    ),
+    Entry("bits", "optimised builds have the bits of the reference", _COMPILERS, "bits"),
+    Entry("faults", "bounded commands and recovery from faults in flight", (), "faults"),
 )

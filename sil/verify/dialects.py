@@ -1,4 +1,4 @@
-"""Check: no compiler at hand has a word to say about the C, in any dialect that firmware is built in."""
+"""Check: no compiler warns about the C, in any dialect that firmware is built in."""
 
 import tempfile
 from dataclasses import dataclass
@@ -7,8 +7,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import WARNING_FLAGS
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.firmware.doctor import command_version
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
+from mambo_nmpc.sil.verify.check import Result, Subject, joined
 from mambo_nmpc.sil.verify.tools import missing, run
 
 _UNSUFFIXED: Final = "-Wunsuffixed-float-constants"
@@ -65,12 +64,5 @@ def check(subject: Subject) -> Result:
             first = next((line for line in said.splitlines() if "error" in line or "warning" in line), said)
             faults.append(f"{name}: {first or f'exit code {done.returncode}'}")
     (subject.folder / "compilers.txt").write_text("\n".join(log), "utf-8")
-    outcome = CheckOutcome.FAILED if faults else CheckOutcome.INCOMPLETE if gaps else CheckOutcome.PASSED
-    counted = f"{len(sources)} files, {len(silent)} of {len(DIALECTS)} dialects without a word"
-    compilers = sorted({dialect.compiler for dialect in DIALECTS.values()})
-    return Result(
-        outcome,
-        "; ".join([*faults, *dict.fromkeys(gaps), counted]),
-        figures={"files": len(sources), "silent": silent, "faults": faults},
-        tools={tool: version for tool in compilers if (version := command_version(tool)) is not None},
-    )
+    counted = f"{len(sources)} files, {len(silent)} of {len(DIALECTS)} dialects without a warning"
+    return joined(faults, gaps, counted, {"files": len(sources), "silent": silent, "faults": faults})

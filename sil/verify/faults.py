@@ -1,7 +1,7 @@
 """Check: whatever fails in flight, commands stay bounded, bad input is refused, and the drone comes back."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 
 import numpy as np
@@ -9,12 +9,13 @@ import numpy as np
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.extension import load_extension
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.report import table, write_csv
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, scenarios
 from mambo_nmpc.sil.files.folders import finite
-from mambo_nmpc.sil.verify.bundle import controller
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
+from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, passed
 
 
 def check(subject: Subject) -> Result:
@@ -23,7 +24,24 @@ def check(subject: Subject) -> Result:
     verdicts = fly_faults(settings, partial(controller, subject))
     (subject.folder / "faults.md").write_text(table(verdicts) + "\n", "utf-8")
     write_csv(verdicts, subject.folder / "faults.csv")
-    return judge(verdicts, settings)
+    return replace(judge(verdicts, settings), tools={"compiler": host_toolchain().identity().splitlines()[0]})
+
+
+def controller(subject: Subject, n: int) -> CompiledController:
+    """Return n controllers of the C in the subject's bundle; raises BuildError and CacheError.
+
+    The extension knows only the prefix nmpc: a bundle with another is generated again with that prefix.
+    """
+    settings = subject.settings
+    if settings.code.prefix != "nmpc":
+        return CompiledController(settings, n, compiled(settings, host_toolchain()))
+    files = {
+        path.relative_to(subject.bundle).as_posix(): path.read_text("utf-8")
+        for part in ("include", "src")
+        for path in sorted((subject.bundle / part).glob("*.[ch]"))
+    }
+    extension = load_extension(files, settings.code.scalar, host_toolchain())
+    return CompiledController(settings, n, extension)
 
 
 def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
@@ -46,19 +64,12 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
             wrong.append(f"{where}: crashed")
         if verdict.end is End.AWAY and not strays and verdict.fault in ending:
             wrong.append(f"{where}: never came back")
-    if wrong:
-        outcome, evidence = (
-            CheckOutcome.FAILED,
-            "; ".join(wrong[:3]) + (f"; {len(wrong)} in all" if wrong[3:] else ""),
-        )
-    elif strays:
-        outcome = CheckOutcome.INCOMPLETE
-        evidence = f"strays further than {STRAY_M:g} m without a fault, so coming back means nothing"
-    else:
-        outcome = CheckOutcome.PASSED
-        evidence = _evidence(verdicts, ending)
     figures = finite({"wrong": wrong, "flights": [asdict(verdict) for verdict in verdicts]})
-    return Result(outcome, evidence, figures, {"compiler": host_toolchain().identity().splitlines()[0]})
+    if wrong:
+        return failed("; ".join(wrong[:3]) + (f"; {len(wrong)} in all" if wrong[3:] else ""), figures)
+    if strays:
+        return incomplete(f"strays further than {STRAY_M:g} m without a fault: no recovery to judge", figures)
+    return passed(_evidence(verdicts, ending), figures)
 
 
 def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:

@@ -9,17 +9,17 @@ from typing import Final
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.firmware.doctor import command_version
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import Tape, answers, call_type, tape_from
 from mambo_nmpc.sil.verify.cases import random_tapes
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
+from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, passed
+from mambo_nmpc.sil.verify.tools import number
 
 RUNS: Final = 500_000
 SEED: Final = 1
 SEEDS: Final = 32
 LONGEST_TAPE: Final = 12
-"""Calls that the fuzzer strings together at most."""
+"""Most calls in a tape of the fuzzer."""
 
 FLAGS: Final = (
     "-g",
@@ -31,46 +31,41 @@ FLAGS: Final = (
 
 def check(subject: Subject, *, runs: int = RUNS) -> Result:
     """Fuzz the bundle's harness for a fixed number of runs, then replay all it kept against the reference."""
-    tools = {"clang": command_version("clang") or ""}
     gap = replay.missing("clang", FLAGS, subject.folder)
     if gap:
-        return Result(CheckOutcome.INCOMPLETE, gap, tools=tools)
+        return incomplete(gap)
     seeds, corpus = subject.folder / "seeds", subject.folder / "corpus"
     _write_seeds(subject.settings, seeds)
     corpus.mkdir()
     try:
         done = _fuzz(subject, runs)
     except BuildError as error:
-        return Result(CheckOutcome.FAILED, f"the harness does not build: {error}", tools=tools)
+        return failed(f"the harness does not build: {error}")
     log = done.stderr.decode(errors="replace")
     (subject.folder / "fuzzer.txt").write_text(log)
     files = sorted([*seeds.iterdir(), *corpus.iterdir()])
     tapes = [tape_from(subject.settings, file.read_bytes()) for file in files]
-    made = _statistic(log, "number_of_executed_units")
+    made = number(log, r"stat::number_of_executed_units:\s+(\d+)")
     figures = {
         "runs": made,
-        "runs_per_second": _statistic(log, "average_exec_per_sec"),
+        "runs_per_second": number(log, r"stat::average_exec_per_sec:\s+(\d+)"),
         "seed": SEED,
         "seeds": SEEDS,
         "corpus": len(files) - SEEDS,
         "replayed_calls": sum(len(tape) for tape in tapes),
     }
-    finding = _finding(subject.folder, done.returncode, log)
-    if finding is None:
-        finding = _beside_the_reference(subject, files, tapes)
-    if finding is not None:
-        return Result(CheckOutcome.FAILED, finding, figures=figures, tools=tools)
-    return Result(
-        CheckOutcome.PASSED,
+    fault = _broken_promise(subject.folder, done.returncode, log) or _other_bits(subject, files, tapes)
+    if fault is not None:
+        return failed(fault, figures)
+    return passed(
         f"{made} runs from seed {SEED} broke no promise; {figures['replayed_calls']} calls of the "
         f"{len(files)} tapes kept have the bits of the reference",
-        figures=figures,
-        tools=tools,
+        figures,
     )
 
 
 def _write_seeds(settings: Settings, folder: Path) -> None:
-    """Write tapes to start from: they depend on settings and scalar type, so they are made, not kept."""
+    """Write tapes to start from; they depend on the settings."""
     folder.mkdir()
     for index, tape in enumerate(random_tapes(settings, SEEDS)):
         (folder / f"seed-{index:02}").write_bytes(tape.tobytes())
@@ -93,7 +88,7 @@ def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
             f"-max_len={longest}",
             "-len_control=0",
             "-reload=0",
-            "-use_cmp=0",  # it remembers what was compared, addresses among it: another run, another corpus
+            "-use_cmp=0",  # its table of compared values holds addresses, so no two runs would be the same
             "-timeout=20",
             "-print_final_stats=1",
             "-artifact_prefix=./",
@@ -106,8 +101,8 @@ def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
     )
 
 
-def _finding(folder: Path, returncode: int, log: str) -> str | None:
-    """Say what the fuzzer found, and which file repeats it."""
+def _broken_promise(folder: Path, returncode: int, log: str) -> str | None:
+    """Return what the fuzzer found, and the command that repeats it."""
     if returncode == 0:
         return None
     words = re.search(r"broken promise.*|runtime error:.*|ERROR: .*", log)
@@ -117,8 +112,8 @@ def _finding(folder: Path, returncode: int, log: str) -> str | None:
     return f"{what}{where}; all it said: {folder / 'fuzzer.txt'}"
 
 
-def _beside_the_reference(subject: Subject, files: Sequence[Path], tapes: Sequence[Tape]) -> str | None:
-    """Replay tapes in C and in the reference; name the first difference and the file that has it."""
+def _other_bits(subject: Subject, files: Sequence[Path], tapes: Sequence[Tape]) -> str | None:
+    """Play tapes on the C; return the first difference from the reference and the file that has it."""
     program = replay.build(subject, "clang", ("-O2",), subject.folder)
     joined = subject.folder / "tapes.bin"
     replay.write_tapes(subject.settings, tapes, joined)
@@ -127,8 +122,3 @@ def _beside_the_reference(subject: Subject, files: Sequence[Path], tapes: Sequen
     fault = replay.fault(played, expected)
     found = replay.difference(expected, played.outcomes)
     return f"{files[found.tape]}: {found}" if found else fault
-
-
-def _statistic(log: str, name: str) -> int:
-    found = re.search(rf"stat::{name}:\s+(\d+)", log)
-    return int(found[1]) if found else 0

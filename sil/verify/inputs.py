@@ -1,4 +1,4 @@
-"""StepInputs for checks: seeded random values, and the corners that random values miss."""
+"""Inputs of steps: seeded random values, and the corners that random values miss."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
 
 @dataclass(frozen=True)
 class StepInputs:
-    """StepInputs of one step of n controllers: state (n, 7), target (n, 4), thrust (n,)."""
+    """Inputs of one step of n controllers: state (n, 7), target (n, 4), thrust (n,)."""
 
     state: Array
     target: Array
@@ -22,7 +22,7 @@ class StepInputs:
 
 
 def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepInputs:
-    """Draw inputs with errors from 0.1 mm to 10 m, a tenth of them with a corner in one place."""
+    """Draw inputs with errors from 0.1 mm to 10 m, a tenth of them with a corner."""
     ranges = settings.ranges
     scale = 10.0 ** rng.uniform(-4, 1, (n, 1))
     target = rng.normal(0, 1, (n, 4)) * [2, 2, 1, 1]
@@ -49,7 +49,7 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
 
 
 def _corner(settings: Settings, state: Array, target: Array, thrust: Array, rng: np.random.Generator) -> None:
-    """Put one corner into one case, in place."""
+    """Put a corner into one row, in place."""
     ranges = settings.ranges
     bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0])
     match rng.integers(10):

@@ -1,7 +1,6 @@
 """Check: Frama-C's plug-in Eva proves what `proof/nmpc_proof.c` of the bundle promises, for every input."""
 
 import csv
-import re
 import shlex
 import subprocess
 from collections.abc import Sequence
@@ -11,9 +10,8 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
 from mambo_nmpc.codegen.render import with_prefix
-from mambo_nmpc.sil.firmware.doctor import command_version
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
-from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
+from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, passed
+from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, number, run
 
 _SHOWN: Final = 5
 """Alarms that the evidence names; all are in the reports."""
@@ -23,7 +21,7 @@ _GRANTED: Final = "postcondition"
 
 @dataclass(frozen=True)
 class Property:
-    """What Eva found out about one assertion, its own or the driver's."""
+    """What Eva concluded about one assertion, its own or the driver's."""
 
     place: str
     function: str
@@ -36,8 +34,7 @@ def check(subject: Subject) -> Result:
     """Prove the absence of run-time errors and the promises of the driver; every alarm is a failure."""
     absent = missing("frama-c", "frama-c-base")
     if absent:
-        return Result(CheckOutcome.INCOMPLETE, absent)
-    tools = {"frama-c": command_version("frama-c") or ""}
+        return incomplete(absent)
     properties: list[Property] = []
     statements = 0
     fixed = subject.settings.code.scalar == "fixed"
@@ -46,15 +43,13 @@ def check(subject: Subject) -> Result:
         try:
             done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
         except subprocess.TimeoutExpired:
-            return Result(
-                CheckOutcome.INCOMPLETE, f"frama-c did not end within {PATIENCE_S:g} s", tools=tools
-            )
+            return incomplete(f"frama-c did not end within {PATIENCE_S:g} s")
         log = done.stdout + done.stderr
         (subject.folder / f"{name}.txt").write_text(log, "utf-8")
         if done.returncode != 0 or not report.is_file():
-            return Result(CheckOutcome.FAILED, f"frama-c refused the code: {_complaint(log)}", tools=tools)
+            return failed(f"frama-c refused the code: {_complaint(log)}")
         properties += read_properties(report)
-        statements += _number(log, r"(\d+) statements reached")
+        statements += number(log, r"(\d+) statements reached")
 
     alarms = unproven(properties)
     proven = len({one.place for one in properties if one.kind == _PROMISE and one.status == "Valid"})
@@ -66,20 +61,13 @@ def check(subject: Subject) -> Result:
         "statements": statements,
     }
     if alarms:
-        return Result(CheckOutcome.FAILED, _alarm_text(alarms), figures, tools)
+        return failed(_alarm_text(alarms), figures)
     if proven < promised:
-        return Result(
-            CheckOutcome.FAILED,
-            f"{promised - proven} of {promised} promises were never reached",
-            figures,
-            tools,
-        )
-    return Result(
-        CheckOutcome.PASSED,
+        return failed(f"{promised - proven} of {promised} promises were never reached", figures)
+    return passed(
         f"no alarm in {statements} statements, whatever the inputs and the order of calls: no run-time "
         f"error, {'no overflow' if fixed else 'no NaN or infinity stored'}, no command beyond the tilt limit",
         figures,
-        tools,
     )
 
 
@@ -148,8 +136,3 @@ def _alarm_text(alarms: Sequence[Property]) -> str:
 def _complaint(log: str) -> str:
     lines = [line.strip() for line in log.splitlines() if "error" in line.lower()]
     return lines[0] if lines else "it ended without a report"
-
-
-def _number(log: str, pattern: str) -> int:
-    found = re.search(pattern, log)
-    return int(found[1]) if found else 0

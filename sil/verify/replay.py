@@ -1,4 +1,4 @@
-"""Play tapes on a bundle's C, built with any compiler and flags, and compare with the reference."""
+"""Build a bundle's C with any compiler and flags, play tapes on it, and compare with the reference."""
 
 import re
 import subprocess
@@ -19,10 +19,10 @@ from mambo_nmpc.sil.verify.check import Subject
 from mambo_nmpc.sil.verify.tools import missing as missing_tool
 
 LIMIT_S: Final = 600
-"""Processor time that a program gets, in seconds."""
+"""Limit of the processor time of a program, in seconds."""
 
 PACKAGES: Final = {"gcc": "gcc", "clang": "libclang-rt-dev"}
-"""What brings the run-time libraries of the sanitizers in Debian, by compiler."""
+"""Debian's package of the sanitizers' run-time libraries, by compiler."""
 
 _SELF_TEST_FAILED: Final = 3
 _REPORT: Final = re.compile(r"runtime error:|ERROR: |WARNING: ")
@@ -32,7 +32,7 @@ FLAGS: Final = ("-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L")
 
 @dataclass(frozen=True)
 class Replay:
-    """How a program ended: outcomes of the tapes, as many as it made, its return code and its report."""
+    """How a program ended: the outcomes of the calls that it made, its return code and its report."""
 
     outcomes: list[Outcomes]
     returncode: int
@@ -41,7 +41,7 @@ class Replay:
 
 @dataclass(frozen=True)
 class Difference:
-    """Where C and reference part: tape and call count from 0."""
+    """The first difference between C and reference; tape and call count from 0."""
 
     tape: int
     call: int
@@ -52,7 +52,7 @@ class Difference:
 
 
 def sources(subject: Subject) -> list[Path]:
-    """Return the C sources of a bundle; raises BuildError unless it is one in folders, with its harness."""
+    """Return the C sources of a bundle; raises BuildError if it is amalgamated or has no harness."""
     found = sorted((subject.bundle / "src").glob("*.c"))
     harness = f"fuzz/{subject.settings.code.prefix}_fuzz.c"
     if not found or not (subject.bundle / harness).is_file():
@@ -61,7 +61,7 @@ def sources(subject: Subject) -> list[Path]:
 
 
 def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
-    """Say what is missing to build with gcc or clang and `flags`, and which package of Debian brings it."""
+    """Return what is missing to build with gcc or clang and `flags`, with its package, None if nothing is."""
     gap = missing_tool(tool, tool)
     if gap:
         return gap
@@ -77,7 +77,7 @@ def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
 
 
 def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
-    """Build the program that replays tapes in `folder`, and return it; raises BuildError."""
+    """Build the program that plays tapes in `folder`, and return it; raises BuildError."""
     program = write_program(subject.settings.code.prefix, folder)
     includes = [f"-I{(subject.bundle / part).resolve()}" for part in ("include", "fuzz")]
     units = [str(path.resolve()) for path in sources(subject)]
@@ -86,7 +86,7 @@ def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Pa
 
 
 def write_program(prefix: str, folder: Path) -> Path:
-    """Write the C that replays tapes into `folder`."""
+    """Write the C that plays tapes into `folder`."""
     text = resources.files("mambo_nmpc.sil.verify").joinpath("replay.c").read_text("utf-8")
     program = folder / "replay.c"
     program.write_text(with_prefix(text, prefix), "utf-8")
@@ -94,7 +94,7 @@ def write_program(prefix: str, folder: Path) -> Path:
 
 
 def write_tapes(settings: Settings, tapes: Sequence[Tape], path: Path) -> None:
-    """Write tapes into one file, an initialisation before each."""
+    """Write tapes into one file, each after an initialisation."""
     init = calls(settings, ApiFunction.INIT, np.zeros((1, 1)))
     path.write_bytes(b"".join(init.tobytes() + tape.tobytes() for tape in tapes))
 
@@ -117,7 +117,7 @@ def play(
 
 
 def fault(played: Replay, expected: Sequence[Outcomes]) -> str | None:
-    """Say what is wrong with a replay: a report, another bit, or a failed self-test; None if nothing is."""
+    """Return what is wrong: a sanitizer's report, another bit, or a failed self-test; None if nothing is."""
     if played.returncode not in {0, _SELF_TEST_FAILED}:
         reports = [line.strip() for line in played.report.splitlines() if _REPORT.search(line)]
         return reports[0] if reports else f"ended with {played.returncode}"

@@ -9,8 +9,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import RULE_FLAGS
 from mambo_nmpc.codegen.render import DEVIATIONS
-from mambo_nmpc.sil.firmware.doctor import command_version
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
+from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, passed
 from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, run
 
 _TEMPLATE: Final = "{file}\t{line}\t{id}\t{message}"
@@ -20,7 +19,7 @@ _SHOWN: Final = 5
 
 @dataclass(frozen=True)
 class RuleViolation:
-    """One line that breaks a rule: MISRA's by number, cppcheck's own by name."""
+    """A line that breaks a rule: MISRA's by number, cppcheck's own by name."""
 
     file: str
     line: int
@@ -38,20 +37,15 @@ def check(subject: Subject) -> Result:
     """Hold the C against MISRA C:2012; a finding that is no listed deviation is a failure."""
     gap = missing("cppcheck", "cppcheck")
     if gap:
-        return Result(CheckOutcome.INCOMPLETE, gap)
-    tools = {"cppcheck": command_version("cppcheck") or ""}
+        return incomplete(gap)
     try:
         done = run(["cppcheck", *RULE_FLAGS, f"--template={_TEMPLATE}", "-Iinclude", "src"], subject.bundle)
     except subprocess.TimeoutExpired:
-        return Result(CheckOutcome.INCOMPLETE, f"cppcheck did not end within {PATIENCE_S:g} s", tools=tools)
+        return incomplete(f"cppcheck did not end within {PATIENCE_S:g} s")
     (subject.folder / "cppcheck.txt").write_text(done.stdout + done.stderr, "utf-8")
-    found = findings(done.stderr)
+    found = violations(done.stderr)
     if done.returncode != 0 or not any(one.rule.startswith(_MISRA) for one in found):
-        return Result(
-            CheckOutcome.INCOMPLETE,
-            "cppcheck ran without its addon misra.py; Debian's package cppcheck brings it",
-            tools=tools,
-        )
+        return incomplete("cppcheck ran without its addon misra.py; Debian's package cppcheck brings it")
     listed = deviations(subject.bundle / DEVIATIONS)
     unlisted = [one for one in found if (one.rule, one.file) not in listed]
     counts = Counter(one.rule.removeprefix(_MISRA) for one in found if (one.rule, one.file) in listed)
@@ -59,22 +53,12 @@ def check(subject: Subject) -> Result:
     figures = {"findings": [asdict(one) for one in unlisted], "deviations": departed}
     if unlisted:
         rest = [f"{len(unlisted) - _SHOWN} more in cppcheck.txt"] if len(unlisted) > _SHOWN else []
-        return Result(
-            CheckOutcome.FAILED,
-            "; ".join([*map(str, unlisted[:_SHOWN]), *rest]),
-            figures=figures,
-            tools=tools,
-        )
+        return failed("; ".join([*map(str, unlisted[:_SHOWN]), *rest]), figures)
     spelled = ", ".join(f"{rule} ({count})" for rule, count in departed.items())
-    return Result(
-        CheckOutcome.PASSED,
-        f"nothing but the deviations listed in {DEVIATIONS}: {spelled}",
-        figures=figures,
-        tools=tools,
-    )
+    return passed(f"nothing but the deviations listed in {DEVIATIONS}: {spelled}", figures)
 
 
-def findings(said: str) -> list[RuleViolation]:
+def violations(said: str) -> list[RuleViolation]:
     """Read what cppcheck said, a finding a line."""
     lines = (line.split("\t", 3) for line in said.splitlines())
     return [RuleViolation(words[0], int(words[1]), words[2], words[3]) for words in lines if len(words) == 4]

@@ -1,19 +1,27 @@
-"""Tools that checks want: what to say where one is missing, and how to run one."""
+"""The tools of the checks: which package brings one, how one is run, and what is read off its log."""
 
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from mambo_nmpc.sil.firmware.doctor import command_version
+
 PATIENCE_S: Final = 3600.0
-"""Time that a tool gets before its check is incomplete, in seconds."""
+"""Time limit of a tool, in seconds."""
 
 
 def missing(tool: str, package: str) -> str | None:
     """Say which package brings `tool`; None if it is here."""
     return None if shutil.which(tool) else f"{tool} is missing; Debian's package {package} brings it"
+
+
+def versions(tools: Sequence[str]) -> dict[str, str]:
+    """Return {tool: version} of those that are here."""
+    return {tool: version for tool in tools if (version := command_version(tool)) is not None}
 
 
 def run(command: Sequence[str], folder: Path) -> "subprocess.CompletedProcess[str]":
@@ -29,3 +37,9 @@ def run(command: Sequence[str], folder: Path) -> "subprocess.CompletedProcess[st
         timeout=PATIENCE_S,
         check=False,
     )
+
+
+def number(log: str, pattern: str) -> int:
+    """Return the number that the group of `pattern` finds in a log, 0 if there is none."""
+    found = re.search(pattern, log)
+    return int(found[1]) if found else 0

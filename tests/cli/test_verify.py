@@ -126,6 +126,6 @@ def test_the_verdict_is_the_worst_outcome(outcomes: tuple[CheckOutcome, ...], wh
 
 def test_checks_have_names_and_order() -> None:
     """Each is named once, and what it is about fits a line."""
-    order = ["warnings", "rules", "proof", "sanitizers", "fuzzing", "faults"]
+    order = ["warnings", "rules", "proof", "sanitizers", "fuzzing", "bits", "faults"]
     assert [entry.name for entry in CHECKS] == order
     assert all(callable(entry.check) and "\n" not in entry.about for entry in CHECKS)

@@ -65,7 +65,6 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     for proof in proofs(scalar):
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
-    assert set(result.tools) == {"frama-c"}
 
 
 FIXED_HARMS = {

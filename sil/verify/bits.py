@@ -1,0 +1,62 @@
+"""Check: optimised builds of gcc and clang have the bits of the reference in all cases."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.cases import cases
+from mambo_nmpc.sil.verify.check import Result, Subject, joined
+
+
+class Build(NamedTuple):
+    """A name, a compiler, its flags."""
+
+    name: str
+    tool: str
+    flags: tuple[str, ...]
+
+
+BUILDS: Final = tuple(
+    Build(f"{tool} {level}", tool, (level,))
+    for tool, level in (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("clang", "-O2"), ("clang", "-O3"))
+)
+
+
+def check(subject: Subject) -> Result:
+    """Play the cases on every build."""
+    return play(subject, BUILDS, "bits of the reference")
+
+
+def play(subject: Subject, builds: Sequence[Build], finding: str) -> Result:
+    """Play the cases on every build; one that reports an error or has other bits than the reference fails.
+
+    `finding` ends the evidence when all builds pass.
+    """
+    tapes, expected = cases(subject.settings)
+    calls = sum(len(tape) for tape in tapes)
+    tapes_file = subject.folder / "tapes.bin"
+    replay.write_tapes(subject.settings, tapes, tapes_file)
+    faults, gaps, good = [], [], []
+    for index, build in enumerate(builds):
+        folder = subject.folder / f"build-{index}"
+        folder.mkdir()
+        gap = replay.missing(build.tool, build.flags, folder)
+        if gap:
+            gaps.append(gap)
+            continue
+        try:
+            program = replay.build(subject, build.tool, build.flags, folder)
+        except BuildError as error:
+            faults.append(f"{build.name}: does not build: {error}")
+            continue
+        played = replay.play(program, tapes_file, subject.settings, tapes)
+        (folder / "report.txt").write_text(played.report)
+        fault = replay.fault(played, expected)
+        if fault:
+            faults.append(f"{build.name}: {fault}; {folder / 'report.txt'}")
+        else:
+            good.append(build.name)
+    counted = f"{calls} calls of {len(tapes)} tapes under {len(good)} of {len(builds)} builds, {finding}"
+    figures = {"tapes": len(tapes), "calls": calls, "builds": good, "faults": faults, "missing": gaps}
+    return joined(faults, gaps, counted, figures)

@@ -1,0 +1,61 @@
+"""The check of bits: every build has those of the reference; another bit fails it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.verify import bits
+from mambo_nmpc.sil.verify.check import CheckOutcome
+from tests.support.subjects import subject
+from tests.support.tools import require
+
+MAMBO = presets.load("mambo")
+WRONG_COMMAND = (
+    "src/nmpc.c",
+    "self->command_rad[1] = self->plan_rad[1];",
+    "self->command_rad[1] = self->plan_rad[0];",
+)
+WRONG_SCALE = (
+    "src/nmpc_float.c",
+    "number_of(state->yaw_rad, NMPC_YAW_SCALE)",
+    "number_of(state->yaw_rad, 1.0f)",
+)
+
+
+@pytest.fixture
+def _compilers() -> None:
+    require("gcc", "gcc")
+    require("clang", "clang")
+
+
+@pytest.mark.usefixtures("_compilers")
+def test_every_build_has_the_bits_of_the_reference(tmp_path: Path) -> None:
+    """All cases, at every optimisation of both compilers."""
+    result = bits.check(subject(MAMBO, tmp_path))
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
+    assert len(result.figures["builds"]) == len(bits.BUILDS)
+    assert json.loads(json.dumps(result.figures)) == result.figures
+
+
+@pytest.mark.usefixtures("_compilers")
+@pytest.mark.parametrize(
+    ("scalar", "fault", "word"),
+    [("float32", WRONG_COMMAND, "command_rad"), ("fixed", WRONG_SCALE, "the self-test fails")],
+)
+def test_another_bit_fails(scalar: str, fault: tuple[str, str, str], word: str, tmp_path: Path) -> None:
+    """In the controller, and in the functions around it that take floats."""
+    result = bits.check(subject(with_option(MAMBO, "code.scalar", scalar), tmp_path, fault))
+    assert result.outcome is CheckOutcome.FAILED
+    assert word in result.evidence
+
+
+def test_without_compilers_the_check_is_incomplete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It names what to install, and never passes."""
+    made = subject(MAMBO, tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    result = bits.check(made)
+    assert result.outcome is CheckOutcome.INCOMPLETE
+    assert "Debian's package clang" in result.evidence
