@@ -7,8 +7,10 @@ import pytest
 
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify import bits
 from mambo_nmpc.sil.verify.check import CheckOutcome
+from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require
 
@@ -32,9 +34,14 @@ def _compilers() -> None:
 
 
 @pytest.mark.usefixtures("_compilers")
-def test_every_build_has_the_bits_of_the_reference(tmp_path: Path) -> None:
-    """All cases, at every optimisation of both compilers."""
-    result = bits.check(subject(MAMBO, tmp_path))
+@pytest.mark.parametrize(
+    "settings",
+    [MAMBO, with_option(settings_case(6, "float64"), "code.prefix", "left_wing")],
+    ids=["mambo", "left_wing"],
+)
+def test_every_build_has_the_bits_of_the_reference(settings: Settings, tmp_path: Path) -> None:
+    """All cases, at every optimisation of both compilers, under any prefix."""
+    result = bits.check(subject(settings, tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert len(result.figures["builds"]) == len(bits.BUILDS)
     assert json.loads(json.dumps(result.figures)) == result.figures
