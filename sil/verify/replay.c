@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Makes the calls in a file, the first argument, and writes what came of every call to the standard output. The
- * second is the time of the processor that this may take, in seconds. Compiled together with a bundle, never
- * part of one.
+ * Makes the calls in the file named by the first argument, and writes the outcome of every call to standard
+ * output. The second argument limits the processor time, in seconds. Compiled with a bundle, never part of one.
  */
 #include "nmpc_fuzz.c"
 
@@ -21,11 +20,12 @@
 #endif
 #endif
 
-/* What a command holds that no step wrote. */
+/* The value of a command that no step has written. */
 #define NMPC_REPLAY_UNWRITTEN ((nmpc_real_t)9)
 
-/* Initialise memory that held something else, such that reading what is not set shows: in the outcome, or to
- * the sanitizer. Returns 0 if all is as promised: the weights of the settings, all else zero but padding. */
+/* Initialise memory with other content before, so that a member that nmpc_init() does not set shows in the
+ * outcome or is reported by the sanitizer. Returns 0 if the weights are those of the settings and everything
+ * else but padding is zero. */
 static int nmpc_replay_init(nmpc_t *self)
 {
     int wrong = 0;
@@ -113,7 +113,7 @@ static int is_alike(nmpc_status_t status, nmpc_status_t expected, const nmpc_flo
            && (found->pitch_rad == ((float)command->pitch_rad * unit_rad));
 }
 
-/* The largest float that is not beyond a number. */
+/* The largest float that does not exceed a number. */
 static float largest_float(nmpc_real_t number, int bits)
 {
     const float unit = 1.0f / (float)((nmpc_sum_t)1 << bits);
@@ -122,7 +122,7 @@ static float largest_float(nmpc_real_t number, int bits)
     return (((double)found / (double)unit) > (double)number) ? (found * 0.99999994f) : found;
 }
 
-/* Halves of a number are rounded away from zero, and less than a half towards it. */
+/* Half a unit is rounded away from zero, less than half towards it. */
 static int rounds_halves(nmpc_t *self)
 {
     const float angle_unit_rad = 1.0f / (float)((nmpc_sum_t)1 << NMPC_ANGLE_BITS);
@@ -143,7 +143,7 @@ static int rounds_halves(nmpc_t *self)
     return is_good;
 }
 
-/* The largest floats within the ranges are accepted, an attitude beyond is not. */
+/* The largest floats within the ranges are accepted, an attitude beyond its range is not. */
 static int takes_the_ends(nmpc_t *self)
 {
     const float position_m = largest_float(NMPC_POSITION_RANGE_M, NMPC_POSITION_BITS);
@@ -167,7 +167,8 @@ static int takes_the_ends(nmpc_t *self)
            && (nmpc_float_step(self, &pitched, &target, thrust_m_s2, &command) == NMPC_BAD_STATE);
 }
 
-/* Steps with floats and with the numbers that they are, and with floats that no format holds. */
+/* A step with floats gives the same as one with the equal numbers of fixed point; floats outside every format are
+ * refused. */
 static int passes_floats(nmpc_t *self)
 {
     const float position_unit_m = 1.0f / (float)(1L << NMPC_POSITION_BITS);
