@@ -9,7 +9,7 @@ import numpy as np
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController, compiled
+from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.controllers.extension import load_extension
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.report import table, write_csv
@@ -34,7 +34,7 @@ def controller(subject: Subject, n: int) -> CompiledController:
     """
     settings = subject.settings
     if settings.code.prefix != "nmpc":
-        return CompiledController(settings, n, compiled(settings, host_toolchain()))
+        return CompiledController(settings, n, build_extension(settings, host_toolchain()))
     files = {
         path.relative_to(subject.bundle).as_posix(): path.read_text("utf-8")
         for part in ("include", "src")

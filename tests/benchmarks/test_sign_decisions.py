@@ -19,7 +19,7 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.inner_steps import watched_step
+from mambo_nmpc.sil.controllers.inner_steps import step_watched
 
 MAMBO = presets.load("mambo")
 FIXED = with_option(MAMBO, "code.scalar", "fixed")
@@ -44,7 +44,7 @@ def test_an_edge_is_where_the_next_number_decides_otherwise(settings: Settings) 
         plan_rad=edge.plan_rad.astype(np.float64),
     )
     (here, inner), (there, inner_there) = (
-        watched_step(many, memory, one.state, one.target, one.thrust_acceleration_m_s2)
+        step_watched(many, memory, one.state, one.target, one.thrust_acceleration_m_s2)
         for one in (edge, beside)
     )
     assert len(x_m) > 30

@@ -10,7 +10,7 @@ from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.inner_steps import watched_step
+from mambo_nmpc.sil.controllers.inner_steps import step_watched
 from mambo_nmpc.sil.verify.inputs import random_inputs
 from tests.support.cases import SCALARS
 
@@ -32,7 +32,7 @@ def test_watching_changes_no_bit(settings: Settings) -> None:
     for _ in range(2):
         memory = plain.memory
         expected = plain.step(*inputs(settings))
-        step, inner = watched_step(settings, memory, *inputs(settings))
+        step, inner = step_watched(settings, memory, *inputs(settings))
         for name in ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged"):
             assert getattr(step, name).tobytes() == getattr(expected, name).tobytes(), name
         good = step.status == Status.OK
@@ -45,7 +45,7 @@ def test_watching_changes_no_bit(settings: Settings) -> None:
 def test_moves_follow_decisions_and_step_sizes(scalar: str) -> None:
     """A decision that repeats the one before moves against the slope by the step size, up to the limit."""
     settings = SETTINGS[scalar]
-    _, inner = watched_step(settings, ReferenceController(Design(settings), N).memory, *inputs(settings))
+    _, inner = step_watched(settings, ReferenceController(Design(settings), N).memory, *inputs(settings))
     decisions, sizes = inner.decisions(settings).astype(np.int64), inner.step_sizes_rad(settings)
     moved_rad = np.diff(inner.plan_rad.astype(np.float64), axis=0)
     assert np.array_equal(np.sign(moved_rad[0]), -decisions[0])  # from level, far from the limit
@@ -62,7 +62,7 @@ def test_moves_follow_decisions_and_step_sizes(scalar: str) -> None:
 def test_after_convergence_all_decisions_are_zero(scalar: str) -> None:
     """With a huge tolerance every cost after the first has converged."""
     settings = with_option(SETTINGS[scalar], "optimizer.tolerance", 1e6)
-    step, inner = watched_step(settings, ReferenceController(Design(settings), N).memory, *inputs(settings))
+    step, inner = step_watched(settings, ReferenceController(Design(settings), N).memory, *inputs(settings))
     decisions = inner.decisions(settings)[:, (step.status == Status.OK) & (inner.cost[0] < 1e5)]
     assert decisions[0].any()
     assert not decisions[1:].any()

@@ -67,7 +67,7 @@ def test_the_crazyflie_keeps_its_promises() -> None:
 @pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.12), ("table1", 1.10)])
 def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
     """Most instructions over least, on the Cortex-M4F."""
-    counts = measured("crazyflie", preset).counts
+    counts = measure_once("crazyflie", preset).counts
     assert counts is not None
     assert counts.most <= spread * counts.least
 
