@@ -19,7 +19,7 @@ from mambo_nmpc.sil.errors import CacheError
 
 _WORK: Final = "build-"
 _ABANDONED_S: Final = 3600.0
-"""Age at which the work folder of a build counts as left over by a killed process."""
+"""Age beyond which the work folder of a build is regarded as left by a killed process."""
 
 
 def cache_folder() -> Path:
@@ -50,10 +50,11 @@ def cache_folder() -> Path:
 
 
 def cached(name: str, build: Callable[[Path], Path]) -> Path:
-    """Return the cached file `name`, its content's hash before its name, building it first if need be.
+    """Return the path of the cached file `name`; build it if it is missing or damaged.
 
-    `build` works in an empty folder and returns what it made, which is then renamed into place: two
-    processes may build the same file at once, and a killed one leaves no half of it.
+    `build(folder)` builds in an empty folder and returns the path of its result, which is then renamed into
+    place. So two processes may build the same file at once, and a killed one leaves no partial file. Raises
+    CacheError if the cache folder cannot be used.
     """
     folder = cache_folder()
     try:

@@ -1,10 +1,10 @@
-"""Result folders: made for one run, replaced as a whole, and never on top of somebody's work.
+"""Result folders: one run at a time writes them, all results are replaced together, foreign files are kept.
 
-A result is a plain file or, if its name ends in a slash, a folder, whose files the summary lists in "files".
+A result is a file or, if its name ends in a slash, a folder, whose files the summary lists in "files".
 
-A run writes into a hidden folder inside its result folder. When it is complete its files are moved into
-place, the summary last; until then earlier results stay as they were. A run that is killed, or stopped while
-it moves, leaves the hidden folder, which the next run clears.
+A run writes into a hidden folder inside its result folder. When the run is complete its files are moved into
+place, the summary last; until then the results of the previous run stay. A run that is killed leaves the
+hidden folder, which the next run removes.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
 from mambo_nmpc.sil.errors import BusyError
 
 SUMMARY: Final = "summary.json"
-"""The file that marks a folder as ours: removed first, written last."""
+"""The file that marks a folder of results; it is removed first and written last."""
 
 _NEW: Final = ".mambo-nmpc-new-"
 GENERATOR: Final = "mambo-nmpc "
@@ -31,14 +31,14 @@ GENERATOR: Final = "mambo-nmpc "
 
 @contextlib.contextmanager
 def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[Path]:
-    """Hold `folder` for one run of `command`; yield a folder for the files `names` and the summary.
+    """Lock `folder` for one run of `command`; yield a temporary folder for the files `names` and the summary.
 
-    On leaving they replace those of an earlier run; if the run fails, the earlier ones stay. Raises
-    ForeignFilesError for a folder that holds other work, BusyError if another run holds it, and
-    UnwritableError for what the file system refuses: as far as can be told, before the run.
+    When the block ends they replace the results of an earlier run; if it raises, the earlier results stay.
+    Raises ForeignFilesError if `folder` holds other files, BusyError if another run has locked it, and
+    UnwritableError if the file system refuses an access; where possible, before the run.
     """
     try:
-        with _made(folder), locked(folder):
+        with _create(folder), locked(folder):
             _refuse_other_work(folder, command, (*names, SUMMARY))
             for left_over in folder.glob(f"{_NEW}*"):
                 shutil.rmtree(left_over)
@@ -59,13 +59,13 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
 
 
 def summary_text(command: str, summary: dict[str, Any]) -> str:
-    """Return what a run of `command` found as JSON, after the version that found it; no number is NaN."""
+    """Return the summary of a run of `command` as JSON with generator and version; NaN becomes null."""
     whole = {"generator": f"{GENERATOR}{__version__}", "command": command, **summary}
     return json.dumps(finite(whole), indent=2, allow_nan=False) + "\n"
 
 
 def finite(value: Any) -> Any:
-    """Return `value` with None for every number that JSON cannot spell."""
+    """Return `value` with None for NaN and infinity, which JSON cannot represent, at any depth."""
     match value:
         case float() if not math.isfinite(value):
             return None
@@ -78,8 +78,8 @@ def finite(value: Any) -> Any:
 
 
 @contextlib.contextmanager
-def _made(folder: Path) -> Iterator[None]:
-    """Make `folder` and its parents; those made here are removed again if the run fails."""
+def _create(folder: Path) -> Iterator[None]:
+    """Create `folder` and its parents; remove those created here if the block raises."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -93,7 +93,7 @@ def _made(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock `folder` against other runs; a file system without locks goes without."""
+    """Lock `folder` against other runs; raises BusyError. A file system without locks is not locked."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         try:
@@ -111,16 +111,16 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def _refuse_other_work(folder: Path, command: str, names: Collection[str]) -> None:
-    """Raise ForeignFilesError unless `folder` is empty or holds results of `command`, in plain files."""
+    """Raise ForeignFilesError unless `folder` is empty or holds results of `command` in plain files."""
     name = echo(str(folder))
     if all(path.name.startswith(_NEW) for path in folder.iterdir()):
         return
-    # A run killed while it moved its files into place has its summary still in the hidden folder.
+    # A run killed while it moved its files into place still has its summary in the hidden folder.
     summaries = [_summary(path) for path in (folder / SUMMARY, *folder.glob(f"{_NEW}*/{SUMMARY}"))]
     ours = next((summary for summary in summaries if summary is not None), None)
     if ours is None:
         raise ForeignFilesError(
-            f"{name}: holds files that are not our results; name another folder with -o", ()
+            f"{name}: holds files that are not results of mambo-nmpc; name another folder with -o", ()
         )
     if ours.get("command") != command:
         raise ForeignFilesError(
@@ -134,27 +134,27 @@ def _refuse_other_work(folder: Path, command: str, names: Collection[str]) -> No
             _refuse_unlisted_files(path, folder, ours.get("files"))
         elif path.is_symlink() or (path.exists() and not path.is_file()):
             raise ForeignFilesError(
-                f"{echo(str(path))}: is not a plain file, and a result belongs there; "
+                f"{echo(str(path))}: is not a plain file and cannot be replaced by a result; "
                 "move it away, or name another folder with -o",
                 (str(path),),
             )
 
 
 def _refuse_unlisted_files(place: Path, folder: Path, listed: object) -> None:
-    """Raise ForeignFilesError if `place` is no folder, or holds a file that no run of ours left there."""
+    """Raise ForeignFilesError if `place` is not a folder, or holds a file that the summary does not list."""
     known = listed if isinstance(listed, dict) else {}
     found = [place] if place.is_symlink() or place.is_file() else sorted(place.rglob("*"))
     for path in found:
         if path.is_symlink() or (not path.is_dir() and path.relative_to(folder).as_posix() not in known):
             raise ForeignFilesError(
-                f"{echo(str(path))}: is not a result of ours, and would be lost; "
+                f"{echo(str(path))}: is not a result of mambo-nmpc and would be lost; "
                 "move it away, or name another folder with -o",
                 (str(path),),
             )
 
 
 def _summary(path: Path) -> dict[str, Any] | None:
-    """Return the summary at `path` if we wrote it, else None."""
+    """Return the summary at `path` if mambo-nmpc wrote it, else None."""
     if path.is_symlink() or not path.is_file():
         return None
     try:

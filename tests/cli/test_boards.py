@@ -172,7 +172,7 @@ def test_a_folder_of_other_work_is_refused_before_measuring(tmp_path: Path) -> N
     (tmp_path / "taken" / "thesis.tex").write_text("years of work")
     said, talk = run("footprint", "-o", "taken", code=2)
     assert said == ""
-    assert "taken: holds files that are not our results" in talk
+    assert "taken: holds files that are not results of mambo-nmpc" in talk
 
 
 @pytest.mark.usefixtures("_no_compiler")

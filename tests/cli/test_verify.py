@@ -88,7 +88,7 @@ def test_an_earlier_run_is_replaced_and_nothing_else(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "verification" / "checks").iterdir()] == ["rules"]
     (tmp_path / "verification" / "checks" / "notes.txt").write_text("mine")
     _, talk = run("verify", "--only", "rules", code=2)
-    assert "notes.txt: is not a result of ours" in talk
+    assert "notes.txt: is not a result of mambo-nmpc" in talk
     assert (tmp_path / "verification" / "checks" / "notes.txt").read_text() == "mine"
 
 

@@ -1,4 +1,4 @@
-"""Result folders: whole or not at all, one run at a time, and nobody else's files."""
+"""Result folders: all results or none, one run at a time, foreign files stay."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ from mambo_nmpc.sil.files.folders import SUMMARY, new_results, summary_text
 
 
 def run(folder: Path, content: str = "new", command: str = "fly") -> None:
-    """Leave the results of one run in `folder`."""
+    """Write the results of one run to `folder`."""
     with new_results(folder, command, ("trace.csv",)) as fresh:
         (fresh / "trace.csv").write_text(content)
         (fresh / SUMMARY).write_text(summary_text(command, {"content": content}))
@@ -23,7 +23,7 @@ def files(folder: Path) -> dict[str, str]:
 
 
 def test_results_replace_those_of_an_earlier_run(tmp_path: Path) -> None:
-    """And leave files of other names alone."""
+    """Files of other names stay."""
     run(tmp_path / "a" / "b", "old")
     (tmp_path / "a" / "b" / "notes.txt").write_text("mine")
     run(tmp_path / "a" / "b")
@@ -31,8 +31,8 @@ def test_results_replace_those_of_an_earlier_run(tmp_path: Path) -> None:
     assert files(tmp_path / "a" / "b") == {"trace.csv": "new", SUMMARY: summary, "notes.txt": "mine"}
 
 
-def test_nothing_moves_before_the_run_is_complete(tmp_path: Path) -> None:
-    """Whoever looks meanwhile sees the earlier results; so does one who looks after a failure."""
+def test_earlier_results_stay_until_the_run_is_complete(tmp_path: Path) -> None:
+    """During a run, and after one that failed, the folder has the earlier results."""
     run(tmp_path, "old")
     before = files(tmp_path)
 
@@ -48,7 +48,7 @@ def test_nothing_moves_before_the_run_is_complete(tmp_path: Path) -> None:
 
 
 def test_a_run_stopped_while_its_files_move_does_not_block_the_next(tmp_path: Path) -> None:
-    """By Ctrl-C, or by the disk: a mixture without a summary is left, and is known as ours."""
+    """It leaves a mixture of results without a summary, which the next run recognizes and replaces."""
     run(tmp_path, "old")
 
     def stop() -> None:
@@ -64,22 +64,22 @@ def test_a_run_stopped_while_its_files_move_does_not_block_the_next(tmp_path: Pa
 
 
 def test_a_failed_run_leaves_no_folder_of_its_own(tmp_path: Path) -> None:
-    """Neither the result folder nor the parents that it needed."""
+    """A failed run removes the result folder and the parents that it created."""
     with pytest.raises(KeyboardInterrupt), new_results(tmp_path / "a" / "b", "fly", ()):
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
 
 
 def test_one_run_at_a_time(tmp_path: Path) -> None:
-    """A second run into the same folder is refused before it starts."""
+    """A second run in the same folder raises `BusyError` before it starts."""
     with pytest.raises(BusyError, match="another run"), new_results(tmp_path, "fly", ()):
         run(tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("moved", [False, True])
-def test_what_a_killed_run_left_is_cleared(tmp_path: Path, moved: bool) -> None:
-    """Killed while it flew, or while it moved its files into place."""
+def test_the_rest_of_a_killed_run_is_removed(tmp_path: Path, moved: bool) -> None:
+    """The run was killed before or while it moved its files into place."""
     hidden = tmp_path / ".mambo-nmpc-new-abc"
     hidden.mkdir()
     if moved:
@@ -94,19 +94,19 @@ def test_what_a_killed_run_left_is_cleared(tmp_path: Path, moved: bool) -> None:
 @pytest.mark.parametrize(
     "summary", [None, "", "[]", "{}", '{"generator": 1}', '{"generator": "other 1"}', "[" * 10**5]
 )
-def test_work_of_others_is_refused(tmp_path: Path, summary: str | None) -> None:
-    """A file named summary.json does not make a folder ours."""
+def test_a_folder_with_other_files_is_refused(tmp_path: Path, summary: str | None) -> None:
+    """A summary.json that mambo-nmpc did not write does not mark a folder of results."""
     (tmp_path / "thesis.tex").write_text("years of work")
     if summary is not None:
         (tmp_path / SUMMARY).write_text(summary)
     before = files(tmp_path)
-    with pytest.raises(ForeignFilesError, match="not our results"):
+    with pytest.raises(ForeignFilesError, match="not results of mambo-nmpc"):
         run(tmp_path)
     assert files(tmp_path) == before
 
 
 def test_results_of_another_command_are_refused(tmp_path: Path) -> None:
-    """Two kinds of results in one folder could not be told apart."""
+    """A folder holds the results of one command only."""
     run(tmp_path, command="table2")
     with pytest.raises(ForeignFilesError, match="holds results of table2, not of fly"):
         run(tmp_path)
@@ -115,7 +115,7 @@ def test_results_of_another_command_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["trace.csv", SUMMARY])
 @pytest.mark.parametrize("kind", ["link", "folder"])
 def test_links_and_folders_in_the_way_are_refused(tmp_path: Path, name: str, kind: str) -> None:
-    """Nothing is written through a link, and no folder is taken for a file."""
+    """A link or a folder in the place of a result is not replaced."""
     run(tmp_path / "out")
     precious = tmp_path / "precious"
     (tmp_path / "out" / name).rename(precious)
@@ -124,13 +124,13 @@ def test_links_and_folders_in_the_way_are_refused(tmp_path: Path, name: str, kin
         (tmp_path / "out" / name).symlink_to(precious)
     else:
         (tmp_path / "out" / name).mkdir()
-    with pytest.raises(MamboNmpcError, match=r"not a plain file|not our results"):
+    with pytest.raises(MamboNmpcError, match=r"not a plain file|not results of mambo-nmpc"):
         run(tmp_path / "out")
     assert precious.read_text() == before
 
 
-def test_a_summary_has_no_number_that_json_cannot_spell() -> None:
-    """NaN and infinity become null, however deep."""
+def test_a_summary_has_null_for_nan_and_infinity() -> None:
+    """Numbers that JSON cannot represent become null at any depth."""
     text = summary_text("fly", {"a": float("nan"), "b": [1.5, (float("inf"), {"c": -float("inf")})]})
     summary = json.loads(text, parse_constant=pytest.fail)
     assert (summary["a"], summary["b"]) == (None, [1.5, [None, {"c": None}]])
