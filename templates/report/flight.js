@@ -1,5 +1,5 @@
 "use strict";
-/* Moves the drones of every flight on the page: play, pause, a slider. Without it the pictures stand still. */
+/* Animates the drones of every flight on the page: play, pause, slider. Without scripts the paths are static. */
 const SPEED = 4, TRAIL_S = 3, ARM_SHARE = 0.035, ROUND = 12;
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 
@@ -11,7 +11,7 @@ for (const figure of document.querySelectorAll(".flight")) {
   const last = data.target.length - 1;
   let time = 0, before = null;
 
-  /* Values at the time, between two samples on a line; null where the flight is lost. */
+  /* Values at the current time, interpolated linearly; null where the flight is lost. */
   function at(samples) {
     const place = Math.min(Math.max((time - data.start) / data.step, 0), last);
     const low = samples[Math.floor(place)], high = samples[Math.ceil(place)];
@@ -19,15 +19,15 @@ for (const figure of document.querySelectorAll(".flight")) {
     return low.map((value, index) => value + (place % 1) * (high[index] - value));
   }
 
-  /* A point of the drone's own frame (nose, right, down) in the world's (north, east, down). */
-  function turned([a, b, c], [roll, pitch, yaw]) {
+  /* Rotates a vector from the body frame (forward, right, down) to the world frame (north, east, down). */
+  function toWorld([a, b, c], [roll, pitch, yaw]) {
     const [sr, cr, sp, cp, sy, cy] = [roll, pitch, yaw].flatMap((mrad) => [Math.sin(mrad / 1e3), Math.cos(mrad / 1e3)]);
     const [b1, c1] = [b * cr - c * sr, b * sr + c * cr];
     const [a2, c2] = [a * cp + c1 * sp, c1 * cp - a * sp];
     return [a2 * cy - b1 * sy, a2 * sy + b1 * cy, c2];
   }
 
-  /* Outlines of a drone, larger than life: two arms, four rotors. */
+  /* Outlines of an enlarged drone: two arms, four rotors. */
   function outlines(position, angles) {
     const tips = [[1, 1], [-1, -1], [1, -1], [-1, 1]].map(([a, b]) => [a * arm, b * arm, 0]);
     const lines = [[tips[0], tips[1]], [tips[2], tips[3]]];
@@ -37,7 +37,7 @@ for (const figure of document.querySelectorAll(".flight")) {
         return [a + 0.7 * arm * Math.cos(angle), b + 0.7 * arm * Math.sin(angle), -0.2 * arm];
       }));
     }
-    return lines.map((line) => line.map((point) => turned(point, angles).map((value, k) => value + position[k])));
+    return lines.map((line) => line.map((point) => toWorld(point, angles).map((value, k) => value + position[k])));
   }
 
   const path = (lines, down) =>
@@ -68,7 +68,7 @@ for (const figure of document.querySelectorAll(".flight")) {
     if (on) requestAnimationFrame(step);
   }
 
-  /* With reduced motion a picture each second instead of smooth movement. */
+  /* With reduced motion one frame per second instead of smooth motion. */
   function step(now) {
     if (before === null) return;
     const passed = (now - before) / 1000;

@@ -154,11 +154,11 @@ def test_missing_traces_are_named_and_the_rest_is_shown() -> None:
     made("table2")
     Path("table2/mambo.npz").unlink()
     page = page_of("table2")
-    assert "does not hold it: mambo.npz" in page
+    assert "therefore not shown: mambo.npz" in page
     assert "Play" in page
     Path("table2/pd.npz").unlink()
     page = page_of("table2")
-    assert "does not hold it: pd.npz, mambo.npz" in page
+    assert "therefore not shown: pd.npz, mambo.npz" in page
     assert "Play" not in page
     assert "7.123" in page
 
