@@ -64,7 +64,7 @@ def _draw_shares(axes: Axes, values: FloatArray, colour: str, name: str) -> None
 
 
 def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup]:
-    """Return a picture of each compared index: the share of flights up to a value, a line a controller."""
+    """Return a picture of each compared index: cumulative distributions over flights, one per controller."""
     pictures: list[Markup] = []
     with style(), mpl.rc_context({"text.parse_math": False}):  # a controller's name is no formula
         for index, label in _SHOWN.items():

@@ -31,7 +31,7 @@ _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
 
 class _Part(BaseModel):
-    """Part of what decides a campaign, of which a page shows some keys and the summary keeps all."""
+    """Part of a campaign's parameters; the summary keeps all keys, a page shows those declared here."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
@@ -53,7 +53,7 @@ class NamedController(_Part):
 
 
 class Drawn(_Part):
-    """What a campaign flies; the first controller is the one that the others are compared with."""
+    """Parameters of a campaign; the other controllers are compared with the first one."""
 
     seed: int
     flight: DrawnFlight
@@ -62,7 +62,7 @@ class Drawn(_Part):
 
 @dataclass(frozen=True)
 class WorstFlight:
-    """A flight to look at, with the record that flies it again."""
+    """One of the worst flights, with the record that replays it."""
 
     flight: int
     crashed: bool
@@ -84,7 +84,7 @@ class CampaignSummary(Summary):
 
 
 class UnfinishedCampaign(Drawn, Summary):
-    """What the folder of a campaign says before its last flight."""
+    """The summary of a campaign that is not finished."""
 
     command = "campaign"
 
@@ -146,7 +146,7 @@ def write_records(campaign: Campaign, store: FlightStore) -> None:
 
 
 def finish(campaign: Campaign, store: FlightStore) -> CampaignSummary:
-    """Put the table in order, and write what follows from it, the summary last; raises UnwritableError."""
+    """Sort the table and write records, pictures and, last, the summary; raises UnwritableError."""
     from mambo_nmpc.sil.campaign.plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
 
     store.put_in_order()

@@ -1,4 +1,4 @@
-"""A campaign on a page, finished or not."""
+"""The section of the report on a campaign, finished or not."""
 
 from pathlib import Path
 
@@ -31,7 +31,7 @@ def campaign_section(folder: Path, summary: CampaignSummary | UnfinishedCampaign
     }
     if finished is None:
         so_far = len(next(iter(table.values()), ()))
-        finding, good = f"not finished, {so_far} flights so far; the same command goes on", None
+        finding, good = f"not finished, {so_far} flights so far; the same command resumes it", None
     else:
         crashes = ", ".join(f"{one.crashed.count} with {name}" for name, one in found.items())
         finding = f"{finished.flights} flights; crashed: {crashes}"

@@ -132,7 +132,7 @@ def worst(table: Table, name: str) -> list[int]:
 
 
 def distributions(table: Table, names: Sequence[str], *, sensed: bool) -> dict[str, Distributions]:
-    """Return the statistics of each controller."""
+    """Return crashes, rejected inputs and quantiles of each controller."""
     indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES if sensed)]
     return {
         name: Distributions(

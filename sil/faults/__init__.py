@@ -1,1 +1,1 @@
-"""Flights with faults: what is injected, which faults are flown, and what became of each."""
+"""Flights with faults: injection, the list of faults, flights and their verdicts."""

@@ -1,7 +1,7 @@
-"""Flights with faults: the figure of eight of Table II and hover, every fault at four moments, and a verdict.
+"""Flights with faults: Table II's figure of eight and hover, each fault with four onsets, and a verdict.
 
-Fault-free flights beside them say how close a healthy controller stays: their largest error after the
-transient, and a half more, is the band into which a flight must come back for good.
+A flight has recovered when its error stays within a band until the end. The band is 1.5 times the largest
+error of the fault-free flight after the transient.
 """
 
 import math
@@ -37,38 +37,38 @@ from mambo_nmpc.sil.plant.vehicle import Vehicle
 
 DURATION_S: Final = 100.0
 ONSETS_S: Final = (20.0, 23.1, 26.3, 29.4)
-"""When the fault begins, in flights of their own: a quarter of the figure of eight apart."""
+"""Times at which a fault begins, one flight each: a quarter of the figure of eight apart."""
 
 CRASH_TILT_RAD: Final = math.acos(WEIGHT_N / THRUST_LIMIT_N)
-"""Tilt at which the most thrust that the altitude loop asks for no longer carries the weight: 59 degrees."""
+"""Tilt beyond which the altitude loop's thrust limit no longer carries the weight: 59 degrees."""
 
 STRAY_M: Final = 10.0
 """Distance at which the stock code of the Mambo shuts the motors down."""
 
 BAND_FACTOR: Final = 1.5
 PATIENCE: Final = 5
-"""Refused steps in a row at which a levelling caller levels out: 0.05 s at 100 Hz."""
+"""Consecutive rejected steps after which a levelling caller commands zero tilt: 0.05 s at 100 Hz."""
 
 TURN_RATE_RAD_S: Final = 1.0
 HOVER_WIND_M_S2: Final = (0.5, 0.3)
-"""Push on the hovering flights: in still air they would hold their place whatever the controller does."""
+"""Steady disturbance acceleration on the hovering flights: without it even a dead controller would hover."""
 NEVER: Final = 2**31
-"""The patience of a caller who never levels out."""
+"""`PATIENCE` of a caller that never levels."""
 
 
 STATUS_NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
-"""What a step came to, by status, in ascending order."""
+"""Name of each status, in ascending order of the statuses."""
 
 
 class End(StrEnum):
     """How a flight ended."""
 
     BACK = "back"
-    """Within the band for good."""
+    """Recovered: within the band until the end."""
     AWAY = "away"
-    """In the air, and not back within the band by the end."""
+    """Not recovered by the end, but in the air."""
     CRASHED = "crashed"
-    """Tilted beyond CRASH_TILT_RAD, or on the ground."""
+    """Tilted beyond `CRASH_TILT_RAD`, or on the ground."""
 
 
 ORDER: Final = (End.BACK, End.AWAY, End.CRASHED)
@@ -76,14 +76,14 @@ ORDER: Final = (End.BACK, End.AWAY, End.CRASHED)
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a scenario: the worst over its moments.
+    """Result of a fault on one course: the worst over its onsets.
 
-    turning:     whether the drone turned throughout: then it has a band of its own.
-    statuses:    names of those seen while it lasted, in the order of their numbers.
-    expected:    whether these are the statuses that the scenario demands.
-    largest_...: from its begin on; the error is the distance to the true target.
-    band_m:      how close to its target a flight must be to be back.
-    recovery_s:  from its end (from its begin if it has none) until the flight is back for good; NaN if never.
+    turning:     whether the heading turned throughout the flight; such flights have a band of their own.
+    statuses:    names of the statuses during the fault, in the order of their numbers.
+    expected:    whether these are exactly the statuses that the fault must cause.
+    largest_...: largest value since the onset; the error is the horizontal distance to the true target.
+    band_m:      largest error of a flight that has recovered.
+    recovery_s:  time from the end of the fault (from its onset if it has no end) to recovery; NaN if never.
     """
 
     course: str
@@ -111,7 +111,7 @@ class FaultsSummary(Summary):
 
 @dataclass(frozen=True, eq=False)
 class _Sortie:
-    """One flight: a scenario at one moment; None flies without fault."""
+    """One flight: a course, a fault (None: no fault) and the updates at which the fault begins and ends."""
 
     course: str
     turning: bool
@@ -131,9 +131,10 @@ def fly_faults(
     progress: Callable[[float], None] | None = None,
     chosen: Sequence[FaultScenario] | None = None,
 ) -> tuple[Verdict, ...]:
-    """Fly every scenario, or those `chosen`, on every course at every moment; course by course, in order.
+    """Fly every fault, or those `chosen`, on every course with every onset; return verdicts course by course.
 
-    `controller` makes n controllers of `settings`. Raises FlightError for settings that cannot be flown.
+    `controller(n)` makes n controllers of `settings`. `progress` is called with the share done. Raises
+    `FlightError` if the update period cannot be simulated, or if the ranges exclude the figure of eight.
     """
     period_s = settings.horizon.update_period_s
     sorties = _sorties(scenarios(settings) if chosen is None else chosen, period_s)
@@ -147,7 +148,7 @@ def fly_faults(
     if (trace.status[:, healthy] == Status.BAD_TARGET).any():
         raise FlightError(
             f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
-            f"{settings.ranges.velocity_m_s:g}: the figure of eight of Table II lies beyond, to 2 m and 1 m/s"
+            f"{settings.ranges.velocity_m_s:g}: must include the figure of eight of Table II, 2 m and 1 m/s"
         )
     return _judged(trace, sorties, reweighted.answers)
 
@@ -206,7 +207,7 @@ def _fault(sortie: _Sortie) -> Fault | None:
 def _judged(
     trace: Trace, sorties: Sequence[_Sortie], answers: Sequence[tuple[int, int]]
 ) -> tuple[Verdict, ...]:
-    """Judge every scenario by the worst of its moments."""
+    """Return the verdict of every fault on every course."""
     error_m = horizontal_error_m(_with_moved_targets(trace, sorties))
     settled = trace.time_s >= TRANSIENT_S
     bands_m = {
@@ -241,9 +242,9 @@ def _with_moved_targets(trace: Trace, sorties: Sequence[_Sortie]) -> Trace:
 def _verdict(
     trace: Trace, row: int, sortie: _Sortie, *, error_m: FloatArray, band_m: float, refused: set[int]
 ) -> Verdict:
-    """Judge flight `row`; `refused` are the statuses with which new weights were refused."""
+    """Judge flight `row`; `refused` holds the statuses of rejected weights."""
     scenario = sortie.scenario
-    assert scenario is not None  # whoever flies without fault is not judged
+    assert scenario is not None  # fault-free flights are not judged
     flown = slice(sortie.begin, None)
     seen = refused | set(trace.status[sortie.begin : sortie.end, row].tolist())
     outside = np.flatnonzero(~(error_m[flown] <= band_m))
@@ -269,7 +270,7 @@ def _verdict(
 
 
 def _worst(verdicts: Sequence[Verdict]) -> Verdict:
-    """Return the worst in every respect."""
+    """Return the worst value of every field."""
     return replace(
         verdicts[0],
         statuses=all_statuses(verdicts),
@@ -283,7 +284,7 @@ def _worst(verdicts: Sequence[Verdict]) -> Verdict:
 
 
 def all_statuses(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
-    """Return the names of all statuses seen, in the order of their numbers."""
+    """Return the names of all statuses in the verdicts, in the order of their numbers."""
     seen = {status for verdict in verdicts for status in verdict.statuses}
     return tuple(name for name in STATUS_NAMES.values() if name in seen)
 

@@ -1,7 +1,7 @@
-"""Faults between vehicle and controller: what it is handed, when it runs, when its command arrives.
+"""Fault injection between drone and controller: wrong inputs, missing updates, late commands, wrong weights.
 
-A fault is a pure function of what a healthy controller would be handed. Wrappers put faults before n
-controllers, one for each flight, and have themselves the interface of a position controller.
+A fault is a pure function of the controller's correct inputs. The wrappers below inject faults into n
+controllers, one per flight, and have the interface of a position controller themselves.
 """
 
 from collections import deque
@@ -19,7 +19,7 @@ from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 @dataclass(frozen=True, eq=False)
 class ControllerInput:
-    """What one controller is handed at one update: state (7,), target (4,), thrust over mass."""
+    """Inputs of one controller at one update: state (7,), target (4,), thrust over mass."""
 
     state: FloatArray
     target: FloatArray
@@ -27,24 +27,24 @@ class ControllerInput:
 
 
 Alter = Callable[[ControllerInput, ControllerInput, int], ControllerInput]
-"""The inputs now, those when the fault began, the updates since then -> what the controller is handed."""
+"""(correct inputs, correct inputs at the onset, updates since the onset) -> the controller's inputs."""
 
 Drop = Callable[[int], bool]
-"""The updates since the fault began -> whether this one is left out."""
+"""Updates since the onset -> whether this update is dropped."""
 
 
 def untouched(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-    """Hand on the inputs as they are."""
+    """Return the correct inputs."""
     return now
 
 
 def frozen_state(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-    """Repeat the state with which the fault began; target and thrust go on."""
+    """Repeat the state at the onset; target and thrust stay correct."""
     return replace(now, state=began.state)
 
 
 def state_set_to(column: int | slice, value: float, *, on: int = 1, of: int = 1) -> Alter:
-    """Overwrite columns of the state in the first `on` of every `of` updates."""
+    """Overwrite columns of the state with `value` in the first `on` of every `of` updates."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         state = now.state.copy()
@@ -56,7 +56,7 @@ def state_set_to(column: int | slice, value: float, *, on: int = 1, of: int = 1)
 
 
 def state_scaled(scale: ArrayLike) -> Alter:
-    """Multiply the state by `scale` (7,): the wrong unit."""
+    """Multiply the state by `scale` (7,), as a wrong unit does."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         return replace(now, state=now.state * np.asarray(scale))
@@ -74,7 +74,7 @@ def yaw_shifted(shift_rad: float) -> Alter:
 
 
 def yaw_wrapped(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-    """Measure the yaw within half a turn of north: it jumps where the drone turns through south."""
+    """Wrap the measured yaw to [-pi, pi): it jumps where the heading passes south."""
     state = now.state.copy()
     state[6] = (state[6] + np.pi) % (2.0 * np.pi) - np.pi
     return replace(now, state=state)
@@ -90,7 +90,7 @@ def target_moved(by_m: float) -> Alter:
 
 
 def thrust_reported(value_m_s2: float) -> Alter:
-    """Report this thrust acceleration, whatever it is."""
+    """Overwrite the thrust acceleration."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
         return replace(now, thrust_acceleration_m_s2=value_m_s2)
@@ -99,27 +99,27 @@ def thrust_reported(value_m_s2: float) -> Alter:
 
 
 def never(since: int) -> bool:  # noqa: ARG001 - a Drop
-    """Leave no update out."""
+    """Drop no update."""
     return False
 
 
 def always(since: int) -> bool:  # noqa: ARG001 - a Drop
-    """Leave every update out."""
+    """Drop every update."""
     return True
 
 
 def every(count: int) -> Drop:
-    """Leave out the first of every `count` updates."""
+    """Drop the first of every `count` updates."""
     return lambda since: since % count == 0
 
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """What goes wrong from update `begin` to before update `end`, the first update of a flight being 0.
+    """A fault from update `begin` until before update `end`; the first update of a flight is 0.
 
-    alter:        what the controller is handed instead.
-    drop:         at which updates it is not called; its command is held.
-    late_updates: by how many updates its command comes late.
+    alter:        computes the controller's inputs.
+    drop:         decides at which updates the controller is not called; its last command is held.
+    late_updates: delay of the commands in updates.
     """
 
     begin: int
@@ -129,23 +129,23 @@ class Fault:
     late_updates: int = 0
 
     def active(self, update: int) -> bool:
-        """Tell whether it lasts at this update."""
+        """Return whether the fault is present at this update."""
         return self.begin <= update < self.end
 
 
 @dataclass(frozen=True, eq=False)
 class Applied:
-    """What reaches the vehicle: command (n, 2), and status (n,), NOT_CALLED where there is none."""
+    """What reaches the drone: command (n, 2) and status (n,), NOT_CALLED if the controller did not run."""
 
     command_rad: NDArray[np.floating[Any]]
     status: IntArray
 
 
 class FaultyController:
-    """n controllers with faults before them; flight `row` has `faults[row]`.
+    """n controllers with faults at their inputs and outputs; flight `row` has `faults[row]`.
 
-    A controller of a batch is left out by handing it a state that is not a number: it refuses such a state,
-    and remembers nothing of it. One that knows no refusal must remember nothing at all, as the PD.
+    To drop an update of one controller in the batch, its state is NaN: the controller rejects it and keeps
+    its internal state. A controller that does not reject NaN must have no internal state, as the PD.
     """
 
     def __init__(self, controller: PositionController, faults: Sequence[Fault | None]) -> None:
@@ -158,7 +158,7 @@ class FaultyController:
         self._computed = deque([level] * (latest + 1), maxlen=latest + 1)
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
-        """Let the controllers step on what is left of states (n, 7), targets (n, 4) and thrusts (n,)."""
+        """Apply the faults to states (n, 7), targets (n, 4), thrusts (n,); step; delay the commands."""
         state, target, thrust = state.copy(), target.copy(), thrust_acceleration_m_s2.copy()
         called = np.ones(len(state), np.bool_)
         active = [(row, fault) for row, fault in self._faults if fault.active(self._update)]
@@ -183,13 +183,13 @@ class Reweightable(PositionController, Protocol):
     """A controller whose weights can be set in flight."""
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Replace tracking and effort weight by `weights` (n, 2); returns a status (n,)."""
+        """Set tracking and effort weight from `weights` (n, 2); return the status (n,)."""
         ...
 
 
 @dataclass(frozen=True)
 class WeightChange:
-    """Flight `row` gets other weights (tracking, effort) before update `update`."""
+    """New weights (tracking, effort) of flight `row`, set before update `update`."""
 
     row: int
     update: int
@@ -197,9 +197,9 @@ class WeightChange:
 
 
 class ReweightedController:
-    """n controllers whose weights somebody changes in flight; `answers` keeps (row, status) of each change.
+    """n controllers whose weights change in flight; `answers` records (row, status) of each change.
 
-    Controllers of the batch that keep their weights are handed NaN, which they refuse.
+    Controllers of the batch whose weights stay receive NaN, which they reject.
     """
 
     def __init__(self, controller: Reweightable, n: int, changes: Sequence[WeightChange]) -> None:
@@ -210,7 +210,7 @@ class ReweightedController:
         self.answers: list[tuple[int, int]] = []
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
-        """Set the weights that are due, and step."""
+        """Set the weights due at this update, and step."""
         due = [change for change in self._changes if change.update == self._update]
         if due:
             weights = np.full((self._n, 2), np.nan)
@@ -223,10 +223,9 @@ class ReweightedController:
 
 
 class LevellingCaller:
-    """A caller of n controllers who levels out after `patience` (n,) refused steps in a row.
+    """A caller of n controllers that commands zero tilt after `patience` (n,) consecutive rejected steps.
 
-    It commands level and starts the controller over from there by `reset` (`nmpc_reset`); the first step
-    that is not refused flies on from level.
+    It also calls `reset` (`nmpc_reset`) with zero tilt, so that the first accepted step starts from there.
     """
 
     def __init__(
@@ -238,11 +237,11 @@ class LevellingCaller:
         self._refused = np.zeros(len(patience), np.int64)
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
-        """Step, and level out where the patience is at its end."""
+        """Step; command zero tilt where `patience` steps in a row were rejected."""
         outcome = self._controller.step(state, target, thrust_acceleration_m_s2)
         self._refused = np.where(outcome.status != 0, self._refused + 1, 0)
         ended = self._refused == self._patience
-        if ended.any():  # the others are handed NaN, which they refuse
+        if ended.any():  # the other controllers receive NaN, which they reject
             self._reset(np.where(ended, 0.0, np.nan)[:, np.newaxis] * np.ones(2))
         levelled = (self._refused >= self._patience)[:, np.newaxis]
         return Applied(np.where(levelled, 0.0, outcome.command_rad), outcome.status)

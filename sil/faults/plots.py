@@ -10,9 +10,9 @@ from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, save, style
 
 
 def draw_faults(verdicts: Sequence[Verdict], stem: Path) -> tuple[Path, Path]:
-    """Draw largest error and time to be back, a fault a row, a colour a course; write stem.png and stem.svg.
+    """Draw largest error and recovery time, one row per fault, one colour per course.
 
-    What never comes back has no dot on the right.
+    Writes stem.png and stem.svg. A flight that does not recover has no dot on the right.
     """
     faults = list(dict.fromkeys(verdict.fault for verdict in verdicts))
     with style():

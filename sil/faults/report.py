@@ -1,4 +1,4 @@
-"""What flights with faults found: as a table, and as CSV."""
+"""Verdicts on flights with faults as Markdown table and CSV."""
 
 import csv
 import math
@@ -11,7 +11,7 @@ from mambo_nmpc.sil.faults.flights import COURSES, ORDER, Verdict, all_statuses
 
 
 def table(verdicts: Sequence[Verdict]) -> str:
-    """Spell the verdicts as a Markdown table, a fault a row, both courses side by side."""
+    """Return the verdicts as a Markdown table with one row per fault and both courses side by side."""
     head = ["fault", "status", "command, rad", "tilt, rad"]
     head += [f"{course}: {what}" for course in COURSES for what in ("error, m", "back after, s")]
     rows = [[*head, "end"], ["---"] * (len(head) + 1)]
@@ -34,7 +34,7 @@ _LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
 
 
 def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:
-    """Write a CSV file, a course and fault a line."""
+    """Write the verdicts as CSV, one line per course and fault."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [field.name for field in fields(Verdict)], lineterminator="\n")
         writer.writeheader()

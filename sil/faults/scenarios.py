@@ -1,4 +1,4 @@
-"""The faults that are flown: each by name, how long it lasts, and the statuses that it must bring about."""
+"""The list of faults: name, duration, effect, and the statuses that the controller must return."""
 
 import math
 from dataclasses import dataclass
@@ -28,13 +28,13 @@ TO_THE_END: Final = math.inf
 
 @dataclass(frozen=True, eq=False)
 class FaultScenario:
-    """A fault by name, without its moment.
+    """A named fault without its onset.
 
-    answers: the statuses that it must bring about, each of them and no other; None where that is open.
-    weights: tracking and effort weight set when it begins; the right ones come back when it ends.
-    moved_m: how far along x the target has truly moved, once it has begun.
-    turning: whether the drone turns its heading throughout.
-    levelled: whether the caller levels out at `sil.faults.flights.PATIENCE` refused steps.
+    answers: exactly the statuses that the controller must return during the fault; None: any.
+    weights: tracking and effort weight set at the onset; the settings' weights return at the end.
+    moved_m: displacement of the true target along x from the onset on.
+    turning: whether the heading turns throughout the flight.
+    levelled: whether the caller commands zero tilt after `flights.PATIENCE` rejected steps.
     """
 
     name: str
@@ -55,7 +55,7 @@ _DEGREES_PER_RAD: Final = 180.0 / math.pi
 
 
 def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
-    """Return the faults for a controller: its ranges say what is beyond them."""
+    """Return the faults; their magnitudes depend on the input ranges of `settings`."""
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
     right = settings.cost
@@ -118,5 +118,5 @@ def _only(*statuses: int) -> frozenset[int]:
 
 
 def _scaled(position: float, attitude: float) -> Alter:
-    """Scale position and velocity, roll, pitch and yaw."""
+    """Scale position and velocity by one factor, roll, pitch and yaw by another."""
     return state_scaled([position] * 4 + [attitude] * 3)

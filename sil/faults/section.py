@@ -1,4 +1,4 @@
-"""Flights with faults on a page: a fault a row, both courses side by side."""
+"""The section of the report on flights with faults: one row per fault, both courses side by side."""
 
 import math
 from pathlib import Path
@@ -34,7 +34,7 @@ def faults_section(_folder: Path, summary: FaultsSummary) -> Section:
 
 
 def _bar_percent(error_m: float, largest_m: float) -> float:
-    """Return the length of a bar, in %, on a logarithmic scale from a centimetre to the largest error."""
+    """Return the length of a bar in % on a logarithmic scale from 0.01 m to the largest error."""
     if not error_m > _SHORTEST_BAR_M or largest_m <= _SHORTEST_BAR_M:
         return 0.0
     return round(100.0 * math.log(error_m / _SHORTEST_BAR_M) / math.log(largest_m / _SHORTEST_BAR_M), 1)

@@ -1,4 +1,4 @@
-"""What a command found, as one record: written as the summary of its folder, printed, and read back."""
+"""The base of the record of a command: printed, written as the summary of its result folder, read back."""
 
 import json
 import math
@@ -11,11 +11,11 @@ from mambo_nmpc.codegen import __version__
 from mambo_nmpc.sil.files.folders import GENERATOR, SUMMARY, finite
 
 Number = Annotated[int | float, BeforeValidator(lambda value: math.nan if value is None else value)]
-"""A measured value; NaN and infinity are null in JSON, null is read as NaN, and a whole number stays one."""
+"""A measured value: NaN and infinity become null in JSON, null is read as NaN, a whole number stays whole."""
 
 
 class Summary(BaseModel):
-    """What every summary begins with; keys that a later version may add are passed over."""
+    """The keys of every summary; unknown keys, which a later version may add, are ignored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore")
 

@@ -1,4 +1,4 @@
-"""A flight that moves on a page: its pictures from above and from the side, and the data that move them."""
+"""The animation of a flight on a page: paths seen from above and from the side, and positions over time."""
 
 import math
 from collections.abc import Mapping
@@ -12,18 +12,18 @@ from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 LONGEST_S: Final = 200.0
-"""What is shown of a long flight, in s."""
+"""Part of a long flight that is shown."""
 
 _STEP_S: Final = 0.1
 _LEAST_SPAN_CM: Final = 100.0
 _STRAY: Final = 0.75
 _MARGIN: Final = 0.08
-"""Of the width: the script draws a drone that reaches so far."""
+"""Margin over the width of the view; the drone that the script draws extends that far."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What is seen from one direction, in cm: a viewBox, grid lines, and a path for target and drones."""
+    """One view in cm: SVG viewBox, grid lines, and paths of target and drones."""
 
     box: tuple[int, int, int, int]
     vertical: list[int]
@@ -34,10 +34,11 @@ class View:
 
 @dataclass(frozen=True)
 class Animation:
-    """Flights along one target.
+    """Flights along one target, in two views.
 
-    hues: numbers of the drones' colours; the PD has one of its own.
-    data: what the script moves the drones by, in cm, mrad and s.
+    hues:    number of each drone's colour; the PD has its own.
+    shown_s: end of the part that is shown; `whole` is true if that is the whole flight.
+    data:    positions in cm, angles in mrad and times in s, from which the script draws the drones.
     """
 
     names: list[str]
@@ -51,10 +52,10 @@ class Animation:
 
 
 def animate(flights: Mapping[str, Trace]) -> Animation:
-    """Return the first flight of each trace, along the target of the first trace.
+    """Return the animation of the first flight of each trace, along the target of the first trace.
 
-    A drone that strays leaves the picture: it shows the target, and on each side at most three quarters
-    of the target's larger extent.
+    The view contains the target and at most 0.75 of its larger extent beyond it on each side, so a drone
+    further away is out of view.
     """
     first = next(iter(flights.values()))
     begin_s = float(first.time_s[0])
@@ -94,12 +95,12 @@ def animate(flights: Mapping[str, Trace]) -> Animation:
 
 
 def _sampled(times_s: FloatArray, trace: Trace, values: FloatArray) -> FloatArray:
-    """Return values (k, m) of a trace at other times (j, m)."""
+    """Interpolate values (k, m) of a trace at times (j,); return (j, m)."""
     return np.stack([np.interp(times_s, trace.time_s, column) for column in values.T], axis=-1)
 
 
 def _range(target: FloatArray, drones: list[FloatArray], stray_cm: float) -> tuple[float, float]:
-    """Return from where to where a view goes, without margins."""
+    """Return the limits of a view along one axis, without margins."""
     low, high = float(np.min(target)), float(np.max(target))
     flown = np.concatenate([drone[np.isfinite(drone)] for drone in drones] or [np.zeros(0)])
     if len(flown):
@@ -110,7 +111,7 @@ def _range(target: FloatArray, drones: list[FloatArray], stray_cm: float) -> tup
 
 
 def _grid(span_cm: float) -> int:
-    """Return the distance of the grid lines: 1, 2 or 5 times a power of ten, about five to the picture."""
+    """Return the distance of the grid lines: 1, 2 or 5 times a power of ten, for about five lines."""
     power = 10.0 ** math.floor(math.log10(span_cm / 3.0))
     return max(1, int(power * max(digit for digit in (1, 2, 5) if digit * power <= span_cm / 3.0)))
 
@@ -130,13 +131,13 @@ def _view(
 
 
 def _path(points_cm: FloatArray) -> str:
-    """Spell points (k, 2) as an SVG path; it ends where a flight is lost."""
+    """Return points (k, 2) as an SVG path, which ends where a flight is lost."""
     finite = points_cm[np.isfinite(points_cm).all(axis=-1)]
     return "M" + " ".join(f"{x:.0f},{y:.0f}" for x, y in finite.tolist()) if len(finite) else ""
 
 
 def _numbers(values: FloatArray, digits: int = 1) -> list[list[float | None]]:
-    """Return values (k, m) rounded; None for what is lost."""
+    """Return rounded values (k, m), None where a flight is lost."""
     return [
         [round(value, digits or None) if math.isfinite(value) else None for value in row]
         for row in values.tolist()

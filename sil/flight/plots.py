@@ -1,4 +1,4 @@
-"""Pictures of flights, after the paper's Fig. 3: path, error, commands; as files, and for a page."""
+"""Pictures of flights as in the paper's Fig. 3: path, error, commands; as files and for a page."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,9 +19,9 @@ _HEIGHT_INCHES: Final = 8.2
 
 
 def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
-    """Draw the first flight of each trace as a column under its title; write stem.png and stem.svg.
+    """Draw the first flight of each trace as one column with the same scales in all columns.
 
-    The columns share their scales, so that they can be compared by eye.
+    Writes stem.png and stem.svg.
     """
     with style():
         figure = Figure(figsize=(PANEL_INCHES * len(flights), _HEIGHT_INCHES), layout="constrained")
@@ -47,7 +47,7 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
 
 
 def _draw_path(axes: Axes, trace: Trace, title: str) -> None:
-    """Draw the target as a broad line beneath: it stays visible however often it is flown around."""
+    """Draw path and target; the target is a broad line below the path, so that both stay visible."""
     target, flown = trace.target[:, 0], trace.position_m[:, 0]
     axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=4, label="target")
     axes.plot(flown[:, 0], flown[:, 1], color=FLOWN, label="flown")
@@ -61,13 +61,13 @@ def _draw_error(axes: Axes, trace: Trace) -> None:
 
 
 def _draw_angle(axes: Axes, trace: Trace, axis: int) -> None:
-    """Draw the command as a broader line beneath: both show where they agree, and where one chatters."""
+    """Draw angle and command; the command is a broader line below the angle, so that both stay visible."""
     axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=2, label="command")
     axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=0.9, label="flown")
 
 
 def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:
-    """Return a picture for each flight: path, error, roll and pitch, on scales they share."""
+    """Return one picture per flight: path, error, roll and pitch, with the same scales in all."""
     with style():
         figures = [_column(title, trace) for title, trace in flights.items()]
         for row in zip(*(figure.axes for figure in figures), strict=True):

@@ -1,4 +1,4 @@
-"""Flights on a page: what was flown, how it tracked, pictures and animation."""
+"""The sections of the report on single flights: parameters, metrics, pictures and animation."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -33,7 +33,7 @@ def fly_section(folder: Path, summary: FlySummary) -> Section:
 
 
 def replay_section(folder: Path, summary: ReplaySummary) -> Section:
-    """Return the section of a flight that was flown again; raises TraceError."""
+    """Return the section of a replayed flight; raises TraceError."""
     name = PD if summary.controller == "pd" else "NMPC"
     facts = {
         "record": summary.replay,
@@ -46,14 +46,14 @@ def replay_section(folder: Path, summary: ReplaySummary) -> Section:
 
 
 def traces(folder: Path, files: Mapping[str, str]) -> tuple[dict[str, Trace], list[str]]:
-    """Return the traces that are there by title, and the files that are not; raises TraceError."""
+    """Return the existing traces by title, and the names of missing files; raises TraceError."""
     here = {path.name: path for path in folder.iterdir()}
     flights = {title: read_npz(here[name]) for title, name in files.items() if name in here}
     return flights, [name for name in files.values() if name not in here]
 
 
 def pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
-    """Return the moving and the still pictures of flights, if there are any."""
+    """Return animation and pictures of flights, if there are any."""
     return {
         "animation": animate(flights) if flights else None,
         "columns": flight_columns(flights) if flights else [],
@@ -71,7 +71,7 @@ def _course(flown: FlySummary | Scenario) -> dict[str, str]:
 def _flight(
     folder: Path, summary: FlightSummary, names: tuple[str, str], facts: dict[str, str], bad: list[str]
 ) -> Section:
-    """Return the section of a flight; `names` are of drone and section, `bad` says what is wrong."""
+    """Return the section of a flight; `names` has the names of drone and section, `bad` the faults found."""
     flights, missing = traces(folder, {names[0]: "trace.npz"})
     if summary.lost:
         bad = [*bad, "the vehicle left the world before the end of the flight"]

@@ -1,1 +1,1 @@
-"""Table II of the paper, flown again."""
+"""Table II of the paper, reproduced in simulation."""

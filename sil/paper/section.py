@@ -1,4 +1,4 @@
-"""Table II on a page: as printed, as flown, claim by claim; and through sensors."""
+"""The sections of the report on Table II: printed and measured indices, claims, and flights with sensors."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def table2_section(folder: Path, summary: Table2Summary) -> Section:
 
 
 def sensed_section(_folder: Path, summary: SensedSummary) -> Section:
-    """Return the section of Table II through sensors."""
+    """Return the section of Table II with sensors."""
     lost, flown = (sum(getattr(row, key) for row in summary.rows) for key in ("lost", "flights"))
     content = {"rows": summary.rows, "indices": INDICES}
-    return Section("sensed", "Table II through sensors", lost == 0, f"{flown} flights, {lost} lost", content)
+    return Section("sensed", "Table II with sensors", lost == 0, f"{flown} flights, {lost} lost", content)

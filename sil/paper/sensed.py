@@ -1,4 +1,4 @@
-"""The Table II case with sensors: PD and NMPC on the truth, and through both estimators."""
+"""The Table II case with sensors: PD and NMPC with the true state, and with both estimators."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from mambo_nmpc.sil.sensors.instruments import Sensors
 from mambo_nmpc.sil.show.numbers import digits
 
 PRESETS: Final = ("mambo", "table1")
-"""Which fly beside the PD."""
+"""Presets that are compared with the PD."""
 FLIGHTS: Final = 20
-"""Flights of a row with noise, seeds 0 and up."""
+"""Flights of a row with noise; their seeds count from 0."""
 
 VIEWS: Final[dict[str, Sensors | None]] = {
     "the truth": None,
@@ -34,10 +34,10 @@ VIEWS: Final[dict[str, Sensors | None]] = {
 
 @dataclass(frozen=True)
 class SensedRow:
-    """One controller with one view of the state: medians over its flights.
+    """One controller with one source of its state: medians over its flights.
 
-    tracked: indices of the true error. seen: those of the error that the estimates suggest.
-    worst_iae_m_s: the largest of the true IAE. drift_m: horizontal error of the estimate at the end.
+    tracked: indices of the true error. seen: indices of the estimated error.
+    worst_iae_m_s: largest true IAE. drift_m: horizontal error of the position estimate at the end.
     """
 
     controller: str
@@ -51,12 +51,12 @@ class SensedRow:
 
 
 class SensedSummary(Summary):
-    """The Table II case through sensors and estimators."""
+    """The Table II case with sensors and estimators."""
 
     command = "table2 --sensors"
 
     scalar: str | None
-    """The type of numbers that was asked for instead of the presets' own."""
+    """Scalar type that replaces that of the presets, if any."""
     rows: list[SensedRow]
 
 
@@ -67,7 +67,10 @@ def fly_sensed(
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
 ) -> list[SensedRow]:
-    """Fly the case with the PD and the compiled C of `settings` by name, each with every view."""
+    """Fly the case with the PD and the compiled C of `settings` by name, each with every one of `VIEWS`.
+
+    Calls `progress` with the share done; rows without noise have one flight.
+    """
     jobs = [(name, view) for name in (PD, *settings) for view in VIEWS]
     rows = []
     for index, (name, view) in enumerate(jobs):
@@ -121,7 +124,7 @@ def _medians(metrics: Metrics) -> Four:
 
 
 def text(rows: Sequence[SensedRow]) -> str:
-    """Spell the rows as a Markdown table, after the printed ones."""
+    """Return the rows as a Markdown table, below those printed in the paper."""
     heads = ("controller", "sees", "flights", *INDICES, "worst IAE", "IAE as seen", "drift, m")
     lines = [" | ".join(heads), " | ".join(["---"] * 3 + ["---:"] * 7)]
     for name, printed in (("PD, printed", PRINTED_PD), ("NMPC, printed", PRINTED_NMPC)):

@@ -1,4 +1,4 @@
-"""Table II of the paper, flown again: PD and every preset, measured beside printed, claim by claim."""
+"""Table II of the paper, reproduced: PD and every preset, printed and measured indices, claims."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ CASES: Final[dict[str, Trajectory]] = {
     "Bernoulli 0.25 rad/s": Bernoulli(2.0, 0.25),
     "Gerono 0.25 rad/s": Gerono(2.0, 0.25),
 }
-"""The Table II case, which reproduces the printed PD row, and the two readings of the printed text."""
+"""The trajectory that reproduces the printed PD row, and the two that the paper's text may mean."""
 
 DURATION_S: Final = 100.0
 _CLOSE: Final = 0.10
@@ -44,12 +44,12 @@ class Table2Row:
     controller: str
     measured: Four
     improvement: Four | None
-    """PD over this controller, index by index; None for the PD itself."""
+    """Ratio of the PD's index to this controller's, for each index; None for the PD itself."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, what was measured, and whether it holds."""
+    """A claim of the paper, the measurement, and whether the claim holds."""
 
     text: str
     holds: bool
@@ -57,12 +57,12 @@ class Claim:
 
 
 class Table2Summary(Summary):
-    """Table II, flown again."""
+    """Results of the command `table2`."""
 
     command = "table2"
 
     scalar: str | None
-    """The type of numbers that was asked for instead of the presets' own."""
+    """Scalar type that replaces that of the presets, if any."""
     cases: list[str]
     rows: list[Table2Row]
     claims: list[Claim]
@@ -73,7 +73,7 @@ def fly_table2(
 ) -> dict[str, Trace]:
     """Fly every case with the PD and with the compiled C of `settings` by name, 100 s each.
 
-    Returns the traces by controller, one flight for each case, in order.
+    Calls `progress` with the share done. Returns the traces by controller, with one flight for each case.
     """
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
     controllers: dict[str, PositionController] = {PD: PdController()}
@@ -90,13 +90,13 @@ def fly_table2(
 
 
 def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summary:
-    """Compare what `fly_table2` flew with what is printed, and judge the claims of section III."""
+    """Compare the traces of `fly_table2` with the printed table, and judge the claims of section III."""
     rows = _rows(traces)
     return Table2Summary(scalar=scalar, cases=list(CASES), rows=rows, claims=_claims(rows))
 
 
 def table2_text(summary: Table2Summary) -> str:
-    """Spell Table II: a block for each case, printed above measured, then what the paper claims."""
+    """Return Table II as text: a block for each case, printed above measured, then the claims."""
     lines = [f"{'':68}  PD over NMPC"]
     for case in CASES:
         lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]

@@ -1,1 +1,1 @@
-"""How results look: plots, pages, animation."""
+"""Presentation of results: style of pictures, HTML pages, sections of the report, format of numbers."""

@@ -1,4 +1,4 @@
-"""Pages: HTML in one look that needs no other file; whatever comes from a file is escaped."""
+"""HTML pages in one style that need no other file; all text from files is escaped."""
 
 import base64
 import hashlib
@@ -14,9 +14,9 @@ _SCRIPT: Final = "flight.js"
 
 
 def render_page(template: str, context: Mapping[str, Any]) -> str:
-    """Render a template of templates/report; values are escaped unless they are markup made by `sil`.
+    """Render a template of templates/report; values are escaped unless they are of type `Markup`.
 
-    The page forbids itself the network and every script but ours.
+    The content security policy of the page forbids network access and every script but flight.js.
     """
     loader = jinja2.PackageLoader("mambo_nmpc.templates", "report")
     environment = jinja2.Environment(

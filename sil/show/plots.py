@@ -1,4 +1,4 @@
-"""How pictures look: one style; PNG and SVG files; and SVG on a page, in its colours, light or dark."""
+"""Pictures: the common style, PNG and SVG files, and SVG for pages in their colours, light or dark."""
 
 import contextlib
 import hashlib
@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
 TARGET, FLOWN, COMMAND = "#c4c4c4", "#0072B2", "#E69F00"
-"""Colours that stay apart for colour-blind readers and in grey (Okabe and Ito)."""
+"""Colours that colour-blind readers and grey prints can distinguish (Okabe and Ito)."""
 
 PANEL_INCHES: Final = 4.2
-"""Width of a picture on a page, of which two stand side by side."""
+"""Width of a picture on a page, which shows two side by side."""
 
 _STYLE: Final[dict[Any, Any]] = {
     "font.size": 9,
@@ -43,12 +43,12 @@ _VARIABLES: Final = {
     "#1f77b4": "var(--flown)",
     "#ff7f0e": "var(--other)",
 }
-"""Colours of the pictures on white, the first two of matplotlib's cycle among them, and the page's names."""
+"""CSS variable of the page for each colour of a picture, the first two of matplotlib's cycle included."""
 
 
 @contextlib.contextmanager
 def style() -> Iterator[None]:
-    """Draw in our style, whatever the user's matplotlibrc says, and without a word on missing glyphs."""
+    """Set the common style, independent of the user's matplotlibrc; missing glyphs give no warning."""
     with mpl.rc_context(), warnings.catch_warnings():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
@@ -73,7 +73,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
 
 
 def inline(figure: Figure, description: str) -> Markup:
-    """Return a figure as an SVG element: no background, the page's font and colours, ids of its own."""
+    """Return a figure as an SVG element: transparent, with the page's font and colours and unique ids."""
     text = io.StringIO()
     figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
@@ -91,7 +91,7 @@ def inline(figure: Figure, description: str) -> Markup:
 
 
 def _with_own_ids(svg: str) -> str:
-    """Return the SVG with ids made of its content: those of matplotlib vary with the last bit of a place."""
+    """Return the SVG with ids derived from its content; matplotlib's depend on last bits of positions."""
     found = list(dict.fromkeys(re.findall(r' id="([^"]+)"', svg)))
     numbered = {name: f"n{number}" for number, name in enumerate(found)}
     plain = re.sub("|".join(found), lambda name: numbered[name[0]], svg)

@@ -1,4 +1,4 @@
-"""A section of the report: what the page shows of one result folder."""
+"""A section of the report: the part of the page on one result folder."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -6,13 +6,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Section:
-    """What a page shows of one folder.
+    """The part of a page on one result folder.
 
-    template: of templates/report, without `_` and `.html.j2`; `content` is what it is filled with.
-    good:     whether what was run came out well; None if there is nothing to judge.
-    finding:  the result in a line.
-    missing:  files of the folder that would have shown more.
-    moves:    whether it has an animation, which needs the page's script.
+    template: name of a template in templates/report, without `_` and `.html.j2`; `content` is its context.
+    good:     whether the result is good; None if there is no verdict.
+    finding:  the result in one line.
+    missing:  files missing in the folder, whose content the section would show.
+    moves:    whether the section has an animation, which needs the page's script.
     """
 
     template: str

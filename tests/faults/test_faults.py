@@ -1,4 +1,4 @@
-"""Faults in flight: what reaches the controller, what reaches the vehicle, and how flights are judged."""
+"""Faults in flight: inputs of the controller, commands to the drone, verdicts, and the check of `verify`."""
 
 import json
 import math
@@ -57,18 +57,18 @@ BEGAN = ControllerInput(-NOW.state, -NOW.target, 1.0)
 FLOWN_S = 1.5
 
 
-def flown(controller: PositionController, flights: int = 1) -> Trace:
-    """Fly the beginning of the Table II case."""
+def fly_start(controller: PositionController, flights: int = 1) -> Trace:
+    """Fly the first 1.5 s of the Table II case."""
     return fly(Flight(EIGHT, duration_s=FLOWN_S, flights=flights), controller)
 
 
-def with_fault(fault: Fault | None) -> Trace:
-    """Fly one flight of the C with a fault."""
-    return flown(FaultyController(CompiledController(MAMBO), [fault]))
+def fly_with(fault: Fault | None) -> Trace:
+    """Fly the compiled C with a fault."""
+    return fly_start(FaultyController(CompiledController(MAMBO), [fault]))
 
 
-def test_a_fault_alters_what_it_names_and_nothing_else() -> None:
-    """Each fault on inputs whose every value differs."""
+def test_a_fault_alters_only_the_inputs_that_it_names() -> None:
+    """Each fault is applied to inputs of distinct values; all other values stay."""
     frozen = frozen_state(NOW, BEGAN, 3)
     assert (frozen.state.tolist(), frozen.target.tolist()) == (BEGAN.state.tolist(), NOW.target.tolist())
     burst = state_set_to(0, math.inf, on=2, of=5)
@@ -85,30 +85,30 @@ def test_a_fault_alters_what_it_names_and_nothing_else() -> None:
 
 @pytest.mark.parametrize("yaw_rad", [-7.0, -3.2, -3.0, 0.0, 3.1, 3.2, 100.0])
 def test_a_wrapped_yaw_is_the_same_heading_within_half_a_turn(yaw_rad: float) -> None:
-    """It differs by whole turns."""
+    """The wrapped yaw is in [-pi, pi) and differs by a multiple of 2 pi."""
     wrapped = yaw_wrapped(replace(NOW, state=np.array([0.0] * 6 + [yaw_rad])), BEGAN, 0).state[6]
     assert -math.pi <= wrapped < math.pi
     assert math.isclose(math.remainder(wrapped - yaw_rad, 2 * math.pi), 0.0, abs_tol=1e-12)
 
 
 def test_without_a_fault_the_wrapper_changes_no_bit() -> None:
-    """No fault, and a fault that alters nothing."""
-    plain = flown(CompiledController(MAMBO))
-    assert with_fault(None).same_bits(plain)
-    assert with_fault(Fault(20, 100)).same_bits(plain)
+    """Neither no fault nor a fault with default effects changes a bit of the trace."""
+    plain = fly_start(CompiledController(MAMBO))
+    assert fly_with(None).same_bits(plain)
+    assert fly_with(Fault(20, 100)).same_bits(plain)
 
 
 def test_a_fault_begins_and_ends_on_time() -> None:
-    """The controller refuses exactly the updates that hold NaN."""
-    status = with_fault(Fault(20, 50, state_set_to(0, math.nan))).status[:, 0]
+    """The controller rejects exactly the updates with NaN."""
+    status = fly_with(Fault(20, 50, state_set_to(0, math.nan))).status[:, 0]
     assert np.flatnonzero(status == Status.BAD_STATE).tolist() == list(range(20, 50))
     assert np.unique(status).tolist() == [Status.OK, Status.BAD_STATE]
 
 
-def test_a_frozen_state_is_that_of_the_begin() -> None:
-    """The controller answers as if the drone had stayed where it was."""
+def test_a_frozen_state_is_the_state_at_the_onset() -> None:
+    """During the fault the controller receives the state of the first update of the fault."""
     shown: list[NDArray[np.float64]] = []
-    flown(FaultyController(Watched(CompiledController(MAMBO), shown), [Fault(30, 60, frozen_state)]))
+    fly_start(FaultyController(Watched(CompiledController(MAMBO), shown), [Fault(30, 60, frozen_state)]))
     assert all(np.array_equal(shown[update], shown[30]) for update in range(30, 60))
     assert not np.array_equal(shown[60], shown[30])
     assert not np.array_equal(shown[30], shown[29])
@@ -116,20 +116,20 @@ def test_a_frozen_state_is_that_of_the_begin() -> None:
 
 @dataclass(frozen=True, eq=False)
 class Watched:
-    """A controller that writes down which states it is handed."""
+    """A controller that records the states it receives."""
 
     controller: PositionController
     shown: list[NDArray[np.float64]]
 
     def step(self, state: Any, target: Any, thrust: Any) -> Any:
-        """Write down and step."""
+        """Record the state and step."""
         self.shown.append(state.copy())
         return self.controller.step(state, target, thrust)
 
 
 @dataclass(eq=False)
 class Skipping:
-    """A controller that is truly not called at some updates; its last command is held."""
+    """A controller that is not called at some updates; its last command is held."""
 
     controller: CompiledController
     skipped: frozenset[int]
@@ -149,69 +149,69 @@ class Skipping:
 @pytest.mark.parametrize(
     ("drop", "skipped"), [(always, range(20, 60)), (every(3), range(20, 60, 3))], ids=["all", "every third"]
 )
-def test_a_dropped_tick_is_a_controller_that_was_not_called(drop: Any, skipped: range) -> None:
-    """The flight equals, bit for bit, that of a controller that is really left out."""
-    really = flown(Skipping(CompiledController(MAMBO), frozenset(skipped)))
-    assert with_fault(Fault(20, 60, drop=drop)).same_bits(really)
+def test_a_dropped_update_equals_a_controller_that_is_not_called(drop: Any, skipped: range) -> None:
+    """Passing NaN gives the same trace, bit for bit, as not calling the controller."""
+    really = fly_start(Skipping(CompiledController(MAMBO), frozenset(skipped)))
+    assert fly_with(Fault(20, 60, drop=drop)).same_bits(really)
 
 
 def test_late_commands_are_those_computed_earlier() -> None:
-    """While they are late the vehicle gets what was computed k updates ago, and what it had at first."""
+    """During the fault the drone receives the command of 5 updates ago, at first the last one on time."""
     computed: list[NDArray[Any]] = []
 
     class Noting:
-        """A controller that writes down what it computes."""
+        """A controller that records its commands."""
 
         controller = CompiledController(MAMBO)
 
         def step(self, state: Any, target: Any, thrust: Any) -> Any:
-            """Step and write down."""
+            """Step and record the command."""
             outcome = self.controller.step(state, target, thrust)
             computed.append(outcome.command_rad[0].astype(np.float64))
             return outcome
 
-    applied = flown(FaultyController(Noting(), [Fault(20, 60, late_updates=5)])).command_rad[:, 0]
+    applied = fly_start(FaultyController(Noting(), [Fault(20, 60, late_updates=5)])).command_rad[:, 0]
     for update in range(len(applied)):
         source = max(update - 5, 19) if 20 <= update < 60 else update
         assert np.array_equal(applied[update], computed[source]), update
 
 
-def test_a_fault_of_one_flight_leaves_the_others_alone() -> None:
-    """Two healthy flights beside a faulty one, weights and levelling included."""
+def test_a_fault_of_one_flight_does_not_affect_the_others() -> None:
+    """Two fault-free flights beside a faulty one, new weights and levelling included, keep their bits."""
     compiled = CompiledController(MAMBO, 3)
     reweighted = ReweightedController(compiled, 3, [WeightChange(1, 10, (0.0, 0.0))])
     caller = LevellingCaller(reweighted, compiled.reset, np.array([2, 2, 2]))
     nan = Fault(30, 80, state_set_to(0, math.nan))
-    together = flown(FaultyController(caller, [None, nan, None]), flights=3)
-    alone = flown(CompiledController(MAMBO))
+    together = fly_start(FaultyController(caller, [None, nan, None]), flights=3)
+    alone = fly_start(CompiledController(MAMBO))
     for row in (0, 2):
         assert np.array_equal(together.command_rad[:, row], alone.command_rad[:, 0])
         assert np.array_equal(together.position_m[:, row], alone.position_m[:, 0])
     assert not np.array_equal(together.position_m[:, 1], alone.position_m[:, 0])
 
 
-def test_bad_weights_are_refused_and_good_ones_taken() -> None:
-    """The answers come with their flight; refused weights change no bit of the flight."""
-    alone = flown(CompiledController(MAMBO))
+def test_bad_weights_are_rejected_and_good_ones_accepted() -> None:
+    """`answers` has the status of each flight's change; rejected weights change no bit of the flight."""
+    alone = fly_start(CompiledController(MAMBO))
     changes = [WeightChange(0, 30, (math.nan, 1.0)), WeightChange(1, 30, (0.0, 0.0))]
     reweighted = ReweightedController(CompiledController(MAMBO, 2), 2, changes)
-    trace = flown(reweighted, flights=2)
+    trace = fly_start(reweighted, flights=2)
     assert reweighted.answers == [(0, Status.BAD_WEIGHT), (1, Status.OK)]
     assert np.array_equal(trace.position_m[:, 0], alone.position_m[:, 0])
     held = trace.command_rad[30:, 1]
-    assert (held == held[0]).all()  # without weights no slope: the plan stays
+    assert (held == held[0]).all()  # both weights 0: the gradient is 0 and the plan stays
 
 
-def test_a_levelling_caller_levels_out_when_its_patience_ends() -> None:
-    """The last command is held for the patience, then level, then the controller flies on from level."""
+def test_a_levelling_caller_commands_zero_tilt_after_its_patience() -> None:
+    """The last command is held for 20 rejected steps, then zero tilt; the controller restarts from zero."""
     compiled = CompiledController(MAMBO)
     caller = LevellingCaller(compiled, compiled.reset, np.array([20]))
-    trace = flown(FaultyController(caller, [Fault(30, 80, state_set_to(0, math.nan))]))
+    trace = fly_start(FaultyController(caller, [Fault(30, 80, state_set_to(0, math.nan))]))
     command = trace.command_rad[:, 0]
     assert (command[30:49] == command[29]).all()
     assert command[29].any()
     assert not command[49:80].any()
-    assert np.abs(command[80]).max() <= 5 * 0.0206  # five growing steps of RPROP from level
+    assert np.abs(command[80]).max() <= 5 * 0.0206  # five growing steps of RPROP from zero tilt
 
 
 CHOSEN = (
@@ -223,8 +223,8 @@ CHOSEN = (
 
 
 @pytest.mark.long
-def test_verdicts_say_what_was_flown() -> None:
-    """Statuses, errors and recovery of faults whose outcome is known."""
+def test_verdicts_match_known_outcomes() -> None:
+    """Statuses, errors and recovery are those expected of an outage, a moved target and a wrapped yaw."""
     verdicts = fly_faults(MAMBO, lambda n: CompiledController(MAMBO, n), chosen=CHOSEN)
     assert [(v.course, v.fault) for v in verdicts] == [
         (course, one.name) for course in ("eight", "hover") for one in CHOSEN
@@ -235,7 +235,7 @@ def test_verdicts_say_what_was_flown() -> None:
     assert outage.end is End.BACK
     assert outage.recovery_s > 0.5
     assert outage.largest_error_m > outage.band_m
-    assert 2.9 < moved.largest_error_m < 3.1  # from the moment of the jump
+    assert 2.9 < moved.largest_error_m < 3.1  # the error at the jump
     assert moved.end is End.BACK
     assert wrapped.recovery_s == 0.0  # the heading is the same
     assert not wrong.expected
@@ -269,25 +269,23 @@ VERDICT = Verdict(
         ({"band_m": math.nan, "end": End.CRASHED}, CheckOutcome.INCOMPLETE, "without a fault"),
     ],
 )
-def test_a_check_fails_on_what_must_not_happen(
-    change: dict[str, Any], outcome: CheckOutcome, word: str
-) -> None:
-    """Each rule alone, beside a flight that went well; the figures are JSON."""
+def test_the_check_judges_each_rule(change: dict[str, Any], outcome: CheckOutcome, word: str) -> None:
+    """One violation beside a passed flight decides outcome and evidence; the figures are valid JSON."""
     found = judge([VERDICT, replace(VERDICT, **change)], MAMBO)
     assert found.outcome is outcome
     assert word in found.evidence
     json.dumps(found.figures, allow_nan=False)
 
 
-def test_a_fault_without_an_end_may_lead_away() -> None:
-    """Nobody comes back without a state."""
+def test_a_fault_without_an_end_need_not_be_recovered_from() -> None:
+    """A controller without a valid state cannot return to its target, and passes."""
     gone = replace(VERDICT, fault="state NaN to the end", end=End.AWAY, recovery_s=math.nan)
     assert judge([VERDICT, gone], MAMBO).outcome is CheckOutcome.PASSED
 
 
 @pytest.mark.long
 def test_the_check_passes_the_preset_and_leaves_its_table(tmp_path: Path) -> None:
-    """Faults, statuses and ends are those of the documentation."""
+    """Faults, statuses and ends equal those of the table in docs/faults.md."""
     chosen = subject(MAMBO, tmp_path)
     found = check(chosen)
     assert found.outcome is CheckOutcome.PASSED, found.evidence
@@ -304,15 +302,15 @@ def words(text: str) -> list[tuple[str, str, str]]:
 
 
 @pytest.mark.long
-def test_the_check_fails_a_controller_that_does_not_refuse(tmp_path: Path) -> None:
-    """Without the test of the attitude's range a NaN reaches the plan."""
+def test_the_check_fails_a_controller_that_accepts_nan(tmp_path: Path) -> None:
+    """A controller whose check of the state is removed lets NaN reach the plan, and fails."""
     right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
     chosen = subject(MAMBO, tmp_path, ("src/nmpc.c", right, "if (!((state != 0)"))
     assert check(chosen).outcome is CheckOutcome.FAILED
 
 
 def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:
-    """The lines in the documentation, in a program whose every state after the first is refused."""
+    """The code in docs/faults.md commands zero tilt from the fifth rejected step on."""
     compiler = require("gcc", "gcc")
     lines = re.search(r"```c\n(.*?)```", DOCS.read_text("utf-8"), re.DOTALL)
     assert lines is not None
@@ -324,8 +322,8 @@ def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:
         [*command, "-o", "caller"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert built.returncode == 0, built.stderr
-    said = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True).stdout.split()
-    good, *refused = map(float, said)
+    printed = subprocess.run([tmp_path / "caller"], capture_output=True, text=True, check=True).stdout
+    good, *refused = map(float, printed.split())
     assert good != 0
     assert refused == [good] * 4 + [0.0] * 2
 
@@ -355,15 +353,15 @@ LINES
 """
 
 
-def test_the_table_has_a_row_a_fault() -> None:
-    """Both courses side by side, the worse of both where there is one column."""
+def test_the_table_has_one_row_per_fault() -> None:
+    """Both courses are side by side; a column for both shows the worse."""
     text = table([VERDICT, replace(VERDICT, course="hover", largest_command_rad=0.35, end=End.AWAY)])
     assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
     assert "eight 0.100 m, hover 0.100 m" in text
 
 
-def test_a_turning_heading_turns_at_its_rate() -> None:
-    """The vehicle follows the heading that the yaw loop holds."""
+def test_the_heading_follows_its_yaw_rate() -> None:
+    """With a yaw reference of constant rate the drone turns at that rate."""
     trace = fly(Flight(Hover(), duration_s=6.0, yaw_rate_rad_s=0.5), CompiledController(MAMBO))
     assert trace.euler_rad[0, 0, 2] == 0.0
     turned_rad = trace.euler_rad[-1, 0, 2] - trace.euler_rad[-101, 0, 2]
