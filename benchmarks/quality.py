@@ -20,7 +20,7 @@ from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.campaign.flights import crashed
+from mambo_nmpc.sil.campaign.flights import detect_crashes
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.flight.loop import PositionController, fly
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
@@ -124,7 +124,7 @@ def fly_world(entrant: Variant, world: Sequence[Scenario]) -> FlownVariant:
     flight = flight_of(world, entrant.settings.horizon.update_period_s)
     trace = fly(flight, entrant.controller(len(world)))
     seen = trace.as_seen() if isinstance(trace, SensedTrace) else trace
-    return FlownVariant(measure(trace), measure(seen).iae_m_s, int(crashed(trace).sum()))
+    return FlownVariant(measure(trace), measure(seen).iae_m_s, int(detect_crashes(trace).sum()))
 
 
 def instructions(entrant: Variant) -> str:

@@ -59,16 +59,16 @@ class FlightSection(FileSection):
     sensors: SensorsName = "mambo-derotated"
 
 
-def _drawn(parameter: Parameter) -> Any:
+def _draw_field(parameter: Parameter) -> Any:
     """Return type and default of the key of a parameter."""
 
-    def validated(value: Any, parameter: Parameter) -> Distribution:
+    def validate(value: Any, parameter: Parameter) -> Distribution:
         try:
             return parse(value, parameter.domain)
         except ValueError as error:
             raise PydanticCustomError("draw", "{rule}", {"rule": str(error)}) from None
 
-    validator = PlainValidator(partial(validated, parameter=parameter))
+    validator = PlainValidator(partial(validate, parameter=parameter))
     written = PlainSerializer(lambda distribution: distribution.document())
     return Annotated[Distribution, validator, written], parameter.default
 
@@ -76,7 +76,7 @@ def _drawn(parameter: Parameter) -> Any:
 Draws: Any = create_model(
     "Draws",
     __base__=FileSection,
-    **{name: _drawn(parameter) for name, parameter in PARAMETERS.items()},
+    **{name: _draw_field(parameter) for name, parameter in PARAMETERS.items()},
 )
 
 
@@ -90,7 +90,7 @@ class CampaignFile(FileSection):
 
     @field_validator("controllers")
     @classmethod
-    def _some(cls, controllers: tuple[str, ...]) -> tuple[str, ...]:
+    def _check_count(cls, controllers: tuple[str, ...]) -> tuple[str, ...]:
         if not 1 <= len(controllers) <= _LONGEST_LIST:
             raise PydanticCustomError(
                 "controllers", f'must name 1 to {_LONGEST_LIST} controllers, as in ["pd", "mambo"]'
@@ -165,7 +165,7 @@ def read_as(model: type[File], path: Path) -> File:
         return model.model_validate(document)
     except ValidationError as error:
         details = error.errors(include_url=False, include_context=False)
-        raise InvalidSettingsError(tuple(f"{source}: {_fault(one, model)}" for one in details)) from None
+        raise InvalidSettingsError(tuple(f"{source}: {_explain(one, model)}" for one in details)) from None
 
 
 def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
@@ -211,14 +211,14 @@ def _entrant(named: str, folder: Path, source: str) -> Entrant:
     return Entrant(name, "nmpc", settings)
 
 
-def _fault(details: ErrorDetails, model: type[FileSection]) -> str:
+def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
     """Return a message that names a wrong key, its value and the rule."""
     names = [str(part) for part in details["loc"]]
     dotted = echo(".".join(names))
-    value = spelled(details["input"])
+    value = format_value(details["input"])
     match details["type"]:
         case "extra_forbidden":
-            return _unknown(names, dotted, model)
+            return _explain_unknown(names, dotted, model)
         case "model_type":
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
         case "greater_than_equal" | "less_than_equal":
@@ -237,7 +237,7 @@ def _section(names: Sequence[str], model: type[FileSection]) -> Any:
     return section
 
 
-def _unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str:
+def _explain_unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str:
     """Return a message that a key does not exist, with similar keys that do."""
     keys = list(_section(names, model).model_fields)
     near = [key for key in keys if key.startswith(f"{names[-1]}_")]
@@ -247,7 +247,7 @@ def _unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str
     return f"{dotted} is not a {what}; {choice}"
 
 
-def spelled(value: object) -> str:
+def format_value(value: object) -> str:
     """Return a value in about the notation of TOML, shortened, for messages."""
     if isinstance(value, dict) and len(value) == 1:
         ((key, inner),) = value.items()

@@ -65,7 +65,7 @@ def fly_batch(
         trace = fly(
             flight_of(scenarios, entrant.settings.horizon.update_period_s), _controller(entrant, len(drawn))
         )
-        for key, values in _found(trace).items():
+        for key, values in _evaluate(trace).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
     return rows
@@ -78,11 +78,11 @@ def _controller(entrant: Entrant, n: int) -> PositionController:
         return CompiledController(entrant.settings, n)
 
 
-def _found(trace: Trace) -> dict[str, list[Any]]:
+def _evaluate(trace: Trace) -> dict[str, list[Any]]:
     """Return the results of n flights by key, each a list of n."""
     refused = (trace.status != 0) & (trace.status != NOT_CALLED)
     found: dict[str, list[Any]] = {
-        CRASHED: crashed(trace).astype(int).tolist(),
+        CRASHED: detect_crashes(trace).astype(int).tolist(),
         REFUSED: refused.sum(axis=0).tolist(),
     }
     views = [("", INDICES, trace)]
@@ -94,7 +94,7 @@ def _found(trace: Trace) -> dict[str, list[Any]]:
     return found | {DIGEST: [trace.digest(flight) for flight in range(trace.flights)]}
 
 
-def crashed(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def detect_crashes(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Return which flights (n,) were lost, tilted beyond `CRASH_TILT_RAD` or on the ground after t = 0."""
     flown = trace.time_s >= 0.0
     angles_rad: FloatArray = trace.euler_rad[flown]

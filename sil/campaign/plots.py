@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mambo_nmpc.sil.campaign.file import PD
 from mambo_nmpc.sil.campaign.flights import CRASHED
-from mambo_nmpc.sil.campaign.statistics import COMPARED, Table, judged
+from mambo_nmpc.sil.campaign.statistics import COMPARED, Table, index_values
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, PlainLogFormatter, inline, save, style
 
@@ -39,12 +39,12 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
         panels = figure.subplots(rows, len(COMPARED), squeeze=False, sharey=True)
         for axes, index, label in zip(panels[0], COMPARED, _LABELS, strict=True):
             for colour, name in enumerate(names):
-                _draw_shares(axes, judged(table, name, index), f"C{colour}", name)
+                _draw_shares(axes, index_values(table, name, index), f"C{colour}", name)
             axes.set(xscale="log", xlabel=label, ylim=(0.0, 1.0))
         panels[0, 0].legend(loc="lower right", frameon=True)
         for axes, index, label in zip(panels[-1] if rows > 1 else (), COMPARED, _LABELS, strict=False):
             for colour, name in enumerate(names[1:], start=1):
-                theirs, ours = judged(table, names[0], index), judged(table, name, index)
+                theirs, ours = index_values(table, names[0], index), index_values(table, name, index)
                 with np.errstate(invalid="ignore", divide="ignore"):
                     _draw_shares(axes, theirs / ours, f"C{colour}", name)
             axes.axvline(1.0, color="#444444", linewidth=0.8)
@@ -72,7 +72,7 @@ def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup
             axes = figure.subplots()
             for row, name in enumerate(controllers):
                 if {f"{name}_{index}", f"{name}_{CRASHED}"} <= table.keys():
-                    values = np.sort(judged(table, name, index))
+                    values = np.sort(index_values(table, name, index))
                     shown = np.isfinite(values)
                     shares = 100.0 * np.arange(1, len(values) + 1) / len(values)
                     colour = COMMAND if name == PD else _HUES[row % len(_HUES)]

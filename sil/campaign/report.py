@@ -17,9 +17,9 @@ from mambo_nmpc.sil.campaign.statistics import (
     Table,
     distributions,
     improvements,
-    worst,
+    worst_flights,
 )
-from mambo_nmpc.sil.campaign.store import FLIGHT, FlightStore, refusals
+from mambo_nmpc.sil.campaign.store import FLIGHT, FlightStore, convert_os_errors
 from mambo_nmpc.sil.files.folders import SUMMARY
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.scenario import Record, write_record
@@ -89,7 +89,7 @@ class UnfinishedCampaign(Drawn, Summary):
     command = "campaign"
 
 
-def numeric(store: FlightStore) -> Table:
+def numeric_columns(store: FlightStore) -> Table:
     """Return the numeric columns of the table."""
     return {
         name: np.array(values, np.float64)
@@ -107,7 +107,7 @@ def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
         flights=len(table[FLIGHT]),
         controllers=distributions(table, names, sensed=sensed),
         improvements=improvements(table, names, sensed=sensed),
-        worst={name: [_worst(table, name, row) for row in worst(table, name)] for name in names},
+        worst={name: [_worst(table, name, row) for row in worst_flights(table, name)] for name in names},
     )
 
 
@@ -130,7 +130,7 @@ def write_records(campaign: Campaign, store: FlightStore) -> None:
     """Write one record per flight and controller for `fly --replay`; raises UnwritableError."""
     values = store.values()
     section = campaign.file.flight.model_dump()
-    with refusals(store.folder):
+    with convert_os_errors(store.folder):
         (store.folder / RECORDS).mkdir(exist_ok=True)
         for row, flight in enumerate(map(int, values[FLIGHT])):
             flown = scenario(section, campaign.draw(flight))
@@ -151,9 +151,9 @@ def finish(campaign: Campaign, store: FlightStore) -> CampaignSummary:
 
     store.put_in_order()
     write_records(campaign, store)
-    table = numeric(store)
+    table = numeric_columns(store)
     summary = summarise(campaign, table)
-    with refusals(store.folder):
+    with convert_os_errors(store.folder):
         draw_campaign(table, [entrant.name for entrant in campaign.entrants], store.folder / PICTURE)
         put(store.folder / SUMMARY, summary.text().encode())
     return summary

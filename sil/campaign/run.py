@@ -24,12 +24,12 @@ def table_columns(campaign: Campaign) -> tuple[str, ...]:
     return ("seed", *PARAMETERS, *columns(names, sensed=sensed))
 
 
-def opened(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
+def open_campaign(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
     """Open and lock the folder of a campaign; raises what `open_store` raises."""
     return open_store(folder, campaign.document(), table_columns(campaign))
 
 
-def missing(store: FlightStore, flights: int) -> list[int]:
+def missing_flights(store: FlightStore, flights: int) -> list[int]:
     """Return the numbers of the flights that are not in the table.
 
     Raises FlightError if the table has more than `flights`.
@@ -53,7 +53,7 @@ def fly_missing(
     batch: int = MOST_IN_A_BATCH,
 ) -> None:
     """Fly the missing flights and store them; call `progress` with the number of finished flights."""
-    left = missing(store, flights)
+    left = missing_flights(store, flights)
     size = max(1, min(batch, -(-len(left) // pool.workers)))
     drawn = {flight: campaign.draw(flight) for flight in left}
     entrants = [entrant.document() for entrant in campaign.entrants]

@@ -75,7 +75,7 @@ def proportion(count: int, flights: int) -> Proportion:
     return Proportion(count, flights, count / flights, float(interval.low), float(interval.high))
 
 
-def judged(table: Table, name: str, index: str) -> FloatArray:
+def index_values(table: Table, name: str, index: str) -> FloatArray:
     """Return an index of a controller (n,), infinite where it crashed."""
     return np.where(table[f"{name}_{CRASHED}"] > 0.0, math.inf, table[f"{name}_{index}"])
 
@@ -88,7 +88,7 @@ def quantiles(values: FloatArray) -> dict[str, float]:
 
 def improvement(table: Table, first: str, name: str, index: str) -> Improvement | None:
     """Compare a controller with the first one on the same flights; None if both crash in every flight."""
-    ours, theirs = judged(table, name, index), judged(table, first, index)
+    ours, theirs = index_values(table, name, index), index_values(table, first, index)
     comparable = np.isfinite(ours) | np.isfinite(theirs)
     if not comparable.any():
         return None
@@ -125,7 +125,7 @@ def _median_interval(values: FloatArray) -> tuple[float, float]:
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
-def worst(table: Table, name: str) -> list[int]:
+def worst_flights(table: Table, name: str) -> list[int]:
     """Return the rows of the `WORST` worst flights of a controller: crashes first, then by IAE."""
     order = np.lexsort((-np.nan_to_num(table[f"{name}_iae_m_s"], nan=math.inf), -table[f"{name}_{CRASHED}"]))
     return [int(position) for position in order[:WORST]]
@@ -138,7 +138,7 @@ def distributions(table: Table, names: Sequence[str], *, sensed: bool) -> dict[s
         name: Distributions(
             crashed=_share(table[f"{name}_{CRASHED}"]),
             refused_an_input=_share(table[f"{name}_{REFUSED}"]),
-            quantiles={index: quantiles(judged(table, name, index)) for index in indices},
+            quantiles={index: quantiles(index_values(table, name, index)) for index in indices},
         )
         for name in names
     }

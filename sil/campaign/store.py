@@ -18,7 +18,7 @@ from typing import Any, Final, Self
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
-from mambo_nmpc.sil.files.folders import GENERATOR, locked
+from mambo_nmpc.sil.files.folders import GENERATOR, lock
 
 TABLE: Final = "flights.csv"
 FLIGHT: Final = "flight"
@@ -47,7 +47,7 @@ class FlightStore:
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
         """Append finished flights and flush them to the disk; raises UnwritableError."""
         lines = {flight: self._line(flight, row) for flight, row in rows.items()}
-        with refusals(
+        with convert_os_errors(
             self._table, "; the flights finished so far are kept, and the same command goes on from there"
         ):
             self._write("".join(lines.values()).encode())
@@ -56,7 +56,7 @@ class FlightStore:
     def put_in_order(self) -> None:
         """Sort the table by flight, atomically."""
         ordered = [self._header(), *(self.lines[flight] for flight in sorted(self.lines))]
-        with refusals(self.folder):
+        with convert_os_errors(self.folder):
             put(self._table, "".join(ordered).encode())
 
     def values(self) -> dict[str, list[str]]:
@@ -84,7 +84,7 @@ class FlightStore:
         Raises ForeignFilesError for a table that this campaign did not write.
         """
         name = echo(str(self._table))
-        with refusals(self.folder):
+        with convert_os_errors(self.folder):
             if self._table.is_symlink() or (self._table.exists() and not self._table.is_file()):
                 raise ForeignFilesError(f"{name}: is not a plain file; move it away", (str(self._table),))
             content = self._table.read_bytes() if self._table.exists() else b""
@@ -118,16 +118,16 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
     Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
     locked it, UnwritableError if the file system refuses an access.
     """
-    with refusals(folder):
+    with convert_os_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder):
+    with lock(folder):
         claim(folder, "campaign", {"command": "campaign", **campaign})
         with FlightStore(folder, columns) as store:
             yield store
 
 
 @contextlib.contextmanager
-def refusals(place: Path, advice: str = "") -> Iterator[None]:
+def convert_os_errors(place: Path, advice: str = "") -> Iterator[None]:
     """Convert an OSError at or below `place` to an UnwritableError."""
     try:
         yield
@@ -152,7 +152,7 @@ def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
             raise ForeignFilesError(
                 f"{name}: holds files that are not from a mambo-nmpc {kind}; name another folder with -o", ()
             )
-        with refusals(folder):
+        with convert_os_errors(folder):
             put(path, (json.dumps(identity, indent=2) + "\n").encode())
         return
     difference = _difference("", held, json.loads(json.dumps(identity)))

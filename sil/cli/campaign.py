@@ -38,14 +38,14 @@ def campaign(
     from mambo_nmpc.sil.campaign import file
     from mambo_nmpc.sil.campaign.executors import cluster, processes
     from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text, finish
-    from mambo_nmpc.sil.campaign.run import missing, opened
+    from mambo_nmpc.sil.campaign.run import missing_flights, open_campaign
     from mambo_nmpc.sil.campaign.store import TABLE
     from mambo_nmpc.sil.files.folders import SUMMARY
 
     chosen = file.default() if source is None else file.read(source)
     pool = cluster(scheduler) if scheduler is not None else processes(workers or os.cpu_count() or 1)
-    with pool as open_pool, opened(chosen, output) as store:
-        if missing(store, flights):
+    with pool as open_pool, open_campaign(chosen, output) as store:
+        if missing_flights(store, flights):
             _fly(chosen, store, flights, open_pool)
         summary = finish(chosen, store)
     show(summary, campaign_text(summary, str(output)), as_json=as_json)

@@ -35,22 +35,22 @@ def tune(
     ] = None,
 ) -> None:
     """Search settings that track well with calm commands, on drawn flights; goes on where it stopped."""
-    from mambo_nmpc.sil.campaign.store import claim, refusals
-    from mambo_nmpc.sil.files.folders import locked
+    from mambo_nmpc.sil.campaign.store import claim, convert_os_errors
+    from mambo_nmpc.sil.files.folders import lock
     from mambo_nmpc.sil.tuning import file
-    from mambo_nmpc.sil.tuning.front import RULE, chosen, pareto_front
-    from mambo_nmpc.sil.tuning.study import judged, open_study
+    from mambo_nmpc.sil.tuning.front import RULE, choose, pareto_front
+    from mambo_nmpc.sil.tuning.study import finished_trials, open_study
 
     tuning = file.default() if source is None else file.read(source)
-    with refusals(output):
+    with convert_os_errors(output):
         output.mkdir(parents=True, exist_ok=True)
-    with locked(output):
+    with lock(output):
         claim(output, "study", {"command": "tune", **tuning.document()})
         with open_study(tuning, output, storage) as study:
             _search(tuning, study, output, trials, workers or os.cpu_count() or 1)
-            found = judged(study)
+            found = finished_trials(study)
         _finish(tuning, found, output)
-    best = chosen(pareto_front(found))
+    best = choose(pareto_front(found))
     for name, one in (*(("base", one) for one in _base(tuning, found)), ("chosen", best)):
         typer.echo(
             f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
@@ -64,9 +64,9 @@ def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers
     """Search until there are enough trials; say on Ctrl-C what is kept."""
     from mambo_nmpc.sil.campaign.executors import processes
     from mambo_nmpc.sil.cli.progress import counting_bar
-    from mambo_nmpc.sil.tuning.study import judged, search
+    from mambo_nmpc.sil.tuning.study import finished_trials, search
 
-    if len(judged(study)) >= trials:
+    if len(finished_trials(study)) >= trials:
         return
     try:
         with counting_bar("tuning", "trials", trials) as progress, processes(workers) as pool:
@@ -74,8 +74,8 @@ def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers
     except KeyboardInterrupt:
         with contextlib.suppress(OSError):
             typer.echo(
-                f"{echo(str(folder))}: stopped with {len(judged(study))} of {trials} trials finished; "
-                "the same command goes on from there",
+                f"{echo(str(folder))}: stopped with {len(finished_trials(study))} of {trials} trials "
+                "finished; the same command goes on from there",
                 err=True,
             )
         raise
@@ -89,11 +89,11 @@ def _base(tuning: "Tuning", found: "list[FinishedTrial]") -> "list[FinishedTrial
 def _finish(tuning: "Tuning", found: "list[FinishedTrial]", folder: Path) -> None:
     """Write what follows from the trials, the controller last."""
     from mambo_nmpc.codegen.atomic import put
-    from mambo_nmpc.sil.campaign.store import refusals
+    from mambo_nmpc.sil.campaign.store import convert_os_errors
     from mambo_nmpc.sil.tuning.front import controller_text, front_csv, pareto_front
     from mambo_nmpc.sil.tuning.plots import draw_front
 
-    with refusals(folder):
+    with convert_os_errors(folder):
         put(folder / f"{FRONT}.csv", front_csv(pareto_front(found)).encode())
         draw_front(found, _base(tuning, found), folder / FRONT)
         put(folder / CONTROLLER, controller_text(tuning, found).encode())

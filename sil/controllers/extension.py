@@ -23,7 +23,7 @@ from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.errors import CacheError
-from mambo_nmpc.sil.files.cache import cached
+from mambo_nmpc.sil.files.cache import build_cached
 
 _DECLARATIONS: Final = """
 typedef REAL nmpc_real_t;
@@ -105,7 +105,7 @@ def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> 
                 sorted(path for path in files if re.fullmatch(r"src/.*\.c", path)), toolchain, folder
             )
 
-        sys.modules[name] = _load(name, cached(f"{name}{suffix}", build))
+        sys.modules[name] = _load(name, build_cached(f"{name}{suffix}", build))
     return sys.modules[name]
 
 

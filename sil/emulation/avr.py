@@ -18,7 +18,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
 from mambo_nmpc.sil.emulation.gdb import GdbStub
 from mambo_nmpc.sil.errors import EmulationError, EmulatorError
-from mambo_nmpc.sil.files.cache import cached
+from mambo_nmpc.sil.files.cache import build_cached
 
 _EMULATOR: Final = "qemu-system-avr"
 _TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux"}
@@ -198,7 +198,7 @@ def _build_plugin() -> Path:
         raise EmulatorError(f"cannot compile the instruction counter for {_PART}: {error}") from error
     contents = "\n".join([source, str(interface), toolchain.identity()])
     name = f"qemu-count-{hashlib.sha256(contents.encode()).hexdigest()[:32]}.so"
-    return cached(name, lambda folder: _compile_plugin(source, interface, toolchain, folder))
+    return build_cached(name, lambda folder: _compile_plugin(source, interface, toolchain, folder))
 
 
 def _compile_plugin(source: str, interface: int, toolchain: Toolchain, folder: Path) -> Path:

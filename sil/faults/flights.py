@@ -141,7 +141,7 @@ def fly_faults(
     flight = _flight(sorties, period_s)
     compiled = controller(len(sorties))
     reweighted = ReweightedController(compiled, len(sorties), _weight_changes(sorties, settings))
-    patience = np.array([PATIENCE if _levelled(sortie) else NEVER for sortie in sorties])
+    patience = np.array([PATIENCE if _is_levelled(sortie) else NEVER for sortie in sorties])
     caller = LevellingCaller(reweighted, compiled.reset, patience)
     trace = fly(flight, FaultyController(caller, [_fault(sortie) for sortie in sorties]), progress)
     healthy = [sortie.scenario is None for sortie in sorties]
@@ -150,7 +150,7 @@ def fly_faults(
             f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
             f"{settings.ranges.velocity_m_s:g}: must include the figure of eight of Table II, 2 m and 1 m/s"
         )
-    return _judged(trace, sorties, reweighted.answers)
+    return _judge_faults(trace, sorties, reweighted.answers)
 
 
 def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
@@ -193,7 +193,7 @@ def _weight_changes(sorties: Sequence[_Sortie], settings: Settings) -> list[Weig
     return changes
 
 
-def _levelled(sortie: _Sortie) -> bool:
+def _is_levelled(sortie: _Sortie) -> bool:
     return sortie.scenario is not None and sortie.scenario.levelled
 
 
@@ -204,11 +204,11 @@ def _fault(sortie: _Sortie) -> Fault | None:
     return Fault(sortie.begin, sortie.end, scenario.alter, scenario.drop, scenario.late_updates)
 
 
-def _judged(
+def _judge_faults(
     trace: Trace, sorties: Sequence[_Sortie], answers: Sequence[tuple[int, int]]
 ) -> tuple[Verdict, ...]:
     """Return the verdict of every fault on every course."""
-    error_m = horizontal_error_m(_with_moved_targets(trace, sorties))
+    error_m = horizontal_error_m(_move_targets(trace, sorties))
     settled = trace.time_s >= TRANSIENT_S
     bands_m = {
         (sortie.course, sortie.turning): BAND_FACTOR * float(error_m[settled, row].max())
@@ -226,12 +226,14 @@ def _judged(
             sortie = sorties[row]
             refused = {status for answered, status in answers if answered == row and status != Status.OK}
             band_m = bands_m[sortie.course, sortie.turning]
-            each.append(_verdict(trace, row, sortie, error_m=error_m[:, row], band_m=band_m, refused=refused))
+            each.append(
+                _judge_flight(trace, row, sortie, error_m=error_m[:, row], band_m=band_m, refused=refused)
+            )
         verdicts.append(_worst(each))
     return tuple(verdicts)
 
 
-def _with_moved_targets(trace: Trace, sorties: Sequence[_Sortie]) -> Trace:
+def _move_targets(trace: Trace, sorties: Sequence[_Sortie]) -> Trace:
     target = trace.target.copy()
     for row, sortie in enumerate(sorties):
         if sortie.scenario is not None:
@@ -239,7 +241,7 @@ def _with_moved_targets(trace: Trace, sorties: Sequence[_Sortie]) -> Trace:
     return replace(trace, target=target)
 
 
-def _verdict(
+def _judge_flight(
     trace: Trace, row: int, sortie: _Sortie, *, error_m: FloatArray, band_m: float, refused: set[int]
 ) -> Verdict:
     """Judge flight `row`; `refused` holds the statuses of rejected weights."""

@@ -33,17 +33,17 @@ Drop = Callable[[int], bool]
 """Updates since the onset -> whether this update is dropped."""
 
 
-def untouched(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+def keep_inputs(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
     """Return the correct inputs."""
     return now
 
 
-def frozen_state(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+def freeze_state(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
     """Repeat the state at the onset; target and thrust stay correct."""
     return replace(now, state=began.state)
 
 
-def state_set_to(column: int | slice, value: float, *, on: int = 1, of: int = 1) -> Alter:
+def set_state(column: int | slice, value: float, *, on: int = 1, of: int = 1) -> Alter:
     """Overwrite columns of the state with `value` in the first `on` of every `of` updates."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
@@ -55,7 +55,7 @@ def state_set_to(column: int | slice, value: float, *, on: int = 1, of: int = 1)
     return alter
 
 
-def state_scaled(scale: ArrayLike) -> Alter:
+def scale_state(scale: ArrayLike) -> Alter:
     """Multiply the state by `scale` (7,), as a wrong unit does."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
@@ -64,7 +64,7 @@ def state_scaled(scale: ArrayLike) -> Alter:
     return alter
 
 
-def yaw_shifted(shift_rad: float) -> Alter:
+def shift_yaw(shift_rad: float) -> Alter:
     """Add `shift_rad` to the measured yaw."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
@@ -73,14 +73,14 @@ def yaw_shifted(shift_rad: float) -> Alter:
     return alter
 
 
-def yaw_wrapped(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+def wrap_yaw(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
     """Wrap the measured yaw to [-pi, pi): it jumps where the heading passes south."""
     state = now.state.copy()
     state[6] = (state[6] + np.pi) % (2.0 * np.pi) - np.pi
     return replace(now, state=state)
 
 
-def target_moved(by_m: float) -> Alter:
+def move_target(by_m: float) -> Alter:
     """Move the target along x."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
@@ -89,7 +89,7 @@ def target_moved(by_m: float) -> Alter:
     return alter
 
 
-def thrust_reported(value_m_s2: float) -> Alter:
+def report_thrust(value_m_s2: float) -> Alter:
     """Overwrite the thrust acceleration."""
 
     def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
@@ -98,17 +98,17 @@ def thrust_reported(value_m_s2: float) -> Alter:
     return alter
 
 
-def never(since: int) -> bool:  # noqa: ARG001 - a Drop
+def drop_none(since: int) -> bool:  # noqa: ARG001 - a Drop
     """Drop no update."""
     return False
 
 
-def always(since: int) -> bool:  # noqa: ARG001 - a Drop
+def drop_all(since: int) -> bool:  # noqa: ARG001 - a Drop
     """Drop every update."""
     return True
 
 
-def every(count: int) -> Drop:
+def drop_every(count: int) -> Drop:
     """Drop the first of every `count` updates."""
     return lambda since: since % count == 0
 
@@ -124,8 +124,8 @@ class Fault:
 
     begin: int
     end: int
-    alter: Alter = untouched
-    drop: Drop = never
+    alter: Alter = keep_inputs
+    drop: Drop = drop_none
     late_updates: int = 0
 
     def active(self, update: int) -> bool:

@@ -9,17 +9,17 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.faults.injection import (
     Alter,
     Drop,
-    always,
-    every,
-    frozen_state,
-    never,
-    state_scaled,
-    state_set_to,
-    target_moved,
-    thrust_reported,
-    untouched,
-    yaw_shifted,
-    yaw_wrapped,
+    drop_all,
+    drop_every,
+    drop_none,
+    freeze_state,
+    keep_inputs,
+    move_target,
+    report_thrust,
+    scale_state,
+    set_state,
+    shift_yaw,
+    wrap_yaw,
 )
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 
@@ -39,8 +39,8 @@ class FaultScenario:
 
     name: str
     duration_s: float
-    alter: Alter = untouched
-    drop: Drop = never
+    alter: Alter = keep_inputs
+    drop: Drop = drop_none
     late_updates: int = 0
     weights: tuple[float, float] | None = None
     answers: frozenset[int] | None = None
@@ -59,9 +59,9 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
     right = settings.cost
-    outage = state_set_to(slice(0, 7), _NAN)
-    bursts = state_set_to(slice(0, 7), _NAN, on=3, of=10)
-    jump = target_moved(jump_m)
+    outage = set_state(slice(0, 7), _NAN)
+    bursts = set_state(slice(0, 7), _NAN, on=3, of=10)
+    jump = move_target(jump_m)
     bad_state, bad_target = _only(Status.BAD_STATE), _only(Status.BAD_TARGET)
     bad_thrust, bad_weight = _only(Status.BAD_THRUST), _only(Status.OK, Status.BAD_WEIGHT)
     levels_out = "caller levels out"
@@ -78,16 +78,16 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario(
             f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True
         ),
-        FaultScenario("x infinite, 1 s", 1.0, state_set_to(0, math.inf), answers=bad_state),
-        FaultScenario("vy minus infinite, 1 s", 1.0, state_set_to(3, -math.inf), answers=bad_state),
-        FaultScenario("state frozen, 0.2 s", 0.2, frozen_state),
-        FaultScenario("state frozen, 1 s", 1.0, frozen_state),
-        FaultScenario("state frozen, 5 s", 5.0, frozen_state),
+        FaultScenario("x infinite, 1 s", 1.0, set_state(0, math.inf), answers=bad_state),
+        FaultScenario("vy minus infinite, 1 s", 1.0, set_state(3, -math.inf), answers=bad_state),
+        FaultScenario("state frozen, 0.2 s", 0.2, freeze_state),
+        FaultScenario("state frozen, 1 s", 1.0, freeze_state),
+        FaultScenario("state frozen, 5 s", 5.0, freeze_state),
         FaultScenario(
-            "every 2nd tick dropped, 5 s", 5.0, drop=every(2), answers=_only(Status.OK, NOT_CALLED)
+            "every 2nd tick dropped, 5 s", 5.0, drop=drop_every(2), answers=_only(Status.OK, NOT_CALLED)
         ),
-        FaultScenario("all ticks dropped, 0.2 s", 0.2, drop=always, answers=_only(NOT_CALLED)),
-        FaultScenario("all ticks dropped, 1 s", 1.0, drop=always, answers=_only(NOT_CALLED)),
+        FaultScenario("all ticks dropped, 0.2 s", 0.2, drop=drop_all, answers=_only(NOT_CALLED)),
+        FaultScenario("all ticks dropped, 1 s", 1.0, drop=drop_all, answers=_only(NOT_CALLED)),
         FaultScenario("commands 2 ticks late, 5 s", 5.0, late_updates=2),
         FaultScenario("commands 5 ticks late, 5 s", 5.0, late_updates=5),
         FaultScenario("commands 20 ticks late, 5 s", 5.0, late_updates=20),
@@ -95,12 +95,12 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario(f"target {jump_m:g} m off, 1 s", 1.0, jump),
         FaultScenario(f"target {jump_m:g} m off, 5 s", 5.0, jump),
         FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
-        FaultScenario("target beyond the range, 1 s", 1.0, target_moved(beyond_m), answers=bad_target),
-        FaultScenario("thrust reported as zero, 1 s", 1.0, thrust_reported(0.0), answers=bad_thrust),
-        FaultScenario("thrust NaN, 1 s", 1.0, thrust_reported(_NAN), answers=bad_thrust),
-        FaultScenario("yaw a turn off, to the end", TO_THE_END, yaw_shifted(2.0 * math.pi)),
-        FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, yaw_wrapped, turning=True),
-        FaultScenario("yaw half a turn off, 1 s", 1.0, yaw_shifted(math.pi)),
+        FaultScenario("target beyond the range, 1 s", 1.0, move_target(beyond_m), answers=bad_target),
+        FaultScenario("thrust reported as zero, 1 s", 1.0, report_thrust(0.0), answers=bad_thrust),
+        FaultScenario("thrust NaN, 1 s", 1.0, report_thrust(_NAN), answers=bad_thrust),
+        FaultScenario("yaw a turn off, to the end", TO_THE_END, shift_yaw(2.0 * math.pi)),
+        FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, wrap_yaw, turning=True),
+        FaultScenario("yaw half a turn off, 1 s", 1.0, shift_yaw(math.pi)),
         FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
@@ -119,4 +119,4 @@ def _only(*statuses: int) -> frozenset[int]:
 
 def _scaled(position: float, attitude: float) -> Alter:
     """Scale position and velocity by one factor, roll, pitch and yaw by another."""
-    return state_scaled([position] * 4 + [attitude] * 3)
+    return scale_state([position] * 4 + [attitude] * 3)

@@ -49,7 +49,7 @@ def cache_folder() -> Path:
     return folder
 
 
-def cached(name: str, build: Callable[[Path], Path]) -> Path:
+def build_cached(name: str, build: Callable[[Path], Path]) -> Path:
     """Return the path of the cached file `name`; build it if it is missing or damaged.
 
     `build(folder)` builds in an empty folder and returns the path of its result, which is then renamed into

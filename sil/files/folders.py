@@ -38,7 +38,7 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
     UnwritableError if the file system refuses an access; where possible, before the run.
     """
     try:
-        with _create(folder), locked(folder):
+        with _create(folder), lock(folder):
             _refuse_other_work(folder, command, (*names, SUMMARY))
             for left_over in folder.glob(f"{_NEW}*"):
                 shutil.rmtree(left_over)
@@ -92,7 +92,7 @@ def _create(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock(folder: Path) -> Iterator[None]:
     """Lock `folder` against other runs; raises BusyError. A file system without locks is not locked."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

@@ -61,9 +61,9 @@ def animate(flights: Mapping[str, Trace]) -> Animation:
     begin_s = float(first.time_s[0])
     shown_s = min(float(first.time_s[-1]), begin_s + LONGEST_S)
     times_s = np.arange(begin_s, shown_s + _STEP_S / 2.0, _STEP_S)
-    target_cm = _sampled(times_s, first, 100.0 * first.target[:, 0, :2])
-    drones_cm = [_sampled(times_s, trace, 100.0 * trace.position_m[:, 0]) for trace in flights.values()]
-    angles_mrad = [_sampled(times_s, trace, 1000.0 * trace.euler_rad[:, 0]) for trace in flights.values()]
+    target_cm = _sample(times_s, first, 100.0 * first.target[:, 0, :2])
+    drones_cm = [_sample(times_s, trace, 100.0 * trace.position_m[:, 0]) for trace in flights.values()]
+    angles_mrad = [_sample(times_s, trace, 1000.0 * trace.euler_rad[:, 0]) for trace in flights.values()]
 
     stray_cm = _STRAY * max(float(np.ptp(target_cm, axis=0).max()), _LEAST_SPAN_CM)
     x, y, z = (
@@ -94,7 +94,7 @@ def animate(flights: Mapping[str, Trace]) -> Animation:
     )
 
 
-def _sampled(times_s: FloatArray, trace: Trace, values: FloatArray) -> FloatArray:
+def _sample(times_s: FloatArray, trace: Trace, values: FloatArray) -> FloatArray:
     """Interpolate values (k, m) of a trace at times (j,); return (j, m)."""
     return np.stack([np.interp(times_s, trace.time_s, column) for column in values.T], axis=-1)
 

@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.settings import controller_toml, presets
 from mambo_nmpc.codegen.settings.keys import KEYS
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
-from mambo_nmpc.sil.campaign.file import Draws, FileSection, FlightSection, read_as, scenario, spelled
+from mambo_nmpc.sil.campaign.file import Draws, FileSection, FlightSection, format_value, read_as, scenario
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.scenario import flight_of
@@ -79,10 +79,10 @@ class Tuning:
         for path, value in values.items():
             section, name = path.split(".")
             whole = KEYS[path].kind == "whole number"
-            document[section][name] = int(value) if whole else rounded(value)
+            document[section][name] = int(value) if whole else round_value(value)
         return controller_toml.validated(document, "the search")
 
-    def drawn(self) -> list[Draw]:
+    def draw_flights(self) -> list[Draw]:
         """Return the draws of the flights that every trial flies."""
         distributions = {name: getattr(self.file.draws, name) for name in PARAMETERS}
         return [draw(self.file.seed, flight, distributions) for flight in range(self.file.flights)]
@@ -94,7 +94,7 @@ class Tuning:
         return document | {"base": self.base.model_dump(), "search": search}
 
 
-def rounded(value: float) -> float:
+def round_value(value: float) -> float:
     """Return `value` rounded to four significant digits."""
     return float(f"{value:.4g}")
 
@@ -124,7 +124,7 @@ def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
         ) from None
     tuning = Tuning(file, base, _search(file.search, base, source))
     try:
-        one = scenario(file.flight.model_dump(), tuning.drawn()[0])
+        one = scenario(file.flight.model_dump(), tuning.draw_flights()[0])
         flight_of([one], base.horizon.update_period_s)
     except FlightError as error:
         raise InvalidSettingsError((f"{source}: base: horizon.{error}; stock loops run at 200 Hz",)) from None
@@ -144,7 +144,7 @@ def _search(
         try:
             found[path] = _range(path, value, base)
         except ValueError as error:
-            faults.append(f"{source}: search.{echo(path)} = {spelled(value)} {error}")
+            faults.append(f"{source}: search.{echo(path)} = {format_value(value)} {error}")
     if not faults and not 1 <= len(found) <= _MOST_KEYS:
         faults.append(
             f"{source}: search must have 1 to {_MOST_KEYS} keys of a controller.toml in its sections"

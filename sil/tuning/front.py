@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from mambo_nmpc.codegen.settings import controller_toml
-from mambo_nmpc.sil.tuning.file import Tuning, rounded
+from mambo_nmpc.sil.tuning.file import Tuning, round_value
 from mambo_nmpc.sil.tuning.study import FinishedTrial, study_name
 
 IAE_ALLOWANCE: Final = 1.1
@@ -25,7 +25,7 @@ def pareto_front(trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
     return front
 
 
-def chosen(front: Sequence[FinishedTrial]) -> FinishedTrial:
+def choose(front: Sequence[FinishedTrial]) -> FinishedTrial:
     """Return the point of a front, which is sorted by IAE, according to `RULE`."""
     return [one for one in front if one.iae_m_s <= IAE_ALLOWANCE * front[0].iae_m_s][-1]
 
@@ -36,16 +36,16 @@ def front_csv(front: Sequence[FinishedTrial]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     keys = list(front[0].values)
     writer.writerow(["trial", "chosen", "iae_m_s", "command_variation_rad", "crashed", *keys])
-    best = chosen(front)
+    best = choose(front)
     for one in front:
         found = (one.number, int(one is best), one.iae_m_s, one.command_variation_rad, one.crashed)
-        writer.writerow([*found, *(rounded(one.values[key]) for key in keys)])
+        writer.writerow([*found, *(round_value(one.values[key]) for key in keys)])
     return text.getvalue()
 
 
 def controller_text(tuning: Tuning, trials: Sequence[FinishedTrial]) -> str:
     """Return the controller.toml of the chosen trial; its head names study, trial and result."""
-    best, flight = chosen(pareto_front(trials)), tuning.file.flight
+    best, flight = choose(pareto_front(trials)), tuning.file.flight
     title = (
         f"Found by mambo-nmpc tune: trial {best.number} of {len(trials)} in study {study_name(tuning)}, seed "
         f"{tuning.file.seed}: {RULE}. Over {tuning.file.flights} random flights of {flight.duration_s:g} s "

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from mambo_nmpc.sil.show.plots import save, style
-from mambo_nmpc.sil.tuning.front import chosen, pareto_front
+from mambo_nmpc.sil.tuning.front import choose, pareto_front
 from mambo_nmpc.sil.tuning.study import FinishedTrial
 
 
@@ -18,7 +18,7 @@ def draw_front(
     A trial without any command variation is left out, as it has no place on a logarithmic axis.
     """
     front = pareto_front(trials)
-    best = chosen(front)
+    best = choose(front)
     with style():
         figure = Figure(figsize=(7.0, 4.6), layout="constrained")
         axes = figure.subplots()

@@ -103,16 +103,16 @@ def search(
 
     Trials that an earlier run in `folder` proposed and did not finish are flown first. Raises WorkerError.
     """
-    drawn = tuning.drawn()
+    drawn = tuning.draw_flights()
     flight = tuning.file.flight.model_dump()
     owner = f"{socket.gethostname()}:{folder.resolve()}"
     if not study.get_trials(deepcopy=False):
         study.enqueue_trial(tuning.start)
-    progress(len(judged(study)))
-    while (finished := len(judged(study))) < trials:
-        proposed = _left_over(tuning, study, owner)
-        count = min(ROUND - _begun(study) % ROUND, trials - finished - len(proposed))
-        proposed |= dict(_ask(tuning, study, owner) for _ in range(max(count, 0)))
+    progress(len(finished_trials(study)))
+    while (finished := len(finished_trials(study))) < trials:
+        proposed = _find_unfinished(tuning, study, owner)
+        count = min(ROUND - _count_proposed(study) % ROUND, trials - finished - len(proposed))
+        proposed |= dict(_propose(tuning, study, owner) for _ in range(max(count, 0)))
         tasks = [
             (__version__, [Entrant(_NAME, "nmpc", tuning.settings(values)).document()], flight, drawn)
             for values in proposed.values()
@@ -122,7 +122,7 @@ def search(
             crashed, means = judge(rows, tuning.file.flight.duration_s, tuning.base.limits.tilt_rad)
             study.set_user_attr(f"{CRASHED}_{numbers[task]}", crashed)
             study.tell(numbers[task], means)
-            progress(len(judged(study)))
+            progress(len(finished_trials(study)))
 
 
 def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int, tuple[float, float]]:
@@ -141,7 +141,7 @@ def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int,
     return int(crashed.sum()), (iae_m_s, variation_rad)
 
 
-def judged(study: "Study") -> list[FinishedTrial]:
+def finished_trials(study: "Study") -> list[FinishedTrial]:
     """Return the finished trials of a study by number."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
@@ -154,18 +154,18 @@ def judged(study: "Study") -> list[FinishedTrial]:
     ]
 
 
-def _begun(study: "Study") -> int:
+def _count_proposed(study: "Study") -> int:
     """Return how many trials have been proposed."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
     return sum(one.state != TrialState.WAITING for one in study.get_trials(deepcopy=False))
 
 
-def _ask(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, float]]:
+def _propose(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, float]]:
     """Propose a new trial; return its number and values."""
     from optuna.samplers import TPESampler  # noqa: PLC0415 - an optional extra
 
-    entropy = np.random.SeedSequence(tuning.file.seed, spawn_key=(_begun(study),))
+    entropy = np.random.SeedSequence(tuning.file.seed, spawn_key=(_count_proposed(study),))
     seed = int(entropy.generate_state(1)[0])
     study.sampler = TPESampler(
         n_startup_trials=DRAWN_AT_RANDOM, multivariate=True, constant_liar=True, seed=seed
@@ -183,7 +183,7 @@ def _suggest(trial: "Trial", path: str, found: Distribution) -> float:
     return trial.suggest_float(path, *found.numbers, log=found.kind == "log_uniform")
 
 
-def _left_over(tuning: Tuning, study: "Study", owner: str) -> dict[int, dict[str, float]]:
+def _find_unfinished(tuning: Tuning, study: "Study", owner: str) -> dict[int, dict[str, float]]:
     """Return the unfinished trials of an earlier run of `owner`; fail those without all values."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 

@@ -13,7 +13,7 @@ from mambo_nmpc.sil.campaign import file
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
 from mambo_nmpc.sil.campaign.flights import INDICES
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
-from mambo_nmpc.sil.campaign.statistics import improvement, improvements, proportion, quantiles, worst
+from mambo_nmpc.sil.campaign.statistics import improvement, improvements, proportion, quantiles, worst_flights
 from mambo_nmpc.sil.plant.airframe import MAMBO
 
 ROOT = Path(__file__).parents[2]
@@ -265,7 +265,7 @@ def test_a_crash_is_infinitely_bad() -> None:
 def test_the_worst_flights_are_crashes_then_the_largest_iae() -> None:
     """At most five flights are returned; a lost flight, whose IAE is NaN, is among the crashes."""
     columns = table(a_iae_m_s=[1.0, 7.0, math.nan, 3.0, 2.0, 9.0], a_crashed=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
-    assert worst(columns, "a") == [2, 3, 5, 1, 4]
+    assert worst_flights(columns, "a") == [2, 3, 5, 1, 4]
 
 
 def test_statistics_are_reproducible() -> None:

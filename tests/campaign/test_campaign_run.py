@@ -18,7 +18,7 @@ from mambo_nmpc.codegen.errors import INTERRUPTED, ForeignFilesError, Unwritable
 from mambo_nmpc.sil.campaign import file
 from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes
 from mambo_nmpc.sil.campaign.flights import fly_batch
-from mambo_nmpc.sil.campaign.run import fly_missing, opened, table_columns
+from mambo_nmpc.sil.campaign.run import fly_missing, open_campaign, table_columns
 from mambo_nmpc.sil.errors import BusyError, FlightError, WorkerError
 from mambo_nmpc.sil.flight.scenario import read_record
 from tests.support.tools import require_module
@@ -73,7 +73,7 @@ def fly_on_threads(
 ) -> bytes:
     """Fly on two threads of this process, and return the table."""
     campaign = file.read(source)
-    with opened(campaign, folder) as store, ThreadPoolExecutor(2) as threads:
+    with open_campaign(campaign, folder) as store, ThreadPoolExecutor(2) as threads:
         fly_missing(campaign, store, flights, Pool(threads, 2, lambda _: None), progress, batch=batch)
         store.put_in_order()
     return (folder / "flights.csv").read_bytes()
@@ -130,12 +130,12 @@ from pathlib import Path
 from mambo_nmpc.sil.campaign import file
 from mambo_nmpc.sil.campaign.executors import processes
 from mambo_nmpc.sil.campaign.flights import fly_batch
-from mambo_nmpc.sil.campaign.run import fly_missing, opened
+from mambo_nmpc.sil.campaign.run import fly_missing, open_campaign
 def progress(finished):
     if finished >= 2:
         os.kill(os.getpid(), signal.SIGKILL)
 campaign = file.read(Path(sys.argv[1]))
-with opened(campaign, Path(sys.argv[2])) as store, processes(2) as pool:
+with open_campaign(campaign, Path(sys.argv[2])) as store, processes(2) as pool:
     fly_missing(campaign, store, 6, pool, progress, batch=1)
 """
 
@@ -219,11 +219,11 @@ def test_a_campaign_survives_repeated_kills(source: Path, whole: Path, tmp_path:
     """A truncated line is removed before the next one is appended."""
     campaign, lines = file.read(source), (whole / "flights.csv").read_bytes().splitlines(keepends=True)
     for flight in range(3):
-        with opened(campaign, tmp_path) as store:
+        with open_campaign(campaign, tmp_path) as store:
             assert set(store.lines) == set(range(flight))
         with (tmp_path / "flights.csv").open("ab") as table:
             table.write(lines[1 + flight][:-20])
-        with opened(campaign, tmp_path) as store:
+        with open_campaign(campaign, tmp_path) as store:
             cells = next(csv.reader([lines[1 + flight].decode()]))
             store.add({flight: dict(zip(table_columns(campaign), cells[1:], strict=True))})
     assert (tmp_path / "flights.csv").read_bytes() == b"".join(lines[:4])
@@ -268,7 +268,7 @@ def test_an_edited_table_is_refused(line: bytes, source: Path, whole: Path, tmp_
 
 def test_one_run_at_a_time(source: Path, tmp_path: Path) -> None:
     """A second run in the same folder raises `BusyError`."""
-    with opened(file.read(source), tmp_path), pytest.raises(BusyError, match="another run"):
+    with open_campaign(file.read(source), tmp_path), pytest.raises(BusyError, match="another run"):
         fly_on_threads(source, tmp_path)
 
 
@@ -276,7 +276,7 @@ def test_a_dead_worker_is_reported(source: Path, tmp_path: Path) -> None:
     """A worker process that ends, for instance for lack of memory, raises `WorkerError`."""
     campaign = file.read(source)
     with (
-        opened(campaign, tmp_path) as store,
+        open_campaign(campaign, tmp_path) as store,
         pytest.raises(WorkerError, match="a worker process has died; the flights finished so far are kept"),
         processes(1) as pool,
     ):
@@ -322,7 +322,7 @@ def test_a_dask_cluster_gives_the_results_of_one_process(source: Path, whole: Pa
 
     campaign = file.read(source)
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
-        with opened(campaign, tmp_path) as store, cluster(local.scheduler_address) as pool:
+        with open_campaign(campaign, tmp_path) as store, cluster(local.scheduler_address) as pool:
             assert pool.workers == 2
             fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, batch=2)
             store.put_in_order()

@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
 from mambo_nmpc.sil.errors import CacheError
-from mambo_nmpc.sil.files.cache import cache_folder, cached
+from mambo_nmpc.sil.files.cache import build_cached, cache_folder
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -73,7 +73,7 @@ def test_a_cache_named_by_a_relative_path_is_refused(monkeypatch: pytest.MonkeyP
 def test_a_build_that_ends_meanwhile_disturbs_no_other(empty_cache: Path) -> None:
     """The work folder of another process may go between being listed and being looked at."""
     (cache_folder() / "build-gone").symlink_to("gone")
-    assert cached("name", make).parent == empty_cache
+    assert build_cached("name", make).parent == empty_cache
 
 
 def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None:
@@ -85,8 +85,8 @@ def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None
         (folder / "made").write_text("made")
         return folder / "made"
 
-    first = cached("name", build)
-    assert cached("name", build) == first
+    first = build_cached("name", build)
+    assert build_cached("name", build) == first
     assert len(built) == 1
     assert list(empty_cache.iterdir()) == [first]
     assert first.name.endswith("-name")
@@ -95,8 +95,8 @@ def test_a_build_happens_once_and_leaves_nothing_else(empty_cache: Path) -> None
 def test_a_damaged_build_is_built_anew(empty_cache: Path) -> None:
     """Cut short by a full disk or a crash, it would kill the process that loads it."""
     for damage in ("", "ma"):
-        cached("name", make).write_text(damage)
-        assert cached("name", make).read_text() == "made"
+        build_cached("name", make).write_text(damage)
+        assert build_cached("name", make).read_text() == "made"
     assert len(list(empty_cache.iterdir())) == 1
 
 
@@ -116,7 +116,7 @@ def test_what_killed_builds_left_is_cleared(empty_cache: Path) -> None:
         then = time.time() - age_s
         os.utime(empty_cache / name, (then, then))
 
-    made = cached("name", make)
+    made = build_cached("name", make)
     assert set(empty_cache.iterdir()) == {made, empty_cache / "build-young"}
 
 
@@ -128,7 +128,7 @@ def test_a_failed_build_leaves_nothing(empty_cache: Path) -> None:
         raise BuildError("no")
 
     with pytest.raises(BuildError):
-        cached("name", fail)
+        build_cached("name", fail)
     assert list(empty_cache.iterdir()) == []
 
 

@@ -18,8 +18,15 @@ from mambo_nmpc.sil.campaign.store import claim
 from mambo_nmpc.sil.cli.tune import tune
 from mambo_nmpc.sil.errors import StudyError
 from mambo_nmpc.sil.tuning import file
-from mambo_nmpc.sil.tuning.front import IAE_ALLOWANCE, chosen, pareto_front
-from mambo_nmpc.sil.tuning.study import CRASH_ERROR_M, FinishedTrial, judge, judged, open_study, search
+from mambo_nmpc.sil.tuning.front import IAE_ALLOWANCE, choose, pareto_front
+from mambo_nmpc.sil.tuning.study import (
+    CRASH_ERROR_M,
+    FinishedTrial,
+    finished_trials,
+    judge,
+    open_study,
+    search,
+)
 from tests.support.tools import require_module
 
 TRIALS = 3
@@ -64,13 +71,13 @@ def search_on_threads(
     tuning = file.read(source)
     with open_study(tuning, folder, storage) as study, ThreadPoolExecutor(2) as threads:
         search(tuning, study, folder, trials, pool=Pool(threads, 2, lambda _: None), progress=progress)
-        return judged(study)
+        return finished_trials(study)
 
 
 def found_in(folder: Path, source: Path, storage: str | None = None) -> list[FinishedTrial]:
     """Return the finished trials of a study."""
     with open_study(file.read(source), folder, storage) as study:
-        return judged(study)
+        return finished_trials(study)
 
 
 def command(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -141,7 +148,7 @@ def test_the_folder_has_front_picture_and_a_controller_that_loads(source: Path, 
     settings = controller_toml.read(whole / "controller.toml")
     assert settings.cost.effort_weight == float(picked[0]["cost.effort_weight"])
     found = found_in(whole, source)
-    assert settings == file.read(source).settings(chosen(pareto_front(found)).values)
+    assert settings == file.read(source).settings(choose(pareto_front(found)).values)
     head = " ".join((whole / "controller.toml").read_text().split("[horizon]")[0].replace("#", "").split())
     assert f"trial {picked[0]['trial']} of {TRIALS} in study mambo-nmpc-" in head
     assert "seed 1:" in head
@@ -212,8 +219,8 @@ def test_the_front_is_pareto_optimal_and_the_choice_follows_the_rule() -> None:
     best, calm, calmest = one(3, 1.0, 0.5), one(1, IAE_ALLOWANCE, 0.2), one(0, 1.2, 0.1)
     front = pareto_front([calmest, calm, one(2, 1.1, 0.3), best, one(4, 1.0, 0.5), one(5, 1.05, 0.6)])
     assert front == [best, calm, calmest]
-    assert chosen(front) == calm
-    assert chosen(front[:1]) == best
+    assert choose(front) == calm
+    assert choose(front[:1]) == best
 
 
 FAULTS = {
