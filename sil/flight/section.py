@@ -16,19 +16,19 @@ from mambo_nmpc.sil.show.section import Section
 def fly_section(folder: Path, summary: FlySummary) -> Section:
     """Return the section of a flight; raises TraceError."""
     name = PD if summary.controller == "pd" else f"NMPC, {summary.source}"
-    bits = "" if summary.same_bits_as_host is not True else ", bit for bit as on the desk"
+    bits = "" if summary.same_bits_as_host is not True else ", bit for bit as on the host"
     facts = {
         **_course(summary),
         "controller": f"{summary.controller}, settings {summary.settings[:16]} of {summary.source}",
         "start": f"{summary.start}, heading {summary.yaw_rad:g} rad",
-        "disturbance": "push of {:g}, {:g} m/s²".format(*summary.wind_m_s2)
-        + f"; moving air {summary.wind_speed_m_s:g} m/s; motor lag {summary.motor_lag_s:g} s",
+        "disturbances": "steady acceleration {:g}, {:g} m/s²".format(*summary.wind_m_s2)
+        + f"; wind with gusts {summary.wind_speed_m_s:g} m/s; motor lag {summary.motor_lag_s:g} s",
     }
     if summary.board is not None:
         facts["flown on"] = f"the emulated core of {summary.board}{bits}"
     bad = []
     if summary.same_bits_as_host is False:
-        bad = [f"the trace of {summary.board} differs from that of the desk"]
+        bad = [f"the trace of {summary.board} differs from that of the host"]
     return _flight(folder, summary, (name, f"Flight: {name}, {summary.trajectory}"), facts, bad)
 
 
@@ -42,7 +42,7 @@ def replay_section(folder: Path, summary: ReplaySummary) -> Section:
         "seed": str(summary.scenario.seed),
     }
     bad = ["the trace differs from the recorded one"] if summary.same_bits_as_recorded is False else []
-    return _flight(folder, summary, (name, f"Flown again: {name}, {summary.replay}"), facts, bad)
+    return _flight(folder, summary, (name, f"Replay: {name}, {summary.replay}"), facts, bad)
 
 
 def traces(folder: Path, files: Mapping[str, str]) -> tuple[dict[str, Trace], list[str]]:
@@ -64,7 +64,7 @@ def _course(flown: FlySummary | Scenario) -> dict[str, str]:
     shape = "" if flown.trajectory.endswith(".csv") else f", {flown.size_m:g} m, {flown.rate_rad_s:g} rad/s"
     return {
         "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",
-        "seen through": "the truth" if flown.sensors == "none" else f"sensors {flown.sensors}",
+        "state": "true" if flown.sensors == "none" else f"estimated, sensors {flown.sensors}",
     }
 
 
@@ -74,7 +74,7 @@ def _flight(
     """Return the section of a flight; `names` has the names of drone and section, `bad` the faults found."""
     flights, missing = traces(folder, {names[0]: "trace.npz"})
     if summary.lost:
-        bad = [*bad, "the vehicle left the world before the end of the flight"]
+        bad = [*bad, "the drone was lost before the end of the flight"]
     elif summary.mostly_refused:
         bad = [*bad, "the controller refused more than half of its inputs"]
     columns = summary.columns

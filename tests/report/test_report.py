@@ -22,8 +22,8 @@ from tests.support.tools import board_builder
 
 VOID = {"meta", "input", "br", "img", "circle", "line", "path", "rect", "use"}
 SEEN = {
-    "fly": ("max error", "Play", "crazyflie, bit for bit as on the desk", "moving air 3 m/s"),
-    "replay": ("Flown again: PD", "✗", "the trace differs from the recorded one", "seen through", "Play"),
+    "fly": ("max error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
+    "replay": ("Replay: PD", "✗", "the trace differs from the recorded one", "<dt>state</dt>", "Play"),
     "sensed": ("20 flights, 1 lost", "7.123", "0.77", "drift, m"),
     "table2": ("63.02", "204.2", "7.123", "✓ holds", "✗ does not hold", "2.50", "Play"),
     "footprint": ("3000 B", "is over its budget", "Arduino Mega 2560", "there is no emulator", "incomplete"),
@@ -180,7 +180,7 @@ def test_a_lost_flight_is_shown_as_far_as_it_went() -> None:
     Path("fly").mkdir()
     fly_folder(Path("fly"), lost=True)
     page = page_of("fly")
-    assert "the vehicle left the world" in page
+    assert "the drone was lost before the end" in page
     assert "[null,null,null]" in page.replace(" ", "")
     assert "NaN" not in page
 
