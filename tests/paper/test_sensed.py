@@ -9,7 +9,7 @@ from mambo_nmpc.sil.paper.sensed import PRESETS, VIEWS, fly_sensed, text
 
 @pytest.mark.long
 def test_sensed_table_has_a_row_for_every_controller_and_view() -> None:
-    """The truth is seen as it is and drifts nowhere; noise is flown more than once."""
+    """With the true state both indices are equal and the drift is 0; rows with noise have several flights."""
     shares: list[float] = []
     settings = {name: presets.load(name) for name in PRESETS}
     rows = fly_sensed(settings, shares.append, duration_s=1.0, flights=2)

@@ -53,7 +53,7 @@ def errors(trace: Trace) -> dict[str, FloatArray]:
     }
 
 
-def test_noise_free_estimates_follow_the_truth() -> None:
+def test_noise_free_estimates_follow_the_true_state() -> None:
     """Over 6 s the errors stay below 0.01 rad of tilt, 2 mm of height, 0.15 m of position and 0.2 m/s."""
     found = errors(fly_eight(replace(QUIET, derotated=True)))
     assert (found["euler"] < [0.01, 0.01, 0.001]).all(), found
