@@ -1,4 +1,4 @@
-"""Check: whatever fails in flight, commands stay bounded, bad input is refused, and the drone comes back."""
+"""Check: with every fault in flight commands stay bounded, bad input is refused, and the drone recovers."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace

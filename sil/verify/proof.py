@@ -86,7 +86,7 @@ def command(subject: Subject, name: str) -> list[str]:
 
 
 def unproven(properties: Sequence[Property]) -> list[Property]:
-    """Return what does not hold in every execution; a promise is dead in one proof, not in both.
+    """Return what does not hold in every execution; a promise may be unreached in one proof, not in both.
 
     What one proof takes for granted of a function, its postconditions, is shown by the other.
     """

@@ -1,4 +1,4 @@
-"""What a verification found, as a record, as lines and as a page: the same words, three times."""
+"""The results of a verification as a record, as lines and as a page."""
 
 import hashlib
 from collections import Counter
@@ -21,7 +21,7 @@ PAGE: Final = "verify.html"
 
 @dataclass(frozen=True)
 class Verified:
-    """A check that was run, and what came of it; `figures` are for programs."""
+    """A check that was run, and its result; `figures` are for programs."""
 
     name: str
     about: str
@@ -48,7 +48,7 @@ class VerifySummary(Summary):
 
 
 def verdict(found: Sequence[Verified]) -> CheckOutcome:
-    """Return the worst outcome: one failure fails all, and what could not run is never passed."""
+    """Return the worst outcome."""
     outcomes = {one.outcome for one in found}
     worst_first = (CheckOutcome.FAILED, CheckOutcome.INCOMPLETE, CheckOutcome.PASSED)
     return next(outcome for outcome in worst_first if outcome in outcomes)
@@ -60,7 +60,7 @@ def line(one: Verified) -> str:
 
 
 def closing(found: Sequence[Verified]) -> str:
-    """Spell the verdict, and what it does not speak of."""
+    """Spell the verdict, and the checks that were not run."""
     counted = Counter(one.outcome for one in found)
     counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in CheckOutcome if counted[outcome])
     left_out = _left_out(found)

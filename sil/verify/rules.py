@@ -1,4 +1,4 @@
-"""Check: cppcheck finds nothing in the C, by MISRA C:2012 or otherwise, but the listed deviations."""
+"""Check: by MISRA C:2012 and its own rules, cppcheck finds only the listed deviations in the C."""
 
 import re
 import subprocess
@@ -27,7 +27,7 @@ class RuleViolation:
     message: str
 
     def __str__(self) -> str:
-        """Spell it; the text of MISRA's rules is not free, so their number says it all."""
+        """Name the rule by number: the text of MISRA's rules is not free."""
         number = self.rule.removeprefix(_MISRA)
         what = self.message if number == self.rule else f"MISRA C:2012 rule {number}"
         return f"{self.file}:{self.line}: {what}"
