@@ -219,8 +219,11 @@ def _folders_of(path: str) -> list[PurePosixPath]:
 
 def _files_in(folder: Path) -> list[str]:
     """Return the relative POSIX path of everything in `folder` that is not itself a folder, sorted."""
-    places = (place for place in folder.rglob("*") if place.is_symlink() or not place.is_dir())
-    return sorted(place.relative_to(folder).as_posix() for place in places)
+    files = []
+    for here, folders, names in os.walk(folder):  # passes over what somebody removes meanwhile
+        links = [name for name in folders if (Path(here) / name).is_symlink()]
+        files += [(Path(here) / name).relative_to(folder).as_posix() for name in (*names, *links)]
+    return sorted(files)
 
 
 def _content(path: Path) -> bytes | None:
