@@ -1,8 +1,6 @@
 """The structure of the project: who may import whom, and what a module may be."""
 
 import ast
-import subprocess
-import sys
 import tomllib
 from collections import defaultdict
 from functools import cache
@@ -149,16 +147,3 @@ def test_modules_are_short_and_named_by_their_subject() -> None:
     for module, path in modules().items():
         assert len(path.read_text("utf-8").splitlines()) <= LONGEST_MODULE, path
         assert module.rpartition(".")[2] not in {"utils", "util", "helpers", "misc"}, path
-
-
-def test_help_loads_no_plotting_library() -> None:
-    """Help answers at once, and works where matplotlib does not."""
-    script = (
-        "import atexit, sys\n"
-        "from mambo_nmpc.__main__ import main\n"
-        "atexit.register(lambda: print('matplotlib' in sys.modules))\n"
-        "main()"
-    )
-    command = [sys.executable, "-c", script, "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.endswith("False\n")
