@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.campaign.file import Campaign, scenario
+from mambo_nmpc.sil.campaign.file import Campaign, FlightSection, scenario
 from mambo_nmpc.sil.campaign.flights import CRASHED, DIGEST
 from mambo_nmpc.sil.campaign.statistics import (
     Distributions,
@@ -30,33 +30,20 @@ PICTURE: Final = "campaign"
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
 
-class _Part(BaseModel):
-    """Part of a campaign's parameters; the summary keeps all keys, a page shows those declared here."""
-
-    model_config = ConfigDict(frozen=True, extra="allow")
-
-
-class DrawnFlight(_Part):
-    """Parameters of all flights of a campaign."""
-
-    trajectory: str
-    size_m: float
-    rate_rad_s: float
-    duration_s: float
-    sensors: str
-
-
-class NamedController(_Part):
-    """A controller of a campaign."""
+class NamedController(BaseModel, extra="allow", frozen=True):
+    """A controller of a campaign; the summary keeps all its keys."""
 
     name: str
 
 
-class Drawn(_Part):
-    """Parameters of a campaign; the other controllers are compared with the first one."""
+class Drawn(BaseModel, extra="allow", frozen=True):
+    """Parameters of a campaign; the other controllers are compared with the first one.
+
+    A page shows these keys, the summary keeps all others too.
+    """
 
     seed: int
-    flight: DrawnFlight
+    flight: FlightSection
     controllers: list[NamedController]
 
 

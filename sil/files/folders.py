@@ -18,7 +18,6 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
 from mambo_nmpc.sil.errors import BusyError
 
@@ -56,12 +55,6 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
             shutil.rmtree(fresh)
     except OSError as error:
         raise UnwritableError(f"{echo(str(folder))}: cannot be written: {error.strerror or error}") from error
-
-
-def summary_text(command: str, summary: dict[str, Any]) -> str:
-    """Return the summary of a run of `command` as JSON with generator and version; NaN becomes null."""
-    whole = {"generator": f"{GENERATOR}{__version__}", "command": command, **summary}
-    return json.dumps(finite(whole), indent=2, allow_nan=False) + "\n"
 
 
 def finite(value: Any) -> Any:

@@ -2,19 +2,33 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from mambo_nmpc.codegen.errors import ForeignFilesError, MamboNmpcError, UnwritableError
 from mambo_nmpc.sil.errors import BusyError
-from mambo_nmpc.sil.files.folders import SUMMARY, new_results, summary_text
+from mambo_nmpc.sil.files.folders import SUMMARY, new_results
+from mambo_nmpc.sil.files.summary import Summary
+
+
+class Found(Summary):
+    """What a run of a test found."""
+
+    command = "fly"
+    content: Any
+
+
+def summary_text(command: str, content: Any) -> str:
+    """Return the summary of a run of `command`."""
+    return Found(content=content).text().replace('"fly"', f'"{command}"')
 
 
 def run(folder: Path, content: str = "new", command: str = "fly") -> None:
     """Write the results of one run to `folder`."""
     with new_results(folder, command, ("trace.csv",)) as fresh:
         (fresh / "trace.csv").write_text(content)
-        (fresh / SUMMARY).write_text(summary_text(command, {"content": content}))
+        (fresh / SUMMARY).write_text(summary_text(command, content))
 
 
 def files(folder: Path) -> dict[str, str]:
@@ -27,7 +41,7 @@ def test_results_replace_those_of_an_earlier_run(tmp_path: Path) -> None:
     run(tmp_path / "a" / "b", "old")
     (tmp_path / "a" / "b" / "notes.txt").write_text("mine")
     run(tmp_path / "a" / "b")
-    summary = summary_text("fly", {"content": "new"})
+    summary = summary_text("fly", "new")
     assert files(tmp_path / "a" / "b") == {"trace.csv": "new", SUMMARY: summary, "notes.txt": "mine"}
 
 
@@ -60,7 +74,7 @@ def test_a_run_stopped_while_its_files_move_does_not_block_the_next(tmp_path: Pa
         stop()
     assert not (tmp_path / SUMMARY).exists()
     run(tmp_path)
-    assert files(tmp_path) == {"trace.csv": "new", SUMMARY: summary_text("fly", {"content": "new"})}
+    assert files(tmp_path) == {"trace.csv": "new", SUMMARY: summary_text("fly", "new")}
 
 
 def test_a_failed_run_leaves_no_folder_of_its_own(tmp_path: Path) -> None:
@@ -133,4 +147,4 @@ def test_a_summary_has_null_for_nan_and_infinity() -> None:
     """Numbers that JSON cannot represent become null at any depth."""
     text = summary_text("fly", {"a": float("nan"), "b": [1.5, (float("inf"), {"c": -float("inf")})]})
     summary = json.loads(text, parse_constant=pytest.fail)
-    assert (summary["a"], summary["b"]) == (None, [1.5, [None, {"c": None}]])
+    assert (summary["content"]["a"], summary["content"]["b"]) == (None, [1.5, [None, {"c": None}]])

@@ -191,7 +191,7 @@ def campaign_folder(folder: Path, *, finished: bool = True) -> None:
             "size_m": 2.0,
             "rate_rad_s": 0.5,
             "duration_s": 100.0,
-            "sensors": "mambo",
+            "sensors": "none",
         },
         "controllers": [{"name": name} for name in ("pd", "mambo")],
     }
