@@ -36,11 +36,6 @@ def app() -> typer.Typer:
     return app
 
 
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
 def run(app: typer.Typer, *arguments: str, code: int = 0) -> tuple[str, str]:
     """Run the command, demand its exit code, and return stdout and stderr."""
     result = CliRunner().invoke(app, arguments)

@@ -10,11 +10,6 @@ from mambo_nmpc.sil.cli.faults import FILES
 from tests.support.command import run
 
 
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.mark.long
 def test_faults_leave_table_picture_and_json(tmp_path: Path) -> None:
     """CSV, PNG, SVG and the summary, which stdout repeats; with the scalar type that was asked for."""

@@ -1,0 +1,65 @@
+"""The command `table2`, used as a person would."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.sil.paper.table2 import Claim, Table2Row, Table2Summary, table2_text
+from tests.support.command import command
+
+
+@pytest.mark.long
+def test_table2_judges_the_claims(tmp_path: Path) -> None:
+    """The PD row is reproduced, table1 and mambo beat the claim, the printed step does not fly."""
+    done = command("table2", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    verdicts = {
+        claim["text"].split(" improves")[0]: claim["holds"] for claim in json.loads(done.stdout)["claims"]
+    }
+    assert verdicts == {
+        "the PD of Table II flies Bernoulli 0.5 rad/s": True,
+        "the PD of Table II flies Bernoulli 0.25 rad/s": False,
+        "the PD of Table II flies Gerono 0.25 rad/s": False,
+        "mambo": True,
+        "mambo-robust": True,
+        "table1": True,
+        "table1-printed": False,
+    }
+    assert (tmp_path / "table2" / "figure3.png").is_file()
+    mixed = command("fly", "-o", "table2", folder=tmp_path)
+    assert (mixed.returncode, "holds results of table2, not of fly" in mixed.stderr) == (2, True)
+
+
+@pytest.mark.long
+def test_table2_flies_the_presets_in_another_scalar_type(tmp_path: Path) -> None:
+    """The row of a preset is what `fly` has of it with the same option."""
+    done = command("table2", "--scalar", "fixed", "--json", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["scalar"] == "fixed"
+    row = next(row for row in summary["rows"] if row["controller"] == "mambo")
+    flown = command("fly", "--scalar", "fixed", "--json", folder=tmp_path)
+    assert json.loads(flown.stdout)["metrics"]["iae_m_s"] == row["measured"][0]
+
+
+@pytest.mark.parametrize("sensors", [[], ["--sensors"]])
+def test_table2_refuses_an_unknown_scalar_type(sensors: list[str], tmp_path: Path) -> None:
+    """Before anything flies or is written, with what there is."""
+    done = command("table2", "--scalar", "flat", *sensors, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith('--scalar: code.scalar = "flat" must be "float32" or ')
+    assert not list(tmp_path.iterdir())
+
+
+def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
+    """Ratios are named, and a claim that does not hold is the paper's."""
+    row = Table2Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
+    claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
+    text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
+    above, header = text.splitlines()[:2]
+    assert above.index("PD over NMPC") > header.index("ITAE")
+    assert header.split()[3:] == ["IAE", "ISE", "ITSE", "ITAE"] * 2
+    assert text.endswith(
+        "the paper's claims, as flown here:\n  holds          it flies: 1 %\n  does not hold  it lands: 90 %"
+    )
