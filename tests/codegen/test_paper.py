@@ -1,0 +1,88 @@
+"""The reference equals `paper.py`, eqs 8-12 and RPROP as they are written, up to rounding."""
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.reference import ReferenceController, cost
+from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.paper import Array, Paper
+from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.settings.model import Settings
+from tests.support.cases import settings_case
+
+CASES = [index for index in range(60) if settings_case(index, "float64").horizon.prediction <= 20]
+
+
+class Situation:
+    """A random state, target and thrust, a last command and a plan."""
+
+    def __init__(self, settings: Settings, rng: np.random.Generator, scale: float = 1.0) -> None:
+        self.state = scale * rng.normal(0, 1, 7) * [1, 1, 1, 1, 0.3, 0.3, 3]
+        self.target = scale * rng.normal(0, 1, 4)
+        self.thrust = rng.uniform(5, 15)
+        self.last = rng.uniform(-0.3, 0.3, 2)
+        self.plan = rng.uniform(-0.3, 0.3, (settings.horizon.control, 2))
+
+    def inputs(self) -> tuple[Array, Array, float]:
+        """Return state, target and thrust."""
+        return self.state, self.target, self.thrust
+
+
+def situation(index: int) -> tuple[Settings, Paper, Situation]:
+    """Return case `index`."""
+    settings = settings_case(index, "float64")
+    return settings, Paper(settings), Situation(settings, np.random.default_rng(index))
+
+
+@pytest.mark.parametrize("index", CASES)
+def test_errors_cost_and_gradient_are_those_of_the_paper(index: int) -> None:
+    """The recurrence gives the errors of a roll-out, with and without lag, exact and printed."""
+    settings, paper, case = situation(index)
+    design = Design(settings)
+    predictor = Predictor(design, arithmetic(design))
+    weights = np.array([[settings.cost.tracking_weight, settings.cost.effort_weight]])
+    prediction = predictor.prepare(case.state[None], case.target[None], np.array([case.thrust]))
+    errors = predictor.errors(prediction, case.plan[None])[:, 0]
+    costs, gradients = cost.evaluate(predictor, prediction, weights, case.plan[None], case.last[None])
+
+    expected = paper.roll_out(*case.inputs(), case.plan)
+    gradient = paper.gradient(expected, paper.responses(*case.inputs()), case.plan, case.last)
+    np.testing.assert_allclose(errors, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+    assert costs[0] == pytest.approx(paper.eq_12(expected, case.plan, case.last), rel=1e-10)
+    np.testing.assert_allclose(gradients[0], gradient, rtol=0, atol=1e-10 * np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("index", CASES)
+def test_the_gradient_is_that_of_the_cost(index: int) -> None:
+    """Away from its kinks, the cost changes with each move as the gradient says."""
+    settings, paper, case = situation(index)
+    errors, responses = paper.roll_out(*case.inputs(), case.plan), paper.responses(*case.inputs())
+    gradient = paper.gradient(errors, responses, case.plan, case.last)
+    for move in np.ndindex(case.plan.shape):
+        offset = np.zeros_like(case.plan)
+        offset[move] = 1e-6
+        more, less = (
+            paper.eq_12(paper.roll_out(*case.inputs(), plan), plan, case.last)
+            for plan in (case.plan + offset, case.plan - offset)
+        )
+        largest_weight = max(settings.cost.tracking_weight, settings.cost.effort_weight)
+        assert gradient[move] == pytest.approx((more - less) / 2e-6, rel=1e-4, abs=1e-6 * largest_weight)
+
+
+@pytest.mark.parametrize("index", CASES)
+def test_the_search_is_that_of_the_paper(index: int) -> None:
+    """Five consecutive steps: plan, cost, updates and convergence."""
+    settings, rng = settings_case(index, "float64"), np.random.default_rng(index)
+    controller, paper = ReferenceController(Design(settings)), Paper(settings)
+    plan, last = np.zeros((settings.horizon.control, 2)), np.zeros(2)
+    for _ in range(5):
+        case = Situation(settings, rng, scale=0.2)
+        guess = plan if settings.optimizer.warm_start == "plan" else np.tile(last, (len(plan), 1))
+        expected = paper.rprop(*case.inputs(), guess, u_last=last)
+        step = controller.step(case.state[None], case.target[None], [case.thrust])
+        assert step.status[0] == 0
+        np.testing.assert_allclose(step.plan_rad[0], expected.U, rtol=0, atol=1e-12)
+        assert step.cost[0] == pytest.approx(expected.J, rel=1e-9)
+        assert (step.iterations[0], step.converged[0]) == (expected.updates, expected.converged)
+        plan, last = expected.U, expected.U[0]
