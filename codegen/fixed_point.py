@@ -1,21 +1,21 @@
-"""The fixed point formats of a controller: how many bits each quantity has behind the point, and why.
+"""The fixed point formats of a controller: the number of fractional bits of each quantity.
 
-A number of format b is a whole number of 32 bits, its value times 2^b. Each quantity has the most bits with
-which no value that it can take overflows. Those values are bounded, not sampled: by the sizes of what is
-added up, as if nothing ever cancelled (`_reach`). That gives away two bits, and lets a proof by intervals
-find the same bounds in the C.
+A number of format b is an integer of 32 bits, its value times 2^b. Each quantity has the most fractional bits
+with which none of its values overflows. Those values are bounded by the sum of the absolute values of all
+terms (`_bounds`), not sampled. That costs two bits compared with the largest values that occur, and lets a
+proof by intervals find the same bounds in the C.
 
-A position error beyond what the horizon can change keeps its sign there whatever the moves: it is clamped to
-a little more than that reach, which changes neither a slope nor a difference of costs, and leaves the bits to
-the errors that matter.
+No plan can change the sign of a position error that is larger than all displacements over the horizon
+together: such an error is clamped. That changes neither the gradient nor a difference of costs, and leaves
+the bits to smaller errors.
 
-The sizes of the errors of a whole horizon add up in one word. Distance, cost and gradient have 64 bits, of
-which they use no more than 53: a double holds them.
+The absolute errors of a whole horizon are summed in one word. Distance, cost and gradient have 64 bits, of
+which they use at most 53, so that a double holds them exactly.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Final
 
 import numpy as np
@@ -25,57 +25,57 @@ from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT,
 from mambo_nmpc.codegen.settings.sections import Sections
 
 WORD_BITS: Final = 31
-"""Bits of a number beside its sign."""
+"""Bits of a number without its sign."""
 
 LARGEST: Final = 2**WORD_BITS - 1
-"""The largest number; as an input it stands for whatever no format holds, and is out of every range."""
+"""The largest number: the saturation value of an input, outside every input range, so it is refused."""
 
 SINE_BITS: Final = 30
-"""Format of sine and cosine, of which 1 is the largest."""
+"""Format of sine and cosine, whose largest value is 1."""
 
 UPPER_BITS: Final = 32
-"""Where the products of shares and factors end, in the upper word: bend and step are shifted up first."""
+"""Right shift of the products of shares and of eta: one factor is shifted left before."""
 
 SUM_BITS: Final = 53
-"""Bits of cost and gradient beside the sign: those of a double, so that logs and tests lose nothing."""
+"""Bits of cost and gradient without the sign: those of a double, so that logs and tests are exact."""
 
 _PRODUCT_BITS: Final = 62
-"""Bits of a product beside its sign: one less than the type has, for what rounding adds."""
+"""Bits of a product without its sign: one less than the type has, because rounding adds to it."""
 
 _MARGIN: Final = 1.01
-"""Every bound is taken larger by a hundredth, a thousand times what all roundings of a horizon add."""
+"""Every bound is enlarged by 1 %, a thousand times more than all roundings over a horizon add."""
 
 _WEIGHT_HEADROOM: Final = 4.0
-"""Weights may grow to so many times those of the settings at run time; an effort of 0 as if it were 1, or as
-much as tracking if that is less."""
+"""At run time weights may be up to this factor larger than in the settings. An effort weight of 0 counts as
+1, or as the tracking weight if that is less."""
 
 _COARSEST_ERROR_BITS: Final = 10
-"""Errors are resolved to a millimetre at least."""
+"""Errors have a resolution of 1 mm or better."""
 
 _FEWEST_WEIGHT: Final = 512
-"""A weight below this number would be rounded by more than a thousandth."""
+"""A weight smaller than this number would be rounded by more than a thousandth."""
 
 
 @dataclass(frozen=True)
 class Formats:
-    """Bits behind the point by quantity, and the limits that are not in the settings, as numbers.
+    """Fractional bits by quantity, and the limits that are not in the settings, as numbers.
 
-    position:       input positions and their difference, m.
-    velocity:       input velocities and their difference, m/s.
-    thrust:         thrust acceleration, m/s^2.
-    yaw:            heading, rad.
-    angle:          tilt, moves, turns and steps of the optimizer, rad.
-    step, step_squared: the prediction step, s, and its square, s^2.
-    gain:           bend by turn, m/rad.
-    bend:           bend, advance and what is to come, m.
-    error:          position less target on the way through the horizon, m.
-    share:          shares of a bend.
-    response:       sums of responses.
-    slope:          distance by turn, m/rad.
-    tracking, effort: the weights, 1/m and 1/rad.
-    factor:         growth and shrinkage of a step.
-    cost, gradient: 64 bits wide.
-    error_limit:    largest start of an error, a number of the format of positions.
+    position:           input positions and their difference, m.
+    velocity:           input velocities and their difference, m/s.
+    thrust:             thrust acceleration, m/s^2.
+    yaw:                rad.
+    angle:              tilt, moves, their changes and the step sizes of RPROP, rad.
+    step, step_squared: tau, s, and tau^2, s^2.
+    gain:               acceleration per tilt, m/step^2 per rad.
+    acceleration:       acceleration, displacement and deficit, m/step^2 and m/step.
+    error:              predicted error, m.
+    share:              shares and decays of the attitude lag.
+    response:           sums of responses.
+    distance_gradient:  gradient of the distance, m/rad.
+    tracking, effort:   lambda_1 and lambda_2, 1/m and 1/rad.
+    factor:             eta+ and eta-.
+    cost, gradient:     of 64 bits.
+    error_limit:        largest initial error, a number of the format of positions.
     tracking_limit, effort_limit: largest weights.
     """
 
@@ -87,11 +87,11 @@ class Formats:
     step: int
     step_squared: int
     gain: int
-    bend: int
+    acceleration: int
     error: int
     share: int
     response: int
-    slope: int
+    distance_gradient: int
     tracking: int
     effort: int
     factor: int
@@ -103,26 +103,27 @@ class Formats:
 
 
 @dataclass(frozen=True)
-class _Reach:
-    """The largest sizes over the horizon.
+class _Bounds:
+    """Bounds of absolute values over the horizon.
 
-    bend:     of bend, advance, what is to come, and every sum of them on the way, m.
-    tilt:     of what a share is taken of: bend of a turn or of the measured tilt, and what is to come, m.
-    error:    of what is added to the first error, m.
-    errors:   of the sum of that over the horizon, m.
-    response: of the sum of responses to a move, with whatever signs and of whatever steps.
+    acceleration: of acceleration, displacement, deficit, and every sum of them, m/step^2 and m/step.
+    shared:       of what is multiplied by a share: the acceleration of a change of tilt or of the measured
+                  tilt, and the deficit, m/step^2.
+    error:        of the change of the error over the horizon, m.
+    error_sum:    of the sum of that change over all steps, m.
+    response:     of the sum of the responses to a move, with any signs and over any steps.
     """
 
-    bend: float
-    tilt: float
+    acceleration: float
+    shared: float
     error: float
-    errors: float
+    error_sum: float
     response: float
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why settings have no fixed point controller: the key to blame, and the rule, from "must" on."""
+    """Why settings have no fixed point controller: the key to change, and the rule, from "must" on."""
 
     section: str
     name: str
@@ -133,7 +134,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     """Choose the formats of `settings`; where `refusals` finds faults, they are too coarse to use."""
     ranges, optimizer, tilt = settings.ranges, settings.optimizer, settings.limits.tilt_rad
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
-    reach = _reach(settings, tables)
+    bounds = _bounds(settings, tables)
 
     factor = _fit(optimizer.increase)
     angle = _fit(
@@ -143,15 +144,18 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         optimizer.step_max_rad * optimizer.increase,
         math.ldexp(optimizer.step_max_rad, UPPER_BITS - factor),
     )
-    share = _fit(max(max(abs(axis.at_once), axis.delayed, axis.decay, tables.held) for axis in tables.axes))
-    bend = _fit(reach.bend, math.ldexp(reach.tilt, UPPER_BITS - share))
-    error_limit = min(2 * ranges.position_m, reach.error) * _MARGIN
-    error = min(_fit(settings.horizon.prediction * error_limit + reach.errors), bend - 1)
+    share = _fit(
+        tables.displacement_share,
+        *(size for axis in tables.axes for size in map(abs, astuple(axis))),
+    )
+    acceleration = _fit(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
+    error_limit = min(2 * ranges.position_m, bounds.error) * _MARGIN
+    error = min(_fit(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1)
     position = min(_fit(2 * ranges.position_m), error)
-    slope_bound = 2 * gain * reach.response
-    slope = _fit(slope_bound)
+    gradient_bound = 2 * gain * bounds.response
+    distance_gradient = _fit(gradient_bound)
 
-    distance = 2 * settings.horizon.prediction * (error_limit + reach.error)
+    distance = 2 * settings.horizon.prediction * (error_limit + bounds.error)
     variation = 4 * settings.horizon.control * tilt
     cost = settings.cost
     effort_limit = _WEIGHT_HEADROOM * (cost.effort_weight or min(1.0, cost.tracking_weight))
@@ -160,10 +164,13 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     tracking = min(
         _fit(tracking_limit),
         SUM_BITS - 1 - max(_whole(tracking_limit, distance), _whole(effort_limit, variation)) - error,
-        SUM_BITS - 1 - max(_whole(tracking_limit, slope_bound), _whole(effort_limit, 2)) - slope,
+        SUM_BITS
+        - 1
+        - max(_whole(tracking_limit, gradient_bound), _whole(effort_limit, 2))
+        - distance_gradient,
         effort + angle - error - 1,
     )
-    effort = min(effort, tracking + slope)
+    effort = min(effort, tracking + distance_gradient)
     return Formats(
         position=position,
         velocity=_fit(2 * ranges.velocity_m_s),
@@ -173,16 +180,16 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         step=_fit(step_s),
         step_squared=_fit(tables.step_squared_s2),
         gain=_fit(gain),
-        bend=bend,
+        acceleration=acceleration,
         error=error,
         share=share,
-        response=_fit(2 * reach.response),  # a bit to spare: gcc shifts by less than 32 in fewer instructions
-        slope=slope,
+        response=_fit(2 * bounds.response),  # one bit spare: gcc shifts by less than 32 in fewer instructions
+        distance_gradient=distance_gradient,
         tracking=tracking,
         effort=effort,
         factor=factor,
         cost=tracking + error,
-        gradient=tracking + slope,
+        gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),
         tracking_limit=raw(min(tracking_limit, WEIGHT_LIMIT), tracking),
         effort_limit=raw(min(effort_limit, WEIGHT_LIMIT), effort),
@@ -199,7 +206,7 @@ def raw(value: float, bits: int) -> int:
 
 
 def refusals(settings: Sections) -> list[Refusal]:
-    """Return what in `settings` fixed point cannot represent, with the nearest value that it can."""
+    """Return what fixed point cannot represent in `settings`, each with the nearest value that it can."""
     tables = horizon_tables(settings)
     found = formats(settings, tables)
     if not _fine_errors(found):
@@ -238,20 +245,20 @@ def _fine_weight(settings: Sections, found: Formats, name: str) -> bool:
 
 
 def _too_wide(settings: Sections, tables: HorizonTables) -> Refusal:
-    """Refuse the range that adds most to the errors over the horizon."""
+    """Name the range that adds most to the errors over the horizon."""
     horizon, ranges = settings.horizon, settings.ranges
-    reach = _reach(settings, tables).error
+    error_m = _bounds(settings, tables).error
     by_speed = 2 * ranges.velocity_m_s * horizon.prediction_step_s * horizon.prediction
     name, least = "thrust_acceleration_max_m_s2", ranges.thrust_acceleration_min_m_s2
     end = math.nextafter(least, math.inf)
-    if by_speed > reach / 2:
+    if by_speed > error_m / 2:
         name, least, end = "velocity_m_s", 0.0, 0.1
     fits = _nearest(settings, "ranges", name, end, lambda changed: _fine_errors(formats(changed, tables)))
     way_out = "write a smaller horizon.prediction_step_s"
     if fits and float(_down(fits)) > least:
         way_out = f"write at most {_down(fits)}"
     rule = (
-        f"lets errors reach {reach:.3g} m over the horizon, coarser than 1 mm with "
+        f"lets errors reach {error_m:.3g} m over the horizon, coarser than 1 mm with "
         f'code.scalar = "fixed"; {way_out}'
     )
     return Refusal("ranges", name, rule)
@@ -311,42 +318,47 @@ def _largest_gain(settings: Sections, tables: HorizonTables) -> float:
     return settings.ranges.thrust_acceleration_max_m_s2 * tables.step_squared_s2
 
 
-def _reach(settings: Sections, tables: HorizonTables) -> _Reach:
-    """Bound what a prediction computes, along one axis of the world, by walking with sizes for values."""
+def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
+    """Bound a roll-out along one axis of the world: absolute values for values, sums for differences."""
     tilt_rad, steps = settings.limits.tilt_rad, settings.horizon.prediction
     measured_rad = ATTITUDE_LIMIT_RAD if tables.has_lag else 0.0
     gain = _largest_gain(settings, tables)
-    bend = tilt = 2 * gain * measured_rad
-    advance = 2 * settings.ranges.velocity_m_s * settings.horizon.prediction_step_s + tables.held * bend
-    error = errors = 0.0
-    to_come = [0.0, 0.0]
-    before_rad = measured_rad
+    acceleration = shared = 2 * gain * measured_rad
+    displacement = (
+        2 * settings.ranges.velocity_m_s * settings.horizon.prediction_step_s
+        + tables.displacement_share * acceleration
+    )
+    error = error_sum = 0.0
+    deficits = [0.0, 0.0]
+    previous_rad = measured_rad
     for step in range(steps):
         if step < settings.horizon.control:
-            turn = gain * (before_rad + tilt_rad)
-            before_rad = tilt_rad
-            bend += 2 * turn
-            advance += turn * sum(abs(axis.at_once) for axis in tables.axes)
-            to_come = [size + axis.delayed * turn for size, axis in zip(to_come, tables.axes, strict=True)]
-            tilt = max(tilt, 2 * turn, *to_come)
-        error += advance
-        errors += error
-        advance += bend + sum(to_come)
-        to_come = [size * axis.decay for size, axis in zip(to_come, tables.axes, strict=True)]
-    return _Reach(
-        bend=advance,
-        tilt=tilt,
+            change = gain * (previous_rad + tilt_rad)
+            previous_rad = tilt_rad
+            acceleration += 2 * change
+            displacement += change * sum(abs(axis.displacement_share) for axis in tables.axes)
+            deficits = [
+                size + axis.deficit_share * change for size, axis in zip(deficits, tables.axes, strict=True)
+            ]
+            shared = max(shared, 2 * change, *deficits)
+        error += displacement
+        error_sum += error
+        displacement += acceleration + sum(deficits)
+        deficits = [size * axis.deficit_decay for size, axis in zip(deficits, tables.axes, strict=True)]
+    return _Bounds(
+        acceleration=displacement,
+        shared=shared,
         error=error,
-        errors=errors,
+        error_sum=error_sum,
         response=float(steps * np.abs(tables.response_sum).max()),
     )
 
 
 def _fit(*sizes: float) -> int:
-    """Return the most bits behind the point with which numbers of these sizes fit in a word."""
+    """Return the most fractional bits with which numbers of these absolute values fit in a word."""
     return WORD_BITS - _whole(max(sizes), 1.0)
 
 
 def _whole(a: float, b: float) -> int:
-    """Return the bits before the point of the product of two bounds."""
+    """Return the integer bits of the product of two bounds."""
     return math.frexp(a * b * _MARGIN)[1]

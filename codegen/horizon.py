@@ -1,10 +1,10 @@
-"""Constants of the prediction: eqs 8-11 of the paper, solved for steps of the horizon.
+"""Constants of the prediction: eqs 8-11 of the paper, discretised for the steps of the horizon.
 
-For a given heading and thrust the predicted error is affine in the moves, and along each axis of the world
-it has few differences: a step adds the advance to the error and the bend to the advance. The bend is
-acceleration times the squared prediction step, less what an attitude with lag has yet to come. So the C rolls
-the model out with two additions a step, two more and two multiplications with lag, and reads from a table
-only what the slope of the distance needs.
+Along each axis of the world the predicted error follows a recurrence that `nmpc_predictor.h` derives: a step
+adds the displacement to the error, and the acceleration, in metres per squared prediction step, to the
+displacement. The acceleration changes only where a move changes the tilt. With attitude lag it has a deficit
+that decays from step to step. So the roll-out takes two additions a step, and two more and two products with
+lag; only the gradient of the distance needs a table.
 
 All arithmetic is float64 in a fixed order; the exponential of the lag comes from `decimal`, which rounds
 alike on every machine. Constants are rounded to the scalar type once, where they are spelled or loaded.
@@ -21,97 +21,99 @@ from mambo_nmpc.codegen.settings.sections import Horizon, Sections
 
 @dataclass(frozen=True)
 class AxisConstants:
-    """How roll or pitch settles after a turn; shares of the bend that the turn ends in.
+    """How roll or pitch follows a change of its command; shares of the change of acceleration.
 
-    at_once: what the turn adds to the next step's advance.
-    delayed: what the bend lacks in the step of the turn.
-    decay:   what of that remains a step later.
+    displacement_share: added to the displacement of the first step.
+    deficit_share:      withheld from the acceleration after one step.
+    deficit_decay:      factor by which the deficit decays per step.
     """
 
-    at_once: float
-    delayed: float
-    decay: float
+    displacement_share: float
+    deficit_share: float
+    deficit_decay: float
 
 
 @dataclass(frozen=True)
 class HorizonTables:
     """Prediction constants of one controller, float64.
 
-    step_squared_s2: square of the prediction step, in s^2: a tilt's bend per acceleration.
-    held:            share of the bend that a tilt held before the first step adds to its advance.
-    axes:            roll and pitch.
-    has_lag:         whether the measured attitude enters the prediction.
-    axes_alike:      axes that share a response, 2 if both lags are equal, else 1.
-    response_sum:    (prediction, responses) sum, over all steps to each, of how far a unit of bend of each
-                     move has carried the error; twice that, but for the last step. Moves are ordered roll,
-                     pitch of the first, and so on; where both axes settle alike, each pair of moves shares
-                     one response. The last move is held to the end.
+    step_squared_s2:    tau^2, square of the prediction step, in s^2.
+    displacement_share: share of a constant acceleration that displaces the drone within the same step:
+                        1/2, from tau^2/2 in eq 9, or 1/(2 tau) as printed.
+    axes:               roll and pitch.
+    has_lag:            whether the measured attitude enters the prediction.
+    axes_per_response:  axes that share a response, 2 if both lags are equal, else 1.
+    response_sum:       (prediction, responses) sum of the response of each move from the first step to each:
+                        twice that, and once in the last row. The response is the change of the error per
+                        unit of acceleration. Moves are ordered roll, pitch of the first, and so on; axes that
+                        share a response share a column. The last move is held.
     """
 
     step_squared_s2: float
-    held: float
+    displacement_share: float
     axes: tuple[AxisConstants, AxisConstants]
     has_lag: bool
-    axes_alike: int
+    axes_per_response: int
     response_sum: NDArray[np.float64]
 
     @property
     def halves(self) -> bool:
-        """Whether every turn adds half of its bend to the next advance: no lag, and exact positions."""
-        return not self.has_lag and self.held == 0.5
+        """Whether every displacement share is 1/2: no lag, and tau^2/2 in eq 9."""
+        return not self.has_lag and self.displacement_share == 0.5
 
 
 def horizon_tables(settings: Sections) -> HorizonTables:
     """Derive the prediction constants from the horizon and the model of `settings`."""
     model, period_s = settings.model, settings.horizon.prediction_step_s
     step_squared_s2 = period_s * period_s
-    held = 0.5 if model.position_update == "exact" else 0.5 / period_s
-    roll, pitch = (_axis(period_s, lag_s, held) for lag_s in (model.roll_lag_s, model.pitch_lag_s))
-    alike = model.roll_lag_s == model.pitch_lag_s
+    share = 0.5 if model.position_update == "exact" else 0.5 / period_s
+    roll, pitch = (_axis(period_s, lag_s, share) for lag_s in (model.roll_lag_s, model.pitch_lag_s))
+    same_lag = model.roll_lag_s == model.pitch_lag_s
     return HorizonTables(
         step_squared_s2=step_squared_s2,
-        held=held,
+        displacement_share=share,
         axes=(roll, pitch),
         has_lag=model.roll_lag_s > 0 or model.pitch_lag_s > 0,
-        axes_alike=2 if alike else 1,
-        response_sum=_response_sum(settings.horizon, (roll,) if alike else (roll, pitch)),
+        axes_per_response=2 if same_lag else 1,
+        response_sum=_response_sum(settings.horizon, (roll,) if same_lag else (roll, pitch)),
     )
 
 
-def _axis(period_s: float, lag_s: float, held: float) -> AxisConstants:
-    """Discretise one axis exactly, an angle that settles on its command with a first-order lag.
+def _axis(period_s: float, lag_s: float, share: float) -> AxisConstants:
+    """Discretise one axis exactly: an angle that follows its command with a first-order lag.
 
-    With the lag as unit of time, a step d and what settles in it, e = 1 - exp(-d), position lacks d - e after
-    a step and velocity e, so that the second difference lacks (d * e) - (e * (d - e)) = e^2.
+    With h = step / lag and c = 1 - exp(-h), after a unit step of the command position lacks h - c after one
+    step, and velocity c, in units of the lag. The second difference of the position then lacks (h * c) - (c *
+    (h - c)) = c^2.
     """
     if lag_s == 0:
-        return AxisConstants(at_once=held, delayed=0.0, decay=0.0)
+        return AxisConstants(displacement_share=share, deficit_share=0.0, deficit_decay=0.0)
     with localcontext() as context:
         context.prec = 50
-        step = Decimal(period_s) / Decimal(lag_s)
-        decay = (-step).exp()
-        settled = 1 - decay
+        h = Decimal(period_s) / Decimal(lag_s)
+        decay = (-h).exp()
+        c = 1 - decay
         return AxisConstants(
-            at_once=held - float((step - settled) / (step * step)),
-            delayed=float((settled * settled) / (step * step)),
-            decay=float(decay),
+            displacement_share=share - float((h - c) / (h * h)),
+            deficit_share=float((c * c) / (h * h)),
+            deficit_decay=float(decay),
         )
 
 
 def _response_sum(horizon: Horizon, axes: tuple[AxisConstants, ...]) -> NDArray[np.float64]:
-    """Walk with a unit of bend of each move, taken back by the next, and add up the errors twice."""
+    """Roll out a unit of acceleration of each move, which ends at the next move, and sum the errors."""
     sums = np.zeros((horizon.prediction, horizon.control, len(axes)))
     for axis, constants in enumerate(axes):
         for move in range(horizon.control):
-            total = error = advance = bend = to_come = 0.0
+            total = error = displacement = acceleration = deficit = 0.0
             for step in range(horizon.prediction):
-                turn = float(step == move) - float(step == move + 1 < horizon.control)
-                advance = advance + (constants.at_once * turn)
-                bend = bend + turn
-                to_come = to_come - (constants.delayed * turn)
-                error = error + advance
-                advance = advance + (bend + to_come)
-                to_come = to_come * constants.decay
+                change = float(step == move) - float(step == move + 1 < horizon.control)
+                displacement = displacement + (constants.displacement_share * change)
+                acceleration = acceleration + change
+                deficit = deficit - (constants.deficit_share * change)
+                error = error + displacement
+                displacement = displacement + (acceleration + deficit)
+                deficit = deficit * constants.deficit_decay
                 total = total + error
                 sums[step, move, axis] = total
     sums[:-1] *= 2

@@ -21,6 +21,7 @@ from mambo_nmpc.codegen.flags import (
     WARNING_FLAGS,
     proofs,
 )
+from mambo_nmpc.codegen.infix import infix
 from mambo_nmpc.codegen.representation import STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.self_test import hover_thrust, self_test
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
@@ -76,6 +77,8 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
         "frozen_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
     }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
+    if design.numbers.formats is None:
+        text = {name: infix(content) for name, content in text.items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
         library = _amalgamated(text, public, code)
@@ -218,9 +221,9 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
 def _instance_bytes(settings: Settings, *, has_lag: bool) -> int:
     """Count the members of nmpc_t: numbers, sums, single bytes, each padded to what follows."""
     moves = 2 * settings.horizon.control
-    weights, gains, tilt, walks, command = 2, 4, 2, 2 * (5 if has_lag else 3), 2
+    weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if has_lag else 3), 2
     flags = 2
-    numbers, sums = weights + gains + tilt + walks + command + moves, moves + 1
+    numbers, sums = weights + gains + tilt + rollouts + command + moves, moves + 1
     number_bytes, sum_bytes = _BYTES[settings.code.scalar]
     before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
     return -(-(before_flags + flags) // sum_bytes) * sum_bytes

@@ -1,8 +1,9 @@
-"""The executable paper: predictor, cost, optimizer and controller in NumPy, for n controllers at once.
+"""The reference controller: predictor, cost, optimizer and controller in NumPy, for n controllers at once.
 
-Every operation stands in the order and with the brackets of the C templates, in the scalar type of the
-settings, so that both compute the same bits. Nothing here calls `@`, `numpy.dot` or `numpy.sum`, which are
-free to reorder additions.
+Every operation has the order and the brackets of the C templates, in the scalar type of the settings, so that
+both compute the same bits. `@`, `numpy.dot` and `numpy.sum` are not used here, because they may reorder
+additions. `paper.py` is the exception: eqs 8-12 and RPROP as a lecture would write them, equal up to
+rounding.
 """
 
 from mambo_nmpc.codegen.reference.controller import Memory, ReferenceController, Status, Step

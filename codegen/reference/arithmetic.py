@@ -1,9 +1,10 @@
-"""Products and constants of the controller, by what they mean: `nmpc_math.h` has the same, by the same names.
+"""Products of the controller, by the names that `nmpc_products_fixed.h` has for them.
 
-In floating point a product is one multiplication. In fixed point it is one multiplication to 64 bits and one
-shift to the format of the result, rounded to nearest, ties up; the products of a walk, of a slope of the
-distance and of a step of the optimizer are rounded down. Sums, differences and comparisons are plain in
-both. The arrays of a fixed point reference are int64, and none of their numbers needs more.
+In floating point a product is one multiplication, which the C writes as `a * b`. In fixed point it is one
+multiplication to 64 bits and one shift to the format of the result, rounded to nearest, ties up; the products
+of a roll-out, of the gradient of the distance and of a step of RPROP are rounded down. Sums, differences and
+comparisons are plain in both. The arrays of a fixed point reference are int64, in which none of its numbers
+overflows.
 """
 
 from typing import Any, Protocol
@@ -18,51 +19,54 @@ from mambo_nmpc.codegen.trigonometry import FixedTrigonometry, Trigonometry
 
 
 class Arithmetic(Protocol):
-    """The products of a control step, and the numbers that they are of."""
+    """The products of a control step and the representation of their numbers."""
 
     numbers: Representation
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         """Return sine and cosine of a heading."""
 
-    def push(self, thrust_acceleration_m_s2: Real) -> Real:
-        """Return the bend of a unit of tilt, sideways."""
+    def thrust_product(self, thrust_m_s2: Real) -> Real:
+        """Return thrust acceleration * tau^2, m/step^2."""
 
-    def component(self, push_m: Real, sine: Real) -> Real:
-        """Return what of a push falls to an axis."""
+    def sine_product(self, value: Real, sine: Real) -> Real:
+        """Return value * sine."""
 
-    def travel(self, velocity_m_s: Real) -> Real:
-        """Return the advance of a velocity."""
+    def velocity_product(self, velocity_m_s: Real) -> Real:
+        """Return tau * velocity, m/step."""
 
-    def bend(self, gain_m: Real, turn_rad: Real) -> Real:
-        """Return the bend of a turn."""
+    def gain_product(self, gain_m_step2: Real, tilt_rad: Real) -> Real:
+        """Return gain * tilt, m/step^2."""
 
-    def part(self, share: Any, bend_m: Real) -> Real:
-        """Return a share of a bend."""
+    def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
+        """Return share * acceleration."""
 
-    def first_error(self, difference_m: Real) -> Real:
-        """Return the start of an error."""
+    def initial_error(self, difference_m: Real) -> Real:
+        """Return a difference of positions as a predicted error, clamped in fixed point."""
 
-    def step_of(self, advance_m: Real) -> Real:
-        """Return what an advance adds to an error."""
+    def error_change(self, displacement_m_step: Real) -> Real:
+        """Return a displacement in the format of errors."""
 
-    def distance_slope(self, gain_m: Real, slopes: Real) -> Real:
-        """Return the slope of the distance (n, moves, 2); gains (n, 2, 1, 2), responses (n, 2, moves, 2)."""
+    def distance_gradient(self, gain_m_step2: Real, subgradient: Real) -> Real:
+        """Return the gradient of the distance by the moves (n, moves, 2).
+
+        Gains are (n, 2, 1, 2), subgradients by acceleration (n, 2, moves, 2).
+        """
 
     def tracking_cost(self, weight: Real, distance_m: Real) -> Real:
-        """Return the cost of a distance."""
+        """Return lambda_1 * distance."""
 
     def effort_cost(self, weight: Real, variation_rad: Real) -> Real:
-        """Return the cost of a variation."""
+        """Return lambda_2 * variation."""
 
-    def tracking_slope(self, weight: Real, slope_m: Real) -> Real:
-        """Return the slope of the cost of a distance."""
+    def tracking_gradient(self, weight: Real, distance_gradient_m: Real) -> Real:
+        """Return lambda_1 * gradient of the distance."""
 
-    def effort_slope(self, weight: Real) -> Real:
-        """Return the slope of the cost of a variation."""
+    def effort_gradient(self, weight: Real) -> Real:
+        """Return lambda_2 in the format of gradients."""
 
-    def scaled(self, step_rad: Real, factor: Any) -> Real:
-        """Return a step grown or shrunk."""
+    def step_product(self, step_rad: Real, factor: Any) -> Real:
+        """Return step size * eta."""
 
 
 class FloatArithmetic:
@@ -77,30 +81,30 @@ class FloatArithmetic:
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return sine_cosine(yaw_rad, self._trigonometry)
 
-    def push(self, thrust_acceleration_m_s2: Real) -> Real:
-        return thrust_acceleration_m_s2 * self._step_squared_s2
+    def thrust_product(self, thrust_m_s2: Real) -> Real:
+        return thrust_m_s2 * self._step_squared_s2
 
-    def component(self, push_m: Real, sine: Real) -> Real:
-        return push_m * sine
+    def sine_product(self, value: Real, sine: Real) -> Real:
+        return value * sine
 
-    def travel(self, velocity_m_s: Real) -> Real:
+    def velocity_product(self, velocity_m_s: Real) -> Real:
         return self._step_s * velocity_m_s
 
-    def bend(self, gain_m: Real, turn_rad: Real) -> Real:
-        return gain_m * turn_rad
+    def gain_product(self, gain_m_step2: Real, tilt_rad: Real) -> Real:
+        return gain_m_step2 * tilt_rad
 
-    def part(self, share: Any, bend_m: Real) -> Real:
-        return share * bend_m
+    def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
+        return share * acceleration_m_step2
 
-    def first_error(self, difference_m: Real) -> Real:
+    def initial_error(self, difference_m: Real) -> Real:
         return difference_m
 
-    def step_of(self, advance_m: Real) -> Real:
-        return advance_m
+    def error_change(self, displacement_m_step: Real) -> Real:
+        return displacement_m_step
 
-    def distance_slope(self, gain_m: Real, slopes: Real) -> Real:
-        shares = gain_m * slopes
-        return shares[:, 0] + shares[:, 1]
+    def distance_gradient(self, gain_m_step2: Real, subgradient: Real) -> Real:
+        products = gain_m_step2 * subgradient
+        return products[:, 0] + products[:, 1]
 
     def tracking_cost(self, weight: Real, distance_m: Real) -> Real:
         return weight * distance_m
@@ -108,13 +112,13 @@ class FloatArithmetic:
     def effort_cost(self, weight: Real, variation_rad: Real) -> Real:
         return weight * variation_rad
 
-    def tracking_slope(self, weight: Real, slope_m: Real) -> Real:
-        return weight * slope_m
+    def tracking_gradient(self, weight: Real, distance_gradient_m: Real) -> Real:
+        return weight * distance_gradient_m
 
-    def effort_slope(self, weight: Real) -> Real:
+    def effort_gradient(self, weight: Real) -> Real:
         return weight
 
-    def scaled(self, step_rad: Real, factor: Any) -> Real:
+    def step_product(self, step_rad: Real, factor: Any) -> Real:
         return step_rad * factor
 
 
@@ -131,37 +135,37 @@ class FixedArithmetic:
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return fixed_sine_cosine(yaw_rad, self._trigonometry)
 
-    def push(self, thrust_acceleration_m_s2: Real) -> Real:
+    def thrust_product(self, thrust_m_s2: Real) -> Real:
         f = self._formats
-        return rounded(thrust_acceleration_m_s2 * self._step_squared_s2, f.thrust + f.step_squared - f.gain)
+        return rounded(thrust_m_s2 * self._step_squared_s2, f.thrust + f.step_squared - f.gain)
 
-    def component(self, push_m: Real, sine: Real) -> Real:
-        return rounded(push_m * sine, SINE_BITS)
+    def sine_product(self, value: Real, sine: Real) -> Real:
+        return rounded(value * sine, SINE_BITS)
 
-    def travel(self, velocity_m_s: Real) -> Real:
+    def velocity_product(self, velocity_m_s: Real) -> Real:
         f = self._formats
-        half = 2 ** (f.bend - f.error - 1)
-        return rounded(self._step_s * velocity_m_s, f.step + f.velocity - f.bend) + half
+        half = 2 ** (f.acceleration - f.error - 1)
+        return rounded(self._step_s * velocity_m_s, f.step + f.velocity - f.acceleration) + half
 
-    def bend(self, gain_m: Real, turn_rad: Real) -> Real:
+    def gain_product(self, gain_m_step2: Real, tilt_rad: Real) -> Real:
         f = self._formats
-        return (gain_m * turn_rad) >> (f.gain + f.angle - f.bend)
+        return (gain_m_step2 * tilt_rad) >> (f.gain + f.angle - f.acceleration)
 
-    def part(self, share: Any, bend_m: Real) -> Real:
-        return (share * bend_m) >> self._formats.share
+    def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
+        return (share * acceleration_m_step2) >> self._formats.share
 
-    def first_error(self, difference_m: Real) -> Real:
+    def initial_error(self, difference_m: Real) -> Real:
         f = self._formats
         return np.clip(difference_m, -f.error_limit, f.error_limit) * 2 ** (f.error - f.position)
 
-    def step_of(self, advance_m: Real) -> Real:
-        return advance_m >> (self._formats.bend - self._formats.error)
+    def error_change(self, displacement_m_step: Real) -> Real:
+        return displacement_m_step >> (self._formats.acceleration - self._formats.error)
 
-    def distance_slope(self, gain_m: Real, slopes: Real) -> Real:
+    def distance_gradient(self, gain_m_step2: Real, subgradient: Real) -> Real:
         f = self._formats
-        shares = gain_m * slopes
-        slope: Real = (shares[:, 0] + shares[:, 1]) >> (f.gain + f.response - f.slope)
-        return slope
+        products = gain_m_step2 * subgradient
+        gradient: Real = (products[:, 0] + products[:, 1]) >> (f.gain + f.response - f.distance_gradient)
+        return gradient
 
     def tracking_cost(self, weight: Real, distance_m: Real) -> Real:
         return weight * distance_m
@@ -170,13 +174,13 @@ class FixedArithmetic:
         f = self._formats
         return rounded(weight * variation_rad, f.effort + f.angle - f.cost)
 
-    def tracking_slope(self, weight: Real, slope_m: Real) -> Real:
-        return weight * slope_m
+    def tracking_gradient(self, weight: Real, distance_gradient_m: Real) -> Real:
+        return weight * distance_gradient_m
 
-    def effort_slope(self, weight: Real) -> Real:
+    def effort_gradient(self, weight: Real) -> Real:
         return weight * 2 ** (self._formats.gradient - self._formats.effort)
 
-    def scaled(self, step_rad: Real, factor: Any) -> Real:
+    def step_product(self, step_rad: Real, factor: Any) -> Real:
         return (step_rad * factor) >> self._formats.factor
 
 

@@ -1,4 +1,4 @@
-"""Controller: checked inputs in, one command out, and what is remembered between two steps."""
+"""Controller: checks the inputs of a step, predicts, optimizes the plan and applies its first move."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ class Status(IntEnum):
 
 @dataclass(frozen=True)
 class Memory:
-    """What n controllers remember between steps.
+    """State of n controllers between two steps.
 
     command_rad is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost (n,), gradient (n, control, 2),
     iterations (n,), converged (n,).
@@ -48,15 +48,15 @@ class Memory:
 
 @dataclass(frozen=True)
 class Step:
-    """The outcome of one step of n controllers; after bad input all but the status is the last good step's.
+    """The result of one step of n controllers; after bad input all but the status is of the last good step.
 
     status:      (n,) a `Status` each.
-    command_rad: (n, 2) roll and pitch to apply now, in rad.
+    command_rad: (n, 2) roll and pitch commands, in rad.
     cost:        (n,) cost of the plan that the last iteration evaluated.
     gradient:    (n, control, 2) gradient of that plan, per rad.
-    plan_rad:    (n, control, 2) moves found, the first of which is the command.
+    plan_rad:    (n, control, 2) the optimized moves, the first of which is the command.
     iterations:  (n,) updates made.
-    converged:   (n,) whether the cost came to rest.
+    converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
 
     With fixed point the numbers are those of the C, converted exactly to SI units in float64.
     """
@@ -71,9 +71,9 @@ class Step:
 
 
 class ReferenceController:
-    """n controllers in NumPy, bit for bit what the generated C computes.
+    """n controllers in NumPy that compute the bits of the generated C.
 
-    `minimize` may be wrapped, to watch the optimizer's inner steps.
+    `minimize` may be wrapped to record the iterations of the optimizer.
     """
 
     def __init__(self, design: Design, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
@@ -97,9 +97,10 @@ class ReferenceController:
         )
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Start all controllers over from `command_rad` (n, 2), clamped to the tilt limit.
+        """Set last command and plan to `command_rad` (n, 2), clamped to the tilt limit.
 
-        Returns a status (n,); one that is not finite, or beyond the limit of attitudes, changes nothing.
+        Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
+        nothing.
         """
         given = self._quantize(command_rad, COMMAND)
         good = _within(given, self._limits.attitude)
@@ -195,6 +196,6 @@ class ReferenceController:
 
 
 def _within(values: Real, limit: Any) -> NDArray[np.bool_]:
-    """Tell for each row of (n, k) whether all values lie in -limit..limit; NaN does not."""
+    """Return for each row of (n, k) whether all values lie in -limit..limit; NaN does not."""
     inside: NDArray[np.bool_] = np.all((values >= -limit) & (values <= limit), axis=1)
     return inside

@@ -1,4 +1,4 @@
-"""Sine, cosine, sign and ordered sums, as `nmpc_math.h` has them."""
+"""Sine, cosine, sign and ordered sums, as in `nmpc_math.h`."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from mambo_nmpc.codegen.fixed_point import SINE_BITS
 from mambo_nmpc.codegen.trigonometry import FixedTrigonometry, Trigonometry
 
 Real = NDArray[Any]
-"""An array of the controller's scalar type, or with fixed point of int64."""
+"""An array of the controller's scalar type; of int64 for fixed point."""
 
 
 def sine_cosine(angle_rad: Real, constants: Trigonometry) -> tuple[Real, Real]:
@@ -22,14 +22,14 @@ def sine_cosine(angle_rad: Real, constants: Trigonometry) -> tuple[Real, Real]:
     square = rest * rest
     sine = rest + (rest * (square * _polynomial(square, constants.sine)))
     cosine = scalar(1) + (square * _polynomial(square, constants.cosine))
-    return _turned(quadrant.astype(np.int64), sine, cosine)
+    return _in_quadrant(quadrant.astype(np.int64), sine, cosine)
 
 
-def _turned(quadrant: NDArray[np.int64], sine: Real, cosine: Real) -> tuple[Real, Real]:
-    turned = [quadrant % 4 == count for count in (1, 2, 3)]
+def _in_quadrant(quadrant: NDArray[np.int64], sine: Real, cosine: Real) -> tuple[Real, Real]:
+    quadrants = [quadrant % 4 == count for count in (1, 2, 3)]
     return (
-        np.select(turned, [cosine, -sine, -cosine], sine),
-        np.select(turned, [-sine, -cosine, sine], cosine),
+        np.select(quadrants, [cosine, -sine, -cosine], sine),
+        np.select(quadrants, [-sine, -cosine, sine], cosine),
     )
 
 
@@ -42,7 +42,7 @@ def _polynomial(square: Real, coefficients: tuple[float, ...]) -> Real:
 
 
 def fixed_sine_cosine(angle_rad: Real, constants: FixedTrigonometry) -> tuple[Real, Real]:
-    """Return sine and cosine of `angle_rad`, numbers of the format of yaws, in the format SINE_BITS."""
+    """Return sine and cosine of `angle_rad`, numbers of the format of yaw, in the format SINE_BITS."""
     quadrant = rounded(angle_rad * constants.quarter_turns_per_rad, constants.quarter_turns_bits)
     fine = (angle_rad * 2**constants.finer_bits) - (quadrant * constants.quarter_turn)
     rest = rounded(fine, constants.fine_bits - SINE_BITS)
@@ -51,7 +51,7 @@ def fixed_sine_cosine(angle_rad: Real, constants: FixedTrigonometry) -> tuple[Re
         rest * rounded(square * _fixed_polynomial(square, constants.sine), SINE_BITS), SINE_BITS
     )
     cosine = 2**SINE_BITS + rounded(square * _fixed_polynomial(square, constants.cosine), SINE_BITS)
-    return _turned(quadrant, sine, cosine)
+    return _in_quadrant(quadrant, sine, cosine)
 
 
 def _fixed_polynomial(square: Real, coefficients: tuple[int, ...]) -> Real:
@@ -62,13 +62,13 @@ def _fixed_polynomial(square: Real, coefficients: tuple[int, ...]) -> Real:
 
 
 def rounded(product: Real, bits: int) -> Real:
-    """Shift `bits` to the right, to the nearest whole number, ties up."""
+    """Shift right by `bits`, rounded to nearest, ties up."""
     nearest: Real = (product + 2 ** (bits - 1)) >> bits
     return nearest
 
 
 def sign(value: Real) -> Real:
-    """Return -1, 0 or 1 in the type of `value`; the sign of zero, of either sign, is 0 (decision 14)."""
+    """Return -1, 0 or 1 in the type of `value`; 0 for +0 and -0 (departure 14 of docs/paper.md)."""
     scalar = value.dtype.type
     signs: Real = np.where(value > 0, scalar(1), np.where(value < 0, scalar(-1), scalar(0)))
     return signs

@@ -16,13 +16,13 @@ Evaluate = Callable[[Real], tuple[Real, Real]]
 
 @dataclass(frozen=True)
 class Search:
-    """Where a search ended, for n controllers.
+    """Result of a search, for n controllers.
 
     moves_rad:   (n, control, 2) the plan.
-    cost:        (n,) cost of the plan that the last iteration evaluated, before its own update.
+    cost:        (n,) cost of the plan that the last iteration evaluated, before its update.
     gradient:    (n, control, 2) gradient of that plan, per rad.
     iterations:  (n,) updates made before the search converged.
-    converged:   (n,) whether the cost came to rest within the tolerance.
+    converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
     """
 
     moves_rad: Real
@@ -55,8 +55,8 @@ class Rprop:
 
         agreement, of the shape of `step`, is this sign times the previous one; where it is 0 the size stays.
         """
-        longer = np.minimum(self._arithmetic.scaled(step, self._increase), self._step_max)
-        shorter = np.maximum(self._arithmetic.scaled(step, self._decrease), self._step_min)
+        longer = np.minimum(self._arithmetic.step_product(step, self._increase), self._step_max)
+        shorter = np.maximum(self._arithmetic.step_product(step, self._decrease), self._step_min)
         return np.where(agreement > 0, longer, np.where(agreement < 0, shorter, step))
 
     def minimize(self, evaluate: Evaluate, moves_rad: Real) -> Search:

@@ -1,6 +1,6 @@
-"""Predictor: how far robot and target will be apart, given the moves (eqs 8-11)."""
+"""Predictor: the error between drone and target over the horizon, for given moves (eqs 8-11)."""
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -11,20 +11,20 @@ from mambo_nmpc.codegen.reference.math import Real
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a control step knows before it chooses moves, for n controllers.
+    """What does not change while the plan of a control step is optimized, for n controllers.
 
-    gain_m:     (n, 2, 2) bend along world x, y per radian of roll, pitch (eq 8 over a prediction step).
-    tilt_rad:   (n, 2) the roll, pitch that the first move turns from: measured, or zero without lag.
-    error_m:    (n, 2) position less target along x, y.
-    advance_m:  (n, 2) what the first step adds to that, if tilt is held.
-    bend_m:     (n, 2) what each step adds to the advance, if tilt is held.
+    gain_m_step2:         (n, 2, 2) tau^2 times eq 8: acceleration along x, y per radian of roll, pitch.
+    tilt_rad:             (n, 2) roll, pitch before the first move: measured, or zero without lag.
+    error_m:              (n, 2) position less target along x, y.
+    displacement_m_step:  (n, 2) change of the error over the first step at constant tilt.
+    acceleration_m_step2: (n, 2) tau^2 times eq 8 at that tilt.
     """
 
-    gain_m: Real
+    gain_m_step2: Real
     tilt_rad: Real
     error_m: Real
-    advance_m: Real
-    bend_m: Real
+    displacement_m_step: Real
+    acceleration_m_step2: Real
 
 
 class Predictor:
@@ -36,64 +36,64 @@ class Predictor:
         self._moves = settings.horizon.control
         self._printed_yaw = settings.model.yaw_convention == "printed"
         self.arithmetic, numbers = arithmetic, arithmetic.numbers
-        self._held = numbers.constant(tables.held, "share")
+        self._displacement_share = numbers.constant(tables.displacement_share, "share")
         self._has_lag = tables.has_lag
         self._axes = np.array(
-            [
-                [numbers.constant(share, "share") for share in (axis.at_once, axis.delayed, axis.decay)]
-                for axis in tables.axes
-            ]
+            [[numbers.constant(share, "share") for share in astuple(axis)] for axis in tables.axes]
         ).T
-        self.axes_alike = tables.axes_alike
+        self.axes_per_response = tables.axes_per_response
         self.response_sum = np.array(
             [[numbers.constant(value, "response") for value in row] for row in tables.response_sum]
         )
 
     def prepare(self, state: Real, target: Real, thrust_acceleration_m_s2: Real) -> Prediction:
-        """Evaluate eq 8 at the present heading and thrust, and find where the walks start without moves.
+        """Evaluate eq 8 at the present yaw and thrust, and start the roll-out along each axis of the world.
 
         state is (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
         """
         arithmetic = self.arithmetic
-        push = arithmetic.push(thrust_acceleration_m_s2)
-        sine, cosine = arithmetic.sine_cosine(state[:, 6])
-        across, along = arithmetic.component(push, sine), arithmetic.component(push, cosine)
-        turned = across if self._printed_yaw else -across
-        gain = np.stack([np.stack([turned, -along], 1), np.stack([along, turned], 1)], 1)
-        advance = arithmetic.travel(state[:, 2:4] - target[:, 2:4])
-        tilt, bend = np.zeros_like(advance), np.zeros_like(advance)
+        thrust = arithmetic.thrust_product(thrust_acceleration_m_s2)
+        sine, cosine = (
+            arithmetic.sine_product(thrust, value) for value in arithmetic.sine_cosine(state[:, 6])
+        )
+        signed_sine = sine if self._printed_yaw else -sine
+        gain = np.stack([np.stack([signed_sine, -cosine], 1), np.stack([cosine, signed_sine], 1)], 1)
+        displacement = arithmetic.velocity_product(state[:, 2:4] - target[:, 2:4])
+        tilt, acceleration = np.zeros_like(displacement), np.zeros_like(displacement)
         if self._has_lag:
             tilt = state[:, 4:6]
-            shares = arithmetic.bend(gain, tilt[:, None])
-            bend = shares[:, :, 0] + shares[:, :, 1]
-            advance = advance + arithmetic.part(self._held, bend)
-        error = arithmetic.first_error(state[:, 0:2] - target[:, 0:2])
-        return Prediction(gain, tilt, error, advance, bend)
+            by_axis = arithmetic.gain_product(gain, tilt[:, None])
+            acceleration = by_axis[:, :, 0] + by_axis[:, :, 1]
+            displacement = displacement + arithmetic.share_product(self._displacement_share, acceleration)
+        error = arithmetic.initial_error(state[:, 0:2] - target[:, 0:2])
+        return Prediction(gain, tilt, error, displacement, acceleration)
 
     def errors(self, prediction: Prediction, moves_rad: Real) -> Real:
         """Predict position less target for `moves_rad` (n, control, 2): (prediction, n, 2), in m."""
-        error, advance, bend = prediction.error_m, prediction.advance_m, prediction.bend_m
-        (at_once, delayed, decay), arithmetic = self._axes, self.arithmetic
-        to_come = np.zeros_like(prediction.gain_m)
+        error, displacement = prediction.error_m, prediction.displacement_m_step
+        acceleration = prediction.acceleration_m_step2
+        (displacement_share, deficit_share, deficit_decay), arithmetic = self._axes, self.arithmetic
+        deficit = np.zeros_like(prediction.gain_m_step2)
         errors = np.empty((self._steps, *error.shape), error.dtype)
-        before = prediction.tilt_rad
+        previous = prediction.tilt_rad
         for i in range(self._steps):
             if i < self._moves:
-                shares = arithmetic.bend(prediction.gain_m, (moves_rad[:, i] - before)[:, None])
-                before = moves_rad[:, i]
-                both = shares[:, :, 0] + shares[:, :, 1]
+                tilt_change = (moves_rad[:, i] - previous)[:, None]
+                previous = moves_rad[:, i]
+                by_axis = arithmetic.gain_product(prediction.gain_m_step2, tilt_change)
+                change = by_axis[:, :, 0] + by_axis[:, :, 1]
                 if self._has_lag:
-                    sooner = arithmetic.part(at_once, shares)
-                    advance = advance + (sooner[:, :, 0] + sooner[:, :, 1])
-                    to_come = to_come - arithmetic.part(delayed, shares)
+                    displaced = arithmetic.share_product(displacement_share, by_axis)
+                    displacement = displacement + (displaced[:, :, 0] + displaced[:, :, 1])
+                    deficit = deficit - arithmetic.share_product(deficit_share, by_axis)
                 else:
-                    advance = advance + arithmetic.part(at_once[0], both)
-                bend = bend + both
-            error = error + arithmetic.step_of(advance)
+                    displacement = displacement + arithmetic.share_product(displacement_share[0], change)
+                acceleration = acceleration + change
+            error = error + arithmetic.error_change(displacement)
             if self._has_lag:
-                advance = advance + (bend + (to_come[:, :, 0] + to_come[:, :, 1]))
-                to_come = arithmetic.part(decay, to_come)
+                displacement = displacement + (acceleration + (deficit[:, :, 0] + deficit[:, :, 1]))
+                deficit = arithmetic.share_product(deficit_decay, deficit)
             else:
-                advance = advance + bend
+                displacement = displacement + acceleration
             errors[i] = error
         return errors

@@ -33,8 +33,12 @@ typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
-typedef struct { nmpc_real_t error_m, advance_m, bend_m; ...; } nmpc_walk_t;
-typedef struct { nmpc_real_t gain_x_m[2], gain_y_m[2]; nmpc_walk_t x, y; ...; } nmpc_prediction_t;
+typedef struct { nmpc_real_t error_m, displacement_m_step, acceleration_m_step2; ...; } nmpc_rollout_t;
+typedef struct {
+    nmpc_real_t gain_x_m_step2[2], gain_y_m_step2[2];
+    nmpc_rollout_t x, y;
+    ...;
+} nmpc_prediction_t;
 typedef struct {
     nmpc_weights_t weights;
     nmpc_prediction_t prediction;
@@ -60,8 +64,9 @@ unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
 
 void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
-void nmpc_predictor_turn(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_walk_t *, nmpc_walk_t *);
-void nmpc_predictor_walk(nmpc_walk_t *);
+void nmpc_predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
+                                nmpc_rollout_t *);
+void nmpc_predictor_step(nmpc_rollout_t *);
 nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
 
 void nmpc_batch_init(nmpc_t *, int);

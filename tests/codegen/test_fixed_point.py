@@ -98,7 +98,7 @@ def test_intermediates_use_their_formats(name: str) -> None:
         (ranges.thrust_acceleration_max_m_s2, found.thrust),
     ):
         assert 2**29 <= raw(value, bits) < 2**31
-    assert found.position <= found.error < found.bend
+    assert found.position <= found.error < found.acceleration
 
 
 @pytest.mark.parametrize(

@@ -36,11 +36,11 @@ GENERATED = Path(__file__).parents[2] / "generated"
 
 FAULTS = {
     "another order": (
-        "src/nmpc_predictor.h",
-        "walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m))",
-        "(walk->advance_m + walk->bend_m) + (walk->roll_to_come_m + walk->pitch_to_come_m)",
+        "src/nmpc_math.c",
+        "rest + (rest * (square * sine_rest))",
+        "rest + ((rest * square) * sine_rest)",
     ),
-    "another sign": ("src/nmpc_cost.c", "effort = -nmpc_effort_slope", "effort = nmpc_effort_slope"),
+    "another sign": ("src/nmpc_cost.c", "effort_gradient = -weight", "effort_gradient = weight"),
 }
 """Faults by name: file, the line, what it becomes."""
 

@@ -36,13 +36,13 @@ REASONS: Final[tuple[Reason, ...]] = (
     ),
     Reason(
         "src/nmpc_cost.c",
-        "for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {",
+        "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {",
         "branch 3 never taken",
         "the count bounds the loop for all to see; changes of sign run out before",
     ),
     Reason(
         "src/nmpc_predictor.h",
-        "const nmpc_real_t *before_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;",
+        "const nmpc_real_t *previous_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;",
         "branch 0 never taken",
         "with one move in the control horizon none follows another",
         _has_one_move,

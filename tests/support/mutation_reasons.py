@@ -62,8 +62,8 @@ def _does_not_show(of: str, change: int) -> Callable[[Settings], bool]:
         def walked(increase: Any, decrease: Any) -> list[Any]:
             steps = [initial]
             for _ in range(optimizer.iterations - 1):
-                longer = [min(products.scaled(step, increase), largest) for step in steps]
-                shorter = [max(products.scaled(step, decrease), smallest) for step in steps]
+                longer = [min(products.step_product(step, increase), largest) for step in steps]
+                shorter = [max(products.step_product(step, decrease), smallest) for step in steps]
                 steps = [*steps, *longer, *shorter]
             return steps
 
@@ -100,7 +100,7 @@ REASONS: Final[tuple[Reason, ...]] = (
     *(
         Reason(
             "src/nmpc_cost.c",
-            "for (part = 1; (changes != 0U) && (part < NMPC_PREDICTION_HORIZON); part++) {",
+            "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {",
             what,
             _PARTS,
         )
@@ -119,38 +119,50 @@ REASONS: Final[tuple[Reason, ...]] = (
     *(
         Reason(
             "src/nmpc_predictor.c",
-            f"walk->{axis}_to_come_m = (nmpc_real_t)0;",
+            f"rollout->{axis}_deficit_m_step2 = (nmpc_real_t)0;",
             "left out",
             "nmpc_init() has written the same, and nothing else is ever written there",
         )
         for axis in ("roll", "pitch")
     ),
-    Reason("src/nmpc_optimizer.c", "rprop[k].before_rad = self->plan_rad[k];", "left out", _PROVEN),
+    Reason("src/nmpc_optimizer.c", "rprop[k].previous_rad = self->plan_rad[k];", "left out", _PROVEN),
     Reason(
         "include/nmpc_config.h",
-        "#define NMPC_STEP_MAX_RAD <real>",
+        "#define NMPC_STEP_MAX_RAD <real> /* Delta_max, Table I */",
         "next number",
         _STEPS,
         _steps_stay_short,
     ),
     *(
-        Reason("include/nmpc_config.h", "#define NMPC_STEP_MIN_RAD <real>", what, _STEPS, _steps_stay_long)
+        Reason(
+            "include/nmpc_config.h",
+            "#define NMPC_STEP_MIN_RAD <real> /* Delta_min, Table I */",
+            what,
+            _STEPS,
+            _steps_stay_long,
+        )
         for what in ("next number", "negative")
     ),
     *(
-        Reason("include/nmpc_config.h", f"#define NMPC_STEP_{end}_RAD <number>", what, _STEPS, holds)
+        Reason(
+            "include/nmpc_config.h",
+            f"#define NMPC_STEP_{end}_RAD <number> /* Delta_{end.lower()}, Table I */",
+            what,
+            _STEPS,
+            holds,
+        )
         for end, holds in (("MAX", _steps_stay_short), ("MIN", _steps_stay_long))
         for what in ("one more", "one less")
     ),
     *(
         Reason(
             "include/nmpc_config.h",
-            f"#define NMPC_{factor.upper()} <number>",
+            f"#define NMPC_{factor.upper()} <number> /* {symbol}, Table I */",
             what,
             "rounds to the same steps, on every path that the iterations there are can take",
             _does_not_show(factor, change),
         )
-        for factor in ("increase", "decrease")
+        for factor, symbol in (("increase", "eta+"), ("decrease", "eta-"))
         for what, change in (("one more", 1), ("one less", -1))
     ),
     Reason(
@@ -173,7 +185,7 @@ REASONS: Final[tuple[Reason, ...]] = (
     *(
         Reason(
             "src/nmpc_float.c",
-            "status = nmpc_step(self, NULL, NULL, 0, &next);",
+            "status = nmpc_step(self, NULL, NULL, 0, &fixed_command);",
             what,
             "null pointers are refused before the thrust is looked at",
         )
@@ -217,7 +229,7 @@ REASONS: Final[tuple[Reason, ...]] = (
     ),
     Reason(
         "src/nmpc_predictor.h",
-        "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_ALIKE)",
+        "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_PER_RESPONSE)",
         "/ -> *",
         "a wider table, whose further columns nobody reads",
         _axes_alike,

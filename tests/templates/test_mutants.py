@@ -33,17 +33,17 @@ INPUTS = inputs_of_steps(BACKTRACKING, CASES, steps=4, seed=0)
 PREDICTOR, PREDICTOR_H, COST = "src/nmpc_predictor.c", "src/nmpc_predictor.h", "src/nmpc_cost.c"
 OPTIMIZER, STEP, HELPERS = "src/nmpc_optimizer.c", "src/nmpc.c", "src/nmpc_math.h"
 FAULTS = {
-    "roll pushes x the other way": (PREDICTOR, "gain_x_m[NMPC_ROLL] = -across", "gain_x_m[NMPC_ROLL] = across"),
+    "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2[NMPC_ROLL] = -sine", "gain_x_m_step2[NMPC_ROLL] = sine"),
     "the sign of zero is one": (HELPERS, "(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
     "one predicted step too few": (COST, "i < NMPC_PREDICTION_HORIZON; i++)", "i < NMPC_PREDICTION_HORIZON - 1; i++)"),
     "one iteration too many": (OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
-    "pitch takes roll's response": (COST, "slopes_x[response]", "slopes_x[response - axis]"),
+    "pitch takes roll's response": (COST, "subgradient_x[response]", "subgradient_x[response - axis]"),
     "roll and pitch change places": (STEP, "command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),
-    "effort weighs like tracking in the cost": (COST, "nmpc_effort_cost(weight.effort, variation_rad)", "nmpc_effort_cost(weight.tracking, variation_rad)"),
-    "a constant an ulp off": (PREDICTOR_H, "NMPC_ROLL_DECAY 0.8309504f", "NMPC_ROLL_DECAY 0.83095044f"),
-    "bend added first": (PREDICTOR_H, "walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m))", "(walk->advance_m + walk->bend_m) + (walk->roll_to_come_m + walk->pitch_to_come_m)"),
+    "effort weighs like tracking in the cost": (COST, "weight.effort * variation_rad", "weight.tracking * variation_rad"),
+    "a constant an ulp off": (PREDICTOR_H, "NMPC_ROLL_DEFICIT_DECAY 0.8309504f", "NMPC_ROLL_DEFICIT_DECAY 0.83095044f"),
+    "sine multiplied out": ("src/nmpc_math.c", "rest + (rest * (square * sine_rest))", "rest * ((nmpc_real_t)1 + (square * sine_rest))"),
     "no lower clamp of a move": (OPTIMIZER, "nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD)", "move_rad - rprop->step_rad"),
-    "no backtracking": (OPTIMIZER, "        next_rad = rprop->before_rad;\n", ""),
+    "no backtracking": (OPTIMIZER, "        next_rad = rprop->previous_rad;\n", ""),
     "no first command": (STEP, "        self->command_rad[k] = (nmpc_real_t)0;\n", ""),
     "bad input gets a level command": (STEP, "    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
 }  # fmt: skip

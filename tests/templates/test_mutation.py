@@ -100,7 +100,11 @@ def test_mutants_meet_their_fate(tmp_path: Path) -> None:
         ("include/nmpc_config.h", "#define NMPC_POSITION_RANGE_M 1000.00006f", Fate.OTHER_BITS),
         ("src/nmpc.c", "for (k = 0; k <= NMPC_AXES; k++) {", Fate.UNDEFINED),
         ("include/nmpc_config.h", "#define NMPC_INSTANCE_BYTES 119", Fate.REFUSED),
-        ("include/nmpc_config.h", "#define NMPC_UPDATE_PERIOD_S 0.010000001f", Fate.SAME),
+        (
+            "include/nmpc_config.h",
+            "#define NMPC_UPDATE_PERIOD_S 0.010000001f /* from k to k + 1 */",
+            Fate.SAME,
+        ),
     ):
         mutant = next(one for one in bench.mutants_of(path) if one.wrong_line == wrong)
         assert bench.fate(mutant) is fate, wrong

@@ -88,7 +88,7 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
 def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None:
-    """Gains, the starts of the walks, predicted errors, cost and its gradient have the same bits."""
+    """Gains, the initial roll-outs, predicted errors, cost and its gradient have the same bits."""
     settings = settings_case(index, scalar)
     blocks = SubBlocks(settings)
     ffi, lib = blocks.ffi, blocks.lib
@@ -117,19 +117,20 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
             thrust[0],
             prediction,
         )
-        gains = [blocks.unpack(prediction.gain_x_m), blocks.unpack(prediction.gain_y_m)]
-        starts = [[walk.error_m, walk.advance_m, walk.bend_m] for walk in (prediction.x, prediction.y)]
-        assert bits(gains) == bits(expected.gain_m[0].astype(blocks.scalar))
-        assert bits(np.array(starts, blocks.scalar).T) == bits(
-            np.concatenate([expected.error_m, expected.advance_m, expected.bend_m]).astype(blocks.scalar)
+        gains = [blocks.unpack(prediction.gain_x_m_step2), blocks.unpack(prediction.gain_y_m_step2)]
+        members = ("error_m", "displacement_m_step", "acceleration_m_step2")
+        starts = [[getattr(axis, name) for axis in (prediction.x, prediction.y)] for name in members]
+        assert bits(gains) == bits(expected.gain_m_step2[0].astype(blocks.scalar))
+        assert bits(np.array(starts, blocks.scalar)) == bits(
+            np.concatenate([getattr(expected, name) for name in members]).astype(blocks.scalar)
         )
 
-        x, y = ffi.new("nmpc_walk_t *", prediction.x), ffi.new("nmpc_walk_t *", prediction.y)
+        x, y = ffi.new("nmpc_rollout_t *", prediction.x), ffi.new("nmpc_rollout_t *", prediction.y)
         for i, errors in enumerate(predictor.errors(expected, computed(moves))):
             if i < settings.horizon.control:
-                lib.nmpc_predictor_turn(prediction, blocks.pointer("nmpc_real_t", moves), i, x, y)
-            for walk in (x, y):
-                lib.nmpc_predictor_walk(walk)
+                lib.nmpc_predictor_apply_moves(prediction, blocks.pointer("nmpc_real_t", moves), i, x, y)
+            for rollout in (x, y):
+                lib.nmpc_predictor_step(rollout)
             assert bits(np.array([x.error_m, y.error_m], blocks.scalar)) == bits(
                 errors[0].astype(blocks.scalar)
             )

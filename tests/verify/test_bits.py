@@ -22,8 +22,8 @@ WRONG_COMMAND = (
 )
 WRONG_SCALE = (
     "src/nmpc_float.c",
-    "number_of(state->yaw_rad, NMPC_YAW_SCALE)",
-    "number_of(state->yaw_rad, 1.0f)",
+    "quantize(state->yaw_rad, NMPC_YAW_SCALE)",
+    "quantize(state->yaw_rad, 1.0f)",
 )
 
 

@@ -34,8 +34,8 @@ HARMS = {
     "one move too many": Harm(STEP, r"k < NMPC_MOVES", "k <= NMPC_MOVES"),
     "a table is read past its end": Harm(
         COST,
-        r"\(NMPC_LAST_STEP - 1U\) - nmpc_lowest_one",
-        "(NMPC_LAST_STEP + 1U) - nmpc_lowest_one",
+        r"\(NMPC_LAST_STEP - 1U\) - nmpc_lowest_set_bit",
+        "(NMPC_LAST_STEP + 1U) - nmpc_lowest_set_bit",
     ),
     "a bad input leaves the command unset": Harm(
         STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""
@@ -74,7 +74,7 @@ FIXED_HARMS = {
         "src/nmpc_math.c", r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"
     ),
     "errors have a bit too many": Harm(
-        "include/nmpc_config.h", r"(#define NMPC_ERROR_BITS) \d+", r"\1 NMPC_BEND_BITS - 1"
+        "include/nmpc_config.h", r"(#define NMPC_ERROR_BITS) \d+", r"\1 NMPC_ACCELERATION_BITS - 1"
     ),
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Settings of this controller; every number that the algorithm reads stands here or in a constant table.
+ * Constants of this controller, with the symbols of the paper that nmpc.h cites.
  * MISRA C:2012: departs from rule 2.5, for the reason in deviations.txt.
  *
  *   horizon.prediction                         10
@@ -34,7 +34,7 @@
 #ifndef NMPC_CONFIG_H
 #define NMPC_CONFIG_H
 
-/* Numbers of the interface, cost and gradient, and sums: value times 2 to the bits below. */
+/* Types of inputs, outputs and moves, and of cost and gradient. */
 #if defined(__SIZEOF_INT__) && (__SIZEOF_INT__ < 4)
 typedef long nmpc_real_t;
 #else
@@ -49,36 +49,37 @@ typedef long long nmpc_sum_t;
  * different bundles do not compile together. */
 #define NMPC_SETTINGS_ID 0xD4C905DCUL
 
-/* Horizons: Np, Nc and Imax of Table I. A move is one angle at one step of the control horizon. */
-#define NMPC_PREDICTION_HORIZON 10
-#define NMPC_CONTROL_HORIZON 2
-#define NMPC_AXES 2
+/* Horizons. A move is the set-point of one angle at one step of the control horizon. */
+#define NMPC_PREDICTION_HORIZON 10 /* N_p, Table I */
+#define NMPC_CONTROL_HORIZON 2 /* N_c, Table I */
+#define NMPC_AXES 2 /* phi and theta */
 #define NMPC_MOVES (NMPC_AXES * NMPC_CONTROL_HORIZON)
-#define NMPC_ITERATIONS 5
 
-/* Call nmpc_step() once in this time; predicted steps are this far apart. */
-#define NMPC_UPDATE_PERIOD_S 0.01f
-#define NMPC_PREDICTION_STEP_S 1889785610
-#define NMPC_PREDICTION_STEP_SQUARED_S2 1663011337
+/* The paper has one tau, the update time step. Here the steps of the prediction may be longer than the period
+ * of the calls of nmpc_step(). */
+#define NMPC_UPDATE_PERIOD_S 0.01f /* from k to k + 1 */
+#define NMPC_PREDICTION_STEP_S 1889785610 /* tau, eqs 9 and 11 */
+#define NMPC_PREDICTION_STEP_SQUARED_S2 1663011337 /* tau^2 */
 
-/* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest to replace them. */
-#define NMPC_TRACKING_WEIGHT 144000
-#define NMPC_EFFORT_WEIGHT 268435456
+/* Cost: the weights that nmpc_init() sets, and the largest that nmpc_set_weights() admits. */
+#define NMPC_TRACKING_WEIGHT 144000 /* lambda_1, eq 12a, 1/m */
+#define NMPC_EFFORT_WEIGHT 268435456 /* lambda_2, eq 12b, 1/rad */
 #define NMPC_TRACKING_WEIGHT_LIMIT 576000
 #define NMPC_EFFORT_WEIGHT_LIMIT 1073741824
 
-/* Optimizer: Ustep, eta+, eta-, Delta_max, Delta_min and epsilon of Table I. */
-#define NMPC_INITIAL_STEP_RAD 5368709
-#define NMPC_INCREASE 1288490189
-#define NMPC_DECREASE 858993459
-#define NMPC_STEP_MAX_RAD 53687091
-#define NMPC_STEP_MIN_RAD 537
-#define NMPC_TOLERANCE 1677722
+/* Optimizer: RPROP. */
+#define NMPC_ITERATIONS 5 /* I_max, Table I */
+#define NMPC_INITIAL_STEP_RAD 5368709 /* U_step, Table I */
+#define NMPC_INCREASE 1288490189 /* eta+, Table I */
+#define NMPC_DECREASE 858993459 /* eta-, Table I */
+#define NMPC_STEP_MAX_RAD 53687091 /* Delta_max, Table I */
+#define NMPC_STEP_MIN_RAD 537 /* Delta_min, Table I */
+#define NMPC_TOLERANCE 1677722 /* epsilon, Table I */
 
-/* No command ever exceeds this, either way. */
+/* Limit of every move and command, either way; the paper has none. */
 #define NMPC_TILT_LIMIT_RAD 187904819
 
-/* Input beyond these is refused with a status: +/- a range, and the two ends of thrust. */
+/* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. */
 #define NMPC_POSITION_RANGE_M 524288000
 #define NMPC_VELOCITY_RANGE_M_S 838860800
 #define NMPC_ATTITUDE_RANGE_RAD 1744830464
@@ -86,9 +87,9 @@ typedef long long nmpc_sum_t;
 #define NMPC_THRUST_ACCELERATION_MIN_M_S2 33554432
 #define NMPC_THRUST_ACCELERATION_MAX_M_S2 1677721600
 
-/* Bits behind the point. A position of 1.5 m is the number 1.5 * 2^NMPC_POSITION_BITS, and so on: positions, m;
- * velocities, m/s; roll, pitch, moves, command, rad; yaw, rad; thrust acceleration, m/s^2; weights, 1/m and
- * 1/rad; cost, and its gradient per rad. */
+/* Fractional bits of inputs and outputs: 1.5 m is the number 1.5 * 2^NMPC_POSITION_BITS. Positions, m;
+ * velocities, m/s; roll, pitch, moves and command, rad; yaw, rad; thrust acceleration, m/s^2; weights, 1/m
+ * and 1/rad; cost; its gradient, 1/rad. */
 #define NMPC_POSITION_BITS 19
 #define NMPC_VELOCITY_BITS 23
 #define NMPC_ANGLE_BITS 29
@@ -99,8 +100,8 @@ typedef long long nmpc_sum_t;
 #define NMPC_COST_BITS 25
 #define NMPC_GRADIENT_BITS 28
 
-/* Numbers of constants, as in NMPC_POSITION(1.5): the nearest, ties away from zero, by the compiler. For values
- * known at run time only there is nmpc_float.h. */
+/* Convert a constant, as in NMPC_POSITION(1.5): rounded to nearest, ties away from zero, by the compiler. To
+ * convert values at run time use nmpc_float.h. */
 #define NMPC_NUMBER(value, bits) \
     ((nmpc_real_t)((((value) * (double)((nmpc_sum_t)2 << (bits))) + (((value) < 0) ? -1 : 1)) / 2))
 #define NMPC_POSITION(value_m) NMPC_NUMBER(value_m, NMPC_POSITION_BITS)
@@ -111,23 +112,24 @@ typedef long long nmpc_sum_t;
 #define NMPC_TRACKING(value) NMPC_NUMBER(value, NMPC_TRACKING_BITS)
 #define NMPC_EFFORT(value) NMPC_NUMBER(value, NMPC_EFFORT_BITS)
 
-/* Inside: prediction step and its square; bend per rad; bends and advances, and errors, m; shares; sums of
- * responses; slope of the distance, m/rad; growth and shrinkage of a step; sine and cosine. */
+/* Fractional bits of internal quantities: tau and tau^2; gain, m/step^2 per rad; displacement, acceleration
+ * and deficit, m/step and m/step^2; predicted error, m; shares and decays of the lag; sums of responses;
+ * gradient of the distance, m/rad; eta+ and eta-; sine and cosine. */
 #define NMPC_STEP_BITS 35
 #define NMPC_STEP_SQUARED_BITS 39
 #define NMPC_GAIN_BITS 33
-#define NMPC_BEND_BITS 25
+#define NMPC_ACCELERATION_BITS 25
 #define NMPC_ERROR_BITS 19
 #define NMPC_SHARE_BITS 31
 #define NMPC_RESPONSE_BITS 20
-#define NMPC_SLOPE_BITS 22
+#define NMPC_DISTANCE_GRADIENT_BITS 22
 #define NMPC_FACTOR_BITS 30
 #define NMPC_SINE_BITS 30
 
-/* A position error beyond this keeps its sign over the horizon whatever the moves, and counts as this. */
+/* Position errors are clamped to this: no plan changes the sign of a larger one within the horizon. */
 #define NMPC_ERROR_LIMIT_M 127676294
 
-/* Room that one nmpc_t takes at most; nmpc.c asserts it. */
+/* Upper bound of sizeof(nmpc_t); nmpc.c asserts it. */
 #define NMPC_INSTANCE_BYTES 144
 
 #endif

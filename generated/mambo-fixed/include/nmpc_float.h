@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Floats in and out of a fixed point controller, for code around it that computes in floating point. Link
- * nmpc_float.c only to use it; the controller itself calls nothing of it.
+ * The interface of nmpc.h with floats in SI units, for firmware that computes in floating point. The
+ * controller itself does not call these functions: link nmpc_float.c only if you use them.
  */
 #ifndef NMPC_FLOAT_H
 #define NMPC_FLOAT_H
@@ -40,9 +40,9 @@ typedef struct {
     float effort;   /* 1/rad */
 } nmpc_float_weights_t;
 
-/* The same as nmpc_step(), nmpc_reset(), nmpc_set_weights() and nmpc_last_cost(), of the nearest numbers, ties
- * away from zero. NaN, infinity and what no format holds become the largest number, which is out of every range:
- * the status says so, as in nmpc.h. */
+/* nmpc_step(), nmpc_reset(), nmpc_set_weights() and nmpc_last_cost() with floats, which are rounded to the
+ * nearest number, ties away from zero. NaN, infinity and what overflows become the largest number, which is
+ * outside of every range and so refused, as in nmpc.h. */
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               float thrust_acceleration_m_s2, nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command);

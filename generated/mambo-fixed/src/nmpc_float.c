@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Floats in and out of a fixed point controller.
+ * Conversion between float and the fixed point numbers of the controller.
  * MISRA C:2012: departs from rule 15.5, for the reason in deviations.txt.
  */
 #include <stddef.h>
@@ -11,7 +11,7 @@
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
-/* Numbers per unit, and units per number. */
+/* Factors from SI units to numbers, and from numbers to SI units. */
 #define NMPC_POSITION_SCALE 524288.0f
 #define NMPC_VELOCITY_SCALE 8.388608e+06f
 #define NMPC_ANGLE_SCALE 5.368709e+08f
@@ -22,10 +22,11 @@
 #define NMPC_ANGLE_UNIT 1.8626451e-09f
 #define NMPC_COST_UNIT 2.9802322e-08f
 
-/* 2^31: no number reaches it. */
+/* 2^31: every number is smaller. */
 #define NMPC_NUMBERS_END 2147483648.0f
 
-static nmpc_real_t number_of(float value, float scale)
+/* Nearest number, ties away from zero; the largest number for what overflows and for NaN. */
+static nmpc_real_t quantize(float value, float scale)
 {
     const float scaled = value * scale;
     nmpc_real_t number = 2147483647;
@@ -40,7 +41,7 @@ static nmpc_real_t number_of(float value, float scale)
         } else if (rest <= -0.5f) {
             number--;
         } else {
-            /* The nearest already. */
+            /* Truncation gave the nearest number. */
         }
     }
     return number;
@@ -49,9 +50,9 @@ static nmpc_real_t number_of(float value, float scale)
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               float thrust_acceleration_m_s2, nmpc_float_command_t *command)
 {
-    nmpc_state_t here;
-    nmpc_target_t there;
-    nmpc_command_t next;
+    nmpc_state_t fixed_state;
+    nmpc_target_t fixed_target;
+    nmpc_command_t fixed_command;
     nmpc_status_t status;
 
     if (command == NULL) {
@@ -59,50 +60,51 @@ nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, con
     }
 
     if ((state == NULL) || (target == NULL)) {
-        status = nmpc_step(self, NULL, NULL, 0, &next);
+        status = nmpc_step(self, NULL, NULL, 0, &fixed_command);
     } else {
         int axis;
 
         for (axis = 0; axis < 2; axis++) {
-            here.position_m[axis] = number_of(state->position_m[axis], NMPC_POSITION_SCALE);
-            here.velocity_m_s[axis] = number_of(state->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
-            there.position_m[axis] = number_of(target->position_m[axis], NMPC_POSITION_SCALE);
-            there.velocity_m_s[axis] = number_of(target->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
+            fixed_state.position_m[axis] = quantize(state->position_m[axis], NMPC_POSITION_SCALE);
+            fixed_state.velocity_m_s[axis] = quantize(state->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
+            fixed_target.position_m[axis] = quantize(target->position_m[axis], NMPC_POSITION_SCALE);
+            fixed_target.velocity_m_s[axis] = quantize(target->velocity_m_s[axis], NMPC_VELOCITY_SCALE);
         }
-        here.roll_rad = number_of(state->roll_rad, NMPC_ANGLE_SCALE);
-        here.pitch_rad = number_of(state->pitch_rad, NMPC_ANGLE_SCALE);
-        here.yaw_rad = number_of(state->yaw_rad, NMPC_YAW_SCALE);
-        status = nmpc_step(self, &here, &there, number_of(thrust_acceleration_m_s2, NMPC_THRUST_SCALE), &next);
+        fixed_state.roll_rad = quantize(state->roll_rad, NMPC_ANGLE_SCALE);
+        fixed_state.pitch_rad = quantize(state->pitch_rad, NMPC_ANGLE_SCALE);
+        fixed_state.yaw_rad = quantize(state->yaw_rad, NMPC_YAW_SCALE);
+        status = nmpc_step(self, &fixed_state, &fixed_target,
+                           quantize(thrust_acceleration_m_s2, NMPC_THRUST_SCALE), &fixed_command);
     }
-    command->roll_rad = (float)next.roll_rad * NMPC_ANGLE_UNIT;
-    command->pitch_rad = (float)next.pitch_rad * NMPC_ANGLE_UNIT;
+    command->roll_rad = (float)fixed_command.roll_rad * NMPC_ANGLE_UNIT;
+    command->pitch_rad = (float)fixed_command.pitch_rad * NMPC_ANGLE_UNIT;
     return status;
 }
 
 nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command)
 {
-    nmpc_command_t last;
+    nmpc_command_t fixed_command;
 
     if (command == NULL) {
         return NMPC_NULL_POINTER;
     }
 
-    last.roll_rad = number_of(command->roll_rad, NMPC_ANGLE_SCALE);
-    last.pitch_rad = number_of(command->pitch_rad, NMPC_ANGLE_SCALE);
-    return nmpc_reset(self, &last);
+    fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
+    fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
+    return nmpc_reset(self, &fixed_command);
 }
 
 nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *weights)
 {
-    nmpc_weights_t numbers;
+    nmpc_weights_t fixed_weights;
 
     if (weights == NULL) {
         return NMPC_NULL_POINTER;
     }
 
-    numbers.tracking = number_of(weights->tracking, NMPC_TRACKING_SCALE);
-    numbers.effort = number_of(weights->effort, NMPC_EFFORT_SCALE);
-    return nmpc_set_weights(self, &numbers);
+    fixed_weights.tracking = quantize(weights->tracking, NMPC_TRACKING_SCALE);
+    fixed_weights.effort = quantize(weights->effort, NMPC_EFFORT_SCALE);
+    return nmpc_set_weights(self, &fixed_weights);
 }
 
 float nmpc_float_last_cost(const nmpc_t *self)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Predictor: how far robot and target will be apart, given the moves (eqs 8-11).
+ * Predictor: the error between drone and target over the horizon, for given moves (eqs 8-11).
  *
- * Prediction step: 0.055 s. Attitude lag: roll 0.27 s, pitch 0.15 s.
+ * tau = 0.055 s; attitude lag: roll 0.27 s, pitch 0.15 s.
  */
 #include "nmpc_predictor.h"
 
@@ -23,40 +23,42 @@ const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESP
     { 22927514, 31431236, 51246709, 73967608 }
 };
 
-/* Start a walk: robot and target keep their velocity, and the robot its tilt. */
-static void start_walk(nmpc_walk_t *walk, nmpc_real_t error_m, nmpc_real_t velocity_m_s,
-                       const nmpc_real_t gain_m[NMPC_AXES], const nmpc_real_t tilt_rad[NMPC_AXES])
+/* Start the roll-out along one axis: velocity and tilt are held. */
+static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_real_t velocity_m_s,
+                          const nmpc_real_t gain_m_step2[NMPC_AXES], const nmpc_real_t tilt_rad[NMPC_AXES])
 {
-    walk->error_m = nmpc_first_error(error_m);
-    walk->bend_m = nmpc_bend(gain_m[NMPC_ROLL], tilt_rad[NMPC_ROLL]) + nmpc_bend(gain_m[NMPC_PITCH], tilt_rad[NMPC_PITCH]);
-    walk->advance_m = nmpc_travel(velocity_m_s) + nmpc_part(1073741824, walk->bend_m);
-    walk->roll_to_come_m = (nmpc_real_t)0;
-    walk->pitch_to_come_m = (nmpc_real_t)0;
+    rollout->error_m = nmpc_initial_error(error_m);
+    rollout->acceleration_m_step2 = nmpc_gain_product(gain_m_step2[NMPC_ROLL], tilt_rad[NMPC_ROLL])
+                                    + nmpc_gain_product(gain_m_step2[NMPC_PITCH], tilt_rad[NMPC_PITCH]);
+    rollout->displacement_m_step = nmpc_velocity_product(NMPC_PREDICTION_STEP_S, velocity_m_s)
+                                   + nmpc_share_product(NMPC_DISPLACEMENT_SHARE, rollout->acceleration_m_step2);
+    rollout->roll_deficit_m_step2 = (nmpc_real_t)0;
+    rollout->pitch_deficit_m_step2 = (nmpc_real_t)0;
 }
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
-    const nmpc_real_t push_m = nmpc_push(thrust_acceleration_m_s2);
+    const nmpc_real_t thrust_m_step2 = nmpc_thrust_product(thrust_acceleration_m_s2, NMPC_PREDICTION_STEP_SQUARED_S2);
     nmpc_real_t sine;
     nmpc_real_t cosine;
-    nmpc_real_t across_m;
-    nmpc_real_t along_m;
+    nmpc_real_t sine_m_step2;
+    nmpc_real_t cosine_m_step2;
 
-    /* Eq 8 with the signs of eq 3, over one step. */
+    /* tau^2 times the matrix of eq 8, sin psi with the sign of eq 3. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
-    across_m = nmpc_component(push_m, sine);
-    along_m = nmpc_component(push_m, cosine);
-    prediction->gain_x_m[NMPC_ROLL] = -across_m;
-    prediction->gain_x_m[NMPC_PITCH] = -along_m;
-    prediction->gain_y_m[NMPC_ROLL] = along_m;
-    prediction->gain_y_m[NMPC_PITCH] = -across_m;
+    sine_m_step2 = nmpc_sine_product(thrust_m_step2, sine);
+    cosine_m_step2 = nmpc_sine_product(thrust_m_step2, cosine);
+    prediction->gain_x_m_step2[NMPC_ROLL] = -sine_m_step2;
+    prediction->gain_x_m_step2[NMPC_PITCH] = -cosine_m_step2;
+    prediction->gain_y_m_step2[NMPC_ROLL] = cosine_m_step2;
+    prediction->gain_y_m_step2[NMPC_PITCH] = -sine_m_step2;
 
     /* Eqs 9-11 without moves. */
     prediction->tilt_rad[NMPC_ROLL] = state->roll_rad;
     prediction->tilt_rad[NMPC_PITCH] = state->pitch_rad;
-    start_walk(&prediction->x, state->position_m[0] - target->position_m[0],
-               state->velocity_m_s[0] - target->velocity_m_s[0], prediction->gain_x_m, prediction->tilt_rad);
-    start_walk(&prediction->y, state->position_m[1] - target->position_m[1],
-               state->velocity_m_s[1] - target->velocity_m_s[1], prediction->gain_y_m, prediction->tilt_rad);
+    start_rollout(&prediction->x, state->position_m[0] - target->position_m[0],
+                  state->velocity_m_s[0] - target->velocity_m_s[0], prediction->gain_x_m_step2, prediction->tilt_rad);
+    start_rollout(&prediction->y, state->position_m[1] - target->position_m[1],
+                  state->velocity_m_s[1] - target->velocity_m_s[1], prediction->gain_y_m_step2, prediction->tilt_rad);
 }

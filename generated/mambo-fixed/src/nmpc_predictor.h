@@ -1,9 +1,23 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Predictor: how far robot and target will be apart, given the moves (eqs 8-11).
+ * Predictor: the error between drone and target over the horizon, for given moves (eqs 8-11).
  *
- * Along each axis of the world the error walks over the horizon by its differences: a step adds the advance
- * to the error and the bend to the advance. That is eq 9 with its velocity update, sums of constants apart.
+ * Along one axis of the world let r be the position, v the velocity and a the acceleration of the drone,
+ * linear in roll and pitch by eq 8, and e = r - Tp the error. Eqs 9 to 11 say
+ *
+ *     r(k+1) = r(k) + tau v(k) + tau^2/2 a(k),   v(k+1) = v(k) + tau a(k),   Tp(k+1) = Tp(k) + tau Tv
+ *
+ * (eq 9 prints tau/2). So the displacement d(k) = e(k+1) - e(k) is tau (v(k) - Tv) + s A(k), with A = tau^2 a
+ * and s = 1/2, and
+ *
+ *     e(k+1) = e(k) + d(k),   d(k+1) = d(k) + A(k) + s (A(k+1) - A(k)).
+ *
+ * A step is two additions. A changes only where a move changes the tilt: only there a product is needed.
+ *
+ * Roll and pitch follow a move with a first-order lag. Let A be the acceleration at the commanded tilt; what
+ * the lag still withholds of it, the deficit D <= 0 for a step up, is added: d(k+1) = d(k) + A(k) + D(k).
+ * Solved exactly, with h = tau/lag and c = 1 - exp(-h), a change of A by dA adds (1/2 - (h - c)/h^2) dA to d
+ * and -(c/h)^2 dA to D, and D decays by exp(-h) per step.
  */
 #ifndef NMPC_PREDICTOR_H
 #define NMPC_PREDICTOR_H
@@ -23,59 +37,69 @@ extern "C" {
 #define NMPC_ROLL 0
 #define NMPC_PITCH 1
 
-/* What a turn of roll, pitch adds to the advance at once, what it delays, and what remains of that a step
- * later: shares of the bend that it ends in. */
-#define NMPC_ROLL_AT_ONCE 69341745
-#define NMPC_PITCH_AT_ONCE 120036206
-#define NMPC_ROLL_DELAYED 1757776741
-#define NMPC_PITCH_DELAYED 1505042703
-#define NMPC_ROLL_DECAY 1751711056
-#define NMPC_PITCH_DECAY 1488293399
+/* s: the share of A that displaces the drone within the same step. */
+#define NMPC_DISPLACEMENT_SHARE 1073741824
 
-/* How far a unit of bend of each move has carried the error, summed over all steps to each; twice that, but for
- * the last step. Axes that settle alike share their responses. */
-#define NMPC_AXES_ALIKE 1
-#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_ALIKE)
+/* The same for a change of A that roll or pitch follows with its lag, the share of the change that enters the
+ * deficit, and the factor by which the deficit decays per step. */
+#define NMPC_ROLL_DISPLACEMENT_SHARE 69341745
+#define NMPC_PITCH_DISPLACEMENT_SHARE 120036206
+#define NMPC_ROLL_DEFICIT_SHARE 1757776741
+#define NMPC_PITCH_DEFICIT_SHARE 1505042703
+#define NMPC_ROLL_DEFICIT_DECAY 1751711056
+#define NMPC_PITCH_DEFICIT_DECAY 1488293399
+
+/* The response of a move: the change of the error at each step per unit of A of that move. The table holds
+ * twice the sum of the response from the first step to each, and once the sum over the whole horizon in its
+ * last row. Axes with the same lag share a response. */
+#define NMPC_AXES_PER_RESPONSE 1
+#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_PER_RESPONSE)
 extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES];
 
-/* Evaluate eq 8 at the present heading and thrust, and find where the walks start without moves. */
+/* Evaluate eq 8 at the present yaw and thrust, and start the roll-out along each axis of the world. */
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
                             nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction);
 
-/* Bend a walk by a turn of roll and pitch. */
-static inline void nmpc_predictor_bend(nmpc_walk_t *walk, const nmpc_real_t gain_m[NMPC_AXES],
-                                       nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+/* Apply a change of tilt to the roll-out along one axis. */
+static inline void nmpc_predictor_change_tilt(nmpc_rollout_t *rollout, const nmpc_real_t gain_m_step2[NMPC_AXES],
+                                              nmpc_real_t roll_change_rad, nmpc_real_t pitch_change_rad)
 {
-    const nmpc_real_t roll_m = nmpc_bend(gain_m[NMPC_ROLL], roll_rad);
-    const nmpc_real_t pitch_m = nmpc_bend(gain_m[NMPC_PITCH], pitch_rad);
+    const nmpc_real_t roll_m_step2 = nmpc_gain_product(gain_m_step2[NMPC_ROLL], roll_change_rad);
+    const nmpc_real_t pitch_m_step2 = nmpc_gain_product(gain_m_step2[NMPC_PITCH], pitch_change_rad);
 
-    walk->advance_m = walk->advance_m + (nmpc_part(NMPC_ROLL_AT_ONCE, roll_m) + nmpc_part(NMPC_PITCH_AT_ONCE, pitch_m));
-    walk->bend_m = walk->bend_m + (roll_m + pitch_m);
-    walk->roll_to_come_m = walk->roll_to_come_m - nmpc_part(NMPC_ROLL_DELAYED, roll_m);
-    walk->pitch_to_come_m = walk->pitch_to_come_m - nmpc_part(NMPC_PITCH_DELAYED, pitch_m);
+    rollout->displacement_m_step = rollout->displacement_m_step
+                                   + (nmpc_share_product(NMPC_ROLL_DISPLACEMENT_SHARE, roll_m_step2)
+                                      + nmpc_share_product(NMPC_PITCH_DISPLACEMENT_SHARE, pitch_m_step2));
+    rollout->acceleration_m_step2 = rollout->acceleration_m_step2 + (roll_m_step2 + pitch_m_step2);
+    rollout->roll_deficit_m_step2 = rollout->roll_deficit_m_step2
+                                    - nmpc_share_product(NMPC_ROLL_DEFICIT_SHARE, roll_m_step2);
+    rollout->pitch_deficit_m_step2 = rollout->pitch_deficit_m_step2
+                                     - nmpc_share_product(NMPC_PITCH_DEFICIT_SHARE, pitch_m_step2);
 }
 
-/* Make move `i` of the control horizon, a turn from the move before. */
-static inline void nmpc_predictor_turn(const nmpc_prediction_t *prediction,
-                                       const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_walk_t *x,
-                                       nmpc_walk_t *y)
+/* Apply the moves of step `i` of the control horizon: the change from the moves before, or the initial tilt. */
+static inline void nmpc_predictor_apply_moves(const nmpc_prediction_t *prediction,
+                                              const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_rollout_t *x,
+                                              nmpc_rollout_t *y)
 {
     const nmpc_real_t *move_rad = &moves_rad[NMPC_AXES * i];
-    const nmpc_real_t *before_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;
-    const nmpc_real_t roll_rad = move_rad[NMPC_ROLL] - before_rad[NMPC_ROLL];
-    const nmpc_real_t pitch_rad = move_rad[NMPC_PITCH] - before_rad[NMPC_PITCH];
+    const nmpc_real_t *previous_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;
+    const nmpc_real_t roll_change_rad = move_rad[NMPC_ROLL] - previous_rad[NMPC_ROLL];
+    const nmpc_real_t pitch_change_rad = move_rad[NMPC_PITCH] - previous_rad[NMPC_PITCH];
 
-    nmpc_predictor_bend(x, prediction->gain_x_m, roll_rad, pitch_rad);
-    nmpc_predictor_bend(y, prediction->gain_y_m, roll_rad, pitch_rad);
+    nmpc_predictor_change_tilt(x, prediction->gain_x_m_step2, roll_change_rad, pitch_change_rad);
+    nmpc_predictor_change_tilt(y, prediction->gain_y_m_step2, roll_change_rad, pitch_change_rad);
 }
 
-/* Go to the next predicted step. */
-static inline void nmpc_predictor_walk(nmpc_walk_t *walk)
+/* Advance the roll-out along one axis by one prediction step. */
+static inline void nmpc_predictor_step(nmpc_rollout_t *rollout)
 {
-    walk->error_m = walk->error_m + nmpc_step_of(walk->advance_m);
-    walk->advance_m = walk->advance_m + (walk->bend_m + (walk->roll_to_come_m + walk->pitch_to_come_m));
-    walk->roll_to_come_m = nmpc_part(NMPC_ROLL_DECAY, walk->roll_to_come_m);
-    walk->pitch_to_come_m = nmpc_part(NMPC_PITCH_DECAY, walk->pitch_to_come_m);
+    rollout->error_m = rollout->error_m + nmpc_error_change(rollout->displacement_m_step);
+    rollout->displacement_m_step = rollout->displacement_m_step
+                                   + (rollout->acceleration_m_step2
+                                      + (rollout->roll_deficit_m_step2 + rollout->pitch_deficit_m_step2));
+    rollout->roll_deficit_m_step2 = nmpc_share_product(NMPC_ROLL_DEFICIT_DECAY, rollout->roll_deficit_m_step2);
+    rollout->pitch_deficit_m_step2 = nmpc_share_product(NMPC_PITCH_DEFICIT_DECAY, rollout->pitch_deficit_m_step2);
 }
 
 #ifdef __cplusplus

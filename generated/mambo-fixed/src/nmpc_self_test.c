@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Self-test: inputs of consecutive steps of one controller, and what the reference controller made of them;
- * and many more steps, from inputs made of whole numbers, of which the reference made a digest.
+ * Self-test: 24 consecutive steps of one controller with the results of the reference
+ * controller, and many more steps with pseudo-random inputs, of whose results there is a digest.
  * MISRA C:2012: departs from rules 2.5, 8.9 and 10.1, for the reasons in deviations.txt.
  */
 #include "nmpc_self_test.h"
@@ -196,7 +196,7 @@ int nmpc_self_test(nmpc_t *scratch)
     return first_difference;
 }
 
-/* What 2^23 units of a draw, a whole number of 24 bits, is in each input. */
+/* Scale of each pseudo-random input: its value per 2^23 units of a draw, a signed integer of 24 bits. */
 #define NMPC_SELF_TEST_TARGET_M 1048576
 #define NMPC_SELF_TEST_TARGET_M_S 8388608
 #define NMPC_SELF_TEST_ATTITUDE_RAD 268435456
@@ -204,26 +204,26 @@ int nmpc_self_test(nmpc_t *scratch)
 #define NMPC_SELF_TEST_THRUST_M_S2 100663296
 #define NMPC_SELF_TEST_HOVER_M_S2 329168978
 
-/* Steps that see the same input: plans reach their limits, and costs come to rest. */
+/* Consecutive steps with the same input, so that moves reach their limits and searches converge. */
 #define NMPC_SELF_TEST_HELD 4
 
-/* The same for the errors, far to near. */
+/* The same for the errors, from large to small. */
 static const nmpc_real_t self_test_error_m[4] = { 10485760, 262144, 26214, 2621 };
 static const nmpc_real_t self_test_error_m_s[4] = { 83886080, 2097152, 209715, 20972 };
 
-/* Of nmpc_real_t. */
+/* sizeof(nmpc_real_t) */
 #define NMPC_SELF_TEST_REAL_BYTES 4
 
-/* The lower 32 bits of an unsigned long, which may have more. */
-static unsigned long word_of(unsigned long value)
+/* The lower 32 bits of `value`; unsigned long may be longer. */
+static unsigned long lower_word(unsigned long value)
 {
     return value & 0xFFFFFFFFUL;
 }
 
-/* Fold a word into a digest: no two words give the same, and upper bits reach lower ones. */
+/* Combine a digest with a word of 32 bits. For a given digest different words give different results. */
 static unsigned long fold(unsigned long digest, unsigned long word)
 {
-    const unsigned long mixed = word_of((digest ^ word) * 2654435761UL);
+    const unsigned long mixed = lower_word((digest ^ word) * 2654435761UL);
 
     return mixed ^ (mixed >> 15);
 }
@@ -233,7 +233,7 @@ static unsigned long fold_real(unsigned long digest, nmpc_real_t value)
     return fold(digest, (unsigned long)nmpc_bits(value));
 }
 
-/* Fold a sum, the upper word first. */
+/* The same for a sum: the upper word first. */
 static unsigned long fold_sum(unsigned long digest, nmpc_sum_t value)
 {
     const unsigned long long bits = (unsigned long long)value;
@@ -241,7 +241,7 @@ static unsigned long fold_sum(unsigned long digest, nmpc_sum_t value)
     return fold(fold(digest, (unsigned long)(bits >> 32)), (unsigned long)(bits & 0xFFFFFFFFU));
 }
 
-static unsigned long fold_outcome(unsigned long digest, const nmpc_t *self, nmpc_status_t status,
+static unsigned long fold_results(unsigned long digest, const nmpc_t *self, nmpc_status_t status,
                                   const nmpc_command_t *command)
 {
     unsigned long folded = digest;
@@ -262,28 +262,28 @@ static unsigned long fold_outcome(unsigned long digest, const nmpc_t *self, nmpc
     return folded;
 }
 
-/* The next of all 32-bit numbers but zero: xorshift (Marsaglia, Journal of Statistical Software 8(14), 2003). */
+/* Pseudo-random 32 bits, never 0: xorshift (Marsaglia, Journal of Statistical Software 8(14), 2003). */
 static unsigned long next_number(unsigned long *stream)
 {
     unsigned long number = *stream;
 
-    number ^= word_of(number << 13);
+    number ^= lower_word(number << 13);
     number ^= number >> 17;
-    number ^= word_of(number << 5);
+    number ^= lower_word(number << 5);
     *stream = number;
     return number;
 }
 
-/* Draw a number of 24 bits, of which 2^23 are one `scale`. */
+/* Draw a signed integer of 24 bits, times `scale` / 2^23. */
 static nmpc_real_t draw(unsigned long *stream, nmpc_real_t scale)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)((nmpc_real_t)(next_number(stream) >> 8) - 8388608) * scale, 23);
 }
 
-/* The largest number, which no range contains. */
+/* The largest number: outside of every range, so it is refused. */
 #define NMPC_SELF_TEST_BEYOND 2147483647
 
-/* Make the next input; five in 64 are refused. Returns the thrust acceleration, in m/s^2. */
+/* Draw the next input, out of range in 5 of 64 cases. Returns the thrust acceleration, in m/s^2. */
 static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_target_t *target)
 {
     const unsigned long choice = next_number(stream);
@@ -326,7 +326,7 @@ static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_t
     case 4UL:
         thrust_m_s2 = (nmpc_real_t)0;
         break;
-    default: /* good as it is */
+    default: /* every input in range */
         break;
     }
     return thrust_m_s2;
@@ -335,9 +335,9 @@ static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_t
 unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long digest)
 {
     unsigned long stream = fold(0UL, (unsigned long)episode + 1UL);
-    unsigned long seen = 0UL;
+    unsigned long results = 0UL;
     int tick;
-    int again;
+    int repeat;
 
     nmpc_init(scratch);
     for (tick = 0; tick < NMPC_SELF_TEST_TICKS; tick += NMPC_SELF_TEST_HELD) {
@@ -345,13 +345,13 @@ unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long
         nmpc_target_t target;
         const nmpc_real_t thrust_m_s2 = next_input(&stream, &state, &target);
 
-        for (again = 0; again < NMPC_SELF_TEST_HELD; again++) {
+        for (repeat = 0; repeat < NMPC_SELF_TEST_HELD; repeat++) {
             nmpc_command_t command;
             const nmpc_status_t status = nmpc_step(scratch, &state, &target, thrust_m_s2, &command);
 
-            seen = fold_outcome(seen, scratch, status, &command);
+            results = fold_results(results, scratch, status, &command);
         }
     }
     nmpc_init(scratch);
-    return fold(digest, seen);
+    return fold(digest, results);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Example: test the build, print its digest, then fly a point mass to a target that walks away along x. The mass takes on
- * each commanded angle at once; a flight on the model of the vehicle is `mambo-nmpc fly`.
+ * Example: run the self-test, print its digest, then fly a point mass to a target that moves along x. The point mass has
+ * no attitude lag; `mambo-nmpc fly` simulates the drone.
  */
 #include <stdio.h>
 
@@ -18,7 +18,7 @@
 
 static nmpc_t controller;
 
-/* Move the point mass on, heading north, by one update period. */
+/* Integrate the point mass over one update period, at yaw 0. */
 static void fly(nmpc_state_t *state, const nmpc_command_t *command)
 {
     const nmpc_real_t acceleration_m_s2[2] = { -THRUST_ACCELERATION_M_S2 * command->pitch_rad,

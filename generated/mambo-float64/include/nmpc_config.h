@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Settings of this controller; every number that the algorithm reads stands here or in a constant table.
+ * Constants of this controller, with the symbols of the paper that nmpc.h cites.
  * MISRA C:2012: departs from rule 2.5, for the reason in deviations.txt.
  *
  *   horizon.prediction                         10
@@ -34,7 +34,7 @@
 #ifndef NMPC_CONFIG_H
 #define NMPC_CONFIG_H
 
-/* Numbers of the interface. */
+/* Types of inputs, outputs and moves, and of cost and gradient. */
 typedef double nmpc_real_t;
 typedef double nmpc_sum_t;
 
@@ -45,36 +45,37 @@ typedef double nmpc_sum_t;
  * different bundles do not compile together. */
 #define NMPC_SETTINGS_ID 0x8D00AE40UL
 
-/* Horizons: Np, Nc and Imax of Table I. A move is one angle at one step of the control horizon. */
-#define NMPC_PREDICTION_HORIZON 10
-#define NMPC_CONTROL_HORIZON 2
-#define NMPC_AXES 2
+/* Horizons. A move is the set-point of one angle at one step of the control horizon. */
+#define NMPC_PREDICTION_HORIZON 10 /* N_p, Table I */
+#define NMPC_CONTROL_HORIZON 2 /* N_c, Table I */
+#define NMPC_AXES 2 /* phi and theta */
 #define NMPC_MOVES (NMPC_AXES * NMPC_CONTROL_HORIZON)
-#define NMPC_ITERATIONS 5
 
-/* Call nmpc_step() once in this time; predicted steps are this far apart. */
-#define NMPC_UPDATE_PERIOD_S 0.01
-#define NMPC_PREDICTION_STEP_S 0.055
-#define NMPC_PREDICTION_STEP_SQUARED_S2 0.003025
+/* The paper has one tau, the update time step. Here the steps of the prediction may be longer than the period
+ * of the calls of nmpc_step(). */
+#define NMPC_UPDATE_PERIOD_S 0.01 /* from k to k + 1 */
+#define NMPC_PREDICTION_STEP_S 0.055 /* tau, eqs 9 and 11 */
+#define NMPC_PREDICTION_STEP_SQUARED_S2 0.003025 /* tau^2 */
 
-/* Cost, eq 12: lambda1 (1/m) and lambda2 (1/rad) that nmpc_init() sets, and the largest to replace them. */
-#define NMPC_TRACKING_WEIGHT 2250.0
-#define NMPC_EFFORT_WEIGHT 1.0
+/* Cost: the weights that nmpc_init() sets, and the largest that nmpc_set_weights() admits. */
+#define NMPC_TRACKING_WEIGHT 2250.0 /* lambda_1, eq 12a, 1/m */
+#define NMPC_EFFORT_WEIGHT 1.0 /* lambda_2, eq 12b, 1/rad */
 #define NMPC_TRACKING_WEIGHT_LIMIT 1000000.0
 #define NMPC_EFFORT_WEIGHT_LIMIT 1000000.0
 
-/* Optimizer: Ustep, eta+, eta-, Delta_max, Delta_min and epsilon of Table I. */
-#define NMPC_INITIAL_STEP_RAD 0.01
-#define NMPC_INCREASE 1.2
-#define NMPC_DECREASE 0.8
-#define NMPC_STEP_MAX_RAD 0.1
-#define NMPC_STEP_MIN_RAD 1e-06
-#define NMPC_TOLERANCE 0.05
+/* Optimizer: RPROP. */
+#define NMPC_ITERATIONS 5 /* I_max, Table I */
+#define NMPC_INITIAL_STEP_RAD 0.01 /* U_step, Table I */
+#define NMPC_INCREASE 1.2 /* eta+, Table I */
+#define NMPC_DECREASE 0.8 /* eta-, Table I */
+#define NMPC_STEP_MAX_RAD 0.1 /* Delta_max, Table I */
+#define NMPC_STEP_MIN_RAD 1e-06 /* Delta_min, Table I */
+#define NMPC_TOLERANCE 0.05 /* epsilon, Table I */
 
-/* No command ever exceeds this, either way. */
+/* Limit of every move and command, either way; the paper has none. */
 #define NMPC_TILT_LIMIT_RAD 0.35
 
-/* Input beyond these is refused with a status: +/- a range, and the two ends of thrust. */
+/* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. */
 #define NMPC_POSITION_RANGE_M 1000.0
 #define NMPC_VELOCITY_RANGE_M_S 100.0
 #define NMPC_ATTITUDE_RANGE_RAD 3.25
@@ -82,7 +83,7 @@ typedef double nmpc_sum_t;
 #define NMPC_THRUST_ACCELERATION_MIN_M_S2 1.0
 #define NMPC_THRUST_ACCELERATION_MAX_M_S2 50.0
 
-/* Room that one nmpc_t takes at most; nmpc.c asserts it. */
+/* Upper bound of sizeof(nmpc_t); nmpc.c asserts it. */
 #define NMPC_INSTANCE_BYTES 240
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Cost function: the Manhattan distance to the target and the variation of the moves (eq 12).
+ * Cost function: the Manhattan distance to the target and the change of the moves (eq 12).
  */
 #ifndef NMPC_COST_H
 #define NMPC_COST_H
@@ -15,7 +15,7 @@
 extern "C" {
 #endif
 
-/* Return the cost of the plan, of which the first move follows the last command; fill the gradient. */
+/* Return J, eq 12, of the plan, and store its subgradient in `self->gradient`. */
 nmpc_sum_t nmpc_cost_evaluate(nmpc_t *self);
 
 #ifdef __cplusplus

@@ -12,38 +12,38 @@
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
-/* What RPROP remembers of a move from one iteration to the next. */
+/* State of RPROP for one move. */
 typedef struct {
-    nmpc_real_t step_rad;
-    nmpc_real_t before_rad; /* the move before its last update */
-    int direction;          /* sign of the slope at its last update, 0 after a step back */
+    nmpc_real_t step_rad;     /* Delta: the step size */
+    nmpc_real_t previous_rad; /* the move before its last update */
+    int previous_sign;        /* sign of dJ/du at the last update; 0 after a step back */
 } nmpc_rprop_t;
 
-/* Update a move, downhill and within the tilt limit: RPROP reads nothing of the gradient but its sign, the
- * slope, now and before. */
-static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int slope)
+/* Return the updated move, within the tilt limit. RPROP uses the sign of the gradient dJ/du, not its size:
+ * while the sign stays the same the step size grows by eta+, where it changes it shrinks by eta-. */
+static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int sign)
 {
-    const int agreement = slope * rprop->direction;
+    const int agreement = sign * rprop->previous_sign;
     nmpc_real_t next_rad = move_rad;
 
     if (agreement < 0) {
-        /* The last update crossed a minimum: take it back, and go on with a shorter step. */
-        next_rad = rprop->before_rad;
-        rprop->step_rad = nmpc_larger(nmpc_scaled(rprop->step_rad, NMPC_DECREASE), NMPC_STEP_MIN_RAD);
-        rprop->direction = 0;
+        /* The last update stepped over a minimum: undo it and shorten the step. */
+        next_rad = rprop->previous_rad;
+        rprop->step_rad = nmpc_larger(rprop->step_rad * NMPC_DECREASE, NMPC_STEP_MIN_RAD);
+        rprop->previous_sign = 0;
     } else {
         if (agreement > 0) {
-            rprop->step_rad = nmpc_smaller(nmpc_scaled(rprop->step_rad, NMPC_INCREASE), NMPC_STEP_MAX_RAD);
+            rprop->step_rad = nmpc_smaller(rprop->step_rad * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
         }
-        if (slope > 0) {
+        if (sign > 0) {
             next_rad = nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD);
-        } else if (slope < 0) {
+        } else if (sign < 0) {
             next_rad = nmpc_smaller(move_rad + rprop->step_rad, NMPC_TILT_LIMIT_RAD);
         } else {
-            /* Level ground: stay. */
+            /* Zero gradient: the move stays. */
         }
-        rprop->before_rad = move_rad;
-        rprop->direction = slope;
+        rprop->previous_rad = move_rad;
+        rprop->previous_sign = sign;
     }
     return next_rad;
 }
@@ -59,8 +59,8 @@ void nmpc_optimizer_minimize(nmpc_t *self)
     NMPC_UNROLL
     for (k = 0; k < NMPC_MOVES; k++) {
         rprop[k].step_rad = NMPC_INITIAL_STEP_RAD;
-        rprop[k].before_rad = self->plan_rad[k];
-        rprop[k].direction = 0;
+        rprop[k].previous_rad = self->plan_rad[k];
+        rprop[k].previous_sign = 0;
     }
 
     for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
@@ -73,11 +73,12 @@ void nmpc_optimizer_minimize(nmpc_t *self)
         if (converged == 0) {
             updates++;
         }
-        /* Once the cost has come to rest all slopes are level: the plan stays, and the work goes on. */
+        /* After convergence the signs are taken as 0: the plan is frozen, and the iterations still run, so
+         * that the work of a step is constant. */
         for (k = 0; k < NMPC_MOVES; k++) {
-            const int slope = (converged == 0) ? nmpc_sign(self->gradient[k]) : 0;
+            const int sign = (converged == 0) ? nmpc_sign(self->gradient[k]) : 0;
 
-            self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], slope);
+            self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], sign);
         }
     }
     self->iterations = (unsigned char)updates;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Self-test: inputs of consecutive steps of one controller, and what the reference controller made of them;
- * and many more steps, from inputs made of whole numbers, of which the reference made a digest.
+ * Self-test: 24 consecutive steps of one controller with the results of the reference
+ * controller, and many more steps with pseudo-random inputs, of whose results there is a digest.
  * MISRA C:2012: departs from rule 8.9, for the reason in deviations.txt.
  */
 #include "nmpc_self_test.h"
@@ -196,7 +196,7 @@ int nmpc_self_test(nmpc_t *scratch)
     return first_difference;
 }
 
-/* What one unit of a draw, a whole number of 24 bits, is in each input. */
+/* Scale of each pseudo-random input: its value per unit of a draw, a signed integer of 24 bits. */
 #define NMPC_SELF_TEST_TARGET_M 2.3841858e-07f
 #define NMPC_SELF_TEST_TARGET_M_S 1.1920929e-07f
 #define NMPC_SELF_TEST_ATTITUDE_RAD 5.9604645e-08f
@@ -204,26 +204,26 @@ int nmpc_self_test(nmpc_t *scratch)
 #define NMPC_SELF_TEST_THRUST_M_S2 3.5762787e-07f
 #define NMPC_SELF_TEST_HOVER_M_S2 9.81f
 
-/* Steps that see the same input: plans reach their limits, and costs come to rest. */
+/* Consecutive steps with the same input, so that moves reach their limits and searches converge. */
 #define NMPC_SELF_TEST_HELD 4
 
-/* The same for the errors, far to near. */
+/* The same for the errors, from large to small. */
 static const nmpc_real_t self_test_error_m[4] = { 2.3841858e-06f, 5.9604645e-08f, 5.9604646e-09f, 5.9604643e-10f };
 static const nmpc_real_t self_test_error_m_s[4] = { 1.1920929e-06f, 2.9802322e-08f, 2.9802323e-09f, 2.9802322e-10f };
 
-/* Of nmpc_real_t. */
+/* sizeof(nmpc_real_t) */
 #define NMPC_SELF_TEST_REAL_BYTES 4
 
-/* The lower 32 bits of an unsigned long, which may have more. */
-static unsigned long word_of(unsigned long value)
+/* The lower 32 bits of `value`; unsigned long may be longer. */
+static unsigned long lower_word(unsigned long value)
 {
     return value & 0xFFFFFFFFUL;
 }
 
-/* Fold a word into a digest: no two words give the same, and upper bits reach lower ones. */
+/* Combine a digest with a word of 32 bits. For a given digest different words give different results. */
 static unsigned long fold(unsigned long digest, unsigned long word)
 {
-    const unsigned long mixed = word_of((digest ^ word) * 2654435761UL);
+    const unsigned long mixed = lower_word((digest ^ word) * 2654435761UL);
 
     return mixed ^ (mixed >> 15);
 }
@@ -233,7 +233,7 @@ static unsigned long fold_real(unsigned long digest, nmpc_real_t value)
     return fold(digest, (unsigned long)nmpc_bits(value));
 }
 
-static unsigned long fold_outcome(unsigned long digest, const nmpc_t *self, nmpc_status_t status,
+static unsigned long fold_results(unsigned long digest, const nmpc_t *self, nmpc_status_t status,
                                   const nmpc_command_t *command)
 {
     unsigned long folded = digest;
@@ -254,19 +254,19 @@ static unsigned long fold_outcome(unsigned long digest, const nmpc_t *self, nmpc
     return folded;
 }
 
-/* The next of all 32-bit numbers but zero: xorshift (Marsaglia, Journal of Statistical Software 8(14), 2003). */
+/* Pseudo-random 32 bits, never 0: xorshift (Marsaglia, Journal of Statistical Software 8(14), 2003). */
 static unsigned long next_number(unsigned long *stream)
 {
     unsigned long number = *stream;
 
-    number ^= word_of(number << 13);
+    number ^= lower_word(number << 13);
     number ^= number >> 17;
-    number ^= word_of(number << 5);
+    number ^= lower_word(number << 5);
     *stream = number;
     return number;
 }
 
-/* Draw a number of 24 bits, which nmpc_real_t holds exactly, times `scale`: one rounding. */
+/* Draw a signed integer of 24 bits, which nmpc_real_t holds exactly, times `scale`: rounded once. */
 static nmpc_real_t draw(unsigned long *stream, nmpc_real_t scale)
 {
     const long number = (long)(next_number(stream) >> 8) - 8388608L;
@@ -274,8 +274,8 @@ static nmpc_real_t draw(unsigned long *stream, nmpc_real_t scale)
     return (nmpc_real_t)number * scale;
 }
 
-/* A number with every bit set, which no range contains. */
-static nmpc_real_t no_number(void)
+/* NaN, with every bit set: outside of every range, so it is refused. */
+static nmpc_real_t not_a_number(void)
 {
     nmpc_real_t value;
     unsigned char *bytes = (unsigned char *)&value;
@@ -287,7 +287,7 @@ static nmpc_real_t no_number(void)
     return value;
 }
 
-/* Make the next input; five in 64 are refused. Returns the thrust acceleration, in m/s^2. */
+/* Draw the next input, out of range in 5 of 64 cases. Returns the thrust acceleration, in m/s^2. */
 static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_target_t *target)
 {
     const unsigned long choice = next_number(stream);
@@ -316,7 +316,7 @@ static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_t
 
     switch ((choice >> 8) & 63UL) {
     case 0UL:
-        state->position_m[0] = no_number();
+        state->position_m[0] = not_a_number();
         break;
     case 1UL:
         state->pitch_rad = (nmpc_real_t)2 * NMPC_ATTITUDE_RANGE_RAD;
@@ -330,7 +330,7 @@ static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_t
     case 4UL:
         thrust_m_s2 = (nmpc_real_t)0;
         break;
-    default: /* good as it is */
+    default: /* every input in range */
         break;
     }
     return thrust_m_s2;
@@ -339,9 +339,9 @@ static nmpc_real_t next_input(unsigned long *stream, nmpc_state_t *state, nmpc_t
 unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long digest)
 {
     unsigned long stream = fold(0UL, (unsigned long)episode + 1UL);
-    unsigned long seen = 0UL;
+    unsigned long results = 0UL;
     int tick;
-    int again;
+    int repeat;
 
     nmpc_init(scratch);
     for (tick = 0; tick < NMPC_SELF_TEST_TICKS; tick += NMPC_SELF_TEST_HELD) {
@@ -349,13 +349,13 @@ unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long
         nmpc_target_t target;
         const nmpc_real_t thrust_m_s2 = next_input(&stream, &state, &target);
 
-        for (again = 0; again < NMPC_SELF_TEST_HELD; again++) {
+        for (repeat = 0; repeat < NMPC_SELF_TEST_HELD; repeat++) {
             nmpc_command_t command;
             const nmpc_status_t status = nmpc_step(scratch, &state, &target, thrust_m_s2, &command);
 
-            seen = fold_outcome(seen, scratch, status, &command);
+            results = fold_results(results, scratch, status, &command);
         }
     }
     nmpc_init(scratch);
-    return fold(digest, seen);
+    return fold(digest, results);
 }

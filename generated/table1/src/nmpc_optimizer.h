@@ -15,7 +15,7 @@
 extern "C" {
 #endif
 
-/* Improve the plan of `self`, from where it stands, against its prediction and weights. */
+/* Improve `self->plan_rad` by I_max iterations, starting from its present value. */
 void nmpc_optimizer_minimize(nmpc_t *self);
 
 #ifdef __cplusplus
