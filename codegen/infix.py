@@ -34,7 +34,9 @@ def infix(text: str) -> str:
     """Return `text` with every product written out, in brackets where it is part of an expression."""
     while call := _CALL.search(text):
         arguments, end = _arguments(text, call.end())
-        product = _FORMS[call[1]].format(*arguments)
+        form = _FORMS[call[1]]
+        factors = [f"({one})" if "*" in form and " " in one else one for one in arguments]
+        product = form.format(*factors)
         alone = text[: call.start()].rstrip().endswith(_STATEMENT_START) and text[end] in _STATEMENT_END
         if not alone and " " in product:
             product = f"({product})"

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Search:
+class Solution:
     """Moves U (N_c, 2), whose first is the command u*; cost of the last iteration; updates; convergence."""
 
     U: Array
@@ -83,7 +83,7 @@ class Paper:
         tracking = np.einsum("ix,ixca->ca", np.sign(errors), responses)
         return np.asarray(lambda_1 * tracking + lambda_2 * effort)
 
-    def rprop(self, R: Array, T: Array, u_1_m: float, U: Array, *, u_last: Array) -> Search:
+    def rprop(self, R: Array, T: Array, u_1_m: float, U: Array, *, u_last: Array) -> Solution:
         """Search from the initial guess U, the paper's Omega_k (6), by RPROP."""
         table_1, limit = self.settings.optimizer, self.settings.limits.tilt_rad
         responses = self.responses(R, T, u_1_m)
@@ -113,4 +113,4 @@ class Paper:
                 U_previous[k] = U[k]
                 U[k] = np.clip(U[k] - sign[k] * Delta[k], -limit, limit)  # (12)
                 sign_previous[k] = sign[k]
-        return Search(U, J, updates, converged)
+        return Solution(U, J, updates, converged)
