@@ -1,5 +1,6 @@
 """Instruction counts are exact and repeatable; the search never returns less than its initial inputs."""
 
+import json
 import re
 from collections import Counter
 from dataclasses import replace
@@ -39,62 +40,61 @@ MAMBO = presets.load("mambo")
 
 STRAIGHT = 700
 """Instructions without a branch, more than one translation block holds."""
-ARM = f"""
-    .syntax unified
+ASSEMBLY = f"""
     .text
     .balign 4
     .global nmpc_known
-    .type nmpc_known, %function
+    .type nmpc_known, {{function}}
     {{mode}}
 nmpc_known:
-    movs r0, #10
-1:  subs r0, r0, #1
-    bne 1b
+    {{start}}
+1:  {{decrement}}
+    {{again}} 1b
     .rept {STRAIGHT}
-    mov r1, r1
+    {{move}}
     .endr
     {{skipped}}
-    b 2f
-    .word 0, 0, 0, 0
-2:  movs r0, #0
-    bx lr
+    {{jump}} 2f
+    .word {{data}}, {{data}}
+2:  {{result}}
+    {{leave}}
     .size nmpc_known, . - nmpc_known
 """
-RISCV = f"""
-    .text
-    .global nmpc_known
-    .type nmpc_known, @function
-nmpc_known:
-    li a0, 10
-1:  addi a0, a0, -1
-    bnez a0, 1b
-    .rept {STRAIGHT}
-    mv a1, a1
-    .endr
-    j 2f
-    .word 0, 0, 0, 0
-2:  li a0, 0
-    ret
-    .size nmpc_known, . - nmpc_known
-"""
-AVR = f"""
-    .text
-    .global nmpc_known
-    .type nmpc_known, @function
-nmpc_known:
-    ldi r24, 10
-1:  subi r24, 1
-    brne 1b
-    .rept {STRAIGHT}
-    mov r26, r26
-    .endr
-    {{skipped}}
-    rjmp 2f
-    .word 0xFFFF, 0xFFFF
-2:  ldi r24, 0
-    ret
-    .size nmpc_known, . - nmpc_known
-"""
+THUMB = {
+    "function": "%function",
+    "mode": ".syntax unified\n.thumb\n.thumb_func",
+    "start": "movs r0, #10",
+    "decrement": "subs r0, r0, #1",
+    "again": "bne",
+    "move": "mov r1, r1",
+    "jump": "b",
+    "data": "0",
+    "result": "movs r0, #0",
+    "leave": "bx lr",
+}
+RISCV = {
+    "function": "@function",
+    "mode": "",
+    "start": "li a0, 10",
+    "decrement": "addi a0, a0, -1",
+    "again": "bnez a0,",
+    "move": "mv a1, a1",
+    "jump": "j",
+    "data": "0",
+    "result": "li a0, 0",
+    "leave": "ret",
+}
+AVR = RISCV | {
+    "start": "ldi r24, 10",
+    "decrement": "subi r24, 1",
+    "again": "brne",
+    "move": "mov r26, r26",
+    "jump": "rjmp",
+    "data": "0xFFFF",
+    "result": "ldi r24, 0",
+}
+WORDS = {"mambo": THUMB | {"mode": ".syntax unified\n.arm"}, "rv32": RISCV, "mega": AVR}
+"""Instructions by board; the other boards have those of Thumb."""
 KNOWN = 1 + 10 * 2 + STRAIGHT + 1 + 2
 """Instructions executed by each: ten iterations of the loop; the data words are skipped."""
 SKIPPED = {
@@ -123,13 +123,11 @@ def costs(elf: Path, inputs: InputSequence) -> list[int]:
 def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
     """The count of a known function is exact: loop, long block, jump over data, conditional instructions."""
     skipped = SKIPPED.get(name, ())
-    mode = ".arm" if name == "mambo" else ".thumb\n.thumb_func"
-    template = {"rv32": RISCV, "mega": AVR}.get(name, ARM)
-    assembly = template.format(mode=mode, skipped="\n".join(skipped))
+    assembly = ASSEMBLY.format(**WORDS.get(name, THUMB), skipped="\n".join(skipped))
     declared = (
         '#include "nmpc.h"\nnmpc_status_t nmpc_known(nmpc_t *self, const nmpc_state_t *state,'
         "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
-        f"__asm({' '.join(_quoted(line) for line in assembly.splitlines())});\n"
+        f"__asm({json.dumps(assembly)});\n"
     )
     glue = batch_source()
     assert glue.count("nmpc_step(") == 1
@@ -145,10 +143,6 @@ def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) 
             0,
             Counter({"nmpc_known": KNOWN + len(skipped)}),
         )
-
-
-def _quoted(line: str) -> str:
-    return f'"{line}\\n"'
 
 
 def it_blocks(image: Image) -> dict[int, list[int]]:

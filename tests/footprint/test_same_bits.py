@@ -13,8 +13,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import read
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.settings.controller_toml import read, with_option
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.controllers.emulated import GUEST, digest_emulated
@@ -45,35 +44,31 @@ FAULTS = {
 """Faults by name: file, the line, what it becomes."""
 
 
-def check_every_build(names: tuple[str, ...], scalar: str) -> None:
-    """Check the digests of the host and of some boards, with all compilers and optimisations."""
+@pytest.mark.parametrize(
+    ("names", "scalar"),
+    [
+        (("crazyflie",), "float32"),
+        *(pytest.param(EMULATED, scalar, marks=pytest.mark.long) for scalar in SCALARS),
+    ],
+)
+def test_every_build_has_the_digest_of_the_reference(names: tuple[str, ...], scalar: str) -> None:
+    """Host and boards, with all compilers and optimisations, with and without an FPU."""
     for compiler in HOST_COMPILERS:
         require(compiler, compiler)
     for name in names:
         board_builder(name)
-    settings = Settings.model_validate(MAMBO.model_dump() | {"code": {"scalar": scalar}})
+    settings = with_option(MAMBO, "code.scalar", scalar)
     chosen = [boards.load(name) for name in names]
     found = list(run_everywhere(settings, chosen, 3))
-    expected = [(REFERENCE, "NumPy", "")]
-    expected += [("host", compiler, flag) for compiler in HOST_COMPILERS for flag in OPTIMISATIONS]
+    builds = [("host", compiler) for compiler in HOST_COMPILERS]
     for board in chosen:
-        for compiler in (builder(board).toolchain.command[0], "clang"):
-            expected += [(board.name, compiler, flag) for flag in OPTIMISATIONS]
-    assert [(one.where, one.compiler, one.optimisation) for one in found] == expected
+        builds += [(board.name, builder(board).toolchain.command[0]), (board.name, "clang")]
+    assert [(one.where, one.compiler, one.optimisation) for one in found] == [
+        (REFERENCE, "NumPy", ""),
+        *((*build, flag) for build in builds for flag in OPTIMISATIONS),
+    ]
     assert len(found) == count_builds(chosen)
     assert {one.digest for one in found} == {f"0x{self_test_digest(Design(settings), 3):08X}"}
-
-
-def test_compilers_and_boards_share_one_digest() -> None:
-    """The digests of host and Crazyflie are equal at every optimisation."""
-    check_every_build(("crazyflie",), "float32")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("scalar", SCALARS)
-def test_everything_shares_one_digest(scalar: str) -> None:
-    """The digests of all emulated boards are equal, with and without an FPU."""
-    check_every_build(EMULATED, scalar)
 
 
 @pytest.mark.parametrize(("fault", "compiler"), list(zip(FAULTS, BOARD_COMPILERS, strict=True)))
@@ -84,31 +79,25 @@ def test_a_wrong_bundle_has_another_digest(fault: str, compiler: str, tmp_path: 
     path, line, instead = FAULTS[fault]
     files = render(MAMBO, with_digest=False)
     assert files[path].count(line) == 1
-    glue = batch_source()
-    good, wrong = (
-        BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2").guest(bundle, glue, GUEST, tmp_path / name)
-        for name, bundle in {
-            "good": files,
-            "wrong": files | {path: files[path].replace(line, instead)},
-        }.items()
-    )
-    digests = [digest_emulated(MAMBO, elf, "cortex-m4", 2) for elf in (good, wrong)]
+    wrong = files | {path: files[path].replace(line, instead)}
+    digests = []
+    for bundle in (files, wrong):
+        build = BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2")
+        elf = build.guest(bundle, batch_source(), GUEST, tmp_path)
+        digests.append(digest_emulated(MAMBO, elf, "cortex-m4", 2))
     assert digests[0] == self_test_digest(Design(MAMBO), 2) != digests[1]
 
 
 def test_other_settings_and_other_steps_have_other_digests() -> None:
     """A change of one bit of a weight, of the optimizer or of the scalar type changes the digest."""
-    document = MAMBO.model_dump()
-    weight = document["cost"]["tracking_weight"]
-    heavier = float(np.nextafter(np.float32(weight), np.float32(np.inf)))
+    heavier = float(np.nextafter(np.float32(MAMBO.cost.tracking_weight), np.float32(np.inf)))
     changed = [
-        document | {"cost": document["cost"] | {"tracking_weight": heavier}},
-        document | {"optimizer": document["optimizer"] | {"variant": "irprop-"}},
-        document | {"code": {"scalar": "float64"}},
+        with_option(MAMBO, "cost.tracking_weight", heavier),
+        with_option(MAMBO, "optimizer.variant", "irprop-"),
+        with_option(MAMBO, "code.scalar", "float64"),
     ]
-    digests = [self_test_digest(Design(Settings.model_validate(one)), 3) for one in (document, *changed)]
+    digests = [self_test_digest(Design(settings), 3) for settings in (MAMBO, *changed)]
     assert len({*digests, self_test_digest(Design(MAMBO), 4)}) == len(digests) + 1
-    assert digests[0] == self_test_digest(Design(MAMBO), 3)
 
 
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
