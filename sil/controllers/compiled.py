@@ -5,12 +5,12 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.representation import COMMAND, OUTCOME, STATE, TARGET, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
@@ -55,12 +55,33 @@ def as_arrays(
 def as_array(
     numbers: Representation, values: ArrayLike, quantities: Sequence[str], shape: tuple[int, ...]
 ) -> NDArray[Any]:
-    """Return `values` as a contiguous array of the C's type; raises ValueError unless they have `shape`."""
+    """Return `values` as an array of the C's type; raises ValueError unless they have `shape`."""
     given = np.asarray(values)
     if given.shape != shape:
         raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
-    quantized = numbers.quantize(given.reshape(-1, len(quantities)), quantities)
-    return np.ascontiguousarray(quantized.reshape(shape))
+    return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
+
+
+def empty_outcome(numbers: Representation, moves: int, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a step of n controllers fills, in the order of nmpc_outcome_t."""
+    return {
+        "status": np.empty(n, integer),
+        "command_rad": np.empty((n, 2), numbers.scalar),
+        "cost": np.empty(n, numbers.wide),
+        "gradient": np.empty((n, moves, 2), numbers.wide),
+        "plan_rad": np.empty((n, moves, 2), numbers.scalar),
+        "iterations": np.empty(n, integer),
+        "converged": np.empty(n, integer),
+    }
+
+
+def as_step(numbers: Representation, outcome: dict[str, NDArray[Any]]) -> Step:
+    """Return the arrays that a step filled in SI units and with the types of the reference."""
+    types = {"status": np.int64, "iterations": np.int64, "converged": np.bool_}
+    return Step(
+        **{name: outcome[name].astype(kind) for name, kind in types.items()},
+        **{name: numbers.to_si(outcome[name], quantity) for name, quantity in OUTCOME.items()},
+    )
 
 
 DIRT = b"\xa5"
@@ -75,7 +96,6 @@ class CompiledController:
         self._numbers = Design(settings).numbers
         self.scalar = self._numbers.scalar
         self._n = n
-        self._moves = (settings.horizon.control, 2)
         extension = extension or build_extension(settings, host_toolchain())
         self._ffi, self._lib = extension.ffi, extension.lib
         self._controllers = self._ffi.new("nmpc_t[]", n)
@@ -92,49 +112,20 @@ class CompiledController:
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
-        n = self._n
-        status, iterations, converged = (np.empty(n, np.intc) for _ in range(3))
-        scalar, wide, to_si = self.scalar, self._numbers.wide, self._numbers.to_si
-        command, plan = np.empty((n, 2), scalar), np.empty((n, *self._moves), scalar)
-        cost, gradient = np.empty(n, wide), np.empty((n, *self._moves), wide)
-        inputs = as_arrays(self._numbers, n, state, target, thrust_acceleration_m_s2)
-        outcome = self._ffi.new("nmpc_outcome_t *")
-        for name, kind, values in (
-            ("status", "int", status),
-            ("command", "nmpc_command_t", command),
-            ("cost", "nmpc_sum_t", cost),
-            ("gradient", "nmpc_sum_t", gradient),
-            ("plan_rad", "nmpc_real_t", plan),
-            ("iterations", "int", iterations),
-            ("converged", "int", converged),
-        ):
-            setattr(outcome, name, self._pointer(kind, values))
-        self._lib.nmpc_batch_step(
-            self._controllers,
-            n,
-            self._pointer("nmpc_state_t", inputs[0]),
-            self._pointer("nmpc_target_t", inputs[1]),
-            self._pointer("nmpc_real_t", inputs[2]),
-            outcome,
-        )
-        return Step(
-            status=status.astype(np.int64),
-            command_rad=to_si(command, "angle"),
-            cost=to_si(cost, "cost"),
-            gradient=to_si(gradient, "gradient"),
-            plan_rad=to_si(plan, "angle"),
-            iterations=iterations.astype(np.int64),
-            converged=converged.astype(np.bool_),
-        )
+        inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
+        outcome = empty_outcome(self._numbers, self.settings.horizon.control, self._n, np.intc)
+        addresses = self._ffi.new("nmpc_outcome_t *", [self._address(values) for values in outcome.values()])
+        self._lib.nmpc_batch_step(self._controllers, self._n, *map(self._address, inputs), addresses)
+        return as_step(self._numbers, outcome)
 
-    def _pointer(self, kind: str, array: NDArray[Any]) -> Any:
-        return self._ffi.cast(f"{kind} *", self._ffi.from_buffer(array))
+    def _address(self, array: NDArray[Any]) -> Any:
+        return self._ffi.cast("void *", self._ffi.from_buffer(array))
 
     def _set_each(
         self, function: Any, kind: str, values: ArrayLike, quantities: Sequence[str]
     ) -> NDArray[np.int64]:
         array = as_array(self._numbers, values, quantities, (self._n, 2))
-        pointer = self._pointer(kind, array)
+        pointer = self._ffi.cast(f"{kind} *", self._address(array))
         return np.array(
             [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)],
             np.int64,

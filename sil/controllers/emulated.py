@@ -1,20 +1,18 @@
 """The emulated controller: the C built for a board, run on an emulated core, with the same interface."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import TICKS
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.representation import OUTCOME
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, with_default_prefix
+from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, as_step, empty_outcome, with_default_prefix
 from mambo_nmpc.sil.controllers.extension import batch_source
 from mambo_nmpc.sil.emulation.avr import Long
 from mambo_nmpc.sil.emulation.machine import TIME_LIMIT_S, start
@@ -52,25 +50,14 @@ class EmulatedController:
         self.settings = settings
         self._numbers = Design(settings).numbers
         self.scalar = self._numbers.scalar
-        real, wide = np.dtype(self.scalar), np.dtype(self._numbers.wide)
         self._n = n
-        horizon = settings.horizon
         work = _work(settings)
         limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * max(work, _MAX_WORK)
         self.machine = start(elf, core, limit_s, counting=counting)
-        integer = np.dtype(f"<i{self.machine.word_bytes}")
-        self._shapes = {
-            "status": (integer, ()),
-            "command_rad": (real, (2,)),
-            "cost": (wide, ()),
-            "gradient": (wide, (horizon.control, 2)),
-            "plan_rad": (real, (horizon.control, 2)),
-            "iterations": (integer, ()),
-            "converged": (integer, ()),
-        }
+        one = self._empty_outcome(1)
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
-        sizes = [self._instance_bytes, *(width * real.itemsize for width in (7, 4, 1))]
-        sizes += [kind.itemsize * math.prod(shape) for kind, shape in self._shapes.values()]
+        sizes = [self._instance_bytes, *(width * np.dtype(self.scalar).itemsize for width in (7, 4, 1))]
+        sizes += [values.nbytes for values in one.values()]
         self._batch_size = min(n, max(1, _MAX_WORK // work), self._room(sizes) // sum(sizes))
         if self._batch_size < 1:
             raise EmulatorError(
@@ -79,7 +66,7 @@ class EmulatedController:
             )
         addresses = [self.machine.allocate(self._batch_size * size) for size in sizes]
         self._controller, self._inputs, outputs = addresses[0], addresses[1:4], addresses[4:]
-        self._outputs = dict(zip(self._shapes, outputs, strict=True))
+        self._outputs = dict(zip(one, outputs, strict=True))
         self._outcome = self.machine.allocate(len(outputs) * self.machine.word_bytes)
         self.machine.write(self._outcome, np.array(outputs, f"<u{self.machine.word_bytes}").tobytes())
         self._instances = bytearray(DIRT * (n * self._instance_bytes))
@@ -89,7 +76,7 @@ class EmulatedController:
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
         inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
-        outcome = {name: np.empty((self._n, *shape), kind) for name, (kind, shape) in self._shapes.items()}
+        outcome = self._empty_outcome(self._n)
         for batch in self._batches():
             for address, values in zip(self._inputs, inputs, strict=True):
                 self.machine.write(address, values[batch].tobytes())
@@ -97,16 +84,10 @@ class EmulatedController:
             for name, values in outcome.items():
                 content = self.machine.read(self._outputs[name], values[batch].nbytes)
                 values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
-        for name, quantity in OUTCOME.items():
-            outcome[name] = self._numbers.to_si(outcome[name], quantity)
-        return Step(
-            **outcome
-            | {
-                "status": outcome["status"].astype(np.int64),
-                "iterations": outcome["iterations"].astype(np.int64),
-                "converged": outcome["converged"].astype(np.bool_),
-            }
-        )
+        return as_step(self._numbers, outcome)
+
+    def _empty_outcome(self, n: int) -> dict[str, NDArray[Any]]:
+        return empty_outcome(self._numbers, self.settings.horizon.control, n, f"<i{self.machine.word_bytes}")
 
     def _room(self, sizes: list[int]) -> int:
         """Return the free bytes, less the pointers to the outputs and the alignment of every array."""

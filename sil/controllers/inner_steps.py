@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -62,7 +61,7 @@ class WatchedController:
         self.controller = ReferenceController(design, n, self._watch)
         self._numbers = design.numbers
         self.steps: list[InnerSteps] = []
-        self._evaluated: list[tuple[Any, Any, Any]] = []
+        self._evaluated: list[list[Real]] = []
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands like `ReferenceController.step`, and append to `steps`."""
@@ -74,9 +73,9 @@ class WatchedController:
     def _watch(self, rprop: Rprop, evaluate: Evaluate, start: Real) -> Search:
         def watch(moves_rad: Real) -> tuple[Real, Real]:
             cost, gradient = evaluate(moves_rad)
-            to_si, numbers = self._numbers.to_si, (moves_rad.copy(), cost.copy(), gradient.copy())
+            values = {"angle": moves_rad, "cost": cost, "gradient": gradient}
             self._evaluated.append(
-                (to_si(numbers[0], "angle"), to_si(numbers[1], "cost"), to_si(numbers[2], "gradient"))
+                [self._numbers.to_si(v.copy(), quantity) for quantity, v in values.items()]
             )
             return cost, gradient
 

@@ -118,7 +118,10 @@ class AvrMachine:
         return counts
 
     def call(self, function: str, *arguments: int) -> int:
-        """Call `function` with arguments in registers, then on the stack; returns its result."""
+        """Call `function` with arguments of type int, pointer or Long; returns an unsigned long.
+
+        Raises EmulationError if it faults or exceeds the time limit; the machine stays usable.
+        """
         registers = bytearray(_REGISTER_BYTES)
         pushed = (_RETURN_ADDRESS // 2).to_bytes(3, "big")
         free = _ARGUMENTS.stop

@@ -86,7 +86,8 @@ class UnicornMachine:
         self._time_limit_s = time_limit_s
         with elf.open("rb") as file:
             program = ELFFile(file)
-            self._symbols = {symbol.name: symbol["st_value"] for symbol in _symbols(program)}
+            symbols = program.get_section_by_name(".symtab").iter_symbols()
+            self._symbols = {symbol.name: symbol["st_value"] for symbol in symbols}
             segments = [(segment["p_vaddr"], segment.data()) for segment in program.iter_segments("PT_LOAD")]
         self._engine = unicorn.Uc(self._core.architecture, self._core.mode)
         self._engine.ctl_set_cpu_model(self._core.model)
@@ -141,7 +142,10 @@ class UnicornMachine:
         self._block_counts[address, size] += 1
 
     def call(self, function: str, *arguments: int) -> int:
-        """Call `function` with words in registers, then on the stack; returns its result."""
+        """Call `function` with arguments of 32 bits; returns an unsigned long.
+
+        Raises EmulationError if it faults or exceeds the time limit; the machine stays usable.
+        """
         core, engine = self._core, self._engine
         in_registers, on_stack = arguments[: len(core.arguments)], arguments[len(core.arguments) :]
         words = b"".join(word.to_bytes(4, "little") for word in on_stack)
@@ -173,7 +177,3 @@ class UnicornMachine:
 
     def _where(self) -> str:
         return f"address {self._engine.reg_read(self._core.program_counter):#x}"
-
-
-def _symbols(program: Any) -> Any:
-    return program.get_section_by_name(".symtab").iter_symbols()

@@ -21,19 +21,19 @@ from mambo_nmpc.sil.firmware.instructions import (
 )
 
 CONVENTION: Final = Convention("lr", frozenset({"r4", "r5", "r6", "r7", "r8", "sb", "sl", "fp"}))
-_MULTIPLE: Final = {
-    arm.ARM_INS_LDM: ("load", 1, False),
-    arm.ARM_INS_LDMIB: ("load", 1, True),
-    arm.ARM_INS_LDMDB: ("load", -1, True),
-    arm.ARM_INS_LDMDA: ("load", -1, False),
-    arm.ARM_INS_STM: ("store", 1, False),
-    arm.ARM_INS_STMIB: ("store", 1, True),
-    arm.ARM_INS_STMDB: ("store", -1, True),
-    arm.ARM_INS_STMDA: ("store", -1, False),
-    arm.ARM_INS_POP: ("load", 1, False),
-    arm.ARM_INS_PUSH: ("store", -1, True),
+_MULTIPLE: Final[dict[int, tuple[type[Load | Store], int, bool]]] = {
+    arm.ARM_INS_LDM: (Load, 1, False),
+    arm.ARM_INS_LDMIB: (Load, 1, True),
+    arm.ARM_INS_LDMDB: (Load, -1, True),
+    arm.ARM_INS_LDMDA: (Load, -1, False),
+    arm.ARM_INS_STM: (Store, 1, False),
+    arm.ARM_INS_STMIB: (Store, 1, True),
+    arm.ARM_INS_STMDB: (Store, -1, True),
+    arm.ARM_INS_STMDA: (Store, -1, False),
+    arm.ARM_INS_POP: (Load, 1, False),
+    arm.ARM_INS_PUSH: (Store, -1, True),
 }
-"""Multiple loads and stores: direction, sign of the address step, whether it precedes each access."""
+"""Multiple loads and stores: effect, sign of the address step, whether it precedes each access."""
 _ALWAYS: Final = {arm.ARM_CC_AL, arm.ARM_CC_INVALID}
 _CALLS: Final = {arm.ARM_INS_BL, arm.ARM_INS_BLX}
 _ENDS: Final = {arm.ARM_INS_UDF, arm.ARM_INS_BKPT}
@@ -121,38 +121,28 @@ def _transfer(insn: Any, here: int) -> tuple[Effect, ...]:
     elif insn.writeback:
         before, offset = (Assign(base, base, offset),), 0
     registers = [insn.reg_name(operand.reg) for operand in insn.operands[:place]]
+    moved: tuple[Effect, ...] = ()
     if insn.id in {arm.ARM_INS_LDR, arm.ARM_INS_LDRD}:
-        moved: tuple[Effect, ...] = tuple(
-            Load(register, None, (here & ~3) + offset + WORD_BYTES * index)
-            if base == PC
-            else Load(register, base, offset + WORD_BYTES * index)
-            for index, register in enumerate(registers)
-        )
+        source, start = (None, (here & ~3) + offset) if base == PC else (base, offset)
+        moved = tuple(Load(name, source, start + WORD_BYTES * i) for i, name in enumerate(registers))
     elif insn.id in {arm.ARM_INS_STR, arm.ARM_INS_STRD}:
         moved = tuple(Store(name, base, offset + WORD_BYTES * i) for i, name in enumerate(registers))
     elif insn.mnemonic.startswith(("str", "vstr")):
         words = 2 if registers[0].startswith("d") else 1
         moved = tuple(Store(None, base, offset + WORD_BYTES * index) for index in range(words))
-    else:
-        moved = ()
     return (*before, *moved, *after)
 
 
 def _multiple(insn: Any) -> tuple[Effect, ...]:
     """Model multiple loads and stores, push and pop included."""
-    direction, growth, first = _MULTIPLE[insn.id]
+    access, growth, first = _MULTIPLE[insn.id]
     names = [insn.reg_name(operand.reg) for operand in insn.operands]
     stack = insn.id in {arm.ARM_INS_PUSH, arm.ARM_INS_POP}
     base, registers = (SP, names) if stack else (names[0], names[1:])
     size = WORD_BYTES * len(registers)
     low = (WORD_BYTES if first else 0) if growth > 0 else -size + (0 if first else WORD_BYTES)
     start = "base of the move"
-    moved: tuple[Effect, ...] = tuple(
-        Load(register, start, low + WORD_BYTES * index)
-        if direction == "load"
-        else Store(register, start, low + WORD_BYTES * index)
-        for index, register in enumerate(registers)
-    )
+    moved = (access(register, start, low + WORD_BYTES * index) for index, register in enumerate(registers))
     moves_base = stack or insn.writeback
     return (Assign(start, base, 0), *([Assign(base, base, growth * size)] if moves_base else []), *moved)
 

@@ -4,7 +4,6 @@ A register pair holds a 16-bit value, the even register its lower byte. The anal
 for each register; two bytes form a known stack pointer only if they are halves of the same value.
 """
 
-import itertools
 import os
 import re
 import shutil
@@ -110,17 +109,17 @@ def _operands(text: str) -> tuple[str, ...]:
 
 def _instructions(lines: list[_Line], return_bytes: int) -> Iterator[Instruction]:
     """Yield the instructions; a 16-bit subtraction (subi, sbci) becomes one, so no jump can split it."""
-    merged = False
-    for line, next_line in itertools.zip_longest(lines, lines[1:]):
-        after = next_line if next_line and next_line.address == line.next_address else None
-        if merged:
-            merged = False
+    at = {line.address: line for line in lines}
+    merged = None
+    for line in lines:
+        after = at.get(line.next_address)
+        if line is merged:
             continue
         if after and (subtracted := _match_subtraction(line, after)):
             low, value = subtracted
             text, size = f"{line.text}; {after.text}", line.size_bytes + after.size_bytes
             yield Instruction(line.address, size, text, _add_to_pair(low, -value))
-            merged = True
+            merged = after
             continue
         effects = _effects(line, return_bytes)
         flow: Flow = "next"
@@ -187,9 +186,9 @@ def _effects(line: _Line, return_bytes: int) -> tuple[Effect, ...] | None:  # no
         case (("adiw" | "sbiw"), (register, value)):
             return _add_to_pair(_number(register), int(value, 0) if mnemonic == "adiw" else -int(value, 0))
         case (("ld" | "ldd"), (register, place)):
-            return _access_indirect(place, register, load=True)
+            return _access_indirect(Load, place, register)
         case (("st" | "std"), (place, register)):
-            return _access_indirect(place, register, load=False)
+            return _access_indirect(Store, place, register)
         case "sts", (place, _) if int(place, 16) in {0x5D, 0x5E}:  # SPL, SPH in data space
             return (Clobber(SP),)
         case (("lpm" | "elpm"), _):
@@ -216,13 +215,12 @@ def _is_half(register: str, port: str) -> bool:
     return _number(register) % 2 == (0 if port == "0x3d" else 1)
 
 
-def _access_indirect(place: str, register: str, *, load: bool) -> tuple[Effect, ...]:
+def _access_indirect(access: type[Load | Store], place: str, register: str) -> tuple[Effect, ...]:
     """Model an indirect load or store through X, Y or Z, with pre-decrement or post-increment."""
     match = _PLACE.fullmatch(place)
     assert match is not None, place
     before, pair, plus, digits = match.groups()
-    low, offset = _POINTERS[pair], int(digits or "0")
-    access = Load(register, f"r{low}", offset) if load else Store(register, f"r{low}", offset)
+    low = _POINTERS[pair]
     first = _add_to_pair(low, -1) if before else ()
     last = _add_to_pair(low, 1) if plus and not digits else ()
-    return (*first, access, *last)
+    return (*first, access(register, f"r{low}", int(digits or "0")), *last)

@@ -3,7 +3,7 @@
 import bisect
 import itertools
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, Literal
@@ -124,7 +124,6 @@ def _read_image(path: Path, elf: ELFFile) -> Image:
     if not isinstance(table, SymbolTableSection):
         raise FootprintError(f"{path.name}: has no symbols; measure it before it is stripped")
     machine = str(elf.header["e_machine"])
-    allocated = {i: s for i, s in enumerate(elf.iter_sections()) if s["sh_flags"] & SH_FLAGS.SHF_ALLOC}
     sections = {
         index: ElfSection(
             name=section.name,
@@ -136,14 +135,13 @@ def _read_image(path: Path, elf: ELFFile) -> Image:
             executable=bool(section["sh_flags"] & SH_FLAGS.SHF_EXECINSTR),
             contents=b"" if section["sh_type"] == "SHT_NOBITS" else section.data(),
         )
-        for index, section in allocated.items()
-        if section["sh_size"]
+        for index, section in enumerate(elf.iter_sections())
+        if section["sh_flags"] & SH_FLAGS.SHF_ALLOC and section["sh_size"]
     }
-    labels = list(_labels(table, sections, machine))
     symbols = [
         symbol
         for index, section in sections.items()
-        for symbol in _split_by_label([label for label in labels if label.section == index], section)
+        for symbol in _merge_labels(_labels(table, section, index, machine), section)
     ]
     modes = {
         (symbol["st_value"], symbol.name[1])
@@ -160,43 +158,31 @@ def _read_image(path: Path, elf: ELFFile) -> Image:
     )
 
 
-@dataclass(frozen=True)
-class _Label:
-    name: str
-    address: int
-    size_bytes: int
-    section: int
-    kind: Literal["function", "object"]
-    file: str | None
-
-
-def _labels(table: SymbolTableSection, sections: dict[int, ElfSection], machine: str) -> Iterator[_Label]:
+def _labels(table: SymbolTableSection, section: ElfSection, index: int, machine: str) -> Iterator[Symbol]:
     """Yield functions, objects, and untyped labels in code, which hand-written assembly has."""
     file = None
     for symbol in table.iter_symbols():
         kind = symbol["st_info"]["type"]
         if kind == "STT_FILE":
             file = symbol.name
-        section = sections.get(symbol["st_shndx"])
-        if section is None or symbol.name.startswith("$"):
-            continue
         if kind == "STT_NOTYPE" and section.executable:
             kind = "STT_FUNC"
-        if kind in _KINDS:
+        if symbol["st_shndx"] == index and kind in _KINDS and not symbol.name.startswith("$"):
             thumb = machine == _ARM and kind == "STT_FUNC"
-            yield _Label(
+            yield Symbol(
                 name=symbol.name,
+                aliases=(),
                 address=symbol["st_value"] & ~1 if thumb else symbol["st_value"],
                 size_bytes=symbol["st_size"],
-                section=symbol["st_shndx"],
+                section=section.name,
                 kind=_KINDS[kind],
                 file=file if symbol["st_info"]["bind"] == "STB_LOCAL" else None,
             )
 
 
-def _split_by_label(labels: list[_Label], section: ElfSection) -> Iterator[Symbol]:
+def _merge_labels(labels: Iterable[Symbol], section: ElfSection) -> Iterator[Symbol]:
     """Yield one symbol for each address; it ends at the next label, or before, where all stated sizes end."""
-    places: dict[int, list[_Label]] = defaultdict(list)
+    places: dict[int, list[Symbol]] = defaultdict(list)
     for label in labels:
         places[label.address].append(label)
     covered = 0
@@ -204,17 +190,10 @@ def _split_by_label(labels: list[_Label], section: ElfSection) -> Iterator[Symbo
     starts = sorted(start for start in places if start < section_end)
     for start, end in itertools.pairwise([*starts, section_end]):
         here = sorted(places[start], key=lambda label: (label.file is not None, len(label.name), label.name))
-        sizes = [label.size_bytes for label in here if label.size_bytes]
-        covered = max(covered, start + max(sizes) if sizes else end)
-        yield Symbol(
-            name=here[0].name,
-            aliases=tuple(label.name for label in here[1:]),
-            address=start,
-            size_bytes=min(covered, end) - start,
-            section=section.name,
-            kind=here[0].kind,
-            file=here[0].file,
-        )
+        stated = max(label.size_bytes for label in here)
+        covered = max(covered, start + stated if stated else end)
+        aliases = tuple(label.name for label in here[1:])
+        yield replace(here[0], aliases=aliases, size_bytes=min(covered, end) - start)
 
 
 def _make_names_unique(symbols: list[Symbol]) -> tuple[Symbol, ...]:

@@ -1,5 +1,6 @@
 """Measure flash and static RAM of a program, and how much a controller adds to them."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,6 +107,6 @@ def _total(symbols: Iterable[Symbol], memory: dict[str, int]) -> int:
 
 def _difference(after: dict[str, int], before: dict[str, int]) -> dict[str, int]:
     """Return the difference of each section; a section absent from one program counts 0 there."""
-    names = dict.fromkeys([*after, *before])
-    changes = {name: after.get(name, 0) - before.get(name, 0) for name in names}
+    changes = Counter(after)
+    changes.subtract(before)
     return {name: change for name, change in changes.items() if change}

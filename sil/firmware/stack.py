@@ -13,7 +13,7 @@ from typing import Final, NoReturn
 from mambo_nmpc.sil.firmware.abstract_state import AbstractState, SymbolicValue
 from mambo_nmpc.sil.firmware.disassembly import Disassembly, disassemble
 from mambo_nmpc.sil.firmware.elf import Image
-from mambo_nmpc.sil.firmware.instructions import SP, Assign, Instruction
+from mambo_nmpc.sil.firmware.instructions import PC, SP, Assign, Instruction
 
 _MAX_DEPTHS: Final = 32
 """Distinct stack depths at one instruction; more than these mean that a loop grows the stack."""
@@ -158,7 +158,7 @@ class _FunctionAnalysis:
                     "alloca and variable-length arrays have no bound",
                 )
             self._frame = max(self._frame, after.depth)
-        target, after = after.split_target()
+        target = after.registers.get(PC)
         if instruction.flow == "jump":
             self._jump(instruction, target, after)
         elif instruction.flow == "call":
