@@ -39,13 +39,10 @@ def disassemble(image: Image) -> Disassembly:
         )
     if image.machine == "EM_AVR":
         return Disassembly(*avr.disassemble(image))
-    if image.machine == "EM_ARM":
-        return Disassembly(
-            {instruction.address: instruction for instruction in _decode_arm(image)}, arm.CONVENTION
-        )
-    return Disassembly(
-        {instruction.address: instruction for instruction in _decode_riscv(image)}, riscv.CONVENTION
+    decode, convention = (
+        (_decode_arm, arm.CONVENTION) if image.machine == "EM_ARM" else (_decode_riscv, riscv.CONVENTION)
     )
+    return Disassembly({instruction.address: instruction for instruction in decode(image)}, convention)
 
 
 def _decode_arm(image: Image) -> Iterator[Instruction]:

@@ -5,15 +5,15 @@ import re
 import shlex
 import shutil
 import subprocess
+from collections import defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Final, Literal
 
 from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.errors import BuildError, echo
 from mambo_nmpc.codegen.toolchain import host_toolchain
 
@@ -24,6 +24,7 @@ PATIENCE_S: Final = 5.0
 """Time limit of one tool's --version, in seconds."""
 
 Registry = Literal["Debian", "PyPI"]
+_OR: Final = " or "
 
 
 @dataclass(frozen=True)
@@ -34,17 +35,6 @@ class Finding:
     tool: str
     here: bool
     version: str
-    enables: str
-    registry: Registry
-    packages: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Need:
-    """A tool that the project uses: alternative commands, or the name of a Python package."""
-
-    kind: str
-    candidates: tuple[str, ...]
     enables: str
     registry: Registry
     packages: tuple[str, ...]
@@ -84,72 +74,57 @@ def doctor_text(findings: Sequence[Finding]) -> str:
     return "\n".join(lines)
 
 
-def _needs() -> tuple[_Need, ...]:
-    """Return the tools that the project uses: compilers, emulators, analysers, a builder."""
+def _needs() -> list[Finding]:
+    """Return the tools that the project uses, as missing; `tool` names alternatives with `or`."""
     known = [boards.load(name) for name in boards.names()]
     on_avr = [board.name for board in known if board.emulated_core.value == "avr"]
     on_others = [board.name for board in known if board.emulated_core.value != "avr"]
-    return (
-        _Need(
-            "compiler", _host_compilers(), "compiles the C for this machine: fly, table2", "Debian", ("gcc",)
+    builder_of: dict[tuple[str, tuple[str, ...]], list[str]] = defaultdict(list)
+    for board in known:
+        builder_of[_OR.join(board.compiler.candidates), board.compiler.packages].append(board.name)
+    return [
+        _need("compiler", _host_compiler(), "compiles the C for this machine: fly, table2", "gcc"),
+        _need("compiler", "clang", "second compiler: same-bits (except AVR), verify", "clang"),
+        *(
+            _need("compiler", tool, f"builds for {', '.join(names)}", *packages)
+            for (tool, packages), names in builder_of.items()
         ),
-        _Need(
-            "compiler", ("clang",), "second compiler: same-bits (except AVR), verify", "Debian", ("clang",)
-        ),
-        *_cross_compilers(known),
-        _Need("emulator", ("unicorn",), f"emulates {', '.join(on_others)}", "PyPI", ("unicorn",)),
-        _Need(
-            "emulator",
-            ("qemu-system-avr",),
-            f"emulates {', '.join(on_avr)}",
-            "Debian",
-            ("qemu-system-misc",),
-        ),
-        _Need("analyser", ("pyelftools",), "footprint: flash and RAM", "PyPI", ("pyelftools",)),
-        _Need("analyser", ("capstone",), "footprint: stack bound", "PyPI", ("capstone",)),
-        _Need("analyser", ("nm",), "make test: symbols of a build", "Debian", ("binutils",)),
-        _Need(
-            "analyser",
-            ("frama-c",),
-            "verify: proof of absence of run-time errors",
-            "Debian",
-            ("frama-c-base",),
-        ),
-        _Need("analyser", ("cppcheck",), "verify: MISRA C:2012", "Debian", ("cppcheck",)),
-        _Need("analyser", ("g++",), "verify: warnings as C++", "Debian", ("g++",)),
-        _Need("analyser", (LIBFUZZER,), "verify: fuzzing", "Debian", ("clang", "libclang-rt-14-dev")),
-        _Need("analyser", ("gcov",), "make test: which lines of the C run", "Debian", ("gcc",)),
-        _Need("builder", ("cmake",), "make test: build of a bundle with CMake", "Debian", ("cmake",)),
-    )
+        _need("emulator", "unicorn", f"emulates {', '.join(on_others)}"),
+        _need("emulator", "qemu-system-avr", f"emulates {', '.join(on_avr)}", "qemu-system-misc"),
+        _need("analyser", "pyelftools", "footprint: flash and RAM"),
+        _need("analyser", "capstone", "footprint: stack bound"),
+        _need("analyser", "nm", "make test: symbols of a build", "binutils"),
+        _need("analyser", "frama-c", "verify: proof of absence of run-time errors", "frama-c-base"),
+        _need("analyser", "cppcheck", "verify: MISRA C:2012", "cppcheck"),
+        _need("analyser", "g++", "verify: warnings as C++", "g++"),
+        _need("analyser", LIBFUZZER, "verify: fuzzing", "clang", "libclang-rt-14-dev"),
+        _need("analyser", "gcov", "make test: which lines of the C run", "gcc"),
+        _need("builder", "cmake", "make test: build of a bundle with CMake", "cmake"),
+    ]
 
 
-def _host_compilers() -> tuple[str, ...]:
+def _need(kind: str, tool: str, enables: str, *debian: str) -> Finding:
+    """Return a tool of Debian's packages `debian`, or else the package of PyPI with its name."""
+    registry: Registry = "Debian" if debian else "PyPI"
+    return Finding(kind, tool, False, "", enables, registry, debian or (tool,))
+
+
+def _host_compiler() -> str:
     """Return the compiler that `host_toolchain` chooses; if there is none, those that it tries."""
     try:
-        return (shlex.join(host_toolchain().command),)
+        return shlex.join(host_toolchain().command)
     except (BuildError, ValueError):
-        return ("cc", "gcc", "clang")
+        return _OR.join(("cc", "gcc", "clang"))
 
 
-def _cross_compilers(known: Sequence[Board]) -> tuple[_Need, ...]:
-    """Return one need for each cross compiler, with the boards that it builds for."""
-    served: dict[tuple[tuple[str, ...], tuple[str, ...]], list[str]] = {}
-    for board in known:
-        served.setdefault((board.compiler.candidates, board.compiler.packages), []).append(board.name)
-    return tuple(
-        _Need("compiler", candidates, f"builds for {', '.join(names)}", "Debian", packages)
-        for (candidates, packages), names in served.items()
-    )
-
-
-def _find(need: _Need) -> Finding:
-    """Return a finding for the first candidate that is here; if none is, one that names all."""
-    for candidate in need.candidates:
-        version = _package_version(candidate) if need.registry == "PyPI" else command_version(candidate)
+def _find(need: Finding) -> Finding:
+    """Return `need` with the first of its alternatives that is here and the version of that."""
+    version_of = _package_version if need.registry == "PyPI" else command_version
+    for tool in need.tool.split(_OR):
+        version = version_of(tool)
         if version is not None:
-            return Finding(need.kind, candidate, True, version, need.enables, need.registry, need.packages)
-    tools = " or ".join(need.candidates)
-    return Finding(need.kind, tools, False, "", need.enables, need.registry, need.packages)
+            return replace(need, tool=tool, here=True, version=version)
+    return need
 
 
 def _package_version(package: str) -> str | None:

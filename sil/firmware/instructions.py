@@ -105,7 +105,3 @@ class Convention:
     word_bytes: int = WORD_BYTES
     return_bytes: int = 0
     exceptions: Mapping[str, frozenset[str]] = field(default_factory=dict)
-
-    def registers_preserved_by(self, function: str) -> frozenset[str]:
-        """Return the registers that a function restores."""
-        return self.preserved - self.exceptions.get(function, frozenset())

@@ -201,7 +201,9 @@ class _FunctionAnalysis:
             self._propagate(target_address, after)
 
     def _find_preserved(self, function: int) -> frozenset[str]:
-        return self._code.convention.registers_preserved_by(self._image.name_of(function))
+        """Return the registers that a function restores."""
+        convention = self._code.convention
+        return convention.preserved - convention.exceptions.get(self._image.name_of(function), frozenset())
 
     def _record_call(self, callee: int, held: int) -> None:
         self._calls[callee] = max(held, self._calls.get(callee, 0))

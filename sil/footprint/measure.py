@@ -125,11 +125,6 @@ class Footprint:
         """Whether all measured values are within budget and nothing forbidden is linked."""
         return not self.forbidden and all(limit.share <= 1 for limit in self.limits)
 
-    def largest(self, count: int) -> list[tuple[str, int]]:
-        """Return the `count` largest symbols in flash and RAM with their bytes, the compiler's included."""
-        everything = self.added.own | self.added.helpers
-        return sorted(everything.items(), key=lambda item: -item[1])[:count]
-
 
 def measure_footprint(
     settings: Settings, board: Board, optimisation: str = "-O2", counted_steps: int = COUNTED_STEPS

@@ -1,5 +1,6 @@
 """Footprints as a record, as text and as a page: the same figures, three times."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
@@ -156,7 +157,8 @@ def _notes(footprint: Footprint) -> list[str]:
             )
             notes.append(f"{name}: {limit.name} {value} is over its budget of {budget} by {over}")
     if not footprint.fits:
-        largest = ", ".join(f"{symbol} {size} B" for symbol, size in footprint.largest(5))
+        sizes = Counter(footprint.added.own | footprint.added.helpers).most_common(5)
+        largest = ", ".join(f"{symbol} {size} B" for symbol, size in sizes)
         notes.append(f"{name}: largest symbols: {largest}")
     for found in footprint.forbidden:
         callers = ", ".join(found.callers) or "an unknown function"

@@ -11,6 +11,7 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
 from mambo_nmpc.sil.controllers.extension import batch_source
 from mambo_nmpc.sil.emulation.machine import CORES as EMULATED_CORES
@@ -113,17 +114,19 @@ def test_memory_is_dirty_before_init(tmp_path: Path) -> None:
     assert step.command_rad.tobytes() == b"\xa5" * step.command_rad.nbytes
 
 
-@pytest.mark.parametrize(
-    ("state", "target", "thrust"),
-    [((3, 7), (2, 4), (2,)), ((2, 6), (2, 4), (2,)), ((2, 7), (4, 2), (2,)), ((2, 7), (2, 4), (2, 1))],
-)
-def test_another_shape_is_refused(
-    state: tuple[int, ...], target: tuple[int, ...], thrust: tuple[int, ...], tmp_path: Path
-) -> None:
-    """An array of a wrong shape would be written beyond the inputs in the core's memory."""
-    controller = start_emulated("crazyflie", presets.load("mambo"), tmp_path, 2)
-    with pytest.raises(ValueError, match=r"expected an array of shape \(2,"):
-        controller.step(np.zeros(state), np.zeros(target), np.zeros(thrust))
+def test_another_shape_is_refused(tmp_path: Path) -> None:
+    """An array of a wrong shape would be read beyond its end, or written beyond the inputs of the core."""
+    settings = presets.load("mambo")
+    for controller in (CompiledController(settings, 2), start_emulated("crazyflie", settings, tmp_path, 2)):
+        for state, target, thrust in (
+            ((1, 7), (2, 4), (2,)),
+            ((3, 7), (2, 4), (2,)),
+            ((2, 6), (2, 4), (2,)),
+            ((2, 7), (4, 2), (2,)),
+            ((2, 7), (2, 4), (2, 1)),
+        ):
+            with pytest.raises(ValueError, match=r"expected an array of shape \(2,"):
+                controller.step(np.zeros(state), np.zeros(target), np.zeros(thrust))
 
 
 def test_arguments_beyond_the_registers_arrive(bad_guest: Machine) -> None:

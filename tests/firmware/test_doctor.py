@@ -1,8 +1,6 @@
 """The doctor reports installed and missing tools, their purpose and their packages."""
 
-import json
 import shutil
-from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 
@@ -139,10 +137,3 @@ def test_the_compiler_that_cc_names_is_examined(bare: Path, monkeypatch: pytest.
     assert doctor_text(examine()).replace("\n", "").isprintable()
     monkeypatch.setenv("CC", 'open "quote')
     assert not examine()[0].here
-
-
-def test_findings_survive_json() -> None:
-    """Findings read back from JSON are equal."""
-    findings = examine()
-    read = json.loads(json.dumps([asdict(finding) for finding in findings]))
-    assert tuple(Finding(**{**one, "packages": tuple(one["packages"])}) for one in read) == findings
