@@ -57,6 +57,7 @@ def test_a_grid_has_every_combination_that_is_a_controller() -> None:
         pytest.param([point(10, 1, 1), point(10, 3, 9), point(10, 2, 2)], 1, id="then most moves"),
         pytest.param([point(10, 2, 3), point(10, 2, 2), point(10, 2, 4)], 1, id="then best tracking"),
         pytest.param([point(10, 1, 1), point(9, 9, 0), point(10, 2, 9)], 2, id="in this order"),
+        pytest.param([point(10, 2, math.nan), point(10, 2, 50)], 1, id="not lost"),
         pytest.param([point(10, 2, 50), point(20, 2, math.nan)], 0, id="lost, but longer"),
         pytest.param([], None, id="none"),
         pytest.param([point(5, 1, math.nan)], None, id="lost"),
@@ -160,3 +161,13 @@ def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
     assert found.stack_bytes > 0
     assert math.isnan(found.time_ms)
     assert not found.fits
+
+
+@pytest.mark.long
+def test_a_small_controller_fits_the_mega() -> None:
+    """Five predicted steps, one move and three iterations take less than half of the period."""
+    board_builder("mega")
+    grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
+    (found,) = measure_grid(presets.load("mambo"), boards.load("mega"), grid)
+    assert found.time_ms < 5
+    assert found.fits
