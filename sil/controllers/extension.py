@@ -104,27 +104,19 @@ def load_extension(files: dict[str, str], scalar: str, toolchain: Toolchain) -> 
     if name not in sys.modules:
 
         def build(folder: Path) -> Path:
-            _write_files(files, folder)
-            _emit_glue(name, glue, scalar, folder)
+            for path, text in files.items():
+                (folder / path).parent.mkdir(parents=True, exist_ok=True)
+                (folder / path).write_text(text, "utf-8")
+            ffi = cffi.FFI()
+            ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar]))
+            ffi.set_source(name, glue, compiler_verbose=0)
+            ffi.emit_c_code(str(folder / "extension.c"))
             return _compile(
                 sorted(path for path in files if re.fullmatch(r"src/.*\.c", path)), toolchain, folder
             )
 
         sys.modules[name] = _load(name, build_cached(f"{name}{suffix}", build))
     return sys.modules[name]
-
-
-def _write_files(files: dict[str, str], folder: Path) -> None:
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, "utf-8")
-
-
-def _emit_glue(name: str, glue: str, scalar: str, folder: Path) -> None:
-    ffi = cffi.FFI()
-    ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar]))
-    ffi.set_source(name, glue, compiler_verbose=0)
-    ffi.emit_c_code(str(folder / "extension.c"))
 
 
 def _compile(sources: list[str], toolchain: Toolchain, folder: Path) -> Path:

@@ -57,7 +57,9 @@ class AvrMachine:
     word_bytes: Final = 2
 
     def __init__(self, elf: Path, time_limit_s: float, *, counting: bool = False) -> None:
-        _require_tools()
+        for tool, package in _TOOLS.items():
+            if shutil.which(tool) is None:
+                raise EmulatorError(f"{tool}, needed to emulate {_PART}, is missing (Debian: {package})")
         flash, data, self._symbols = _read_program(elf)
         used = max((start + len(content) for start, content in data), default=_RAM.start)
         self._next = -(-used // _ALIGNMENT) * _ALIGNMENT
@@ -148,12 +150,6 @@ class AvrMachine:
         if self.read(self.stack.start - len(_GUARD), len(_GUARD)) != _GUARD:
             raise EmulationError(f"{function} overflowed its stack of {_STACK_BYTES} B")
         return int.from_bytes(after[_RESULT], "little")
-
-
-def _require_tools() -> None:
-    for tool, package in _TOOLS.items():
-        if shutil.which(tool) is None:
-            raise EmulatorError(f"{tool}, needed to emulate {_PART}, is missing (Debian: {package})")
 
 
 def _read_program(elf: Path) -> tuple[bytes, list[tuple[int, bytes]], dict[str, int]]:

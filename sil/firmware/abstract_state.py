@@ -5,6 +5,7 @@ from typing import TypeVar
 
 from mambo_nmpc.sil.firmware.elf import Image
 from mambo_nmpc.sil.firmware.instructions import (
+    PC,
     SP,
     Add,
     Assign,
@@ -72,6 +73,10 @@ class AbstractState:
         """Return the state after a call that preserves the registers `preserved`."""
         kept = preserved | {SP}
         return replace(self, registers={name: self.registers[name] for name in self.registers.keys() & kept})
+
+    def split_target(self) -> tuple[SymbolicValue | None, "AbstractState"]:
+        """Return the value assigned to the program counter, None if unknown, and the state without it."""
+        return self.registers.get(PC), replace(self, registers=_with(self.registers, PC, None))
 
     def apply(self, effect: Effect, image: Image) -> "AbstractState":
         """Return the state after one effect of an instruction."""

@@ -25,13 +25,7 @@ OPTIMISATIONS: Final = ("-O0", "-O2", "-O3", "-Os")
 _COMPILE: Final = ("-ffunction-sections", "-fdata-sections", "-fno-pie")
 _NO_LIBRARY: Final = ("-fno-tree-loop-distribute-patterns",)
 """Without this flag GCC compiles the loop of memset in freestanding.c to a call of memset."""
-_LINK: Final = (
-    "-static",
-    "-nostartfiles",
-    "-nodefaultlibs",
-    "-Wl,--gc-sections",
-    "-Wl,--build-id=none",
-)
+_LINK: Final = ("-static", "-nostartfiles", "-nodefaultlibs", "-Wl,--gc-sections", "-Wl,--build-id=none")
 _GUEST_ADDRESS: Final = "-Wl,-Ttext=0x10000"
 _CLANG: Final = "clang"
 _CLANG_TARGETS: Final = {
@@ -85,34 +79,13 @@ class Builder:
             (place / path).parent.mkdir(parents=True, exist_ok=True)
             (place / path).write_text(text, "utf-8")
         chosen = sorted(path for path in sources if re.fullmatch(r"(src/)?[^/]*\.c", path))
-        self.toolchain.run(
-            [
-                *COMPILE_FLAGS,
-                *self.board.compiler.flags,
-                *([self.toolchain.optimisation] if self.toolchain.optimisation else []),
-                *_COMPILE,
-                *self.own_flags,
-                *define,
-                "-Iinclude",
-                "-c",
-                *chosen,
-            ],
-            place,
-        )
-        self.linker.run(
-            [
-                *self.board.compiler.flags,
-                *(Path(source).with_suffix(".o").name for source in chosen),
-                *_LINK,
-                *address,
-                f"-Wl,-e,{keep[0]}",
-                *(f"-Wl,-u,{symbol}" for symbol in keep[1:]),
-                *self.board.compiler.libraries,
-                "-o",
-                "program.elf",
-            ],
-            place,
-        )
+        core, optimisation = self.board.compiler.flags, self.toolchain.optimisation
+        flags = [*COMPILE_FLAGS, *core, *([optimisation] if optimisation else []), *_COMPILE, *self.own_flags]
+        self.toolchain.run([*flags, *define, "-Iinclude", "-c", *chosen], place)
+        objects = [Path(source).with_suffix(".o").name for source in chosen]
+        kept = [f"-Wl,-e,{keep[0]}", *(f"-Wl,-u,{symbol}" for symbol in keep[1:])]
+        link = [*core, *objects, *_LINK, *address, *kept, *self.board.compiler.libraries]
+        self.linker.run([*link, "-o", "program.elf"], place)
         return place / "program.elf"
 
 

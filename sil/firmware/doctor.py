@@ -50,27 +50,18 @@ def examine() -> tuple[Finding, ...]:
 def doctor_text(findings: Sequence[Finding]) -> str:
     """Return one line for each tool, then the commands that install what is missing."""
     rows = [
-        (finding.kind, echo(finding.tool), finding.version or ("here" if finding.here else "missing"))
-        for finding in findings
+        (one.kind, echo(one.tool), one.version or ("here" if one.here else "missing"), one.enables)
+        for one in findings
     ]
-    widths = [max(len(row[column]) for row in rows) for column in range(3)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
-        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True))
-        + f"  {finding.enables}"
-        for row, finding in zip(rows, findings, strict=True)
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
-    installers: dict[Registry, str] = {"Debian": "apt install", "PyPI": "pip install"}
-    for registry, installer in installers.items():
-        missing = sorted(
-            {
-                package
-                for finding in findings
-                if finding.registry == registry and not finding.here
-                for package in finding.packages
-            }
-        )
+    absent = [one for one in findings if not one.here]
+    for registry, installer in (("Debian", "apt install"), ("PyPI", "pip install")):
+        missing = {package for one in absent if one.registry == registry for package in one.packages}
         if missing:
-            lines.append(f"install what is missing from {registry}: {installer} {' '.join(missing)}")
+            lines.append(f"install what is missing from {registry}: {installer} {' '.join(sorted(missing))}")
     return "\n".join(lines)
 
 

@@ -30,7 +30,6 @@ class ElfSection:
     name: str
     address: int
     size_bytes: int
-    alignment: int
     in_flash: bool
     in_ram: bool
     executable: bool
@@ -129,7 +128,6 @@ def _read_image(path: Path, elf: ELFFile) -> Image:
             name=section.name,
             address=section["sh_addr"],
             size_bytes=section["sh_size"],
-            alignment=section["sh_addralign"],
             in_flash=section["sh_type"] != "SHT_NOBITS",
             in_ram=bool(section["sh_flags"] & SH_FLAGS.SHF_WRITE),
             executable=bool(section["sh_flags"] & SH_FLAGS.SHF_EXECINSTR),

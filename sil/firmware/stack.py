@@ -13,7 +13,7 @@ from typing import Final, NoReturn
 from mambo_nmpc.sil.firmware.abstract_state import AbstractState, SymbolicValue
 from mambo_nmpc.sil.firmware.disassembly import Disassembly, disassemble
 from mambo_nmpc.sil.firmware.elf import Image
-from mambo_nmpc.sil.firmware.instructions import PC, SP, Assign, Instruction
+from mambo_nmpc.sil.firmware.instructions import SP, Assign, Instruction
 
 _MAX_DEPTHS: Final = 32
 """Distinct stack depths at one instruction; more than these mean that a loop grows the stack."""
@@ -29,14 +29,13 @@ class Frame:
 
 @dataclass(frozen=True)
 class StackReport:
-    """Worst-case stack of `entry`: `bytes` below its stack pointer at the call, without interrupts.
+    """Worst-case stack of a function: `bytes` below its stack pointer at the call, without interrupts.
 
     The return address counts where it is stored: on ARM and RISC-V if a function saves its link register, on
     AVR always, since calls push it. The frames of `path`, one deepest call path, add up to `bytes`. By
     function, `frames` has its own largest frame in bytes and `depths` that frame with everything it calls.
     """
 
-    entry: str
     bytes: int
     path: tuple[Frame, ...]
     frames: dict[str, int]
@@ -49,7 +48,7 @@ def bound_stack(image: Image, entry: str) -> StackReport:
     Raises FootprintError, which names function and instruction, if no bound can be proven.
     """
     code = disassemble(image)
-    uses: dict[int, _StackUse] = {}
+    uses: dict[int, _FunctionAnalysis] = {}
     depths: dict[int, int] = {}
     active: list[int] = []
 
@@ -60,7 +59,8 @@ def bound_stack(image: Image, entry: str) -> StackReport:
             raise image.error(f"{names} is recursive and has no stack bound; use a loop")
         if function not in depths:
             active.append(function)
-            use = uses[function] = _FunctionAnalysis(image, code, function).analyse()
+            use = uses[function] = _FunctionAnalysis(image, code, function)
+            use.analyse()
             calls = (held + depth_of(callee) for callee, held in use.calls.items())
             depths[function] = max([use.frame, *calls])
             active.pop()
@@ -68,7 +68,6 @@ def bound_stack(image: Image, entry: str) -> StackReport:
 
     start = image.symbol(entry).address
     return StackReport(
-        entry=image.name_of(start),
         bytes=depth_of(start),
         path=_find_deepest_path(image, uses, depths, start),
         frames={image.name_of(address): use.frame for address, use in uses.items()},
@@ -86,16 +85,8 @@ def find_callers(image: Image) -> dict[str, tuple[str, ...]]:
     return {callee: tuple(sites) for callee, sites in callers.items()}
 
 
-@dataclass(frozen=True)
-class _StackUse:
-    """Largest frame of a function in bytes, and the bytes it holds at its calls, by address of the callee."""
-
-    frame: int
-    calls: dict[int, int]
-
-
 def _find_deepest_path(
-    image: Image, uses: dict[int, _StackUse], depths: dict[int, int], address: int
+    image: Image, uses: dict[int, "_FunctionAnalysis"], depths: dict[int, int], address: int
 ) -> tuple[Frame, ...]:
     name, use = image.name_of(address), uses[address]
     for callee, held in use.calls.items():
@@ -105,7 +96,10 @@ def _find_deepest_path(
 
 
 class _FunctionAnalysis:
-    """Abstract interpretation of one function, and of shared code that it jumps into."""
+    """Abstract interpretation of one function, and of shared code that it jumps into.
+
+    `frame` is the largest frame in bytes; `calls` the bytes held at calls, by address of the callee.
+    """
 
     def __init__(self, image: Image, code: Disassembly, function: int) -> None:
         self._image, self._code, self._function = image, code, function
@@ -113,16 +107,15 @@ class _FunctionAnalysis:
         self._preserved = self._find_preserved(function)
         self._states: dict[int, dict[int, AbstractState]] = defaultdict(dict)
         self._waiting: list[tuple[int, int]] = []
-        self._frame = code.convention.return_bytes
-        self._calls: dict[int, int] = {}
+        self.frame = code.convention.return_bytes
+        self.calls: dict[int, int] = {}
 
-    def analyse(self) -> _StackUse:
-        """Propagate states along every path until a fixed point; returns the stack use."""
+    def analyse(self) -> None:
+        """Propagate states along every path until a fixed point."""
         self._propagate(self._function, AbstractState.at_entry(self._code.convention))
         while self._waiting:
             address, depth = self._waiting.pop()
             self._execute(self._instruction_at(address), self._states[address][depth])
-        return _StackUse(self._frame, self._calls)
 
     def _instruction_at(self, address: int) -> Instruction:
         instruction = self._code.instructions.get(address)
@@ -157,8 +150,8 @@ class _FunctionAnalysis:
                     "sets the stack pointer to a value known only at run time; "
                     "alloca and variable-length arrays have no bound",
                 )
-            self._frame = max(self._frame, after.depth)
-        target = after.registers.get(PC)
+            self.frame = max(self.frame, after.depth)
+        target, after = after.split_target()
         if instruction.flow == "jump":
             self._jump(instruction, target, after)
         elif instruction.flow == "call":
@@ -206,7 +199,7 @@ class _FunctionAnalysis:
         return convention.preserved - convention.exceptions.get(self._image.name_of(function), frozenset())
 
     def _record_call(self, callee: int, held: int) -> None:
-        self._calls[callee] = max(held, self._calls.get(callee, 0))
+        self.calls[callee] = max(held, self.calls.get(callee, 0))
 
     def _resolve(self, instruction: Instruction, target: SymbolicValue | None) -> int:
         """Return the address of a jump or call target; raises FootprintError if it is not constant."""

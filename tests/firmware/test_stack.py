@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.emulation.machine import start
+from mambo_nmpc.sil.emulation.machine import Machine, start
 from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
 from mambo_nmpc.sil.firmware.stack import Frame, bound_stack, find_callers
 from tests.support.linking import link, link_controller
@@ -20,41 +20,31 @@ UNTOUCHED_BYTES = 16
 """Largest difference of bound and high-water mark: paths not taken, unwritten ends of frames."""
 
 
-class PaintedStack:
-    """A program on an emulated core with a painted stack."""
-
-    def __init__(self, board: str, image: Image) -> None:
-        self._image = image
-        self._machine = start(image.path, CORES[board])
-        self._stack = self._machine.stack
-        self._machine.write(self._stack.start, PAINT * len(self._stack))
-
-    def call(self, function: str) -> int:
-        """Call a function without arguments; returns its result."""
-        return self._machine.call(function)
-
-    def write(self, variable: str, content: bytes) -> None:
-        """Write all bytes of a variable."""
-        symbol = self._image.symbol(variable)
-        assert symbol.size_bytes == len(content)
-        self._machine.write(symbol.address, content)
-
-    def high_water_bytes(self) -> int:
-        """Return the depth to which the paint is overwritten."""
-        return len(self._machine.read(self._stack.start, len(self._stack)).lstrip(PAINT))
+def start_painted(board: str, image: Image) -> Machine:
+    """Start a program on an emulated core and paint its stack."""
+    machine = start(image.path, CORES[board])
+    machine.write(machine.stack.start, PAINT * len(machine.stack))
+    return machine
 
 
-def fly(emulator: PaintedStack, steps: int) -> None:
+def high_water_bytes(machine: Machine) -> int:
+    """Return the depth to which the paint is overwritten."""
+    return len(machine.read(machine.stack.start, len(machine.stack)).lstrip(PAINT))
+
+
+def fly(machine: Machine, image: Image, steps: int) -> None:
     """Step with plausible inputs of all magnitudes, and with random bits."""
     rng = np.random.default_rng(7)
     for _ in range(steps):
         inputs = rng.normal(0, 10.0 ** rng.uniform(-4, 1), 12).astype("<f4")
         inputs[-1] = 9.81 + rng.normal()
         content = inputs.tobytes() if rng.random() < 0.9 else rng.bytes(48)
-        emulator.write("state", content[:28])
-        emulator.write("target", content[28:44])
-        emulator.write("thrust", content[44:])
-        emulator.call("fly")
+        for variable in ("state", "target", "thrust"):
+            symbol = image.symbol(variable)
+            machine.write(symbol.address, content[: symbol.size_bytes])
+            content = content[symbol.size_bytes :]
+        assert not content
+        machine.call("fly")
 
 
 def gcc_frames(folder: Path) -> dict[str, int]:
@@ -76,14 +66,14 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
     image = load(link_controller(board, tmp_path, optimisation))
     report, step = bound_stack(image, "run"), bound_stack(image, "fly")
 
-    emulator = PaintedStack(board, image)
-    assert emulator.call("run") == 0
-    seen = emulator.high_water_bytes()
+    machine = start_painted(board, image)
+    assert machine.call("run") == 0
+    seen = high_water_bytes(machine)
     assert seen <= report.bytes <= seen + UNTOUCHED_BYTES
 
-    emulator = PaintedStack(board, image)
-    fly(emulator, 60)
-    seen = emulator.high_water_bytes()
+    machine = start_painted(board, image)
+    fly(machine, image, 60)
+    seen = high_water_bytes(machine)
     assert seen <= step.bytes <= seen + UNTOUCHED_BYTES
 
     known = gcc_frames(tmp_path)
@@ -99,9 +89,9 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
 def test_other_scalar_types_have_a_bound(board: str, scalar: str, tmp_path: Path) -> None:
     """The analysis covers the compiler's helpers, including those with their own calling convention."""
     image = load(link_controller(board, tmp_path, scalar=scalar))  # avr-gcc's double has 32 bits
-    emulator = PaintedStack(board, image)
-    assert emulator.call("run") == 0
-    assert 0 <= bound_stack(image, "run").bytes - emulator.high_water_bytes() <= UNTOUCHED_BYTES
+    machine = start_painted(board, image)
+    assert machine.call("run") == 0
+    assert 0 <= bound_stack(image, "run").bytes - high_water_bytes(machine) <= UNTOUCHED_BYTES
 
 
 SHAPES = """

@@ -250,7 +250,6 @@ def test_spread_inputs_are_all_accepted(index: int) -> None:
 
 def test_flight_inputs_are_those_of_the_flight() -> None:
     """Every seventh input equals what the controller received: state, target, thrust."""
-    trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), PdController())
     given: list[tuple[Any, ...]] = []
 
     class Spy(PdController):
@@ -258,7 +257,7 @@ def test_flight_inputs_are_those_of_the_flight() -> None:
             given.append(tuple(np.array(argument[0]) for argument in arguments))
             return super().step(*arguments)
 
-    fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), Spy())
+    trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), Spy())
     inputs = sample_flight(trace, every=7)
     assert len(inputs.thrust) == len(given[::7]) == 15
     for row, (state, target, thrust) in enumerate(given[::7]):
