@@ -58,7 +58,9 @@ class EmulatedController:
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
         sizes = [self._instance_bytes, *(width * np.dtype(self.scalar).itemsize for width in (7, 4, 1))]
         sizes += [values.nbytes for values in one.values()]
-        self._batch_size = min(n, max(1, _MAX_WORK // work), self._room(sizes) // sum(sizes))
+        overhead = len(sizes) * (self.machine.word_bytes + _MAX_PADDING) + _MAX_PADDING  # pointers, alignment
+        room = (self.machine.free_bytes - overhead) // sum(sizes)
+        self._batch_size = min(n, max(1, _MAX_WORK // work), room)
         if self._batch_size < 1:
             raise EmulatorError(
                 f"a controller with its inputs and outputs takes {sum(sizes)} B, "
@@ -88,10 +90,6 @@ class EmulatedController:
 
     def _empty_outcome(self, n: int) -> dict[str, NDArray[Any]]:
         return empty_outcome(self._numbers, self.settings.horizon.control, n, f"<i{self.machine.word_bytes}")
-
-    def _room(self, sizes: list[int]) -> int:
-        """Return the free bytes, less the pointers to the outputs and the alignment of every array."""
-        return self.machine.free_bytes - len(sizes) * (self.machine.word_bytes + _MAX_PADDING) - _MAX_PADDING
 
     def _batches(self) -> Iterator[slice]:
         """Yield the indices of the controllers of each batch."""
