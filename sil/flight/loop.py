@@ -10,7 +10,7 @@ gives the same bits alone and in a batch.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.names import Start
-from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.flight.traces import AXES, SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Trajectory
 from mambo_nmpc.sil.plant import loops
 from mambo_nmpc.sil.plant.airframe import MAMBO
@@ -27,8 +27,8 @@ from mambo_nmpc.sil.plant.disturbances import Disturbances, World
 from mambo_nmpc.sil.plant.link import NOT_CALLED, Drops, Link, Wire
 from mambo_nmpc.sil.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
+from mambo_nmpc.sil.sensors.estimators import Suite
 from mambo_nmpc.sil.sensors.instruments import Sensors
-from mambo_nmpc.sil.sensors.suite import Suite
 
 HEIGHT_REFERENCE_M = -1.1
 """Altitude reference of every flight: z points down."""
@@ -194,7 +194,8 @@ def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
     offset, body = flight.offset, state.body
     for row in range(3):
         body[POSITION][row] += offset.position_m[row]
-    body[EULER][:2] = [np.broadcast_to(angle, flight.flights) for angle in offset.tilt_rad]
+    for row in range(2):
+        body[EULER][row] = offset.tilt_rad[row]
     velocity_m_s = np.stack([np.broadcast_to(component, flight.flights) for component in offset.velocity_m_s])
     body[VELOCITY] = to_body(body[EULER], velocity_m_s)
     return state
@@ -219,25 +220,14 @@ def _mark_lost(state: VehicleState) -> VehicleState:
 
 def _allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
     """Return a trace with times and targets set and its other arrays uninitialized."""
+    kind = SensedTrace if sensed else Trace
     shape = targets.shape[:2]
     arrays: dict[str, Any] = {
-        "time_s": times_s,
-        "position_m": np.empty((*shape, 3)),
-        "velocity_m_s": np.empty((*shape, 3)),
-        "euler_rad": np.empty((*shape, 3)),
-        "target": targets,
-        "command_rad": np.empty((*shape, 2)),
-        "thrust_acceleration_m_s2": np.empty(shape),
-        "status": np.empty(shape, dtype=np.int64),
+        column.name: np.empty((*shape, *AXES[column.name.removeprefix("seen_")]))
+        for column in fields(kind)
+        if column.name not in ("time_s", "target", "status")
     }
-    if not sensed:
-        return Trace(**arrays)
-    return SensedTrace(
-        **arrays,
-        seen_position_m=np.empty((*shape, 3)),
-        seen_velocity_m_s=np.empty((*shape, 3)),
-        seen_euler_rad=np.empty((*shape, 3)),
-    )
+    return kind(time_s=times_s, target=targets, status=np.empty(shape, np.int64), **arrays)
 
 
 class _Caller:

@@ -15,8 +15,6 @@ from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, TARGET, inli
 
 _LABELS: Final = ("y (east), m", "error, m", "roll, rad", "pitch, rad")
 
-_HEIGHT_INCHES: Final = 8.2
-
 
 def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
     """Draw the first flight of each trace as one column with the same scales in all columns.
@@ -24,46 +22,39 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
     Writes stem.png and stem.svg.
     """
     with style():
-        figure = Figure(figsize=(PANEL_INCHES * len(flights), _HEIGHT_INCHES), layout="constrained")
+        figure = Figure(figsize=(PANEL_INCHES * len(flights), 8.2), layout="constrained")
         rows = figure.subplots(4, len(flights), squeeze=False, sharey="row", height_ratios=(1.9, 1, 1, 1))
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
             _draw_column(column, trace, title)
-        for axes, label in zip(rows[:, 0], _LABELS, strict=True):
-            axes.set_ylabel(label)
         _share_scales(rows[0])
         rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
-        for axes in (rows[0, 0], rows[2, 0]):
-            axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
+        _label_column(rows[:, 0])
         return save(figure, stem)
 
 
 def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
-    """Draw the first flight of a trace in four axes (4,): path, error, roll, pitch."""
-    _draw_path(column[0], trace, title)
-    _draw_error(column[1], trace)
-    _draw_angle(column[2], trace, axis=0)
-    _draw_angle(column[3], trace, axis=1)
-    column[3].set_xlabel("time, s")
+    """Draw the first flight of a trace in four axes (4,): path, error, roll, pitch.
+
+    Target and commands are broad lines below the flown ones, so that both stay visible.
+    """
+    path, error, *angles = column
+    path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=4, label="target")
+    path.plot(*trace.position_m[:, 0, :2].T, color=FLOWN, label="flown")
+    path.set_title(title, loc="right", parse_math=False)
+    path.set(xlabel="x (north), m", aspect="equal")
+    error.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
+    error.set_ylim(0, None)
+    for axis, axes in enumerate(angles):
+        axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=2, label="command")
+        axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=0.9, label="flown")
+    angles[-1].set_xlabel("time, s")
 
 
-def _draw_path(axes: Axes, trace: Trace, title: str) -> None:
-    """Draw path and target; the target is a broad line below the path, so that both stay visible."""
-    target, flown = trace.target[:, 0], trace.position_m[:, 0]
-    axes.plot(target[:, 0], target[:, 1], color=TARGET, linewidth=4, label="target")
-    axes.plot(flown[:, 0], flown[:, 1], color=FLOWN, label="flown")
-    axes.set_title(title, loc="right", parse_math=False)
-    axes.set(xlabel="x (north), m", aspect="equal")
-
-
-def _draw_error(axes: Axes, trace: Trace) -> None:
-    axes.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
-    axes.set_ylim(0, None)
-
-
-def _draw_angle(axes: Axes, trace: Trace, axis: int) -> None:
-    """Draw angle and command; the command is a broader line below the angle, so that both stay visible."""
-    axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=2, label="command")
-    axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=0.9, label="flown")
+def _label_column(column: NDArray[Any]) -> None:
+    for axes, label in zip(column, _LABELS, strict=True):
+        axes.set_ylabel(label)
+    for axes in (column[0], column[2]):
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
 
 
 def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:
@@ -85,10 +76,7 @@ def _column(title: str, trace: Trace) -> Figure:
     column = figure.subplots(len(_LABELS), 1, height_ratios=(1.9, 1, 1, 1))
     _draw_column(column, trace, "")
     figure.suptitle(title, fontsize=10, parse_math=False)  # above the legend, whatever the path's shape
-    for axes, label in zip(column, _LABELS, strict=True):
-        axes.set_ylabel(label)
-    for axes in (column[0], column[2]):
-        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
+    _label_column(column)
     return figure
 
 

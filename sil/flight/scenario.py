@@ -6,9 +6,9 @@ controller and the digest of the trace. `flight_of` makes one `Flight` of severa
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Final, Literal, Self, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -19,8 +19,7 @@ from mambo_nmpc.sil.errors import FlightError, ScenarioError
 from mambo_nmpc.sil.flight.loop import Flight, Offset
 from mambo_nmpc.sil.flight.names import ControllerName, CurveName, SensorsName, Start
 from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectories
-from mambo_nmpc.sil.plant.airframe import MAMBO
-from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.airframe import MAMBO, Airframe
 from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.plant.link import Link
 from mambo_nmpc.sil.plant.vehicle import Vehicle
@@ -31,12 +30,6 @@ LARGEST_FILE_BYTES: Final = 1_000_000
 
 Two = tuple[float, float]
 Three = tuple[float, float, float]
-
-INERTIA_KG_M2: Final[Three] = (
-    float(MAMBO.inertia_kg_m2[0]),
-    float(MAMBO.inertia_kg_m2[1]),
-    float(MAMBO.inertia_kg_m2[2]),
-)
 
 
 class _Record(BaseModel):
@@ -67,7 +60,7 @@ class Scenario(_Record):
     yaw_rate_rad_s: float = 0.0
 
     mass_kg: float = Field(float(MAMBO.mass_kg), gt=0.0)
-    inertia_kg_m2: Three = INERTIA_KG_M2
+    inertia_kg_m2: Three = cast(Three, MAMBO.inertia_kg_m2)
     thrust_factor_n_s2: float = Field(float(MAMBO.thrust_factor_n_s2), gt=0.0)
     torque_factor_n_m_s2: float = Field(float(MAMBO.torque_factor_n_m_s2), gt=0.0)
     motor_lag_s: float = Field(0.0, ge=0.0, le=1.0)
@@ -122,55 +115,31 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         if any(getattr(scenario, key) != getattr(first, key) for scenario in scenarios):
             raise FlightError(f"{key} must be the same in all flights of one simulation")
 
-    def each(key: str) -> FloatArray:
-        return np.array([getattr(scenario, key) for scenario in scenarios], np.float64)
+    def each(key: str) -> Any:
+        """Return an array (n,) for a number, or a tuple of such arrays for a tuple."""
+        values = np.array([getattr(scenario, key) for scenario in scenarios], np.float64)
+        return values if values.ndim == 1 else tuple(np.ascontiguousarray(values.T))
 
-    def parts(key: str) -> tuple[Any, ...]:
-        return tuple(np.ascontiguousarray(each(key).T))
+    def common(kind: type[Any]) -> dict[str, Any]:
+        """Return the fields that a record has in common with a scenario."""
+        return {field.name: each(field.name) for field in fields(kind) if field.name in Scenario.model_fields}
 
+    n, derotated = len(scenarios), first.sensors == "mambo-derotated"
+    delays = np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64)
     return Flight(
         Trajectories(tuple(CURVES[s.trajectory](s.size_m, s.rate_rad_s) for s in scenarios)),
         duration_s=first.duration_s,
-        flights=len(scenarios),
+        flights=n,
         start=first.start,
         yaw_rad=each("yaw_rad"),
         yaw_rate_rad_s=each("yaw_rate_rad_s"),
-        vehicle=Vehicle(
-            replace(
-                MAMBO,
-                mass_kg=each("mass_kg"),
-                inertia_kg_m2=parts("inertia_kg_m2"),
-                thrust_factor_n_s2=each("thrust_factor_n_s2"),
-                torque_factor_n_m_s2=each("torque_factor_n_m_s2"),
-            ),
-            motor_lag_s=each("motor_lag_s"),
-            drag_1_s=each("drag_1_s"),
-            wind_m_s2=parts("wind_m_s2"),
-        ),
+        vehicle=Vehicle(replace(MAMBO, **common(Airframe)), **common(Vehicle)),
         update_period_s=update_period_s,
         seeds=tuple(scenario.seed for scenario in scenarios),
-        offset=Offset(parts("start_offset_m"), parts("start_velocity_m_s"), parts("start_tilt_rad")),
-        disturbances=Disturbances(
-            wind_speed_m_s=each("wind_speed_m_s"),
-            wind_direction_rad=each("wind_direction_rad"),
-            battery_sag_1_s=each("battery_sag_1_s"),
-            payload_kg=each("payload_kg"),
-            payload_time_s=each("payload_time_s"),
-            push_n_s=parts("push_n_s"),
-            push_time_s=each("push_time_s"),
-        ),
-        link=Link(
-            delay_ticks=np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64),
-            dropped_share=each("dropped_share"),
-        ),
-        sensors=None
-        if first.sensors == "none"
-        else Sensors(
-            each("noise_scale"),
-            parts("accelerometer_bias_m_s2"),
-            parts("gyro_bias_rad_s"),
-            derotated=first.sensors == "mambo-derotated",
-        ),
+        offset=Offset(each("start_offset_m"), each("start_velocity_m_s"), each("start_tilt_rad")),
+        disturbances=Disturbances(**common(Disturbances)),
+        link=Link(delay_ticks=delays, **common(Link)),
+        sensors=None if first.sensors == "none" else Sensors(derotated=derotated, **common(Sensors)),
     )
 
 

@@ -24,8 +24,7 @@ SEEN_COLUMNS = (
 )
 """Columns that follow `CSV_COLUMNS` in a flight with sensors."""
 
-
-_AXES: Final[dict[str, tuple[int, ...]]] = {
+AXES: Final[dict[str, tuple[int, ...]]] = {
     "position_m": (3,),
     "velocity_m_s": (3,),
     "euler_rad": (3,),
@@ -111,32 +110,14 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
 
     Every number is spelled so that it reads back to the same bits.
     """
-    seen = (
-        [trace.seen_position_m, trace.seen_velocity_m_s, trace.seen_euler_rad]
-        if isinstance(trace, SensedTrace)
-        else []
-    )
-    numbers = np.column_stack(
-        [
-            trace.time_s,
-            trace.position_m[:, flight],
-            trace.velocity_m_s[:, flight],
-            trace.euler_rad[:, flight],
-            trace.target[:, flight],
-            trace.command_rad[:, flight],
-            trace.thrust_acceleration_m_s2[:, flight],
-        ]
-    )
+    rows = [[time_s] for time_s in trace.time_s.tolist()]
+    for name in (field.name for field in fields(trace) if field.name != "time_s"):
+        for row, values in zip(rows, getattr(trace, name)[:, flight].tolist(), strict=True):
+            row.extend(values if isinstance(values, list) else [values])
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow((*CSV_COLUMNS, *(SEEN_COLUMNS if seen else ())))
-        estimates = np.column_stack([trace.time_s, *(values[:, flight] for values in seen)])[:, 1:]
-        writer.writerows(
-            [*row, status, *estimate]
-            for row, status, estimate in zip(
-                numbers.tolist(), trace.status[:, flight].tolist(), estimates.tolist(), strict=True
-            )
-        )
+        writer.writerow((*CSV_COLUMNS, *(SEEN_COLUMNS if isinstance(trace, SensedTrace) else ())))
+        writer.writerows(rows)
 
 
 def write_npz(trace: Trace, path: Path) -> None:
@@ -160,7 +141,7 @@ def read_npz(path: Path) -> Trace:
     if len(steps) != 2 or 0 in steps or trace.time_s.shape != steps[:1]:
         raise TraceError(f"{path}: is no trace: time_s {trace.time_s.shape} and status {steps} disagree")
     for name in (field.name for field in fields(trace) if field.name not in ("time_s", "status")):
-        array, axes = getattr(trace, name), _AXES[name.removeprefix("seen_")]
+        array, axes = getattr(trace, name), AXES[name.removeprefix("seen_")]
         if array.shape != (*steps, *axes) or array.dtype.kind not in "fi":
             raise TraceError(f"{path}: is no trace: {name} has the shape {array.shape}")
     if not (np.isfinite(trace.target).all() and np.isfinite(trace.time_s).all()):

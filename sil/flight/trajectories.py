@@ -43,10 +43,11 @@ class Trajectory(Protocol):
         ...
 
 
-def _rest_before_start(time_s: FloatArray, target: FloatArray) -> FloatArray:
-    """Set the velocity of targets (..., 4) to 0 where the time (...) is before t = 0."""
-    target[..., 2:] *= (time_s >= 0.0)[..., np.newaxis]
-    return target
+def _rest_before_start(time_s: ArrayLike, *target: FloatArray) -> FloatArray:
+    """Return x, y, vx, vy, each (...), as (..., 4), with velocity 0 where the time (...) is before t = 0."""
+    stacked = np.stack(target, axis=-1)
+    stacked[..., 2:] *= (np.asarray(time_s) >= 0.0)[..., np.newaxis]
+    return stacked
 
 
 @dataclass(frozen=True)
@@ -58,24 +59,13 @@ class Bernoulli:
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
-        times = np.asarray(time_s, dtype=np.float64)
-        phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
+        phase = self.angular_rate_rad_s * np.maximum(time_s, 0.0)
         sine, cosine = np.sin(phase), np.cos(phase)
         denominator = 1.0 + cosine * cosine
         x = self.half_width_m * sine / denominator
         speed = self.half_width_m * self.angular_rate_rad_s / (denominator * denominator)
-        return _rest_before_start(
-            times,
-            np.stack(
-                [
-                    x,
-                    x * cosine,
-                    speed * cosine * (denominator + 2.0 * sine * sine),
-                    speed * (3.0 * cosine * cosine - 1.0),
-                ],
-                axis=-1,
-            ),
-        )
+        vx = speed * cosine * (denominator + 2.0 * sine * sine)
+        return _rest_before_start(time_s, x, x * cosine, vx, speed * (3.0 * cosine * cosine - 1.0))
 
 
 @dataclass(frozen=True)
@@ -88,34 +78,18 @@ class Lissajous:
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
-        times = np.asarray(time_s, dtype=np.float64)
-        phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
-        width, height = self.half_width_m, self.height * self.half_width_m
-        rate = self.angular_rate_rad_s
-        return _rest_before_start(
-            times,
-            np.stack(
-                [
-                    width * np.sin(phase),
-                    height * np.sin(2.0 * phase),
-                    width * rate * np.cos(phase),
-                    2.0 * height * rate * np.cos(2.0 * phase),
-                ],
-                axis=-1,
-            ),
-        )
+        rate, width, height = self.angular_rate_rad_s, self.half_width_m, self.height * self.half_width_m
+        phase = rate * np.maximum(time_s, 0.0)
+        x, y = width * np.sin(phase), height * np.sin(2.0 * phase)
+        vx, vy = width * rate * np.cos(phase), 2.0 * height * rate * np.cos(2.0 * phase)
+        return _rest_before_start(time_s, x, y, vx, vy)
 
 
 @dataclass(frozen=True)
-class Gerono:
+class Gerono(Lissajous):
     """Lemniscate of Gerono, x = a sin(w t), y = a sin(w t) cos(w t): a Lissajous curve of half height."""
 
-    half_width_m: float
-    angular_rate_rad_s: float
-
-    def target(self, time_s: ArrayLike) -> FloatArray:
-        """Return [x, y, vx, vy] (..., 4)."""
-        return Lissajous(self.half_width_m, self.angular_rate_rad_s, height=0.5).target(time_s)
+    height: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -127,11 +101,10 @@ class Circle:
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
-        times = np.asarray(time_s, dtype=np.float64)
-        phase = self.angular_rate_rad_s * np.maximum(times, 0.0)
-        x, y = self.radius_m * np.cos(phase), self.radius_m * np.sin(phase)
         rate = self.angular_rate_rad_s
-        return _rest_before_start(times, np.stack([x, y, -rate * y, rate * x], axis=-1))
+        phase = rate * np.maximum(time_s, 0.0)
+        x, y = self.radius_m * np.cos(phase), self.radius_m * np.sin(phase)
+        return _rest_before_start(time_s, x, y, -rate * y, rate * x)
 
 
 @dataclass(frozen=True)
@@ -181,27 +154,23 @@ class Waypoints:
                 content = file.read(LARGEST_FILE_BYTES + 1)
             if len(content) > LARGEST_FILE_BYTES:
                 raise TrajectoryError("is larger than 10 MB; some thousand waypoints take less")
-            text = io.StringIO(content.decode("utf-8-sig"), newline="")
-            lines, points = _read(csv.DictReader(text, strict=True))
-            _check(lines, points)
+            points = _read(content.decode("utf-8-sig"))
+            _check(list(points), tuple(points.values()))
         except OSError as error:
             raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error
         except UnicodeDecodeError:
             raise TrajectoryError(f"{name}: is not UTF-8; save the file as UTF-8") from None
         except TrajectoryError as error:
             raise TrajectoryError(f"{name}: {error}") from None
-        return cls(points)
+        return cls(tuple(points.values()))
 
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
-        times = np.asarray(time_s, dtype=np.float64)
         knots, x, y = np.array(self.points).T
-        clock = np.maximum(times, 0.0)
+        clock = np.maximum(time_s, 0.0)
         leg = np.searchsorted(knots, clock, side="right")
-        velocity = np.zeros((len(knots) + 1, 2))
-        velocity[1:-1] = np.stack([np.diff(x), np.diff(y)], axis=-1) / np.diff(knots)[:, np.newaxis]
-        position = np.stack([np.interp(clock, knots, x), np.interp(clock, knots, y)], axis=-1)
-        return _rest_before_start(times, np.concatenate([position, velocity[leg]], axis=-1))
+        vx, vy = (np.concatenate([[0.0], np.diff(each) / np.diff(knots), [0.0]])[leg] for each in (x, y))
+        return _rest_before_start(time_s, np.interp(clock, knots, x), np.interp(clock, knots, y), vx, vy)
 
 
 def _check(places: Sequence[str], points: Sequence[Point]) -> None:
@@ -222,48 +191,37 @@ def _check(places: Sequence[str], points: Sequence[Point]) -> None:
             )
 
 
-def _read(rows: "csv.DictReader[str]") -> tuple[list[str], tuple[Point, ...]]:
-    """Return the line number and the point of every row of a CSV file."""
-    lines: list[str] = []
-    points: list[Point] = []
+def _read(text: str) -> dict[str, Point]:
+    """Return the point of every row of a CSV file that is not blank, by the number of its line."""
+    rows, points = csv.reader(io.StringIO(text, newline=""), strict=True), {}
     try:
-        header = [name.strip() for name in rows.fieldnames or ()]
-        rows.fieldnames = header
-        _check_header(header)
-        for row in rows:
-            lines.append(f"line {rows.line_num}")
-            points.append(_point(row, lines[-1], len(header)))
+        header = [name.strip() for name in next(rows, [])]
+        for column in COLUMNS:
+            if header.count(column) != 1:
+                fault = "appears more than once" if column in header else "is missing"
+                raise TrajectoryError(
+                    f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
+                )
+        for row in filter(None, rows):
+            line = f"line {rows.line_num}"
+            if len(row) > len(header):
+                raise TrajectoryError(f"{line}: has more fields than the {len(header)} of the header")
+            time_s, x_m, y_m = (_number(row[header.index(name) :][:1], line, name) for name in COLUMNS)
+            points[line] = time_s, x_m, y_m
     except csv.Error as error:
-        raise TrajectoryError(f"line {rows.reader.line_num}: is not CSV: {error}") from None
-    return lines, tuple(points)
+        raise TrajectoryError(f"line {rows.line_num}: is not CSV: {error}") from None
+    return points
 
 
-def _check_header(header: Sequence[str]) -> None:
-    """Raise `TrajectoryError` unless the header names each of `COLUMNS` exactly once."""
-    for column in COLUMNS:
-        if header.count(column) != 1:
-            fault = "appears more than once" if column in header else "is missing"
-            raise TrajectoryError(
-                f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
-            )
-
-
-def _point(row: dict[str, str], line: str, width: int) -> Point:
-    """Return the point of one row of a CSV file."""
-    if None in row:  # the key under which DictReader stores fields beyond the header
-        raise TrajectoryError(f"{line}: has more fields than the {width} of the header")
-    time_s, x_m, y_m = (_number(row[column], line, column) for column in COLUMNS)
-    return time_s, x_m, y_m
-
-
-def _number(text: str | None, line: str, column: str) -> float:
-    """Return one field of a CSV row as a number; None is a field missing at the end of the row."""
-    if not (text or "").strip():
+def _number(field: Sequence[str], line: str, column: str) -> float:
+    """Return one field of a CSV row as a number; no field is one missing at the end of the row."""
+    text = "".join(field)
+    if not text.strip():
         raise TrajectoryError(f"{line}: {column} is missing")
     try:
-        return float(text or "")
+        return float(text)
     except ValueError:
-        raise TrajectoryError(f"{line}: {column} = {echo(text or '')} must be a number") from None
+        raise TrajectoryError(f"{line}: {column} = {echo(text)} must be a number") from None
 
 
 @dataclass(frozen=True)

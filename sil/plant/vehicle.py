@@ -115,16 +115,15 @@ class Vehicle:
         thrust_n: FloatArray,
         yaw_reference_rad: PerFlight,
         *,
-        seen: Seen | None = None,
+        seen: Seen,
         moment: Moment | None = None,
     ) -> VehicleState:
         """Return the state one tick later.
 
         `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the demanded total thrust. The stock loops
-        receive `seen`; None gives them the true state.
+        receive `seen`.
         """
-        angles_rad = state.body[EULER] if seen is None else seen.euler_rad
-        rates_rad_s = state.body[RATES] if seen is None else seen.rates_rad_s
+        angles_rad, rates_rad_s = seen.euler_rad, seen.rates_rad_s
         wrench = np.empty((4, state.body.shape[1]))
         wrench[0] = thrust_n
         wrench[1:3] = loops.attitude_torque(
@@ -150,8 +149,3 @@ class Vehicle:
             body = replace(body, mass_kg=mass_kg, air_m_s=moment.air_m_s)
         inputs = (wrenches[:, 0], wrenches[:, 1], wrenches[:, 2])
         return bogacki_shampine(body.derivative, state.body, inputs, STEP_S), speeds[3]
-
-
-def thrust_demand(state: VehicleState, reference_m: float) -> FloatArray:
-    """Return the total thrust (n,) in N that the altitude loop demands in the true state."""
-    return loops.altitude_thrust(reference_m, state.body[2], world_velocity(state.body)[2])

@@ -6,6 +6,7 @@ These releases leave the camera's rotation in the optical flow; later ones subtr
 """
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.rigid_body import to_body, to_world
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
-from mambo_nmpc.sil.sensors.instruments import PA_PER_M, SONAR_MIN_M, Readings
+from mambo_nmpc.sil.sensors.instruments import PA_PER_M, SONAR_MIN_M, Instruments, Readings, Sensors
 
 ACCELEROMETER_TAPS: Final = (0.02640772, 0.14053, 0.33306, 0.33306, 0.14053, 0.02640772)
 """FIR low-pass of the specific force before the attitude filter (order 5, cut-off 0.1 of 100 Hz)."""
@@ -95,12 +96,11 @@ class Attitude:
         )
 
     def _smooth(self, force: FloatArray) -> FloatArray:
-        self._forces = [force, *(self._forces or [force] * len(ACCELEROMETER_TAPS))][
-            : len(ACCELEROMETER_TAPS)
-        ]
+        earlier = self._forces or [force] * len(ACCELEROMETER_TAPS)
+        self._forces = [force, *earlier[:-1]]
         smooth = ACCELEROMETER_TAPS[0] * self._forces[0]
-        for tap, earlier in zip(ACCELEROMETER_TAPS[1:], self._forces[1:], strict=True):
-            smooth = smooth + tap * earlier
+        for tap, before in zip(ACCELEROMETER_TAPS[1:], self._forces[1:], strict=True):
+            smooth = smooth + tap * before
         return smooth
 
 
@@ -186,17 +186,20 @@ class Velocity:
         self._predicted = self.velocity_m_s + STEP_S * ACCELERATION_GAIN * acceleration_m_s2
 
 
-class Estimators:
-    """Attitude, altitude, velocity and position in series; they start from the true state."""
+class Suite:
+    """Instruments and estimators of n flights; the estimates start from the true state."""
 
-    def __init__(self, start: Seen, *, derotated: bool) -> None:
+    def __init__(self, sensors: Sensors, seeds: Sequence[int], start: Seen) -> None:
+        self._instruments = Instruments(sensors, seeds, start)
         self._attitude = Attitude(start.euler_rad)
         self._altitude = Altitude(start.position_m[2], start.velocity_m_s[2])
-        self._velocity = Velocity(to_body(start.euler_rad, start.velocity_m_s)[:2], derotated=derotated)
+        velocity_m_s = to_body(start.euler_rad, start.velocity_m_s)[:2]
+        self._velocity = Velocity(velocity_m_s, derotated=sensors.derotated)
         self._position_m = start.position_m[:2].copy()
 
-    def update(self, readings: Readings) -> Seen:
-        """Return the estimate after the readings of this tick."""
+    def estimate(self, true: Seen) -> Seen:
+        """Return the estimate that the controllers receive at this tick; call it once per tick of 5 ms."""
+        readings = self._instruments.read(true)
         self._attitude.update(readings.imu)
         sines, cosines = np.sin(self._attitude.euler_rad), np.cos(self._attitude.euler_rad)
         force = to_world(sines, cosines, readings.imu[:3])

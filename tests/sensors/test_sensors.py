@@ -16,9 +16,8 @@ from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
 from mambo_nmpc.sil.sensors import estimators, instruments
-from mambo_nmpc.sil.sensors.estimators import Altitude, Attitude, Velocity
+from mambo_nmpc.sil.sensors.estimators import Altitude, Attitude, Suite, Velocity
 from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Instruments, Readings, Sensors
-from mambo_nmpc.sil.sensors.suite import Suite
 
 QUIET = Sensors(noise_scale=0.0)
 
