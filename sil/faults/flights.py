@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -54,7 +54,6 @@ HOVER_WIND_M_S2: Final = (0.5, 0.3)
 """Steady disturbance acceleration on the hovering flights: without it even a dead controller would hover."""
 NEVER: Final = 2**31
 """`PATIENCE` of a caller that never levels."""
-
 
 STATUS_NAMES: Final = {NOT_CALLED: "not called", **{int(status): status.name for status in Status}}
 """Name of each status, in ascending order of the statuses."""
@@ -111,11 +110,10 @@ class FaultsSummary(Summary):
 
 @dataclass(frozen=True, eq=False)
 class _Sortie:
-    """One flight: a course, a fault (None: no fault) and the updates at which the fault begins and ends."""
+    """One flight: a course, a fault and the updates at which it begins and ends, both 0 without a fault."""
 
     course: str
-    turning: bool
-    scenario: FaultScenario | None
+    scenario: FaultScenario
     begin: int = 0
     end: int = 0
 
@@ -141,10 +139,13 @@ def fly_faults(
     flight = _flight(sorties, period_s)
     compiled = controller(len(sorties))
     reweighted = ReweightedController(compiled, len(sorties), _weight_changes(sorties, settings))
-    patience = np.array([PATIENCE if _is_levelled(sortie) else NEVER for sortie in sorties])
+    patience = np.array([PATIENCE if sortie.scenario.levelled else NEVER for sortie in sorties])
     caller = LevellingCaller(reweighted, compiled.reset, patience)
-    trace = fly(flight, FaultyController(caller, [_fault(sortie) for sortie in sorties]), progress)
-    healthy = [sortie.scenario is None for sortie in sorties]
+    faults = [
+        Fault(s.begin, s.end, s.scenario.alter, s.scenario.drop, s.scenario.late_updates) for s in sorties
+    ]
+    trace = fly(flight, FaultyController(caller, faults), progress)
+    healthy = [not sortie.end for sortie in sorties]
     if (trace.status[:, healthy] == Status.BAD_TARGET).any():
         raise FlightError(
             f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
@@ -160,7 +161,7 @@ def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
             Trajectories(tuple(COURSES[sortie.course] for sortie in sorties)),
             duration_s=DURATION_S,
             flights=len(sorties),
-            yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.turning for sortie in sorties]),
+            yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.scenario.turning for sortie in sorties]),
             vehicle=Vehicle(wind_m_s2=(HOVER_WIND_M_S2[0] * hovering, HOVER_WIND_M_S2[1] * hovering)),
             update_period_s=period_s,
         )
@@ -169,17 +170,17 @@ def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
 
 
 def _sorties(chosen: Sequence[FaultScenario], period_s: float) -> list[_Sortie]:
-    sorties = [_Sortie(course, turning, None) for course in COURSES for turning in (False, True)]
+    healthy = [FaultScenario("none", 0.0, turning=turning) for turning in (False, True)]
+    sorties = [_Sortie(course, scenario) for course in COURSES for scenario in healthy]
     last = round(DURATION_S / period_s) + 1
     for course in COURSES:
         for scenario in chosen:
             for onset_s in ONSETS_S:
                 begin = round(onset_s / period_s)
-                lasts = (
-                    math.inf if scenario.duration_s == TO_THE_END else round(scenario.duration_s / period_s)
-                )
-                end = int(min(last, begin + max(1, lasts)))
-                sorties.append(_Sortie(course, scenario.turning, scenario, begin, end))
+                end = last
+                if scenario.duration_s != TO_THE_END:
+                    end = min(last, begin + max(1, round(scenario.duration_s / period_s)))
+                sorties.append(_Sortie(course, scenario, begin, end))
     return sorties
 
 
@@ -187,58 +188,33 @@ def _weight_changes(sorties: Sequence[_Sortie], settings: Settings) -> list[Weig
     right = (settings.cost.tracking_weight, settings.cost.effort_weight)
     changes = []
     for row, sortie in enumerate(sorties):
-        if sortie.scenario is not None and sortie.scenario.weights is not None:
+        if sortie.scenario.weights is not None:
             changes.append(WeightChange(row, sortie.begin, sortie.scenario.weights))
             changes.append(WeightChange(row, sortie.end, right))
     return changes
-
-
-def _is_levelled(sortie: _Sortie) -> bool:
-    return sortie.scenario is not None and sortie.scenario.levelled
-
-
-def _fault(sortie: _Sortie) -> Fault | None:
-    scenario = sortie.scenario
-    if scenario is None:
-        return None
-    return Fault(sortie.begin, sortie.end, scenario.alter, scenario.drop, scenario.late_updates)
 
 
 def _judge_faults(
     trace: Trace, sorties: Sequence[_Sortie], answers: Sequence[tuple[int, int]]
 ) -> tuple[Verdict, ...]:
     """Return the verdict of every fault on every course."""
-    error_m = horizontal_error_m(_move_targets(trace, sorties))
-    settled = trace.time_s >= TRANSIENT_S
-    bands_m = {
-        (sortie.course, sortie.turning): BAND_FACTOR * float(error_m[settled, row].max())
-        for row, sortie in enumerate(sorties)
-        if sortie.scenario is None
-    }
-    flown: dict[tuple[str, str], list[int]] = {}
-    for row, sortie in enumerate(sorties):
-        if sortie.scenario is not None:
-            flown.setdefault((sortie.course, sortie.scenario.name), []).append(row)
-    verdicts = []
-    for rows in flown.values():
-        each = []
-        for row in rows:
-            sortie = sorties[row]
-            refused = {status for answered, status in answers if answered == row and status != Status.OK}
-            band_m = bands_m[sortie.course, sortie.turning]
-            each.append(
-                _judge_flight(trace, row, sortie, error_m=error_m[:, row], band_m=band_m, refused=refused)
-            )
-        verdicts.append(_worst(each))
-    return tuple(verdicts)
-
-
-def _move_targets(trace: Trace, sorties: Sequence[_Sortie]) -> Trace:
     target = trace.target.copy()
     for row, sortie in enumerate(sorties):
-        if sortie.scenario is not None:
-            target[sortie.begin :, row, 0] += sortie.scenario.moved_m
-    return replace(trace, target=target)
+        target[sortie.begin :, row, 0] += sortie.scenario.moved_m
+    error_m = horizontal_error_m(replace(trace, target=target))
+    settled = trace.time_s >= TRANSIENT_S
+    bands_m: dict[tuple[str, bool], float] = {}
+    flown: dict[tuple[str, str], list[Verdict]] = {}
+    for row, sortie in enumerate(sorties):  # the flights without a fault come first
+        kind = sortie.course, sortie.scenario.turning
+        if not sortie.end:
+            bands_m[kind] = BAND_FACTOR * float(error_m[settled, row].max())
+            continue
+        refused = {status for answered, status in answers if answered == row and status != Status.OK}
+        flown.setdefault((sortie.course, sortie.scenario.name), []).append(
+            _judge_flight(trace, row, sortie, error_m=error_m[:, row], band_m=bands_m[kind], refused=refused)
+        )
+    return tuple(_worst(verdicts) for verdicts in flown.values())
 
 
 def _judge_flight(
@@ -246,7 +222,6 @@ def _judge_flight(
 ) -> Verdict:
     """Judge flight `row`; `refused` holds the statuses of rejected weights."""
     scenario = sortie.scenario
-    assert scenario is not None  # fault-free flights are not judged
     flown = slice(sortie.begin, None)
     seen = refused | set(trace.status[sortie.begin : sortie.end, row].tolist())
     outside = np.flatnonzero(~(error_m[flown] <= band_m))
@@ -259,7 +234,7 @@ def _judge_flight(
     return Verdict(
         course=sortie.course,
         fault=scenario.name,
-        turning=sortie.turning,
+        turning=scenario.turning,
         statuses=tuple(STATUS_NAMES[status] for status in sorted(seen)),
         expected=scenario.answers is None or seen == scenario.answers,
         largest_command_rad=float(np.abs(trace.command_rad[flown, row]).max()),
@@ -273,15 +248,14 @@ def _judge_flight(
 
 def _worst(verdicts: Sequence[Verdict]) -> Verdict:
     """Return the worst value of every field."""
+    names = ("largest_command_rad", "largest_tilt_rad", "largest_error_m", "recovery_s")
+    largest: Any = {name: float(np.max([getattr(verdict, name) for verdict in verdicts])) for name in names}
     return replace(
         verdicts[0],
         statuses=all_statuses(verdicts),
         expected=all(verdict.expected for verdict in verdicts),
-        largest_command_rad=_largest(verdicts, "largest_command_rad"),
-        largest_tilt_rad=_largest(verdicts, "largest_tilt_rad"),
-        largest_error_m=_largest(verdicts, "largest_error_m"),
-        recovery_s=_largest(verdicts, "recovery_s"),
         end=max((verdict.end for verdict in verdicts), key=ORDER.index),
+        **largest,
     )
 
 
@@ -289,7 +263,3 @@ def all_statuses(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
     """Return the names of all statuses in the verdicts, in the order of their numbers."""
     seen = {status for verdict in verdicts for status in verdict.statuses}
     return tuple(name for name in STATUS_NAMES.values() if name in seen)
-
-
-def _largest(verdicts: Sequence[Verdict], name: str) -> float:
-    return float(np.max([getattr(verdict, name) for verdict in verdicts]))

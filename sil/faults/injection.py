@@ -33,12 +33,12 @@ Drop = Callable[[int], bool]
 """Updates since the onset -> whether this update is dropped."""
 
 
-def keep_inputs(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+def keep_inputs(now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
     """Return the correct inputs."""
     return now
 
 
-def freeze_state(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+def freeze_state(now: ControllerInput, began: ControllerInput, _since: int) -> ControllerInput:
     """Repeat the state at the onset; target and thrust stay correct."""
     return replace(now, state=began.state)
 
@@ -46,7 +46,7 @@ def freeze_state(now: ControllerInput, began: ControllerInput, since: int) -> Co
 def set_state(column: int | slice, value: float, *, on: int = 1, of: int = 1) -> Alter:
     """Overwrite columns of the state with `value` in the first `on` of every `of` updates."""
 
-    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+    def alter(now: ControllerInput, _began: ControllerInput, since: int) -> ControllerInput:
         state = now.state.copy()
         if since % of < on:
             state[column] = value
@@ -57,23 +57,16 @@ def set_state(column: int | slice, value: float, *, on: int = 1, of: int = 1) ->
 
 def scale_state(scale: ArrayLike) -> Alter:
     """Multiply the state by `scale` (7,), as a wrong unit does."""
-
-    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-        return replace(now, state=now.state * np.asarray(scale))
-
-    return alter
+    return lambda now, _began, _since: replace(now, state=now.state * np.asarray(scale))
 
 
 def shift_yaw(shift_rad: float) -> Alter:
     """Add `shift_rad` to the measured yaw."""
-
-    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-        return replace(now, state=now.state + np.array([0.0] * 6 + [shift_rad]))
-
-    return alter
+    shift = np.array([0.0] * 6 + [shift_rad])
+    return lambda now, _began, _since: replace(now, state=now.state + shift)
 
 
-def wrap_yaw(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
+def wrap_yaw(now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
     """Wrap the measured yaw to [-pi, pi): it jumps where the heading passes south."""
     state = now.state.copy()
     state[6] = (state[6] + np.pi) % (2.0 * np.pi) - np.pi
@@ -82,28 +75,21 @@ def wrap_yaw(now: ControllerInput, began: ControllerInput, since: int) -> Contro
 
 def move_target(by_m: float) -> Alter:
     """Move the target along x."""
-
-    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-        return replace(now, target=now.target + np.array([by_m, 0.0, 0.0, 0.0]))
-
-    return alter
+    shift = np.array([by_m, 0.0, 0.0, 0.0])
+    return lambda now, _began, _since: replace(now, target=now.target + shift)
 
 
 def report_thrust(value_m_s2: float) -> Alter:
     """Overwrite the thrust acceleration."""
-
-    def alter(now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:  # noqa: ARG001 - an Alter
-        return replace(now, thrust_acceleration_m_s2=value_m_s2)
-
-    return alter
+    return lambda now, _began, _since: replace(now, thrust_acceleration_m_s2=value_m_s2)
 
 
-def drop_none(since: int) -> bool:  # noqa: ARG001 - a Drop
+def drop_none(_since: int) -> bool:
     """Drop no update."""
     return False
 
 
-def drop_all(since: int) -> bool:  # noqa: ARG001 - a Drop
+def drop_all(_since: int) -> bool:
     """Drop every update."""
     return True
 
@@ -127,10 +113,6 @@ class Fault:
     alter: Alter = keep_inputs
     drop: Drop = drop_none
     late_updates: int = 0
-
-    def active(self, update: int) -> bool:
-        """Return whether the fault is present at this update."""
-        return self.begin <= update < self.end
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +143,7 @@ class FaultyController:
         """Apply the faults to states (n, 7), targets (n, 4), thrusts (n,); step; delay the commands."""
         state, target, thrust = state.copy(), target.copy(), thrust_acceleration_m_s2.copy()
         called = np.ones(len(state), np.bool_)
-        active = [(row, fault) for row, fault in self._faults if fault.active(self._update)]
+        active = [(row, fault) for row, fault in self._faults if fault.begin <= self._update < fault.end]
         for row, fault in active:
             now = ControllerInput(state[row].copy(), target[row].copy(), float(thrust[row]))
             since = self._update - fault.begin

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from mambo_nmpc.sil.faults.flights import End, FaultsSummary
+from mambo_nmpc.sil.faults.flights import End, FaultsSummary, Verdict
 from mambo_nmpc.sil.show.section import Section
 
 _SHORTEST_BAR_M = 0.01
@@ -12,24 +12,16 @@ _SHORTEST_BAR_M = 0.01
 def faults_section(_folder: Path, summary: FaultsSummary) -> Section:
     """Return the section of flights with faults."""
     courses = list(dict.fromkeys(flight.course for flight in summary.flights))
-    faults = list(dict.fromkeys(flight.fault for flight in summary.flights))
     errors_m = [flight.largest_error_m for flight in summary.flights]
     largest_m = max((error_m for error_m in errors_m if math.isfinite(error_m)), default=0.0)
-    rows = [
-        (
-            fault,
-            [
-                (flight, _bar_percent(flight.largest_error_m, largest_m))
-                for flight in summary.flights
-                if flight.fault == fault
-            ],
-        )
-        for fault in faults
-    ]
+    rows: dict[str, list[tuple[Verdict, float]]] = {}
+    for flight in summary.flights:
+        percent = _bar_percent(flight.largest_error_m, largest_m)
+        rows.setdefault(flight.fault, []).append((flight, percent))
     ends = [flight.end for flight in summary.flights]
     counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
-    finding = f"{len(ends)} flights with {len(faults)} faults: {counts}"
-    content = {"summary": summary, "courses": courses, "rows": rows}
+    finding = f"{len(ends)} flights with {len(rows)} faults: {counts}"
+    content = {"summary": summary, "courses": courses, "rows": list(rows.items())}
     return Section("faults", f"Faults in flight, {summary.source}", End.CRASHED not in ends, finding, content)
 
 

@@ -36,6 +36,11 @@ class Metrics:
     command_variation_rad: FloatArray
     """Mean 1-norm of the change of u from one update of the controller to the next."""
 
+    @property
+    def table2(self) -> FloatArray:
+        """The indices of Table II (4, n): IAE, ISE, ITSE, ITAE."""
+        return np.array([self.iae_m_s, self.ise_m2_s, self.itse_m2_s2, self.itae_m_s2])
+
 
 def horizontal_error_m(trace: Trace) -> FloatArray:
     """Return e (k, n), the horizontal distance to the target in m."""

@@ -11,10 +11,19 @@ from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.names import PD
-from mambo_nmpc.sil.flight.traces import SensedTrace
-from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S, INDICES, PRINTED_NMPC, PRINTED_PD, Four
+from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.paper.table2 import (
+    CASES,
+    DURATION_S,
+    INDICES,
+    PRINTED_NMPC,
+    PRINTED_PD,
+    Four,
+    four,
+    report_part,
+)
 from mambo_nmpc.sil.sensors.instruments import Sensors
 from mambo_nmpc.sil.show.numbers import digits
 
@@ -62,7 +71,7 @@ class SensedSummary(Summary):
 
 def fly_sensed(
     settings: Mapping[str, Settings],
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None],
     *,
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
@@ -72,55 +81,34 @@ def fly_sensed(
     Calls `progress` with the share done; rows without noise have one flight.
     """
     jobs = [(name, view) for name in (PD, *settings) for view in VIEWS]
+    case = next(iter(CASES.values()))
     rows = []
     for index, (name, view) in enumerate(jobs):
-
-        def report(share: float, flown: int = index) -> None:
-            if progress is not None:
-                progress((flown + share) / len(jobs))
-
-        rows.append(_row(name, settings.get(name), view, report, duration_s=duration_s, flights=flights))
+        sensors = VIEWS[view]
+        n = flights if sensors is not None and sensors.noise_scale else 1
+        flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
+        controller = PdController() if name == PD else CompiledController(settings[name], n)
+        trace = fly(flight, controller, report_part(progress, index, len(jobs)))
+        rows.append(_judge(name, view, trace))
     return rows
 
 
-def _row(
-    name: str,
-    settings: Settings | None,
-    view: str,
-    progress: Callable[[float], None],
-    *,
-    duration_s: float,
-    flights: int,
-) -> SensedRow:
-    sensors = VIEWS[view]
-    n = flights if sensors is not None and sensors.noise_scale else 1
-    case = next(iter(CASES.values()))
-    flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
-    controller = PdController() if settings is None else CompiledController(settings, n)
-    trace = fly(flight, controller, progress)
+def _judge(name: str, view: str, trace: Trace) -> SensedRow:
     tracked = measure(trace)
-    seen, drift_m = tracked, np.zeros(n)
+    seen, drift_m = tracked, np.zeros(trace.flights)
     if isinstance(trace, SensedTrace):
         seen = measure(trace.as_seen())
         drift_m = np.hypot(*(trace.seen_position_m - trace.position_m)[-1, :, :2].T)
     return SensedRow(
         controller=name,
         view=view,
-        flights=n,
+        flights=trace.flights,
         lost=int(trace.diverged.sum()),
-        tracked=_medians(tracked),
-        seen=_medians(seen),
+        tracked=four(np.median(tracked.table2, axis=1)),
+        seen=four(np.median(seen.table2, axis=1)),
         worst_iae_m_s=float(tracked.iae_m_s.max()),
         drift_m=float(np.median(drift_m)),
     )
-
-
-def _medians(metrics: Metrics) -> Four:
-    iae, ise, itse, itae = (
-        float(np.median(values))
-        for values in (metrics.iae_m_s, metrics.ise_m2_s, metrics.itse_m2_s2, metrics.itae_m_s2)
-    )
-    return iae, ise, itse, itae
 
 
 def text(rows: Sequence[SensedRow]) -> str:

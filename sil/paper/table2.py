@@ -68,9 +68,12 @@ class Table2Summary(Summary):
     claims: list[Claim]
 
 
-def fly_table2(
-    settings: Mapping[str, Settings], progress: Callable[[float], None] | None = None
-) -> dict[str, Trace]:
+def report_part(progress: Callable[[float], None], part: int, parts: int) -> Callable[[float], None]:
+    """Return a function that turns the share done of one of `parts` parts into that of the whole."""
+    return lambda share: progress((part + share) / parts)
+
+
+def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], None]) -> dict[str, Trace]:
     """Fly every case with the PD and with the compiled C of `settings` by name, 100 s each.
 
     Calls `progress` with the share done. Returns the traces by controller, with one flight for each case.
@@ -78,15 +81,10 @@ def fly_table2(
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
     controllers: dict[str, PositionController] = {PD: PdController()}
     controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
-    traces = {}
-    for index, (name, controller) in enumerate(controllers.items()):
-
-        def report(share: float, flown: int = index) -> None:
-            if progress is not None:
-                progress((flown + share) / len(controllers))
-
-        traces[name] = fly(flight, controller, report)
-    return traces
+    return {
+        name: fly(flight, controller, report_part(progress, index, len(controllers)))
+        for index, (name, controller) in enumerate(controllers.items())
+    }
 
 
 def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summary:
@@ -124,23 +122,21 @@ def _line(name: str, values: Four, improvement: Four | None) -> str:
 
 
 def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:
-    indices = {
-        name: np.array([metrics.iae_m_s, metrics.ise_m2_s, metrics.itse_m2_s2, metrics.itae_m_s2])
-        for name, metrics in ((name, measure(trace)) for name, trace in traces.items())
-    }
+    indices = {name: measure(trace).table2 for name, trace in traces.items()}
     return [
         Table2Row(
             case=case,
             controller=name,
-            measured=_four(values[:, column]),
-            improvement=None if name == PD else _four(indices[PD][:, column] / values[:, column]),
+            measured=four(values[:, column]),
+            improvement=None if name == PD else four(indices[PD][:, column] / values[:, column]),
         )
         for column, case in enumerate(CASES)
         for name, values in indices.items()
     ]
 
 
-def _four(values: np.ndarray) -> Four:
+def four(values: np.ndarray) -> Four:
+    """Return four numbers as a tuple."""
     iae, ise, itse, itae = (float(value) for value in values)
     return iae, ise, itse, itae
 

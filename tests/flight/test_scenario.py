@@ -14,8 +14,8 @@ from mambo_nmpc.sil.controllers.inner_steps import WatchedController
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.errors import FlightError, ScenarioError
 from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.scenario import Record, Scenario, flight_of, read_record, write_record
-from mambo_nmpc.sil.flight.traces import SEEN_COLUMNS, SensedTrace, read_npz, write_npz
+from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
+from mambo_nmpc.sil.flight.traces import SEEN_COLUMNS
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 
 MAMBO = presets.load("mambo")
@@ -28,10 +28,13 @@ HARD = Scenario(
     start_velocity_m_s=(0.1, -0.1, 0.05),
     start_tilt_rad=(0.02, -0.03),
     yaw_rad=0.4,
+    yaw_rate_rad_s=0.1,
     mass_kg=0.068,
     inertia_kg_m2=(6e-5, 7e-5, 1.1e-4),
     thrust_factor_n_s2=4.8e-8,
+    torque_factor_n_m_s2=1.2e-10,
     motor_lag_s=0.02,
+    drag_1_s=0.05,
     wind_m_s2=(0.1, -0.05),
     wind_speed_m_s=4.0,
     wind_direction_rad=1.0,
@@ -120,21 +123,22 @@ def test_a_flight_among_many_is_the_flight_alone(controller: str) -> None:
     assert digests(noisy, CALM, still, HARD, CALM) == [alone[3], alone[1], alone[2], alone[0], alone[1]]
 
 
+def test_every_key_of_a_scenario_changes_its_flight() -> None:
+    """Flights that differ from the first one in a single key all have different digests."""
+    base = HARD.model_copy(update={"duration_s": 1.5})
+    other = Scenario(rate_rad_s=0.4)
+    keys = [key for key in Scenario.model_fields if key not in SHARED_KEYS]
+    flown = [base, *(base.model_copy(update={key: getattr(other, key)}) for key in keys)]
+    trace = fly(flight_of(flown, 0.01), PdController())
+    assert len({trace.digest(flight) for flight in range(trace.flights)}) == len(flown)
+
+
 def test_scenarios_that_cannot_share_a_simulation_are_refused() -> None:
     """Scenarios with different sensors, or none at all, raise `FlightError`."""
     with pytest.raises(FlightError, match="sensors must be the same"):
         flight_of([HARD, CALM.model_copy(update={"sensors": "none"})], 0.01)
     with pytest.raises(FlightError, match="flights = 0"):
         flight_of([], 0.01)
-
-
-def test_sensed_trace_survives_on_disk(tmp_path: Path) -> None:
-    """True and estimated state read back bit for bit."""
-    trace = fly(flight_of([HARD, CALM], 0.01), PdController())
-    write_npz(trace, tmp_path / "trace.npz")
-    again = read_npz(tmp_path / "trace.npz")
-    assert isinstance(again, SensedTrace)
-    assert again.same_bits(trace)
 
 
 def test_step_sizes_are_the_changes_of_the_plan() -> None:

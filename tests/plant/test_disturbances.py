@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Hover
@@ -137,9 +136,3 @@ def test_start_can_be_offset_in_position_velocity_and_tilt() -> None:
     np.testing.assert_allclose(trace.position_m[0, 0], [0.1, -0.2, -0.8])
     np.testing.assert_allclose(trace.velocity_m_s[0, 0], [0.4, 0.5, -0.6])
     np.testing.assert_allclose(trace.euler_rad[0, 0], [0.05, -0.06, 0.8])
-
-
-def test_a_wrong_number_of_seeds_is_refused() -> None:
-    """Seeds are given for all flights or for none."""
-    with pytest.raises(FlightError, match="there are 1 for 2 flights"):
-        Flight(Hover(), flights=2, seeds=(1,))
