@@ -7,7 +7,6 @@ import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar
 
@@ -28,7 +27,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
-from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, Parameter, draw, scenario_values
+from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw, scenario_values
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.names import CurveName, SensorsName, Start
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
@@ -59,24 +58,21 @@ class FlightSection(FileSection):
     sensors: SensorsName = "mambo-derotated"
 
 
-def _draw_field(parameter: Parameter) -> Any:
+def _draw_field(default: Distribution) -> Any:
     """Return type and default of the key of a parameter."""
 
-    def validate(value: Any, parameter: Parameter) -> Distribution:
+    def validate(value: Any) -> Distribution:
         try:
-            return parse(value, parameter.domain)
+            return parse(value, default.domain)
         except ValueError as error:
             raise PydanticCustomError("draw", "{rule}", {"rule": str(error)}) from None
 
-    validator = PlainValidator(partial(validate, parameter=parameter))
     written = PlainSerializer(lambda distribution: distribution.document())
-    return Annotated[Distribution, validator, written], parameter.default
+    return Annotated[Distribution, PlainValidator(validate), written], default
 
 
 Draws: Any = create_model(
-    "Draws",
-    __base__=FileSection,
-    **{name: _draw_field(parameter) for name, parameter in PARAMETERS.items()},
+    "Draws", __base__=FileSection, **{name: _draw_field(default) for name, default in PARAMETERS.items()}
 )
 
 
@@ -178,29 +174,36 @@ def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
                 (f"{source}: controllers: two are called {name}; give their files different names",)
             )
     campaign = Campaign(file, entrants)
-    flight = file.flight.model_dump()
     for entrant, named in zip(entrants, file.controllers, strict=True):
-        try:
-            flight_of([scenario(flight, campaign.draw(0))], entrant.settings.horizon.update_period_s)
-        except FlightError as error:
-            raise InvalidSettingsError(
-                (f"{source}: controllers: {echo(named)}: horizon.{error}; stock loops run at 200 Hz",)
-            ) from None
+        demand_flyable(
+            entrant.settings, file.flight, campaign.draw(0), f"{source}: controllers: {echo(named)}"
+        )
     return campaign
+
+
+def demand_flyable(settings: Settings, flight: FlightSection, drawn: Draw, place: str) -> None:
+    """Raise InvalidSettingsError, which begins with `place`, if a drawn flight cannot be simulated."""
+    try:
+        flight_of([scenario(flight.model_dump(), drawn)], settings.horizon.update_period_s)
+    except FlightError as error:
+        raise InvalidSettingsError((f"{place}: horizon.{error}; stock loops run at 200 Hz",)) from None
+
+
+def load_settings(named: str, folder: Path, place: str) -> Settings:
+    """Load a preset or a file in `folder`; raises InvalidSettingsError, whose lines begin with `place`."""
+    path = folder / named
+    try:
+        return presets.load(named if named in presets.names() or not path.exists() else str(path))
+    except MamboNmpcError as error:
+        raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
 
 
 def _entrant(named: str, folder: Path, source: str) -> Entrant:
     """Return the controller that the file `source` in `folder` calls `named`: PD, preset or file."""
     if named == PD:
         return Entrant(PD, "pd", Settings())
-    path = folder / named
-    try:
-        settings = presets.load(named if named in presets.names() or not path.exists() else str(path))
-    except MamboNmpcError as error:
-        raise InvalidSettingsError(
-            tuple(f"{source}: controllers: {line}" for line in str(error).splitlines())
-        ) from None
-    name = named if named in presets.names() else path.stem
+    settings = load_settings(named, folder, f"{source}: controllers")
+    name = named if named in presets.names() else Path(named).stem
     if not _NAME.fullmatch(name) or name == PD:
         raise InvalidSettingsError(
             (

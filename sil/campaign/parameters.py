@@ -5,70 +5,59 @@ docs/campaign.md gives the sources of the default ranges.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
+from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.plant.airframe import MAMBO
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One key of [draws]: its domain and its distribution in the default campaign."""
-
-    name: str
-    domain: Domain
-    default: Distribution
-
-
-def _parameter(name: str, low: float, high: float, default: Any, *, whole: bool = False) -> Parameter:
-    """Return a parameter; `default` is its distribution in the notation of campaign.toml."""
-    domain = Domain(low, high, whole)
-    return Parameter(name, domain, parse(default, domain))
-
-
-def _axes(stem: str, unit: str, axes: str, domain: tuple[float, float], default: Any) -> list[Parameter]:
+def _axes(
+    stem: str, unit: str, axes: str, domain: tuple[float, float], default: Any
+) -> dict[str, Distribution]:
     """Return one parameter per axis."""
-    return [_parameter(f"{stem}_{axis}{unit}", *domain, default) for axis in axes]
+    return {f"{stem}_{axis}{unit}": parse(default, Domain(*domain)) for axis in axes}
+
+
+def _parameter(low: float, high: float, default: Any) -> Distribution:
+    return parse(default, Domain(low, high))
 
 
 def _uniform(low: float, high: float) -> dict[str, list[float]]:
     return {"uniform": [low, high]}
 
 
-PARAMETERS: Final[dict[str, Parameter]] = {
-    parameter.name: parameter
-    for parameter in (
-        _parameter("mass_kg", 0.01, 1.0, _uniform(0.063, 0.08)),
-        *_axes("inertia_scale", "", "xyz", (0.1, 10.0), _uniform(0.8, 1.2)),
-        _parameter("thrust_scale", 0.1, 10.0, _uniform(0.9, 1.1)),
-        _parameter("motor_lag_s", 0.0, 1.0, _uniform(0.0, 0.05)),
-        _parameter("drag_1_s", 0.0, 10.0, _uniform(0.0335, 0.1005)),
-        _parameter("battery_sag_1_s", 0.0, 1.0, _uniform(0.0, 0.001)),
-        _parameter("command_delay_ticks", 0, 200, {"choice": [0, 1, 2]}, whole=True),
-        _parameter("dropped_share", 0.0, 1.0, _uniform(0.0, 0.05)),
-        _parameter("noise_scale", 0.0, 1000.0, {"log_uniform": [0.5, 2.0]}),
-        *_axes("accelerometer_bias", "_m_s2", "xyz", (-10.0, 10.0), {"normal": [0.0, 0.02]}),
-        *_axes("gyro_bias", "_rad_s", "xyz", (-10.0, 10.0), {"normal": [0.0, 0.0005]}),
-        *_axes("wind", "_m_s2", "xy", (-100.0, 100.0), 0.0),
-        _parameter("wind_speed_m_s", 0.0, 50.0, _uniform(0.0, 2.0)),
-        _parameter("wind_direction_rad", -10.0, 10.0, _uniform(-math.pi, math.pi)),
-        _parameter("yaw_rad", -1000.0, 1000.0, _uniform(-math.pi, math.pi)),
-        _parameter("yaw_rate_rad_s", -10.0, 10.0, 0.0),
-        *_axes("start_offset", "_m", "xy", (-100.0, 100.0), _uniform(-0.5, 0.5)),
-        _parameter("start_offset_z_m", -100.0, 100.0, _uniform(-0.2, 0.2)),
-        *_axes("start_velocity", "_m_s", "xyz", (-10.0, 10.0), _uniform(-0.2, 0.2)),
-        _parameter("start_roll_rad", -1.0, 1.0, _uniform(-0.1, 0.1)),
-        _parameter("start_pitch_rad", -1.0, 1.0, _uniform(-0.1, 0.1)),
-        _parameter("payload_kg", 0.0, 1.0, 0.0),
-        _parameter("payload_time_s", 0.0, 3600.0, 0.0),
-        *_axes("push", "_n_s", "xyz", (-1.0, 1.0), 0.0),
-        _parameter("push_time_s", 0.0, 3600.0, 0.0),
-    )
+PARAMETERS: Final[dict[str, Distribution]] = {
+    "mass_kg": _parameter(0.01, 1.0, _uniform(0.063, 0.08)),
+    **_axes("inertia_scale", "", "xyz", (0.1, 10.0), _uniform(0.8, 1.2)),
+    "thrust_scale": _parameter(0.1, 10.0, _uniform(0.9, 1.1)),
+    "motor_lag_s": _parameter(0.0, 1.0, _uniform(0.0, 0.05)),
+    "drag_1_s": _parameter(0.0, 10.0, _uniform(0.0335, 0.1005)),
+    "battery_sag_1_s": _parameter(0.0, 1.0, _uniform(0.0, 0.001)),
+    "command_delay_ticks": parse({"choice": [0, 1, 2]}, Domain(0, 200, whole=True)),
+    "dropped_share": _parameter(0.0, 1.0, _uniform(0.0, 0.05)),
+    "noise_scale": _parameter(0.0, 1000.0, {"log_uniform": [0.5, 2.0]}),
+    **_axes("accelerometer_bias", "_m_s2", "xyz", (-10.0, 10.0), {"normal": [0.0, 0.02]}),
+    **_axes("gyro_bias", "_rad_s", "xyz", (-10.0, 10.0), {"normal": [0.0, 0.0005]}),
+    **_axes("wind", "_m_s2", "xy", (-100.0, 100.0), 0.0),
+    "wind_speed_m_s": _parameter(0.0, 50.0, _uniform(0.0, 2.0)),
+    "wind_direction_rad": _parameter(-10.0, 10.0, _uniform(-math.pi, math.pi)),
+    "yaw_rad": _parameter(-1000.0, 1000.0, _uniform(-math.pi, math.pi)),
+    "yaw_rate_rad_s": _parameter(-10.0, 10.0, 0.0),
+    **_axes("start_offset", "_m", "xy", (-100.0, 100.0), _uniform(-0.5, 0.5)),
+    "start_offset_z_m": _parameter(-100.0, 100.0, _uniform(-0.2, 0.2)),
+    **_axes("start_velocity", "_m_s", "xyz", (-10.0, 10.0), _uniform(-0.2, 0.2)),
+    "start_roll_rad": _parameter(-1.0, 1.0, _uniform(-0.1, 0.1)),
+    "start_pitch_rad": _parameter(-1.0, 1.0, _uniform(-0.1, 0.1)),
+    "payload_kg": _parameter(0.0, 1.0, 0.0),
+    "payload_time_s": _parameter(0.0, 3600.0, 0.0),
+    **_axes("push", "_n_s", "xyz", (-1.0, 1.0), 0.0),
+    "push_time_s": _parameter(0.0, 3600.0, 0.0),
 }
-"""In the order in which they use the random stream of a flight: a new parameter must be appended."""
+"""Domain and default distribution by name, in the order in which they use the
+random stream of a flight: a new parameter must be appended."""
 
 Draw = dict[str, float]
 """One flight: its parameters by name, and the `seed` of its noise, gusts and dropped updates."""
@@ -91,22 +80,11 @@ def scenario_values(drawn: Draw) -> dict[str, Any]:
     def parts(stem: str, unit: str, axes: str = "xyz") -> tuple[float, ...]:
         return tuple(drawn[f"{stem}_{axis}{unit}"] for axis in axes)
 
-    scale = drawn["thrust_scale"]
-    airframe = replace(
-        MAMBO,
-        thrust_factor_n_s2=scale * MAMBO.thrust_factor_n_s2,
-        torque_factor_n_m_s2=scale * MAMBO.torque_factor_n_m_s2,
-    )
-    factors = parts("inertia_scale", "")
-    unchanged = (
-        *("seed", "mass_kg", "motor_lag_s", "drag_1_s", "battery_sag_1_s", "command_delay_ticks"),
-        *("dropped_share", "noise_scale", "wind_speed_m_s", "wind_direction_rad", "yaw_rad"),
-        *("yaw_rate_rad_s", "payload_kg", "payload_time_s", "push_time_s"),
-    )
-    return {name: drawn[name] for name in unchanged} | {
+    scale, factors = drawn["thrust_scale"], parts("inertia_scale", "")
+    return {name: value for name, value in drawn.items() if name in Scenario.model_fields} | {
         "inertia_kg_m2": tuple(f * j for f, j in zip(factors, MAMBO.inertia_kg_m2, strict=True)),
-        "thrust_factor_n_s2": airframe.thrust_factor_n_s2,
-        "torque_factor_n_m_s2": airframe.torque_factor_n_m_s2,
+        "thrust_factor_n_s2": scale * MAMBO.thrust_factor_n_s2,
+        "torque_factor_n_m_s2": scale * MAMBO.torque_factor_n_m_s2,
         "accelerometer_bias_m_s2": parts("accelerometer_bias", "_m_s2"),
         "gyro_bias_rad_s": parts("gyro_bias", "_rad_s"),
         "wind_m_s2": parts("wind", "_m_s2", "xy"),

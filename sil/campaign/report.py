@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
 from pydantic import BaseModel
 
 from mambo_nmpc.codegen.atomic import put
@@ -19,7 +18,8 @@ from mambo_nmpc.sil.campaign.statistics import (
     improvements,
     worst_flights,
 )
-from mambo_nmpc.sil.campaign.store import FLIGHT, FlightStore, convert_os_errors
+from mambo_nmpc.sil.campaign.store import FLIGHT, TABLE, FlightStore, convert_os_errors
+from mambo_nmpc.sil.campaign.table import read_table
 from mambo_nmpc.sil.files.folders import SUMMARY
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.scenario import Record, write_record
@@ -76,15 +76,6 @@ class UnfinishedCampaign(Drawn, Summary):
     command = "campaign"
 
 
-def numeric_columns(store: FlightStore) -> Table:
-    """Return the numeric columns of the table."""
-    return {
-        name: np.array(values, np.float64)
-        for name, values in store.values().items()
-        if not name.endswith(DIGEST) and name != "seed"
-    }
-
-
 def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
     """Return statistics of a finished campaign, and the worst flights with the names of their records."""
     names = [entrant.name for entrant in campaign.entrants]
@@ -122,12 +113,11 @@ def write_records(campaign: Campaign, store: FlightStore) -> None:
         for row, flight in enumerate(map(int, values[FLIGHT])):
             flown = scenario(section, campaign.draw(flight))
             for entrant in campaign.entrants:
-                digest = values[f"{entrant.name}_{DIGEST}"][row]
                 record = Record(
                     scenario=flown,
                     controller=entrant.kind,
                     settings=entrant.settings,
-                    trace_sha256=digest,
+                    trace_sha256=values[f"{entrant.name}_{DIGEST}"][row],
                 )
                 write_record(record, store.folder / _record_name(flight, entrant.name))
 
@@ -138,7 +128,7 @@ def finish(campaign: Campaign, store: FlightStore) -> CampaignSummary:
 
     store.put_in_order()
     write_records(campaign, store)
-    table = numeric_columns(store)
+    table = read_table(store.folder / TABLE)
     summary = summarise(campaign, table)
     with convert_os_errors(store.folder):
         draw_campaign(table, [entrant.name for entrant in campaign.entrants], store.folder / PICTURE)

@@ -12,8 +12,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.atomic import put
@@ -32,51 +31,38 @@ class FlightStore:
     def __init__(self, folder: Path, columns: Sequence[str]) -> None:
         self.folder = folder
         self._columns = (FLIGHT, *columns)
+        self._header = _csv_line(self._columns)
         self._table = folder / TABLE
         self.lines = self._read()
         self._file = self._table.open("ab", buffering=0)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Close the table."""
         self._file.close()
 
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
         """Append finished flights and flush them to the disk; raises UnwritableError."""
-        lines = {flight: self._line(flight, row) for flight, row in rows.items()}
+        columns = self._columns[1:]
+        lines = {flight: _csv_line([flight, *(row[key] for key in columns)]) for flight, row in rows.items()}
         with convert_os_errors(
             self._table, "; the flights finished so far are kept, and the same command goes on from there"
         ):
-            self._write("".join(lines.values()).encode())
+            left = memoryview("".join(lines.values()).encode())
+            while left:
+                left = left[self._file.write(left) :]
+            os.fsync(self._file.fileno())
         self.lines |= lines
 
     def put_in_order(self) -> None:
         """Sort the table by flight, atomically."""
-        ordered = [self._header(), *(self.lines[flight] for flight in sorted(self.lines))]
+        ordered = [self._header, *(self.lines[flight] for flight in sorted(self.lines))]
         with convert_os_errors(self.folder):
             put(self._table, "".join(ordered).encode())
 
     def values(self) -> dict[str, list[str]]:
         """Return the columns of the table by name, in the order of the flights."""
         rows = csv.reader(self.lines[flight] for flight in sorted(self.lines))
-        return {
-            name: list(column) for name, column in zip(self._columns, zip(*rows, strict=True), strict=True)
-        }
-
-    def _header(self) -> str:
-        return _csv_line(self._columns)
-
-    def _line(self, flight: int, row: Mapping[str, Value]) -> str:
-        return _csv_line([flight, *(row[column] for column in self._columns[1:])])
-
-    def _write(self, content: bytes) -> None:
-        left = memoryview(content)
-        while left:
-            left = left[self._file.write(left) :]
-        os.fsync(self._file.fileno())
+        return dict(zip(self._columns, map(list, zip(*rows, strict=True)), strict=True))
 
     def _read(self) -> dict[int, str]:
         """Return the lines of an earlier run by flight, after removing a truncated last line.
@@ -90,7 +76,7 @@ class FlightStore:
             content = self._table.read_bytes() if self._table.exists() else b""
             whole = content[: content.rfind(b"\n") + 1]
             if not whole:
-                put(self._table, self._header().encode())
+                put(self._table, self._header.encode())
                 return {}
             if len(whole) < len(content):
                 os.truncate(self._table, len(whole))
@@ -99,7 +85,7 @@ class FlightStore:
         for number, line in enumerate([header, *lines], start=1):
             cells = next(csv.reader([line]), [])
             flight = cells[0] if len(cells) == len(self._columns) else ""
-            if number == 1 and line == self._header():
+            if number == 1 and line == self._header:
                 continue
             if number == 1 or not (flight.isascii() and flight.isdigit()) or int(flight) in found:
                 raise ForeignFilesError(
@@ -122,7 +108,7 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
         folder.mkdir(parents=True, exist_ok=True)
     with lock(folder):
         claim(folder, "campaign", {"command": "campaign", **campaign})
-        with FlightStore(folder, columns) as store:
+        with contextlib.closing(FlightStore(folder, columns)) as store:
             yield store
 
 

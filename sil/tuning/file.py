@@ -8,15 +8,21 @@ from typing import Any, Final
 
 from pydantic import Field
 
-from mambo_nmpc.codegen.errors import InvalidSettingsError, MamboNmpcError, echo
-from mambo_nmpc.codegen.settings import controller_toml, presets
+from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
+from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.keys import KEYS
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
-from mambo_nmpc.sil.campaign.file import Draws, FileSection, FlightSection, format_value, read_as, scenario
+from mambo_nmpc.sil.campaign.file import (
+    Draws,
+    FileSection,
+    FlightSection,
+    demand_flyable,
+    format_value,
+    load_settings,
+    read_as,
+)
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw
-from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.scenario import flight_of
 
 DEFAULT_SEARCH: Final[dict[str, dict[str, Any]]] = {
     "horizon": {
@@ -115,19 +121,9 @@ def read(path: Path) -> Tuning:
 
 def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
     """Load the base and check that every combination of the ranges' ends is valid and can be simulated."""
-    path = folder / file.base
-    try:
-        base = presets.load(file.base if file.base in presets.names() or not path.exists() else str(path))
-    except MamboNmpcError as error:
-        raise InvalidSettingsError(
-            tuple(f"{source}: base: {line}" for line in str(error).splitlines())
-        ) from None
+    base = load_settings(file.base, folder, f"{source}: base")
     tuning = Tuning(file, base, _search(file.search, base, source))
-    try:
-        one = scenario(file.flight.model_dump(), tuning.draw_flights()[0])
-        flight_of([one], base.horizon.update_period_s)
-    except FlightError as error:
-        raise InvalidSettingsError((f"{source}: base: horizon.{error}; stock loops run at 200 Hz",)) from None
+    demand_flyable(base, file.flight, tuning.draw_flights()[0], f"{source}: base")
     _demand_valid_corners(tuning, source)
     return tuning
 
@@ -138,13 +134,13 @@ def _search(
     """Return the range of each searched key; raises InvalidSettingsError with all errors."""
     found: dict[str, Distribution] = {}
     faults: list[str] = []
-    for path, value in (
-        (f"{section}.{name}", value) for section, values in sections.items() for name, value in values.items()
-    ):
-        try:
-            found[path] = _range(path, value, base)
-        except ValueError as error:
-            faults.append(f"{source}: search.{echo(path)} = {format_value(value)} {error}")
+    for section, values in sections.items():
+        for name, value in values.items():
+            path = f"{section}.{name}"
+            try:
+                found[path] = _range(path, value, base)
+            except ValueError as error:
+                faults.append(f"{source}: search.{echo(path)} = {format_value(value)} {error}")
     if not faults and not 1 <= len(found) <= _MOST_KEYS:
         faults.append(
             f"{source}: search must have 1 to {_MOST_KEYS} keys of a controller.toml in its sections"

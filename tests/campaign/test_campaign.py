@@ -17,7 +17,6 @@ from mambo_nmpc.sil.campaign.statistics import improvement, improvements, propor
 from mambo_nmpc.sil.plant.airframe import MAMBO
 
 ROOT = Path(__file__).parents[2]
-DEFAULTS = {name: parameter.default for name, parameter in PARAMETERS.items()}
 WIDE = Domain(-1e3, 1e3)
 
 
@@ -77,21 +76,21 @@ def test_a_distribution_is_written_as_it_is_read(value: object) -> None:
 
 def test_a_draw_depends_on_seed_and_flight_only() -> None:
     """Draws depend neither on other flights nor on the distributions of other parameters."""
-    assert draw(5, 17, DEFAULTS) == draw(5, 17, DEFAULTS)
-    assert draw(5, 17, DEFAULTS) != draw(5, 18, DEFAULTS)
-    assert draw(5, 17, DEFAULTS) != draw(6, 17, DEFAULTS)
-    fixed = DEFAULTS | {"mass_kg": parse(0.07, PARAMETERS["mass_kg"].domain)}
-    assert draw(5, 17, fixed) == draw(5, 17, DEFAULTS) | {"mass_kg": 0.07}
+    assert draw(5, 17, PARAMETERS) == draw(5, 17, PARAMETERS)
+    assert draw(5, 17, PARAMETERS) != draw(5, 18, PARAMETERS)
+    assert draw(5, 17, PARAMETERS) != draw(6, 17, PARAMETERS)
+    fixed = PARAMETERS | {"mass_kg": parse(0.07, PARAMETERS["mass_kg"].domain)}
+    assert draw(5, 17, fixed) == draw(5, 17, PARAMETERS) | {"mass_kg": 0.07}
 
 
 def test_seeds_of_flights_differ() -> None:
     """2000 flights have 2000 seeds, and so different noise."""
-    assert len({draw(0, flight, DEFAULTS)["seed"] for flight in range(2000)}) == 2000
+    assert len({draw(0, flight, PARAMETERS)["seed"] for flight in range(2000)}) == 2000
 
 
 def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
     """Over 1000 flights mean, limits, shares of a choice and correlation are those of the distributions."""
-    flights = [draw(0, flight, DEFAULTS) for flight in range(1000)]
+    flights = [draw(0, flight, PARAMETERS) for flight in range(1000)]
     mass_kg = np.array([flight["mass_kg"] for flight in flights])
     assert 0.063 <= mass_kg.min() < 0.0632
     assert 0.0798 < mass_kg.max() <= 0.08
@@ -104,7 +103,7 @@ def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
 
 def test_every_parameter_changes_the_scenario() -> None:
     """Each parameter at a limit of its domain gives a valid scenario that differs from the nominal one."""
-    nominal = {name: replace(parameter.default, kind="constant") for name, parameter in PARAMETERS.items()}
+    nominal = {name: replace(default, kind="constant") for name, default in PARAMETERS.items()}
     section = file.FlightSection().model_dump()
     plain = file.scenario(section, draw(0, 0, nominal))
     for name, parameter in PARAMETERS.items():
@@ -116,7 +115,7 @@ def test_every_parameter_changes_the_scenario() -> None:
 
 def test_scales_apply_to_the_nominal_mambo() -> None:
     """The thrust scale applies to rotor thrust and torque, the inertia scale to one axis."""
-    drawn = draw(0, 0, DEFAULTS) | {"thrust_scale": 0.5, "inertia_scale_y": 2.0}
+    drawn = draw(0, 0, PARAMETERS) | {"thrust_scale": 0.5, "inertia_scale_y": 2.0}
     flown = file.scenario(file.FlightSection().model_dump(), drawn)
     assert flown.thrust_factor_n_s2 == 0.5 * MAMBO.thrust_factor_n_s2
     assert flown.torque_factor_n_m_s2 == 0.5 * MAMBO.torque_factor_n_m_s2
