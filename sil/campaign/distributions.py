@@ -5,6 +5,7 @@ flight's stream, so changing the distribution of one parameter does not change t
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any, Final, Literal
@@ -83,32 +84,27 @@ def parse(value: Any, domain: Domain) -> Distribution:
     )
     if wrong or kind not in ("constant", "uniform", "log_uniform", "normal", "choice"):
         raise ValueError(f"must be {_SHAPES}")
-    _demand_count(kind, numbers)
-    within = numbers[:1] if kind == "normal" else numbers
-    for number in within:
-        if not domain.low <= number <= domain.high:
-            raise ValueError(f"must lie in {domain.low:g}..{domain.high:g}")
-        if domain.whole and number != int(number):
-            raise ValueError("must be whole numbers")
-    _demand_order(kind, numbers, whole=domain.whole)
+    for rule in _broken_rules(kind, numbers, domain):
+        raise ValueError(rule)
     return Distribution(kind, tuple(float(number) for number in numbers), domain)
 
 
-def _demand_count(kind: str, numbers: list[float]) -> None:
-    """Raise ValueError unless the number of `numbers` fits this kind of distribution."""
+def _broken_rules(kind: str, numbers: list[float], domain: Domain) -> Iterator[str]:
+    """Yield the rules that the numbers of this kind of distribution break; a rule assumes those before it."""
     if kind == "choice" and not 1 <= len(numbers) <= _MOST_CHOICES:
-        raise ValueError(f"must have 1 to {_MOST_CHOICES} values to choose from")
+        yield f"must have 1 to {_MOST_CHOICES} values to choose from"
     if kind in ("uniform", "log_uniform", "normal") and len(numbers) != 2:
-        raise ValueError(f"must have two numbers: {_SHAPES}")
-
-
-def _demand_order(kind: str, numbers: list[float], *, whole: bool) -> None:
-    """Raise ValueError unless numbers within the domain are valid for this kind of distribution."""
-    if whole and kind not in ("constant", "choice"):
-        raise ValueError("must be a whole number or { choice = [value, ...] } of them")
+        yield f"must have two numbers: {_SHAPES}"
+    within = numbers[:1] if kind == "normal" else numbers
+    if not all(domain.low <= number <= domain.high for number in within):
+        yield f"must lie in {domain.low:g}..{domain.high:g}"
+    if domain.whole and any(number != int(number) for number in within):
+        yield "must be whole numbers"
+    if domain.whole and kind not in ("constant", "choice"):
+        yield "must be a whole number or { choice = [value, ...] } of them"
     if kind in ("uniform", "log_uniform") and numbers[0] > numbers[1]:
-        raise ValueError("must have the lower limit first")
+        yield "must have the lower limit first"
     if kind == "log_uniform" and numbers[0] <= 0.0:
-        raise ValueError("must have limits above 0; a logarithm needs them")
+        yield "must have limits above 0; a logarithm needs them"
     if kind == "normal" and not 0.0 <= numbers[1] < math.inf:
-        raise ValueError("must have a standard deviation of 0 or more")
+        yield "must have a standard deviation of 0 or more"

@@ -5,8 +5,8 @@ from pathlib import Path
 from mambo_nmpc.sil.campaign.file import PD
 from mambo_nmpc.sil.campaign.plots import distribution_panels
 from mambo_nmpc.sil.campaign.report import CampaignSummary, UnfinishedCampaign
+from mambo_nmpc.sil.campaign.statistics import read_table
 from mambo_nmpc.sil.campaign.store import TABLE
-from mambo_nmpc.sil.campaign.table import read_table
 from mambo_nmpc.sil.flight.report import named
 from mambo_nmpc.sil.show.section import Section
 

@@ -4,15 +4,19 @@ Every index of a crashed flight is infinite: leaving such flights out would favo
 in difficult ones. Intervals are 95 % confidence intervals.
 """
 
+import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
+from mambo_nmpc.sil.errors import ResultsError
 from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
@@ -28,6 +32,24 @@ _SEED: Final = 0
 
 Table = Mapping[str, FloatArray]
 """Columns (n,) by name, in the order of the flights."""
+
+
+def read_table(path: Path) -> Table:
+    """Return the numeric columns of a table without a truncated last line; raises ResultsError."""
+    name = echo(str(path))
+    try:
+        text = path.read_text("utf-8")
+        header, *rows = csv.reader(text[: text.rfind("\n") + 1].splitlines())
+        columns = zip(header, zip(*rows, strict=True), strict=True) if rows else ()
+        return {
+            title: np.array([float(cell) for cell in cells])
+            for title, cells in columns
+            if not title.endswith("_sha256")
+        }
+    except (OSError, ValueError, csv.Error) as error:
+        raise ResultsError(
+            f"{name}: is not the table of a campaign: {echo(str(error))}; run campaign again"
+        ) from error
 
 
 @dataclass(frozen=True)

@@ -80,20 +80,17 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         ),
         FaultScenario("x infinite, 1 s", 1.0, set_state(0, math.inf), answers=bad_state),
         FaultScenario("vy minus infinite, 1 s", 1.0, set_state(3, -math.inf), answers=bad_state),
-        FaultScenario("state frozen, 0.2 s", 0.2, freeze_state),
-        FaultScenario("state frozen, 1 s", 1.0, freeze_state),
-        FaultScenario("state frozen, 5 s", 5.0, freeze_state),
+        *(FaultScenario(f"state frozen, {span_s:g} s", span_s, freeze_state) for span_s in (0.2, 1.0, 5.0)),
         FaultScenario(
             "every 2nd tick dropped, 5 s", 5.0, drop=drop_every(2), answers=_only(Status.OK, NOT_CALLED)
         ),
         FaultScenario("all ticks dropped, 0.2 s", 0.2, drop=drop_all, answers=_only(NOT_CALLED)),
         FaultScenario("all ticks dropped, 1 s", 1.0, drop=drop_all, answers=_only(NOT_CALLED)),
-        FaultScenario("commands 2 ticks late, 5 s", 5.0, late_updates=2),
-        FaultScenario("commands 5 ticks late, 5 s", 5.0, late_updates=5),
-        FaultScenario("commands 20 ticks late, 5 s", 5.0, late_updates=20),
-        FaultScenario(f"target {jump_m:g} m off, 0.2 s", 0.2, jump),
-        FaultScenario(f"target {jump_m:g} m off, 1 s", 1.0, jump),
-        FaultScenario(f"target {jump_m:g} m off, 5 s", 5.0, jump),
+        *(FaultScenario(f"commands {late} ticks late, 5 s", 5.0, late_updates=late) for late in (2, 5, 20)),
+        *(
+            FaultScenario(f"target {jump_m:g} m off, {span_s:g} s", span_s, jump)
+            for span_s in (0.2, 1.0, 5.0)
+        ),
         FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
         FaultScenario("target beyond the range, 1 s", 1.0, move_target(beyond_m), answers=bad_target),
         FaultScenario("thrust reported as zero, 1 s", 1.0, report_thrust(0.0), answers=bad_thrust),

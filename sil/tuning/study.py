@@ -26,7 +26,6 @@ from mambo_nmpc.sil.tuning.file import Tuning
 
 if TYPE_CHECKING:
     from optuna import Study, Trial
-    from optuna.trial import FrozenTrial
 
 ROUND: Final = 8
 """Trials proposed together, before any of them is evaluated."""
@@ -143,22 +142,19 @@ def judge(rows: Sequence[Row], duration_s: float, tilt_rad: float) -> tuple[int,
 
 def finished_trials(study: "Study") -> list[FinishedTrial]:
     """Return the finished trials of a study by number."""
-    from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
-
     crashed = study.user_attrs
     return [
         FinishedTrial(
             one.number, dict(one.params), one.values[0], one.values[1], crashed[f"{CRASHED}_{one.number}"]
         )
-        for one in study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+        for one in study.get_trials(deepcopy=False)
+        if one.state.name == "COMPLETE"
     ]
 
 
 def _count_proposed(study: "Study") -> int:
     """Return how many trials have been proposed."""
-    from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
-
-    return sum(one.state != TrialState.WAITING for one in study.get_trials(deepcopy=False))
+    return sum(one.state.name != "WAITING" for one in study.get_trials(deepcopy=False))
 
 
 def _propose(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, float]]:
@@ -187,13 +183,12 @@ def _find_unfinished(tuning: Tuning, study: "Study", owner: str) -> dict[int, di
     """Return the unfinished trials of an earlier run of `owner`; fail those without all values."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
-    waiting: Sequence[FrozenTrial] = [
-        one
-        for one in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,))
-        if one.user_attrs.get(_OWNER) == owner
-    ]
-    whole = {one.number: dict(one.params) for one in waiting if set(one.params) == set(tuning.search)}
-    for one in waiting:
-        if one.number not in whole:
+    whole = {}
+    for one in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
+        if one.user_attrs.get(_OWNER) != owner:
+            continue
+        if set(one.params) == set(tuning.search):
+            whole[one.number] = dict(one.params)
+        else:
             study.tell(one.number, state=TrialState.FAIL)
     return whole

@@ -4,7 +4,8 @@ import json
 import math
 import re
 import subprocess
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -107,43 +108,31 @@ def test_a_fault_begins_and_ends_on_time() -> None:
 
 def test_a_frozen_state_is_the_state_at_the_onset() -> None:
     """During the fault the controller receives the state of the first update of the fault."""
-    shown: list[NDArray[np.float64]] = []
-    fly_start(FaultyController(Watched(CompiledController(MAMBO), shown), [Fault(30, 60, freeze_state)]))
+    recorder = Recorder()
+    fly_start(FaultyController(recorder, [Fault(30, 60, freeze_state)]))
+    shown = recorder.states
     assert all(np.array_equal(shown[update], shown[30]) for update in range(30, 60))
     assert not np.array_equal(shown[60], shown[30])
     assert not np.array_equal(shown[30], shown[29])
 
 
-@dataclass(frozen=True, eq=False)
-class Watched:
-    """A controller that records the states it receives."""
+class Recorder:
+    """The compiled C, which records states and commands and is not called at updates of `skipped`."""
 
-    controller: PositionController
-    shown: list[NDArray[np.float64]]
-
-    def step(self, state: Any, target: Any, thrust: Any) -> Any:
-        """Record the state and step."""
-        self.shown.append(state.copy())
-        return self.controller.step(state, target, thrust)
-
-
-@dataclass(eq=False)
-class Skipping:
-    """A controller that is not called at some updates; its last command is held."""
-
-    controller: CompiledController
-    skipped: frozenset[int]
-    update: int = 0
-    command_rad: Any = None
+    def __init__(self, skipped: Sequence[int] = ()) -> None:
+        self.controller, self.skipped = CompiledController(MAMBO), skipped
+        self.states: list[NDArray[np.float64]] = []
+        self.commands: list[NDArray[Any]] = []
 
     def step(self, state: Any, target: Any, thrust: Any) -> Applied:
-        """Step, unless this update is skipped."""
-        self.update += 1
-        if self.update - 1 in self.skipped:
-            return Applied(self.command_rad, np.array([NOT_CALLED]))
+        """Step and record, or hold the last command."""
+        skip = len(self.states) in self.skipped
+        self.states.append(state.copy())
+        if skip:
+            return Applied(self.commands[-1], np.array([NOT_CALLED]))
         outcome = self.controller.step(state, target, thrust)
-        self.command_rad = outcome.command_rad
-        return Applied(outcome.command_rad, outcome.status)
+        self.commands.append(outcome.command_rad.astype(np.float64))
+        return Applied(self.commands[-1], outcome.status)
 
 
 @pytest.mark.parametrize(
@@ -153,29 +142,16 @@ class Skipping:
 )
 def test_a_dropped_update_equals_a_controller_that_is_not_called(drop: Any, skipped: range) -> None:
     """Passing NaN gives the same trace, bit for bit, as not calling the controller."""
-    really = fly_start(Skipping(CompiledController(MAMBO), frozenset(skipped)))
-    assert fly_with(Fault(20, 60, drop=drop)).same_bits(really)
+    assert fly_with(Fault(20, 60, drop=drop)).same_bits(fly_start(Recorder(skipped)))
 
 
 def test_late_commands_are_those_computed_earlier() -> None:
     """During the fault the drone receives the command of 5 updates ago, at first the last one on time."""
-    computed: list[NDArray[Any]] = []
-
-    class Noting:
-        """A controller that records its commands."""
-
-        controller = CompiledController(MAMBO)
-
-        def step(self, state: Any, target: Any, thrust: Any) -> Any:
-            """Step and record the command."""
-            outcome = self.controller.step(state, target, thrust)
-            computed.append(outcome.command_rad[0].astype(np.float64))
-            return outcome
-
-    applied = fly_start(FaultyController(Noting(), [Fault(20, 60, late_updates=5)])).command_rad[:, 0]
+    recorder = Recorder()
+    applied = fly_start(FaultyController(recorder, [Fault(20, 60, late_updates=5)])).command_rad
     for update in range(len(applied)):
         source = max(update - 5, 19) if 20 <= update < 60 else update
-        assert np.array_equal(applied[update], computed[source]), update
+        assert np.array_equal(applied[update], recorder.commands[source]), update
 
 
 def test_a_fault_of_one_flight_does_not_affect_the_others() -> None:

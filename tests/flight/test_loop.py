@@ -36,20 +36,6 @@ class Lean:
         return PdOutcome(command_rad, np.full(len(state), 3, dtype=np.int64))
 
 
-@dataclass(frozen=True)
-class Echo:
-    """A position controller that returns two columns of its input, state and target, as its command."""
-
-    columns: tuple[int, int]
-
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> PdOutcome:
-        """Return the chosen columns as command, and the thrust acceleration as status."""
-        given = np.concatenate([state, target], axis=1)
-        return PdOutcome(
-            0.01 * given[:, self.columns], np.asarray(1e6 * thrust_acceleration_m_s2, dtype=np.int64)
-        )
-
-
 def test_pd_reproduces_its_row_of_table_2_at_half_a_radian_per_second() -> None:
     """The four indices are within 2 % of the printed ones; the printed rate gives less than half the IAE."""
     flight = Flight(Trajectories(tuple(CASES.values())), flights=len(CASES))
@@ -103,15 +89,23 @@ def test_take_off_reaches_the_reference_height_before_the_clock_starts() -> None
 
 def test_controller_receives_the_recorded_state_and_target() -> None:
     """The controller's input is what the trace records at the same update."""
-    drifting = Vehicle(wind_m_s2=(0.5, 0.3))
-    flight = Flight(FIGURE_OF_EIGHT, duration_s=3.0, yaw_rad=0.4, vehicle=drifting)
-    for columns in ((0, 1), (2, 3), (4, 5), (6, 7), (8, 9), (10, 0)):
-        trace = fly(flight, Echo(columns))
-        recorded = np.concatenate(
-            [trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad, trace.target], axis=-1
-        )
-        np.testing.assert_array_equal(trace.command_rad, 0.01 * recorded[..., columns])
-        np.testing.assert_array_equal(trace.status, np.int64(1e6 * trace.thrust_acceleration_m_s2))
+    given: list[tuple[FloatArray, ...]] = []
+
+    class Recorder(PdController):
+        """The PD, which records its inputs."""
+
+        def step(self, *inputs: FloatArray) -> PdOutcome:
+            """Record and step."""
+            given.append(inputs)
+            return super().step(*inputs)
+
+    flight = Flight(FIGURE_OF_EIGHT, 3.0, yaw_rad=0.4, vehicle=Vehicle(wind_m_s2=(0.5, 0.3)))
+    trace = fly(flight, Recorder())
+    state = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad], axis=-1)
+    for values, recorded in zip(
+        zip(*given, strict=True), (state, trace.target, trace.thrust_acceleration_m_s2), strict=True
+    ):
+        np.testing.assert_array_equal(np.stack(values), recorded)
 
 
 def test_recorded_velocity_is_the_rate_of_the_position() -> None:

@@ -1,8 +1,6 @@
 """Scenarios and records: files, flights in a batch, replay."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +15,7 @@ from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
 from mambo_nmpc.sil.flight.traces import SEEN_COLUMNS
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from tests.support.command import command
 
 MAMBO = presets.load("mambo")
 HARD = Scenario(
@@ -166,11 +165,7 @@ def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
     write_record(good, tmp_path / "good.json")
     write_record(good.model_copy(update={"trace_sha256": "0" * 64}), tmp_path / "other.json")
 
-    def again(*arguments: str) -> subprocess.CompletedProcess[str]:
-        line = [sys.executable, "-m", "mambo_nmpc", "fly", *arguments]
-        return subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)
-
-    done = again("--replay", "good.json", "-o", "good")
+    done = command("fly", "--replay", "good.json", "-o", "good", folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "the trace equals the recorded one, bit for bit" in done.stdout
     inner = np.load(tmp_path / "good" / "inner-steps.npz")
@@ -179,8 +174,8 @@ def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
     assert inner["plan_rad"].shape == inner["step_size_rad"].shape == (k, iterations, 1, 2, 2)
     header = (tmp_path / "good" / "trace.csv").read_text().splitlines()[0]
     assert header.endswith(",".join(SEEN_COLUMNS))
-    assert again("--replay", "other.json").returncode == 1
-    refused = again("--replay", "good.json", "--seed", "3")
+    assert command("fly", "--replay", "other.json", folder=tmp_path).returncode == 1
+    refused = command("fly", "--replay", "good.json", "--seed", "3", folder=tmp_path)
     assert (refused.returncode, refused.stderr) == (
         2,
         "--replay good.json says how to fly: leave out --seed\n",

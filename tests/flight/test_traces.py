@@ -42,6 +42,14 @@ def test_npz_reads_back_as_it_was_written(trace: SensedTrace, tmp_path: Path) ->
         np.testing.assert_array_equal(after, before, strict=True)
 
 
+def test_the_estimated_flight_is_a_trace_of_its_own(trace: SensedTrace) -> None:
+    """`as_seen` replaces the true state by the estimates and keeps times and targets."""
+    seen = trace.as_seen()
+    np.testing.assert_array_equal(seen.position_m, trace.seen_position_m)
+    np.testing.assert_array_equal(seen.target, trace.target)
+    assert not trace.same_bits(seen)
+
+
 def test_csv_holds_the_chosen_flight_bit_for_bit(trace: SensedTrace, tmp_path: Path) -> None:
     """There is one row per sample and one named column per number, none rounded."""
     write_csv(trace, tmp_path / "trace.csv", flight=1)

@@ -152,16 +152,12 @@ def test_bad_waypoint_file_is_refused_with_file_line_and_rule(
 
 
 def test_unreadable_waypoint_file_is_refused(tmp_path: Path) -> None:
-    """A missing file and a file that is not text raise `TrajectoryError`, which names the file once."""
+    """A file that is missing, not text or above 10 MB raises `TrajectoryError`, which names it once."""
     with pytest.raises(TrajectoryError, match=r"absent\.csv: cannot be read: No such file or directory$"):
         Waypoints.read(tmp_path / "absent.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x80")
     with pytest.raises(TrajectoryError, match=r"binary\.csv: is not UTF-8"):
         Waypoints.read(tmp_path / "binary.csv")
-
-
-def test_huge_waypoint_file_is_refused(tmp_path: Path) -> None:
-    """A file above 10 MB is rejected before it is read into memory."""
     (tmp_path / "zero.csv").touch()
     os.truncate(tmp_path / "zero.csv", 2**40)
     with pytest.raises(TrajectoryError, match=r"zero\.csv: is larger than 10 MB"):

@@ -53,19 +53,15 @@ def errors(trace: Trace) -> dict[str, FloatArray]:
 
 
 def test_noise_free_estimates_follow_the_true_state() -> None:
-    """Over 6 s the errors stay below 0.01 rad of tilt, 2 mm of height, 0.15 m of position and 0.2 m/s."""
+    """Over 6 s the errors stay below 0.01 rad of tilt, 2 mm of height, 0.15 m of position and 0.2 m/s.
+
+    Rotation left in the flow makes the velocity error at least 1.4 times as large on both axes.
+    """
     found = errors(fly_eight(replace(QUIET, derotated=True)))
     assert (found["euler"] < [0.01, 0.01, 0.001]).all(), found
     assert (found["position"] < [0.15, 0.15, 0.002]).all(), found
     assert (found["velocity"] < [0.2, 0.2, 0.01]).all(), found
-
-
-def test_rotation_left_in_the_flow_biases_the_velocity() -> None:
-    """Without derotation the velocity error is at least 1.4 times as large on both axes."""
-    without, with_it = (
-        errors(fly_eight(replace(QUIET, derotated=yes)))["velocity"][:2] for yes in (False, True)
-    )
-    assert (without > 1.4 * with_it).all()
+    assert (errors(fly_eight(QUIET))["velocity"][:2] > 1.4 * found["velocity"][:2]).all()
 
 
 def test_noise_free_estimates_at_rest_do_not_drift() -> None:
@@ -281,13 +277,3 @@ def test_yaw_drifts_as_a_random_walk_and_position_with_it() -> None:
     for tick in (99, 199):
         assert x[tick].var() == pytest.approx(0.3 * factor * factor * (tick + 1), rel=0.25)
     assert x[799].var() > 4.0 * x[199].var()
-
-
-def test_the_estimated_flight_is_a_trace_of_its_own() -> None:
-    """`as_seen` replaces the true state by the estimates and keeps times and targets."""
-    trace = fly_eight(Sensors(), 1.0)
-    assert isinstance(trace, SensedTrace)
-    seen = trace.as_seen()
-    np.testing.assert_array_equal(seen.position_m, trace.seen_position_m)
-    np.testing.assert_array_equal(seen.target, trace.target)
-    assert not trace.same_bits(seen)

@@ -16,8 +16,16 @@ def run(*arguments: str, code: int = 0) -> tuple[str, str]:
     return result.stdout, result.stderr
 
 
-def command(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run mambo-nmpc in `folder`, in a process of its own."""
-    script = "from mambo_nmpc.sil.cli.app import main; main()"
+def command(
+    *arguments: object,
+    folder: Path | None = None,
+    script: str = "from mambo_nmpc.sil.cli.app import main; main()",
+) -> subprocess.CompletedProcess[str]:
+    """Run mambo-nmpc in `folder` and a session of its own, until all that hold its output have ended.
+
+    `script` is the Python that runs it.
+    """
     line = [sys.executable, "-c", script, *map(str, arguments)]
-    return subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        line, cwd=folder, capture_output=True, text=True, check=False, timeout=120, start_new_session=True
+    )
