@@ -54,10 +54,10 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
         return save(figure, stem)
 
 
-def _draw_shares(axes: Axes, values: FloatArray, colour: str, name: str) -> None:
-    """Draw the share of flights (0 to 1) up to each finite value; infinite ones count in the total."""
+def _draw_shares(axes: Axes, values: FloatArray, colour: str, name: str, whole: float = 1.0) -> None:
+    """Draw the share of flights (0 to `whole`) up to each finite value; infinite ones count in the total."""
     counted = values[~np.isnan(values)]
-    shares = np.arange(1, len(counted) + 1) / max(len(counted), 1)
+    shares = whole * np.arange(1, len(counted) + 1) / max(len(counted), 1)
     ordered = np.sort(counted)
     shown = np.isfinite(ordered)
     axes.step(ordered[shown], shares[shown], where="post", color=colour, label=name)
@@ -72,11 +72,8 @@ def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup
             axes = figure.subplots()
             for row, name in enumerate(controllers):
                 if {f"{name}_{index}", f"{name}_{CRASHED}"} <= table.keys():
-                    values = np.sort(index_values(table, name, index))
-                    shown = np.isfinite(values)
-                    shares = 100.0 * np.arange(1, len(values) + 1) / len(values)
                     colour = COMMAND if name == PD else _HUES[row % len(_HUES)]
-                    axes.step(values[shown], shares[shown], where="post", color=colour, label=name)
+                    _draw_shares(axes, index_values(table, name, index), colour, name, whole=100.0)
             if not axes.lines:
                 continue
             axes.set(xlabel=label, ylabel="flights below, %", xscale="log", ylim=(0, 102))

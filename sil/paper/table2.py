@@ -90,7 +90,9 @@ def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], Non
 def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summary:
     """Compare the traces of `fly_table2` with the printed table, and judge the claims of section III."""
     rows = _rows(traces)
-    return Table2Summary(scalar=scalar, cases=list(CASES), rows=rows, claims=_claims(rows))
+    claims = [_pd_claim(rows, case) for case in CASES]
+    claims += [_improvement_claim(row) for row in rows if row.case == next(iter(CASES)) and row.improvement]
+    return Table2Summary(scalar=scalar, cases=list(CASES), rows=rows, claims=claims)
 
 
 def table2_text(summary: Table2Summary) -> str:
@@ -139,15 +141,6 @@ def four(values: np.ndarray) -> Four:
     """Return four numbers as a tuple."""
     iae, ise, itse, itae = (float(value) for value in values)
     return iae, ise, itse, itae
-
-
-def _claims(rows: Sequence[Table2Row]) -> list[Claim]:
-    case, *printed_readings = CASES
-    return [
-        _pd_claim(rows, case),
-        *(_pd_claim(rows, reading) for reading in printed_readings),
-        *(_improvement_claim(row) for row in rows if row.case == case and row.improvement is not None),
-    ]
 
 
 def _pd_claim(rows: Sequence[Table2Row], case: str) -> Claim:

@@ -101,35 +101,6 @@ def test_a_worst_flight_replays_bit_for_bit(whole: Path, tmp_path: Path) -> None
     assert summary["metrics"]["iae_m_s"] == worst["iae_m_s"]
 
 
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from mambo_nmpc.sil.campaign import file
-from mambo_nmpc.sil.campaign.executors import processes
-from mambo_nmpc.sil.campaign.flights import fly_batch
-from mambo_nmpc.sil.campaign.run import fly_missing, open_campaign
-def progress(finished):
-    if finished >= 2:
-        os.kill(os.getpid(), signal.SIGKILL)
-campaign = file.read(Path(sys.argv[1]))
-with open_campaign(campaign, Path(sys.argv[2])) as store, processes(2) as pool:
-    fly_missing(campaign, store, 6, pool, progress, batch=1)
-"""
-
-
-@pytest.mark.long
-def test_a_killed_campaign_resumes_to_the_same_bytes(source: Path, whole: Path, tmp_path: Path) -> None:
-    """SIGKILL keeps finished flights and leaves no worker; the resumed campaign ends with the same bytes."""
-    done = command(source, tmp_path, script=KILLED)
-    assert done.returncode == -signal.SIGKILL
-    before = (tmp_path / "flights.csv").read_text().splitlines()
-    assert 2 <= len(before) - 1 < FLIGHTS
-    resumed = command("campaign", source, "--flights", FLIGHTS, "-o", tmp_path)
-    assert resumed.returncode == 0, resumed.stderr
-    assert contents(tmp_path) == contents(whole)
-    assert set(before) <= set((tmp_path / "flights.csv").read_text().splitlines())
-
-
 STOPPED = """
 import os, signal
 from mambo_nmpc.__main__ import main
@@ -137,26 +108,34 @@ from mambo_nmpc.sil.campaign.store import FlightStore
 add = FlightStore.add
 def add_and_stop(self, rows):
     add(self, rows)
-    os.killpg(0, signal.SIGINT)
+    STOP
 FlightStore.add = add_and_stop
 main()
 """
 
 
 @pytest.mark.long
-def test_a_campaign_resumes_after_ctrl_c(source: Path, whole: Path, tmp_path: Path) -> None:
-    """Ctrl-C, which also signals the workers, exits with 130 and one line; two workers give one's results."""
+@pytest.mark.parametrize(
+    ("stop", "code"),
+    [("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL), ("os.killpg(0, signal.SIGINT)", INTERRUPTED)],
+    ids=["killed", "Ctrl-C, which also signals the workers"],
+)
+def test_a_stopped_campaign_resumes_to_the_same_bytes(
+    stop: str, code: int, source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """It keeps finished flights and leaves no worker; resumed on two workers it has the results of one."""
     arguments = ("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
-    done = command(*arguments, script=STOPPED)
-    assert done.returncode == INTERRUPTED
-    assert done.stdout == ""
-    assert done.stderr.endswith(
-        f"stopped with 3 of {FLIGHTS} flights finished; the same command goes on from there\n"
-    )
-    assert done.stderr.count("\n") == 1
+    done = command(*arguments, script=STOPPED.replace("STOP", stop))
+    assert (done.returncode, done.stdout) == (code, "")
+    message = f"stopped with 3 of {FLIGHTS} flights finished; the same command goes on from there\n"
+    assert done.stderr.endswith(message if code == INTERRUPTED else "")
+    assert done.stderr.count("\n") == (code == INTERRUPTED)
+    before = (tmp_path / "flights.csv").read_text().splitlines()
+    assert len(before) == 1 + 3
     resumed = command(*arguments)
     assert (resumed.returncode, "ratio of pd to the other" in resumed.stdout) == (0, True), resumed.stderr
     assert contents(tmp_path) == contents(whole)
+    assert set(before) <= set((tmp_path / "flights.csv").read_text().splitlines())
 
 
 def test_a_campaign_resumes_after_a_full_disk(source: Path, whole: Path, tmp_path: Path) -> None:
