@@ -122,7 +122,7 @@ class Campaign:
 
     def draw(self, flight: int) -> Draw:
         """Return seed and parameters of flight number `flight`."""
-        return draw(self.file.seed, flight, {name: getattr(self.file.draws, name) for name in PARAMETERS})
+        return draw(self.file.seed, flight, dict(self.file.draws))
 
     def document(self) -> dict[str, Any]:
         """Return everything that determines the result, as plain values."""

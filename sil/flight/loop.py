@@ -204,7 +204,7 @@ def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
 def _thrust_n(seen: Seen, lifting: bool) -> FloatArray:
     """Return the demanded total thrust (n,) in N: constant while lifting, then from the altitude loop."""
     if lifting:
-        return np.full(seen.position_m.shape[1], loops.take_off_thrust())
+        return np.full(seen.position_m.shape[1], loops.TAKE_OFF_THRUST_N)
     return loops.altitude_thrust(HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
 
 

@@ -23,10 +23,12 @@ YAW_D_N_M_S = 0.0012
 ALTITUDE_P_N_M = 0.8
 ALTITUDE_D_N_S_M = 0.3
 THRUST_LIMIT_N = 1.20204
-TAKE_OFF_GAIN = 0.45
-TAKE_OFF_S = 1.0
 
 WEIGHT_N = float(MAMBO.mass_kg * GRAVITY_M_S2)
+
+TAKE_OFF_S = 1.0
+TAKE_OFF_THRUST_N = WEIGHT_N * (1.0 + 0.45)
+"""Constant total thrust, without feedback, of the first second of a take-off."""
 
 
 def attitude_torque(
@@ -57,8 +59,3 @@ def altitude_thrust(reference_m: float, z_m: FloatArray, velocity_z_m_s: FloatAr
     """Return the total thrust (n,) in N, positive upwards, that the altitude loop demands; z points down."""
     thrust = WEIGHT_N - ALTITUDE_P_N_M * (reference_m - z_m) + ALTITUDE_D_N_S_M * velocity_z_m_s
     return np.clip(thrust, -THRUST_LIMIT_N, THRUST_LIMIT_N)
-
-
-def take_off_thrust() -> float:
-    """Return the constant total thrust in N, without feedback, of the first second of a take-off."""
-    return WEIGHT_N * (1.0 + TAKE_OFF_GAIN)

@@ -22,7 +22,7 @@ from mambo_nmpc.sil.campaign.file import (
     load_settings,
     read_as,
 )
-from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw
+from mambo_nmpc.sil.campaign.parameters import Draw, draw
 
 DEFAULT_SEARCH: Final[dict[str, dict[str, Any]]] = {
     "horizon": {
@@ -90,7 +90,7 @@ class Tuning:
 
     def draw_flights(self) -> list[Draw]:
         """Return the draws of the flights that every trial flies."""
-        distributions = {name: getattr(self.file.draws, name) for name in PARAMETERS}
+        distributions = dict(self.file.draws)
         return [draw(self.file.seed, flight, distributions) for flight in range(self.file.flights)]
 
     def document(self) -> dict[str, Any]:
