@@ -7,11 +7,12 @@ controllers, one per flight, and have the interface of a position controller the
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.flight.loop import Outcome, PositionController
 from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
 from mambo_nmpc.sil.plant.link import NOT_CALLED
@@ -161,14 +162,6 @@ class FaultyController:
         return Applied(command_rad, np.where(called, outcome.status, NOT_CALLED))
 
 
-class Reweightable(PositionController, Protocol):
-    """A controller whose weights can be set in flight."""
-
-    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Set tracking and effort weight from `weights` (n, 2); return the status (n,)."""
-        ...
-
-
 @dataclass(frozen=True)
 class WeightChange:
     """New weights (tracking, effort) of flight `row`, set before update `update`."""
@@ -184,7 +177,7 @@ class ReweightedController:
     Controllers of the batch whose weights stay receive NaN, which they reject.
     """
 
-    def __init__(self, controller: Reweightable, n: int, changes: Sequence[WeightChange]) -> None:
+    def __init__(self, controller: CompiledController, n: int, changes: Sequence[WeightChange]) -> None:
         self._controller = controller
         self._n = n
         self._changes = changes
