@@ -74,7 +74,7 @@ bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.times --python $(PEERS)/bin/python --output build/bench
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
-	$(BIN)/python -m benchmarks.peers --python $(PEERS)/bin/python
+	$(BIN)/python -m benchmarks.peers
 
 # The generators of others live in an environment of their own; TinyMPC asks for a SciPy that new Pythons lack.
 # Of DAQP the C is wanted, which only the source distribution has.

@@ -5,8 +5,8 @@ for the same 100 s: compiled C at 100 Hz, stock loops and integrator at 200 Hz. 
 """
 
 import statistics
-import time
-from collections.abc import Callable
+import timeit
+from functools import partial
 
 from rotorpy.vehicles.crazyflie_params import quad_params
 from rotorpy.vehicles.multirotor import Multirotor
@@ -36,16 +36,10 @@ def fly_rotorpy() -> None:
         state = vehicle.step(state, control, 0.01)
 
 
-def seconds(work: Callable[[], None]) -> float:
-    """Return the wall time of `work`."""
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
-
-
 def main() -> None:
     """Run both alternately; print the median times and their ratio."""
     fly_ours(1)  # builds the C
+    seconds = partial(timeit.timeit, number=1)
     rounds = [(seconds(lambda: fly_ours(1)), seconds(fly_rotorpy)) for _ in range(ROUNDS)]
     ours, theirs = (statistics.median(column) for column in zip(*rounds, strict=True))
     ratio = statistics.median(b / a for a, b in rounds)

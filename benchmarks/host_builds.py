@@ -1,4 +1,4 @@
-"""Build the C of peers and ours as shared libraries for this machine, in the same way, and call them.
+"""Build programs as shared libraries for this machine, in the same way, and call them.
 
 A library exports only `run`, so that compiler and linker can optimise the rest as in one program; heap calls
 are counted.
@@ -6,7 +6,6 @@ are counted.
 
 import ctypes
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,81 +13,46 @@ import numpy as np
 from elftools.elf.elffile import ELFFile
 from numpy.typing import NDArray
 
-from benchmarks.peers_c import definitions, run_tool, sources
-from benchmarks.peers_programs import Program
+from benchmarks.ours import Ours
+from benchmarks.programs import BENCHMARKS, Program, run_tool
 from mambo_nmpc.codegen.toolchain import host_toolchain
 
 Array = NDArray[Any]
 
-PORTABLE: Final = ("-O2",)
-NATIVE: Final = ("-O3", "-march=native")
 _COMMON: Final = ("-w", "-fPIC", "-fvisibility=hidden", "-ffunction-sections", "-fdata-sections")
 _ALLOCATORS: Final = ("malloc", "calloc", "realloc", "_Znwm", "_Znam")
 """Allocators of C, and operators new of C++."""
-_COUNTERS: Final = """#include <stddef.h>
-
-__attribute__((visibility("default"))) unsigned long heap_calls;
-
-#define COUNTED(name, parameters, arguments) \\
-    void *__real_##name parameters __attribute__((weak)); \\
-    void *__wrap_##name parameters; \\
-    void *__wrap_##name parameters { heap_calls++; return __real_##name arguments; }
-
-COUNTED(malloc, (size_t bytes), (bytes))
-COUNTED(calloc, (size_t count, size_t bytes), (count, bytes))
-COUNTED(realloc, (void *old, size_t bytes), (old, bytes))
-COUNTED(_Znwm, (size_t bytes), (bytes))
-COUNTED(_Znam, (size_t bytes), (bytes))
-"""
-_CODE: Final = (".text", ".rodata")
-_RAM: Final = (".data", ".bss")
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """Bytes of a library: code with constants, and static variables."""
-
-    code: int
-    ram: int
-
-
-def build(program: Program, folder: Path, flags: tuple[str, ...], library: Path) -> Path:
+def build(program: Program, folder: Path, flags: str, library: Path) -> Path:
     """Build `program`, whose C is in `folder`, as the shared library `library`; raises NotHereError.
 
     Peers may use fused multiply-add if `flags` allow it; ours and the roll-out do not, to keep their bits.
     """
     work = library.with_suffix("")
     work.mkdir(parents=True)
-    suffix = "cpp" if program.language == "c++" else "c"
-    glue, counters = work / f"glue.{suffix}", work / "counters.c"
-    glue.write_text(program.glue, "utf-8")
-    counters.write_text(_COUNTERS, "utf-8")
     c = [*host_toolchain().command]
     compiler = c if program.language == "c" else ["c++", "-fno-gnu-unique"]
-    contract = "off" if program.name in ("ours", "rollout") else "fast"
-    line = [*compiler, program.dialect, *_COMMON, *flags, f"-ffp-contract={contract}"]
-    line += [*definitions(program, folder), "-c"]
-    objects: list[str] = []
-    for source in sources(program, folder):
-        objects.append(str(work / f"{len(objects)}.o"))
-        run_tool([*line, str(source), "-o", objects[-1]])
-    run_tool([*line, "-fvisibility=default", str(glue), "-o", str(work / "glue.o")])
-    run_tool([*c, "-O2", "-fPIC", "-c", str(counters), "-o", str(work / "counters.o")])
+    contract = "off" if isinstance(program, Ours) else "fast"
+    line = [*compiler, *_COMMON, *flags.split(), f"-ffp-contract={contract}"]
+    objects = program.compile(line, folder, work)
+    objects.append(str(work / "heap_calls.o"))
+    run_tool([*c, "-O2", "-fPIC", "-c", str(BENCHMARKS / "glue/heap_calls.c"), "-o", objects[-1]])
     wrapped = [f"-Wl,--wrap={name}" for name in _ALLOCATORS]
     link = [*compiler, "-shared", "-Wl,--gc-sections", "-Wl,-Bsymbolic", *wrapped, *objects]
-    run_tool([*link, str(work / "glue.o"), str(work / "counters.o"), "-lm", "-o", str(library)])
+    run_tool([*link, "-lm", "-o", str(library)])
     return library
 
 
-def sizes(library: Path) -> Sizes:
-    """Measure a library, including its heap counters."""
+def sizes(library: Path) -> tuple[int, int]:
+    """Return bytes of code with constants, and of static variables, heap counters included."""
     with library.open("rb") as stream:
-        found = [(s.name, s["sh_size"]) for s in ELFFile(stream).iter_sections()]
+        found = [(f"{section.name}.", section["sh_size"]) for section in ELFFile(stream).iter_sections()]
     code, ram = (
-        sum(size for name, size in found if name in kinds or name.startswith(tuple(f"{k}." for k in kinds)))
-        for kinds in (_CODE, _RAM)
+        sum(size for name, size in found if name.startswith(kinds))
+        for kinds in ((".text.", ".rodata."), (".data.", ".bss."))
     )
-    return Sizes(code, ram)
+    return code, ram
 
 
 def silence() -> None:

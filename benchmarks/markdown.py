@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
-    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows))
+def table(rows: Sequence[dict[str, str]]) -> str:
+    """Return a table of rows by column; the longest row has all columns, in their order."""
+    head = max((list(row) for row in rows), key=len)
+    cells = [head, ["---"] * len(head), *([row.get(name, "") for name in head] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in cells)

@@ -1,7 +1,7 @@
 """Quality of a plan: its cost relative to the optimum for the same input, computed by SciPy.
 
 An input (6,) is the error x, vx, y, vy and the last command, which is also the initial tilt of a lag, at
-heading 0 and a thrust of 9.81 m/s2. With `ours.peers_model` this is the problem of `peers_setups`.
+heading 0 and a thrust of 9.81 m/s2. With `ours.PEERS_MODEL` this is `benchmarks.problem`.
 """
 
 from typing import Any
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from benchmarks.peers_programs import Cost
-from benchmarks.peers_setups import GRAVITY_M_S2
+from benchmarks.problem import GRAVITY_M_S2
+from benchmarks.programs import Cost
 from benchmarks.searches import Array, CostModel, Problems
 from mambo_nmpc.codegen.settings.model import Settings
 

@@ -23,9 +23,9 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.flights import detect_crashes
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.flight.loop import PositionController, fly
-from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
-from mambo_nmpc.sil.flight.traces import SensedTrace
+from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
@@ -53,14 +53,6 @@ SENSED: Final = tuple(
 )
 """Sensor noise, then sensor noise and gusts with the same seeds."""
 
-TRUTH_HEAD: Final = (
-    *("search", "instructions: mean, most", "IAE", "started 1 mm off", "ISE", "ITAE", "variation"),
-    *("wind along x: IAE", "along y", "motor lag: IAE", "variation"),
-)
-SENSED_HEAD: Final = (
-    *("search", "noise: IAE", "estimated", "variation", "gusts: IAE", "estimated", "variation", "crashed"),
-)
-
 
 @dataclass(frozen=True)
 class Variant:
@@ -74,15 +66,6 @@ class Variant:
         if self.searching is None:
             return CompiledController(self.settings, n)
         return SearchingController(self.settings, n, self.searching)
-
-
-@dataclass(frozen=True)
-class FlownVariant:
-    """Results of the flights of a world; `seen_iae_m_s` (n,) is the IAE of the estimated position."""
-
-    metrics: Metrics
-    seen_iae_m_s: FloatArray
-    crashed: int
 
 
 def entrants(preset: str) -> dict[str, Variant]:
@@ -119,19 +102,17 @@ def by_weight() -> dict[tuple[str, str], Variant]:
     return found
 
 
-def fly_world(entrant: Variant, world: Sequence[Scenario]) -> FlownVariant:
+def fly_world(variant: Variant, world: Sequence[Scenario]) -> Trace:
     """Fly all flights of a world as one batch."""
-    flight = flight_of(world, entrant.settings.horizon.update_period_s)
-    trace = fly(flight, entrant.controller(len(world)))
-    seen = trace.as_seen() if isinstance(trace, SensedTrace) else trace
-    return FlownVariant(measure(trace), measure(seen).iae_m_s, int(detect_crashes(trace).sum()))
+    flight = flight_of(world, variant.settings.horizon.update_period_s)
+    return fly(flight, variant.controller(len(world)))
 
 
-def instructions(entrant: Variant) -> str:
+def instructions(variant: Variant) -> str:
     """Return mean and most instructions of a step on the board, "-" for a search without C."""
-    if entrant.searching is not None:
+    if variant.searching is not None:
         return "-"
-    counts = measure_footprint(entrant.settings, boards.load(BOARD)).counts
+    counts = measure_footprint(variant.settings, boards.load(BOARD)).counts
     return "-" if counts is None else f"{counts.mean:.0f}, {counts.most}"
 
 
@@ -145,50 +126,62 @@ def _mean(values: FloatArray) -> str:
     return f"{_digits(values.mean())} ± {error:.2g}"
 
 
-def truth_cells(flown: FlownVariant) -> list[str]:
-    """Format the results of `TRUTH`."""
-    found, beside = flown.metrics, len(BESIDE_M)
+def fly_with_true_states(variant: Variant) -> dict[str, str]:
+    """Fly `TRUTH`; returns cells by column."""
+    found, beside = measure(fly_world(variant, TRUTH)), len(BESIDE_M)
     iae, variation = found.iae_m_s, found.command_variation_rad
-    return [
-        *(_digits(iae[0]), ", ".join(map(_digits, iae[1:beside]))),
-        *(_digits(found.ise_m2_s[0]), _digits(found.itae_m_s2[0]), f"{variation[0]:.4f}"),
-        *map(_digits, iae[beside:]),
-        f"{variation[-1]:.4f}",
-    ]
+    return {
+        "IAE": _digits(iae[0]),
+        "started 1 mm off": ", ".join(map(_digits, iae[1:beside])),
+        "ISE": _digits(found.ise_m2_s[0]),
+        "ITAE": _digits(found.itae_m_s2[0]),
+        "variation": f"{variation[0]:.4f}",
+        "wind along x: IAE": _digits(iae[beside]),
+        "along y": _digits(iae[beside + 1]),
+        "motor lag: IAE": _digits(iae[beside + 2]),
+        "motor lag: variation": f"{variation[-1]:.4f}",
+    }
 
 
-def sensed_cells(flown: FlownVariant) -> list[str]:
-    """Format the results of `SENSED`."""
-    found = flown.metrics
-    cells = []
-    for case in (slice(0, SEEDS), slice(SEEDS, None)):
-        variation = found.command_variation_rad[case].mean()
-        cells += [_mean(found.iae_m_s[case]), _mean(flown.seen_iae_m_s[case]), f"{variation:.4f}"]
-    return [*cells, f"{flown.crashed}"]
+def fly_with_sensors(variant: Variant) -> dict[str, str]:
+    """Fly `SENSED`; returns cells by column. "estimated" is the IAE of the estimated position."""
+    trace = fly_world(variant, SENSED)
+    assert isinstance(trace, SensedTrace)
+    found, seen = measure(trace), measure(trace.as_seen())
+    cells = {}
+    for world, case in (("noise", slice(0, SEEDS)), ("gusts", slice(SEEDS, None))):
+        cells[f"{world}: IAE"] = _mean(found.iae_m_s[case])
+        cells[f"{world}: estimated"] = _mean(seen.iae_m_s[case])
+        cells[f"{world}: variation"] = f"{found.command_variation_rad[case].mean():.4f}"
+    return cells | {"crashed": f"{detect_crashes(trace).sum()}"}
 
 
 def main() -> None:
     """Fly everything in parallel processes and print the tables."""
     searched = {preset: entrants(preset) for preset in PRESETS}
-    with_every_search = [one for several in searched.values() for one in several.values()]
-    everyone = {*with_every_search, *by_weight().values()}
+    weighted = by_weight()
+    with_every_search = {one for several in searched.values() for one in several.values()}
+    everyone = list(with_every_search.union(weighted.values()))
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
-        truth = {one: pool.submit(fly_world, one, TRUTH) for one in everyone}
-        sensed = {one: pool.submit(fly_world, one, SENSED) for one in everyone}
         counted = {one: pool.submit(instructions, one) for one in with_every_search}
-        in_truth = {one: truth_cells(flown.result()) for one, flown in truth.items()}
-        in_noise = {one: sensed_cells(flown.result()) for one, flown in sensed.items()}
+        truth = dict(zip(everyone, pool.map(fly_with_true_states, everyone), strict=True))
+        sensed = dict(zip(everyone, pool.map(fly_with_sensors, everyone), strict=True))
         count = {one: counting.result() for one, counting in counted.items()}
     for preset, several in searched.items():
-        rows = [(title, count[one], *in_truth[one]) for title, one in several.items()]
-        print(f"`{preset}`, with true states:\n\n{table(TRUTH_HEAD, rows)}\n")
-        rows = [(title, *in_noise[one]) for title, one in several.items()]
-        print(f"`{preset}`, with sensors:\n\n{table(SENSED_HEAD, rows)}\n")
+        rows = [
+            {"search": title, "instructions: mean, most": count[one]} | truth[one]
+            for title, one in several.items()
+        ]
+        print(f"`{preset}`, with true states:\n\n{table(rows)}\n")
+        rows = [{"search": title} | sensed[one] for title, one in several.items()]
+        print(f"`{preset}`, with sensors:\n\n{table(rows)}\n")
     rows = [
-        (*titles, in_truth[one][0], in_truth[one][4], *in_noise[one]) for titles, one in by_weight().items()
+        {"preset, effort weight": preset, "search": search}
+        | {name: truth[one][name] for name in ("IAE", "variation")}
+        | sensed[one]
+        for (preset, search), one in weighted.items()
     ]
-    head = ("preset, effort weight", "search", "IAE", "variation", *SENSED_HEAD[1:])
-    print(f"Other effort weights:\n\n{table(head, rows)}")
+    print(f"Other effort weights:\n\n{table(rows)}")
 
 
 if __name__ == "__main__":

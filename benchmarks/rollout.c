@@ -1,6 +1,6 @@
 /* The controller as a plain roll-out: every iteration predicts the states step by step (eqs 8-11), sums the cost
  * (eq 12), and computes the gradient by a backward pass. No tables, no input check; the C library's sine and
- * cosine. The settings are in the bundle's nmpc_config.h, further constants in rollout.h:
+ * cosine. The settings are in the bundle's nmpc_config.h; the compiler's command line defines:
  *
  *   ROLLOUT_HAS_LAG      1 if the prediction models the attitude lag
  *   ROLLOUT_KEEPS_PLAN   1 if the search starts from the last plan, 0 from the last command
@@ -11,7 +11,7 @@
 #include <math.h>
 
 #include "nmpc_config.h"
-#include "rollout.h"
+#include "run.h"
 
 #define STEP_S NMPC_PREDICTION_STEP_S
 #define HALF_SQUARE_S2 ((nmpc_real_t)0.5 * NMPC_PREDICTION_STEP_S * NMPC_PREDICTION_STEP_S)
@@ -190,9 +190,7 @@ static void minimize(const model_t *start, const nmpc_real_t gain[2][2], const n
     }
 }
 
-void run(const float error[4], const float last[2], float moves[4]);
-
-/* Plan as benchmarks/peers_programs.py asks for, at heading 0 and hover thrust, which are not known before. */
+/* Plan as run.h asks for, at heading 0 and hover thrust, which are not known before. */
 static volatile nmpc_real_t rollout_yaw_rad = 0, rollout_thrust_m_s2 = 9.81f;
 
 void run(const float error[4], const float last[2], float moves[4])

@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.markdown import table
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
@@ -209,34 +210,39 @@ def compare_flights(settings: Settings) -> tuple[str, Moments]:
     few, many = fly(flight, recording), fly(flight, CompiledController(in_float64(settings), n))
     apart_m = np.hypot(*np.moveaxis((few.position_m - many.position_m)[..., :2], -1, 0)).max(axis=0)
     indices = [(m.iae_m_s, m.ise_m2_s, m.itse_m2_s2, m.itae_m_s2) for m in map(measure, (few, many))]
-    lines = [
-        f"| Table II case | IAE {settings.code.scalar} | IAE float64 | ISE | ITSE | ITAE | paths apart, m |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    few_scalar = settings.code.scalar
+    rows = []
     for row, case in enumerate(CASES):
-        iae, *others = (f"{a[row]:.4g} / {b[row]:.4g}" for a, b in zip(*indices, strict=True))
-        lines.append(f"| {case} | {iae.replace(' / ', ' | ')} | {' | '.join(others)} | {apart_m[row]:.3f} |")
+        iae, *others = ((f"{a[row]:.4g}", f"{b[row]:.4g}") for a, b in zip(*indices, strict=True))
+        rows.append(
+            {"Table II case": case, f"IAE {few_scalar}": iae[0], "IAE float64": iae[1]}
+            | {name: " / ".join(both) for name, both in zip(("ISE", "ITSE", "ITAE"), others, strict=True)}
+            | {"paths apart, m": f"{apart_m[row]:.3f}"}
+        )
     moments = Moments(
         *(np.concatenate([getattr(m, field.name) for m in recording.moments]) for field in fields(Moments))
     )
-    return "\n".join(lines), moments
+    return table(rows), moments
 
 
 def decision_table(found: Sequence[Disagreement]) -> str:
     """Return a Markdown table with a row for each kind of input."""
-    lines = [
-        "| inputs | steps | of these decide otherwise | first in iteration 1, 2, ... "
-        "| decisions that differ | command changes by: median, 99 %, largest, rad | by rounding alone, rad |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for one in found:
-        spread = ", ".join(f"{value:.3f}" for value in one.command_rad) if one.differing_steps else "-"
-        lines.append(
-            f"| {one.inputs} | {one.steps} | {one.differing_steps} | "
-            f"{', '.join(map(str, one.first_by_iteration))} | {one.differing} of {one.decisions} | "
-            f"{spread} | {one.rounding_rad:.1e} |"
-        )
-    return "\n".join(lines)
+    return table(
+        [
+            {
+                "inputs": one.inputs,
+                "steps": f"{one.steps}",
+                "of these decide otherwise": f"{one.differing_steps}",
+                "first in iteration 1, 2, ...": ", ".join(map(str, one.first_by_iteration)),
+                "decisions that differ": f"{one.differing} of {one.decisions}",
+                "command changes by: median, 99 %, largest, rad": (
+                    ", ".join(f"{rad:.3f}" for rad in one.command_rad) if one.differing_steps else "-"
+                ),
+                "by rounding alone, rad": f"{one.rounding_rad:.1e}",
+            }
+            for one in found
+        ]
+    )
 
 
 def main() -> None:
@@ -251,8 +257,8 @@ def main() -> None:
                 "at an edge": at_the_edge(settings, random_moments(settings, EDGE_SEEDS, rng)),
                 "in flight": flown,
             }
-            table = decision_table([disagreement(settings, kind, m) for kind, m in inputs.items()])
-            print(f"## Preset {name}, {scalar}\n\n{table}\n\n{flights}\n")
+            decisions = decision_table([disagreement(settings, kind, m) for kind, m in inputs.items()])
+            print(f"## Preset {name}, {scalar}\n\n{decisions}\n\n{flights}\n")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Inputs of the comparison: errors against the target, and the last command."""
+"""Inputs of the comparison: the sets W, T, F and C of docs/benchmarks.md."""
 
 from typing import Any, Final
 
@@ -15,26 +15,19 @@ Inputs = NDArray[np.float32]
 
 COUNT: Final = 1000
 _LAST_RAD: Final = 0.1
-_RANGES: Final = {"W": (0.5, 1.0), "T": (0.05, 0.1), "F": (0.005, 0.01)}
-_NOISE: Final = (0.01, 0.05)
+_WITHIN: Final = {"W": [0.5, 1.0], "T": [0.05, 0.1], "F": [0.005, 0.01]}
+_NOISE: Final = [0.01, 0.05]
+"""Of position (m) and velocity (m/s)."""
 _SEED: Final = 1
 _SETTLED_S: Final = 10.0
-
-MEANING: Final = {
-    "W": "random, within 0.5 m and 1 m/s",
-    "T": "random, within 5 cm and 10 cm/s",
-    "F": "random, within 5 mm and 1 cm/s",
-    "C": "100 Hz along the figure of eight of Table II, noise of 1 cm and 5 cm/s",
-}
-"""In W, T and F the last command is random within 0.1 rad; along C it is the contender's own."""
 
 
 def state_sets() -> dict[str, Inputs]:
     """Return the sets, (COUNT, 6) each."""
     random = np.random.default_rng(_SEED)
     sets = {}
-    for name, (position_m, velocity_m_s) in _RANGES.items():
-        scale = [position_m, velocity_m_s, position_m, velocity_m_s, _LAST_RAD, _LAST_RAD]
+    for name, within in _WITHIN.items():
+        scale = [*within, *within, _LAST_RAD, _LAST_RAD]
         sets[name] = (random.uniform(-1, 1, (COUNT, 6)) * scale).astype(np.float32)
     sets["C"] = _flown(random)
     return sets
@@ -46,6 +39,6 @@ def _flown(random: np.random.Generator) -> Inputs:
     trace: Any = fly(flight, CompiledController(presets.load("mambo")))
     error = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2]], -1) - trace.target
     x, y, vx, vy = error[-COUNT:, 0].T
-    noise = random.standard_normal((COUNT, 4)) * [_NOISE[0], _NOISE[1], _NOISE[0], _NOISE[1]]
+    noise = random.standard_normal((COUNT, 4)) * (_NOISE * 2)
     seen = np.stack([x, vx, y, vy], 1) + noise
     return np.concatenate([seen, np.zeros((COUNT, 2))], 1).astype(np.float32)

@@ -1,15 +1,14 @@
 """The benchmarks compare equal controllers and equal problems."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import optimum, peers_setups
+from benchmarks import optimum, problem
 from benchmarks.host_builds import build, plans
-from benchmarks.ours import bundle_program, peers_model, place_bundle, place_rollout, rollout_program
-from benchmarks.peers_programs import Cost, Program
+from benchmarks.ours import PEERS_MODEL, Ours, bundle, rollout
+from benchmarks.programs import Cost
 from benchmarks.searches import Array
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
@@ -24,15 +23,10 @@ def random_inputs(n: int) -> Array:
     return inputs
 
 
-def plan_all(
-    settings: Settings,
-    place: Callable[[Settings, Path], None],
-    program: Callable[[str, Settings], Program],
-    folder: Path,
-) -> list[Array]:
+def plan_all(program: Ours, folder: Path) -> list[Array]:
     """Return the plans (n, 4) of a build, with a reset before each input, and without."""
-    place(settings, folder)
-    library = build(program("", settings), folder, ("-O0",), folder / "library.so")
+    program.write(folder)
+    library = build(program, folder, "-O0", folder / "library.so")
     return [plans(library, random_inputs(600), follows=follows)[1] for follows in (False, True)]
 
 
@@ -41,8 +35,8 @@ def test_plain_roll_out_plans_what_the_generated_c_plans(preset: str, tmp_path: 
     """In double both have the same plans, with and without lag, with and without warm start."""
     require("gcc", "gcc")
     settings = with_option(presets.load(preset), "code.scalar", "float64", "test")
-    ours = plan_all(settings, place_bundle, bundle_program, tmp_path / "ours")
-    plain = plan_all(settings, place_rollout, rollout_program, tmp_path / "plain")
+    ours = plan_all(bundle("ours", "", settings), tmp_path / "ours")
+    plain = plan_all(rollout("plain", "", settings), tmp_path / "plain")
     for mine, theirs in zip(ours, plain, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=0, atol=1e-6)
         assert np.ptp(mine, axis=0).min() > 0.1
@@ -51,21 +45,21 @@ def test_plain_roll_out_plans_what_the_generated_c_plans(preset: str, tmp_path: 
 def test_optimum_is_of_the_problem_of_the_peers() -> None:
     """Its rows are the weighted errors and changes of the peers' condensed problem."""
     inputs = random_inputs(30)
-    found = optimum.problems(peers_model(), inputs)
-    from_state, from_moves = peers_setups.condensed()
+    found = optimum.problems(PEERS_MODEL, inputs)
+    from_state, from_moves = problem.condensed()
     before = np.hstack([inputs[:, 4:], np.zeros((30, 2))])
-    weights = np.repeat([peers_setups.TRACKING, peers_setups.EFFORT], [20, 4])
-    rows = np.vstack([from_moves, peers_setups.changes()])
+    weights = np.repeat([problem.TRACKING, problem.EFFORT], [20, 4])
+    rows = np.vstack([from_moves, problem.CHANGES])
     offset = np.hstack([inputs[:, :4] @ from_state.T, -before])
     np.testing.assert_allclose(
         found.slope, np.tile(weights[:, None] * rows, (30, 1, 1)), rtol=1e-12, atol=1e-12
     )
     np.testing.assert_allclose(found.offset, weights * offset, rtol=1e-12, atol=1e-9)
-    assert found.limit_rad == peers_setups.TILT_RAD
+    assert found.limit_rad == problem.TILT_RAD
 
 
 @pytest.mark.parametrize("kind", ["1-norm", "quadratic"])
-@pytest.mark.parametrize("settings", [peers_model(), presets.load("mambo")], ids=["no lag", "lag"])
+@pytest.mark.parametrize("settings", [PEERS_MODEL, presets.load("mambo")], ids=["no lag", "lag"])
 def test_no_neighbour_of_the_optimum_costs_less(kind: Cost, settings: Settings) -> None:
     """Both costs are convex, so a plan that no small step within the limit improves is optimal."""
     inputs = random_inputs(30)
@@ -73,5 +67,5 @@ def test_no_neighbour_of_the_optimum_costs_less(kind: Cost, settings: Settings) 
     least = optimum.costs(kind, settings, inputs, best)
     steps = np.random.default_rng(1).choice([-1e-3, 0.0, 1e-3], (100, *best.shape))
     for step in steps:
-        moved = np.clip(best + step, -peers_setups.TILT_RAD, peers_setups.TILT_RAD)
+        moved = np.clip(best + step, -problem.TILT_RAD, problem.TILT_RAD)
         assert np.all(optimum.costs(kind, settings, inputs, moved) >= least * (1 - 1e-9))
