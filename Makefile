@@ -71,7 +71,7 @@ generated: $(SETUP)
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights
-	$(BIN)/python -m benchmarks.times --python $(PEERS)/bin/python --output build/bench
+	$(BIN)/python -m benchmarks.times
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.peers
