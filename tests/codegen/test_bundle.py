@@ -13,14 +13,6 @@ from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, Unwritable
 from tests.support.bundles import FILES, NEXT, content, expected
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Write the bundle FILES into a folder that is alone in its parent."""
-    folder = tmp_path / "home" / "controller"
-    bundle.write(FILES, folder)
-    return folder
-
-
 def only(folder: Path) -> bool:
     """Whether nothing is left beside `folder`."""
     return [place.name for place in folder.parent.iterdir()] == [folder.name]

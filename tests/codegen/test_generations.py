@@ -14,12 +14,12 @@ from mambo_nmpc.codegen import bundle
 from mambo_nmpc.codegen import render as rendering
 from mambo_nmpc.codegen.atomic import is_left_over
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.model import Settings
-from tests.support.bundles import FILES, NEXT, content, expected
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from tests.support.bundles import FILES, NEXT, content, expected, place
 from tests.support.tools import require
 
 AGAIN = "this file and its headers are of different bundles: run mambo-nmpc generate again"
-MINE = {"src/mine.txt": b"mine", "build/nmpc.o": b"\0"}
+MINE = {"src/mine.txt": "mine", "build/nmpc.o": "\0"}
 
 STOPPED_RUNS = """
 import json, os, shutil, signal, sys
@@ -93,19 +93,14 @@ except UnwritableError as error:
 """A run that may write no more than 20 kB into a file, and prints how it failed."""
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Write the bundle FILES into a folder that is alone in its parent."""
-    folder = tmp_path / "home" / "controller"
-    bundle.write(FILES, folder)
-    return folder
-
-
 @cache
-def generation(preset: str, scalar: str = "float32", *, amalgamate: bool = False) -> dict[str, str]:
-    """Render one of the bundles that are mixed here."""
-    settings = presets.load(preset).model_dump() | {"code": {"scalar": scalar}}
-    return rendering.render(Settings.model_validate(settings), amalgamate=amalgamate, with_digest=False)
+def generation(name: str) -> dict[str, str]:
+    """Render the bundle of a preset, as in "mambo fixed" or "table1 amalgamated"; "" is no bundle."""
+    if not name:
+        return {}
+    preset, *options = name.split()
+    settings = with_option(presets.load(preset), "code.scalar", "fixed" if "fixed" in options else "float32")
+    return rendering.render(settings, amalgamate="amalgamated" in options, with_digest=False)
 
 
 def c_files(files: dict[str, bytes]) -> dict[str, bytes]:
@@ -113,11 +108,11 @@ def c_files(files: dict[str, bytes]) -> dict[str, bytes]:
     return {path: text for path, text in files.items() if path.endswith((".c", ".h"))}
 
 
-def refusal(folder: Path) -> str:
-    """Compile every source in `folder`; return what the compiler said, nothing if all is well."""
+def refusal(folder: Path, *files: str) -> str:
+    """Compile `files`, or every source in `folder`; return what the compiler said, nothing if all is well."""
     require("gcc", "gcc")
-    sources = sorted(str(path.relative_to(folder)) for path in folder.rglob("*.c"))
-    flags = ["-fsyntax-only", "-Iinclude", "-I.", "-DNMPC_SELF_TEST_DIGEST=0UL"]
+    sources = files or sorted(str(path.relative_to(folder)) for path in folder.rglob("*.c"))
+    flags = ["-fsyntax-only", "-Iinclude", "-Isrc", "-I.", "-DNMPC_SELF_TEST_DIGEST=0UL", "-x", "c"]
     done = subprocess.run(["gcc", *flags, *sources], cwd=folder, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == (done.stderr == "")
     return done.stderr
@@ -130,24 +125,18 @@ def run_in_a_process(script: str, files: dict[str, str], *arguments: str | Path)
     return done.stdout + done.stderr
 
 
-def place(files: dict[str, str], folder: Path) -> None:
-    """Write `files` into `folder`."""
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, "utf-8")
-
-
-@pytest.mark.parametrize("amalgamate", [False, True])
-def test_one_file_of_another_generation_stops_the_compiler(tmp_path: Path, *, amalgamate: bool) -> None:
-    """Every C file of the bundle in turn comes from other settings."""
-    ours = generation("mambo", amalgamate=amalgamate)
+@pytest.mark.parametrize(("layout", "count"), [("", 16), ("amalgamated", 5)])
+def test_one_file_of_another_generation_stops_the_compiler(layout: str, count: int, tmp_path: Path) -> None:
+    """Every C file of the bundle in turn comes from other settings; the compiler reads that file alone."""
+    ours, others = (generation(f"{preset} {layout}") for preset in ("mambo", "table1"))
     place(ours, tmp_path)
     assert refusal(tmp_path) == ""
     changed = [path for path in ours if path.endswith((".c", ".h"))]
-    assert len(changed) == (5 if amalgamate else 16)
+    assert len(changed) == count
+    sources = {"include/nmpc_config.h": "src/nmpc.c", "nmpc.h": "nmpc.c"}  # these two state the number
     for path in changed:
-        place({path: generation("table1", amalgamate=amalgamate)[path]}, tmp_path)
-        assert AGAIN in refusal(tmp_path), path
+        place({path: others[path]}, tmp_path)
+        assert AGAIN in refusal(tmp_path, sources.get(path, path)), path
         place({path: ours[path]}, tmp_path)
 
 
@@ -157,24 +146,25 @@ def test_files_of_another_version_stop_the_compiler(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(rendering, "__version__", "99.0")
     newer = rendering.render(presets.load("mambo"), with_digest=False)
     place({"src/nmpc_math.c": newer["src/nmpc_math.c"]}, tmp_path)
-    assert AGAIN in refusal(tmp_path)
+    assert AGAIN in refusal(tmp_path, "src/nmpc_math.c")
 
 
 def test_the_check_carries_the_prefix() -> None:
     """Two controllers in one image have a number each."""
-    files = rendering.render(Settings.model_validate({"code": {"prefix": "roll"}}), with_digest=False)
+    files = rendering.render(with_option(presets.load("mambo"), "code.prefix", "roll"), with_digest=False)
     header = files["include/roll.h"]
     assert "#if !defined(ROLL_SETTINGS_ID) || (ROLL_SETTINGS_ID != 0x" in header
     assert f'#error "{AGAIN}"' in header
     assert "NMPC_SETTINGS_ID" not in "".join(files.values())
 
 
+@pytest.mark.long
 def test_any_mixture_stops_the_compiler(tmp_path: Path) -> None:
     """Each file from one of two generations, at random."""
     random.seed(11)
     one, other = generation("mambo"), generation("table1")
     paths = [path for path in one if path.endswith((".c", ".h"))]
-    for _ in range(10):
+    for _ in range(30):
         chosen = random.sample(paths, random.randint(1, len(paths) - 1))
         place({path: (other if path in chosen else one)[path] for path in paths}, tmp_path)
         assert AGAIN in refusal(tmp_path), chosen
@@ -184,25 +174,24 @@ def test_any_mixture_stops_the_compiler(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "force"),
     [
-        ({}, generation("mambo", amalgamate=True), False),
-        (generation("mambo"), generation("mambo", "fixed"), False),
-        (generation("mambo", "fixed"), generation("table1", amalgamate=True), True),
+        pytest.param("", "mambo amalgamated", False, marks=pytest.mark.long),
+        ("table1 amalgamated", "mambo amalgamated", False),
+        pytest.param("mambo", "mambo fixed", False, marks=pytest.mark.long),
+        pytest.param("mambo fixed", "table1 amalgamated", True, marks=pytest.mark.long),
     ],
-    ids=["first", "next", "layout"],
 )
 def test_run_stopped_anywhere_leaves_no_mixture_that_compiles(
-    tmp_path: Path, old: dict[str, str], new: dict[str, str], force: bool, how: str
+    tmp_path: Path, old: str, new: str, force: bool, how: str
 ) -> None:
     """Every file is old or new; both together do not compile; the same run, repeated, makes it whole."""
     start = tmp_path / "start"
-    for path, mine in MINE.items():
-        (start / path).parent.mkdir(parents=True, exist_ok=True)
-        (start / path).write_bytes(mine)
+    place(MINE, start)
+    mine, files = content(start), generation(new)
     if old:
-        bundle.write(old, start)
-    before = content(start)
-    is_old, is_new = (c_files(expected(files)).items() for files in (old, new))
-    run_in_a_process(STOPPED_RUNS, new, start, tmp_path / "runs", how, str(force))
+        bundle.write(generation(old), start)
+    before, after = content(start), expected(files)
+    is_old, is_new = (c_files(whole).items() for whole in (before, after))
+    run_in_a_process(STOPPED_RUNS, files, start, tmp_path / "runs", how, str(force))
     # No file changes before all new ones are on the disk.
     untouched, said = 0, dict[frozenset[tuple[str, bytes]], str]()
     for folder in (run / "controller" for run in (tmp_path / "runs").iterdir()):
@@ -210,7 +199,7 @@ def test_run_stopped_anywhere_leaves_no_mixture_that_compiles(
         found = {path: text for path, text in laid.items() if not is_left_over(path)}
         untouched += found == before
         assert how == "kill" or laid == found
-        assert MINE.items() <= found.items()
+        assert mine.items() <= found.items()
         state = frozenset(c_files(found).items())
         assert state <= is_old | is_new
         if not (state <= is_old or state <= is_new):
@@ -218,10 +207,10 @@ def test_run_stopped_anywhere_leaves_no_mixture_that_compiles(
                 said[state] = refusal(folder)
             whole = is_old <= state or is_new <= state  # the rest is headers that no source of it includes
             assert AGAIN in said[state] or (whole and said[state] == "")
-        bundle.write(new, folder, force=force)
-        assert content(folder) == {**expected(new), **MINE}
-    assert untouched > len(expected(new).items() - before.items())
-    assert (len(said) > 3) == bool(old)
+        bundle.write(files, folder, force=force)
+        assert content(folder) == after | mine
+    assert untouched > len(after.items() - before.items())
+    assert bool(said) == bool(old)
 
 
 def test_file_edited_during_the_run_is_not_lost(folder: Path) -> None:

@@ -1,5 +1,6 @@
-"""Two small bundles, and what a folder holds that holds one."""
+"""Two small bundles; files put into a folder, and read from it."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from mambo_nmpc.codegen import bundle
@@ -11,6 +12,14 @@ FILES = {
     "src/a.c": "µ\n",
 }
 NEXT = {"README.md": "What.\n", "include/nmpc.h": "/* next */\n", "src/nmpc.c": "int x;\n", "src/b.c": "\n"}
+
+
+def place(files: Mapping[str, str], folder: Path) -> Path:
+    """Write `files`, {relative path: text}, into `folder`, and return it."""
+    for path, text in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, "utf-8")
+    return folder
 
 
 def content(folder: Path) -> dict[str, bytes]:

@@ -13,6 +13,7 @@ from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
 from mambo_nmpc.codegen.render import render, with_prefix
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.extension import batch_source
+from tests.support.bundles import place
 from tests.support.tools import require
 
 _FUNCTIONS: Final = {
@@ -51,9 +52,7 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
     files = render(settings, amalgamate=amalgamate, with_digest=False) | {
         "batch.c": with_prefix(batch, prefix)
     }
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, "utf-8")
+    place(files, folder)
     suffixes = ["-Wunsuffixed-float-constants"] if (compiler, scalar) == ("gcc", "float32") else []
     flags = [*COMPILE_FLAGS, *WARNING_FLAGS, *suffixes, "-Werror", "-fPIC", "-shared"]
     sources = sorted(path for path in files if re.fullmatch(r"(src/)?[^/]*\.c", path))

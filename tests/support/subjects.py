@@ -1,12 +1,18 @@
 """Subjects of checks: a bundle on disk, as it is generated or with something put wrong."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.calls import Tape, answers
+from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Subject
+from tests.support.bundles import place
+from tests.support.tools import require
 
 
 class Harm(NamedTuple):
@@ -32,8 +38,13 @@ def subject(
             right, wrong = re.escape(right), wrong.replace("\\", r"\\")
         files[path], count = re.subn(right, wrong, files[path], count=1)
         assert count == 1, "the template moved on: the harm must follow"
-    for path, text in files.items():
-        (folder / "controller" / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / "controller" / path).write_text(text, "utf-8")
     (folder / "evidence").mkdir()
-    return Subject(settings, folder / "controller", folder / "evidence")
+    return Subject(settings, place(files, folder / "controller"), folder / "evidence")
+
+
+def played_fault(its: Subject, *flags: str, tapes: Sequence[Tape] | None = None) -> str | None:
+    """Build the C with gcc, play `tapes` or all cases, and return what differs from the reference."""
+    played, expected = (tapes, answers(its.settings, tapes)) if tapes else cases(its.settings)
+    replay.write_tapes(its.settings, played, its.folder / "tapes.bin")
+    program = replay.build(its, require("gcc", "gcc"), flags, its.folder)
+    return replay.fault(replay.play(program, its.folder / "tapes.bin", its.settings, played), expected)

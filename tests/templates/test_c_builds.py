@@ -6,6 +6,7 @@ import re
 import subprocess
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -19,6 +20,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.dialects import DIALECTS
+from tests.support.bundles import place
 from tests.support.cases import SCALARS, settings_case
 from tests.support.tools import require
 
@@ -37,20 +39,37 @@ SYSTEM_HEADERS = """
     sys/socket sys/stat sys/time sys/types sys/wait termios threads time uchar unistd wchar wctype
     wordexp
 """
+
+
+def by_default(*names: str) -> list[Any]:
+    """Return the names of all settings as parameters, marked as long except `names`."""
+    return [pytest.param(name, marks=[] if name in names else [pytest.mark.long]) for name in SETTINGS]
+
+
 COMPILER_HELPERS = {"memcpy", "memset"}
 
 
 def placed(settings: Settings, folder: Path, *, amalgamate: bool = False) -> Path:
-    """Write the bundle of `settings` below `folder`, without ceremony."""
-    for path, text in render(settings, amalgamate=amalgamate).items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text)
-    return folder
+    """Write the bundle of `settings` into `folder`, and return it."""
+    return place(render(settings, amalgamate=amalgamate), folder)
 
 
-def renamed(settings: Settings, prefix: str) -> Settings:
-    """Return `settings` with another prefix."""
-    return with_option(settings, "code.prefix", prefix)
+def named(prefix: str, preset: str = "mambo") -> Settings:
+    """Return a preset with a prefix."""
+    return with_option(presets.load(preset), "code.prefix", prefix)
+
+
+@pytest.fixture
+def mambo(tmp_path: Path) -> Path:
+    """Return a folder with the bundle of preset mambo."""
+    return placed(presets.load("mambo"), tmp_path)
+
+
+def refused(*command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command that must fail; returns what it said."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    return done
 
 
 def shell(*command: str | Path, folder: Path) -> str:
@@ -64,27 +83,25 @@ def shell(*command: str | Path, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", by_default("mambo"))
 def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
     """All warnings on and fatal, library, self-test, example and proof."""
     chosen = DIALECTS[dialect]
     require(chosen.compiler, chosen.package)
-    placed(SETTINGS[name], tmp_path)
-    sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
+    sources = sorted(placed(SETTINGS[name], tmp_path).rglob("*.c"))
     shell(*chosen.command(SETTINGS[name]), "-Iinclude", "-c", *sources, folder=tmp_path)
 
 
-@pytest.mark.parametrize("amalgamate", [False, True])
+@pytest.mark.parametrize("amalgamate", [pytest.param(False, marks=pytest.mark.long), True])
 def test_float64_builds_without_a_word(tmp_path: Path, *, amalgamate: bool) -> None:
-    """The same for double, less the one warning of gcc that asks for a suffix C has not got."""
+    """The same for double, without gcc's warning of a missing suffix: C has none for double."""
     require("gcc", "gcc")
-    wide = Settings.model_validate(presets.load("mambo").model_dump() | {"code": {"scalar": "float64"}})
-    placed(wide, tmp_path, amalgamate=amalgamate)
+    placed(with_option(presets.load("mambo"), "code.scalar", "float64"), tmp_path, amalgamate=amalgamate)
     sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
     shell("gcc", "-std=c99", *STRICT, "-O2", "-Iinclude", "-I.", "-c", *sources, folder=tmp_path)
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", by_default("mambo", "fixed mambo"))
 def test_the_objects_need_nothing_from_outside(name: str, tmp_path: Path) -> None:
     """Every undefined symbol is defined by another object of the bundle, or is a helper of the compiler."""
     require("nm", "binutils")
@@ -102,7 +119,7 @@ def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
     """Two controllers of different settings link into one program, and both pass their self-test."""
     require("gcc", "gcc")
     for prefix, preset in (("left", "mambo"), ("right_wing", "table1")):
-        placed(renamed(presets.load(preset), prefix), tmp_path / prefix)
+        placed(named(prefix, preset), tmp_path / prefix)
     (tmp_path / "main.c").write_text(
         '#include "left_self_test.h"\n#include "right_wing_self_test.h"\n'
         "static left_t one;\nstatic right_wing_t two;\n"
@@ -110,19 +127,8 @@ def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
     )
     includes = ["-Ileft/include", "-Iright_wing/include"]
     sources = sorted(tmp_path.glob("*/src/*.c"))
-    shell(
-        "gcc",
-        "-std=c99",
-        *GCC_STRICT,
-        "-O2",
-        "-ffp-contract=off",
-        *includes,
-        *sources,
-        "main.c",
-        "-o",
-        "image",
-        folder=tmp_path,
-    )
+    flags = [*COMPILE_FLAGS, *GCC_STRICT, *includes]
+    shell("gcc", *flags, *sources, "main.c", "-o", "image", folder=tmp_path)
     shell("./image", folder=tmp_path)
 
 
@@ -155,7 +161,7 @@ def test_no_prefix_that_is_admitted_takes_a_name_of_the_system(tmp_path: Path) -
 def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: bool) -> None:
     """`make run`: the self-test passes and the point mass closes in on its target."""
     require("make", "make")
-    placed(renamed(presets.load("mambo"), "drone"), tmp_path, amalgamate=amalgamate)
+    placed(named("drone"), tmp_path, amalgamate=amalgamate)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
     digest = self_test_digest(Design(presets.load("mambo")), 1000)
@@ -182,62 +188,45 @@ def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: s
     assert f"digest: 0x{self_test_digest(Design(settings), 1000):08X} after 100000 steps\n" in printed
 
 
-def test_another_digest_than_the_reference_s_fails_the_example(tmp_path: Path) -> None:
-    """Both digests are said, and the example goes no further."""
+def test_another_digest_than_the_reference_s_fails_the_example(mambo: Path) -> None:
+    """The example prints both digests, and stops."""
     require("make", "make")
-    header = placed(presets.load("mambo"), tmp_path) / "include" / "nmpc_self_test.h"
+    header = mambo / "include" / "nmpc_self_test.h"
     text = header.read_text()
     stated = re.findall(r"#define NMPC_SELF_TEST_DIGEST 0x(\w{8})UL\n", text)
     assert len(stated) == 1
     header.write_text(text.replace(stated[0], "0BADC0DE"))
-    done = subprocess.run(["make", "-s", "run"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert done.stdout.splitlines()[2:] == [
+    assert refused("make", "-s", "run", folder=mambo).stdout.splitlines()[2:] == [
         f"digest: 0x{stated[0]} after 100000 steps",
         "digest: the reference has 0x0BADC0DE",
     ]
 
 
-def test_a_changed_header_is_built_anew(tmp_path: Path) -> None:
+def test_a_changed_header_is_built_anew(mambo: Path) -> None:
     """New settings over a built bundle: the objects follow the header, and the self-test passes."""
     require("make", "make")
-    longer = with_option(presets.load("mambo"), "horizon.prediction", 20)
-    for settings in (presets.load("mambo"), longer):
-        for path, text in render(settings).items():
-            if not (tmp_path / path).is_file() or (tmp_path / path).read_text() != text:
-                (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-                (tmp_path / path).write_text(text)
-                os.utime(tmp_path / path, ns=(time.time_ns() + 10**9,) * 2)
-        done = subprocess.run(
-            ["make", "-s", "run"], cwd=tmp_path, capture_output=True, text=True, check=False
-        )
-        assert "self-test: all steps equal the reference" in done.stdout, done.stderr
+    shell("make", folder=mambo)
+    files = render(with_option(presets.load("mambo"), "horizon.prediction", 20))
+    changed = {path: text for path, text in files.items() if (mambo / path).read_text() != text}
+    place(changed, mambo)
+    for path in changed:
+        os.utime(mambo / path, ns=(time.time_ns() + 10**9,) * 2)
+    assert "all steps equal the reference" in shell("make", "-s", "run", folder=mambo)
 
 
-@pytest.mark.parametrize(
-    "ranges", [{"thrust_acceleration_min_m_s2": 49.0}, {"position_m": 1.0, "velocity_m_s": 0.1}]
-)
-def test_the_example_runs_whatever_the_ranges(ranges: dict[str, float], tmp_path: Path) -> None:
-    """Narrow ranges refuse inputs, and the example says so: they do not fail it."""
+def test_the_example_runs_whatever_the_ranges(tmp_path: Path) -> None:
+    """Narrow ranges refuse inputs; the self-test expects that."""
     require("make", "make")
-    placed(Settings.model_validate({"ranges": ranges}), tmp_path)
+    narrow = {"thrust_acceleration_min_m_s2": 49.0, "position_m": 1.0, "velocity_m_s": 0.1}
+    placed(Settings.model_validate({"ranges": narrow}), tmp_path)
     assert "all steps equal the reference" in shell("make", "-s", "run", folder=tmp_path)
 
 
-def test_the_bundle_builds_by_cmake(tmp_path: Path) -> None:
-    """CMakeLists.txt configures, builds and runs the same example."""
+@pytest.mark.parametrize("amalgamate", [pytest.param(False, marks=pytest.mark.long), True])
+def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path, *, amalgamate: bool) -> None:
+    """The example passes its self-test; `find_package` brings library and headers, under the prefix."""
     require("cmake", "cmake")
-    placed(presets.load("mambo"), tmp_path)
-    shell("cmake", "-S", ".", "-B", "out", folder=tmp_path)
-    shell("cmake", "--build", "out", folder=tmp_path)
-    assert "all steps equal" in shell("out/nmpc_example", folder=tmp_path)
-
-
-@pytest.mark.parametrize("amalgamate", [False, True])
-def test_a_project_finds_the_installed_bundle(tmp_path: Path, *, amalgamate: bool) -> None:
-    """`find_package` brings the library and its headers, under the bundle's prefix."""
-    require("cmake", "cmake")
-    placed(renamed(presets.load("mambo"), "drone"), tmp_path / "drone", amalgamate=amalgamate)
+    placed(named("drone"), tmp_path / "drone", amalgamate=amalgamate)
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.10)\nproject(firmware C)\n"
         "find_package(drone_controller REQUIRED)\nadd_executable(firmware main.c)\n"
@@ -249,6 +238,7 @@ def test_a_project_finds_the_installed_bundle(tmp_path: Path, *, amalgamate: boo
     )
     shell("cmake", "-S", "drone", "-B", "one", folder=tmp_path)
     shell("cmake", "--build", "one", folder=tmp_path)
+    assert "all steps equal" in shell("one/drone_example", folder=tmp_path)
     shell("cmake", "--install", "one", "--prefix", "installed", folder=tmp_path)
     shell("cmake", "-S", ".", "-B", "two", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", folder=tmp_path)
     shell("cmake", "--build", "two", folder=tmp_path)
@@ -281,31 +271,24 @@ def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path, 
     assert "-c" in shell("make", folder=tmp_path)
 
 
-def test_make_lists_the_boards_when_it_knows_none_of_that_name(tmp_path: Path) -> None:
+def test_make_lists_the_boards_when_it_knows_none_of_that_name(mambo: Path) -> None:
     """It does not silently build for the host."""
-    require("make", "make")
-    placed(presets.load("mambo"), tmp_path)
-    command = ["make", "BOARD=crazyfly"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert f"BOARD=crazyfly is unknown; the boards are: {' '.join(boards.names())}." in done.stderr
-    assert not (tmp_path / "build").exists()
+    said = refused(require("make", "make"), "BOARD=crazyfly", folder=mambo).stderr
+    assert f"BOARD=crazyfly is unknown; the boards are: {' '.join(boards.names())}." in said
+    assert not (mambo / "build").exists()
 
 
 @pytest.mark.parametrize(
     "flag", ["-ffast-math", "-Ofast", "-ffinite-math-only", "-funsafe-math-optimizations"]
 )
-def test_flags_that_change_the_arithmetic_are_refused(flag: str, tmp_path: Path) -> None:
+def test_flags_that_change_the_arithmetic_are_refused(flag: str, mambo: Path) -> None:
     """They would remove the NaN checks or reorder sums: the build stops and says which flag."""
-    require("gcc", "gcc")
-    placed(presets.load("mambo"), tmp_path)
-    command = ["gcc", flag, "-Iinclude", "-c", "src/nmpc.c"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    assert "build without -f" in done.stderr
+    gcc = require("gcc", "gcc")
+    said = refused(gcc, flag, "-Iinclude", "-fsyntax-only", "src/nmpc.c", folder=mambo).stderr
+    assert "build without -f" in said
 
 
-@pytest.mark.parametrize("name", presets.names())
+@pytest.mark.parametrize("name", by_default("mambo"))
 def test_the_self_test_notices_a_build_that_contracts(name: str, tmp_path: Path) -> None:
     """Fused multiply-adds, where the processor has them, change bits that the vectors see."""
     require("gcc", "gcc")

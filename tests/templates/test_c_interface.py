@@ -174,7 +174,7 @@ def any_number(limit: float, width: Literal[32, 64]) -> st.SearchStrategy[float]
 
 
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: st.DataObject) -> None:
     """Whatever the input, among good ones: a documented status and |command| <= tilt limit."""

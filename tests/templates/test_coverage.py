@@ -11,13 +11,11 @@ import pytest
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify import replay
-from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Subject
 from tests.support.cases import SCALARS, settings_case
 from tests.support.coverage_reasons import REASONS
 from tests.support.reasons import Key, is_explained, plain
-from tests.support.subjects import subject
+from tests.support.subjects import played_fault, subject
 from tests.support.tools import require
 
 MAMBO = presets.load("mambo")
@@ -33,11 +31,7 @@ def counts(its: Subject) -> dict[tuple[str, int], tuple[int, list[int]]]:
     Several objects contain the functions of a header: their counts are added.
     """
     require("gcov", "gcc")
-    tapes, expected = cases(its.settings)
-    replay.write_tapes(its.settings, tapes, its.folder / "tapes.bin")
-    program = replay.build(its, require("gcc", "gcc"), ("--coverage", "-O0"), its.folder)
-    played = replay.play(program, its.folder / "tapes.bin", its.settings, tapes)
-    assert replay.fault(played, expected) is None
+    assert played_fault(its, "--coverage", "-O0") is None
     command = ["gcov", "--json-format", "--branch-probabilities", "--stdout"]
     objects = [str(path) for path in its.folder.glob("*.gcda")]
     done = subprocess.run([*command, *objects], cwd=its.folder, capture_output=True, text=True, check=True)

@@ -91,6 +91,7 @@ def test_a_key_names_one_mutant_whatever_the_settings() -> None:
     assert mutants("a.h", "#define A 0.0f")[0].key == mutants("a.h", "#define A 0.0")[0].key
 
 
+@pytest.mark.long
 def test_mutants_meet_their_fate(tmp_path: Path) -> None:
     """Other bits, undefined behaviour, refused, or the same machine code; then the C is restored."""
     require("gcc", "gcc")

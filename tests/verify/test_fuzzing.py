@@ -12,6 +12,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify import fuzzing, replay
 from mambo_nmpc.sil.verify.check import CheckOutcome
+from tests.support.bundles import place
 from tests.support.cases import settings_case
 from tests.support.subjects import subject
 from tests.support.tools import require
@@ -113,9 +114,7 @@ def test_the_same_runs_keep_the_same_corpus(tmp_path: Path) -> None:
 @pytest.mark.parametrize("amalgamate", [False, True])
 def test_the_command_in_the_harness_works(tmp_path: Path, *, amalgamate: bool) -> None:
     """A user repeats the fuzzing from the bundle alone."""
-    for path, text in render(presets.load("mambo"), amalgamate=amalgamate).items():
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / path).write_text(text)
+    place(render(presets.load("mambo"), amalgamate=amalgamate), tmp_path)
     comment = (tmp_path / "fuzz/nmpc_fuzz.c").read_text().partition("*/")[0]
     lines = [line.removeprefix(" *   ") for line in comment.splitlines() if line.startswith(" *   ")]
     script = "\n".join(lines).replace("1000000", "1000")

@@ -20,21 +20,11 @@ from mambo_nmpc.sil.verify.calls import (
 )
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Subject
-from tests.support.subjects import subject
-from tests.support.tools import require
+from tests.support.subjects import played_fault, subject
 
 MAMBO = presets.load("mambo")
 GOOD = np.array([[0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9.81]])
 REFUSED = np.full((1, 12), np.nan)
-
-
-def fault_of(made: Subject) -> str | None:
-    """Build, play all cases, and say what differs."""
-    require("gcc", "gcc")
-    tapes, expected = cases(made.settings)
-    replay.write_tapes(made.settings, tapes, made.folder / "tapes.bin")
-    program = replay.build(made, "gcc", ("-O2",), made.folder)
-    return replay.fault(replay.play(program, made.folder / "tapes.bin", made.settings, tapes), expected)
 
 
 def test_the_cases_have_outcomes_of_every_status() -> None:
@@ -59,7 +49,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
 )
 def test_what_differs_is_named(right: str, wrong: str, what: str, tmp_path: Path) -> None:
     """Tape, call and field of the first difference, with both values."""
-    fault = fault_of(subject(MAMBO, tmp_path, ("src/nmpc.c", right, wrong)))
+    fault = played_fault(subject(MAMBO, tmp_path, ("src/nmpc.c", right, wrong)), "-O2")
     assert fault is not None
     assert fault.startswith("tape ")
     assert what in fault
