@@ -17,12 +17,6 @@ HOSTILE = '<img src=x onerror="alert(1)">&.toml'
 
 
 @pytest.fixture
-def _no_compiler(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make a machine without any command."""
-    monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("bin")))
-
-
-@pytest.fixture
 def _crazyflie() -> None:
     """Skip without a compiler for the Crazyflie."""
     compiler = boards.load("crazyflie").compiler
@@ -88,7 +82,7 @@ def test_the_name_of_a_board_is_no_formula(tmp_path: Path) -> None:
     assert r"$\frac{$ &lt;b&gt;  flash" in (tmp_path / "footprint.svg").read_text("utf-8")
 
 
-@pytest.mark.usefixtures("_no_compiler")
+@pytest.mark.usefixtures("_no_tool")
 def test_missing_compilers_are_named() -> None:
     """Exit 2 with every package."""
     _, talk = run("footprint", code=2)
@@ -160,7 +154,7 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
     assert [path.name for path in tmp_path.iterdir()] == ["odd.toml"]
 
 
-@pytest.mark.usefixtures("_no_compiler")
+@pytest.mark.usefixtures("_no_tool")
 def test_a_folder_of_other_work_is_refused_before_measuring(tmp_path: Path) -> None:
     """Nobody waits for a measurement that has nowhere to go."""
     (tmp_path / "taken").mkdir()
@@ -170,7 +164,7 @@ def test_a_folder_of_other_work_is_refused_before_measuring(tmp_path: Path) -> N
     assert "taken: holds files that are not results of mambo-nmpc" in talk
 
 
-@pytest.mark.usefixtures("_no_compiler")
+@pytest.mark.usefixtures("_no_tool")
 def test_same_bits_compares_and_says_what_did_not_run() -> None:
     """The reference alone, where there is no compiler: a digest, and a reason for everything else."""
     options = ["--boards", "mega,crazyflie", "--steps", "100"]
@@ -186,7 +180,7 @@ def test_same_bits_compares_and_says_what_did_not_run() -> None:
     assert "24 not run" in text.splitlines()[-1]
 
 
-@pytest.mark.usefixtures("_no_compiler")
+@pytest.mark.usefixtures("_no_tool")
 def test_the_doctor_answers() -> None:
     """Text for people, JSON for machines, and exit 0 though everything is missing."""
     assert "apt install" in run("doctor")[0]

@@ -311,8 +311,3 @@ def test_help_teaches_by_example(app: typer.Typer, command: str) -> None:
     text = run(app, command, "--help")[0]
     assert command == "presets" or f"mambo-nmpc {command}" in text
     assert "\x1b" not in text
-
-
-def test_version_is_printed(app: typer.Typer) -> None:
-    """--version prints name and version."""
-    assert run(app, "--version")[0].startswith("mambo-nmpc ")

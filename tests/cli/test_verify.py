@@ -15,12 +15,6 @@ from tests.support.tools import require
 HOSTILE = '<img src=x onerror="alert(1)">&.toml'
 
 
-@pytest.fixture
-def _no_tool(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make a machine without any command."""
-    monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("bin")))
-
-
 def ended(*outcomes: CheckOutcome) -> list[Verified]:
     """Return checks that ended so."""
     return [

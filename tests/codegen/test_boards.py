@@ -3,11 +3,9 @@
 import json
 import shutil
 import subprocess
-import tomllib
 from pathlib import Path
 
 import pytest
-from pydantic import ValidationError
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.boards import Board
@@ -16,17 +14,7 @@ from tests.support.tools import require
 
 FOLDER = Path(boards.__file__).parent / "data" / "boards"
 NAMES = ("crazyflie", "mambo", "mega", "rp2040", "rv32", "teensy41")
-SECTIONS = (
-    "core",
-    "fpu",
-    "emulated_core",
-    "clock_hz",
-    "flash_bytes",
-    "ram_bytes",
-    "compiler",
-    "cycles",
-    "budget",
-)
+SECTIONS = sorted(Board.model_fields.keys() - {"name", "title"})
 MACROS: dict[str, dict[str, str | None]] = {
     "crazyflie": {"__ARM_ARCH_7EM__": "1", "__thumb2__": "1", "__ARM_PCS_VFP": "1"},
     "mambo": {"__ARM_ARCH_5TEJ__": "1", "__SOFTFP__": "1", "__pic__": "2", "__pie__": None},
@@ -73,12 +61,6 @@ def compile_empty(board: Board, folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def macros_of(board: Board, folder: Path) -> dict[str, str]:
-    """Return the predefined macros of the board's compiler."""
-    defined = (line.split(maxsplit=2) for line in compile_empty(board, folder, "-dM", "-E").splitlines())
-    return {words[1]: words[2] if len(words) > 2 else "" for words in defined}
-
-
 def fpu_of(macros: dict[str, str]) -> str:
     """Return the widest format that the FPU computes, from __ARM_FP (ACLE) or __riscv_flen."""
     if "__riscv_flen" in macros:
@@ -93,26 +75,17 @@ def test_the_boards_are_those_with_a_file() -> None:
     assert [boards.load(name).name for name in NAMES] == list(NAMES)
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("key", ["source", "confidence"])
 @pytest.mark.parametrize("section", SECTIONS)
-def test_no_value_stands_without_source_and_confidence(
-    section: str, key: str, name: str, tmp_path: Path
-) -> None:
-    """A file without a source or a confidence is refused, with the name of the missing key."""
-    before, header, after = file_of(name).partition(f"[{section}]\n")
+def test_every_section_states_source_and_confidence(section: str, key: str, tmp_path: Path) -> None:
+    """A file without one of them is refused, with the name of the missing key."""
+    before, header, after = file_of("crazyflie").partition(f"[{section}]\n")
     lines = after.splitlines(keepends=True)
     lines.remove(next(line for line in lines if line.startswith(f"{key} =")))
     with pytest.raises(InvalidSettingsError) as caught:
         boards.load(write_board(tmp_path, before + header + "".join(lines)))
     assert len(caught.value.faults) == 1
     assert f"own.toml: {section}.{key} is missing; add it: " in caught.value.faults[0]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_sections_are_all_that_a_file_holds(name: str) -> None:
-    """All values of a file are in sections with a source, except the title."""
-    assert set(tomllib.loads(file_of(name))) == {"title", *SECTIONS}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -123,25 +96,13 @@ def test_the_compiler_accepts_the_flags(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_compiler_confirms_the_core(name: str, tmp_path: Path) -> None:
-    """With the board's flags the compiler defines the macros of its architecture and type sizes."""
-    macros = macros_of(boards.load(name), tmp_path)
-    assert {macro: macros.get(macro) for macro in MACROS[name]} == MACROS[name]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_compiler_confirms_the_fpu(name: str, tmp_path: Path) -> None:
-    """The FPU in the file is the one that the flags select."""
+def test_the_compiler_confirms_core_and_fpu(name: str, tmp_path: Path) -> None:
+    """With the board's flags it defines the macros of architecture, type sizes and the file's FPU."""
     board = boards.load(name)
-    assert fpu_of(macros_of(board, tmp_path)) == board.fpu.value
-
-
-def test_a_board_cannot_be_changed() -> None:
-    """A loaded board is immutable."""
-    board = boards.load("mambo")
-    with pytest.raises(ValidationError, match="frozen"):
-        board.budget.ram_bytes = 1  # type: ignore[misc] # that it is refused is the point
-    assert boards.load("mambo") == board
+    defined = (line.split(maxsplit=2) for line in compile_empty(board, tmp_path, "-dM", "-E").splitlines())
+    macros = {words[1]: words[2] if len(words) > 2 else "" for words in defined}
+    assert {macro: macros.get(macro) for macro in MACROS[name]} == MACROS[name]
+    assert fpu_of(macros) == board.fpu.value
 
 
 def test_name_finds_board_and_path_finds_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -156,11 +117,8 @@ def test_name_finds_board_and_path_finds_file(tmp_path: Path, monkeypatch: pytes
 
 
 @pytest.mark.parametrize("name", ["teensy", "none/board.toml", "a\0b", "x" * 5000, "\x1b[31m"])
-def test_unknown_board_lists_those_there_are(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unknown_board_lists_those_there_are(name: str) -> None:
     """The message for an unknown board lists the named boards and mentions files."""
-    monkeypatch.chdir(tmp_path)
     with pytest.raises(SourceNotFoundError) as caught:
         boards.load(name)
     message = str(caught.value)
@@ -173,65 +131,33 @@ def test_unknown_board_lists_those_there_are(
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ("value = 168_000_000", "value = -1", "clock_hz.value = -1 must be greater than or equal to 1"),
-        ("value = 168_000_000", 'value = "fast"', 'clock_hz.value = "fast" must be a valid integer'),
-        ("value = 168_000_000", "value = true", "clock_hz.value = true must be a valid integer"),
+        ("168_000_000", "-1", "clock_hz.value = -1 must be greater than or equal to 1"),
+        ("168_000_000", '"fast"', 'clock_hz.value = "fast" must be a valid integer'),
+        ("168_000_000", "true", "clock_hz.value = true must be a valid integer"),
         (
-            "value = 168_000_000",
-            f"value = 0x{'f' * 6000}",
-            "clock_hz.value = a value too long to repeat must be less than or equal to 100000000000",
+            "168_000_000",
+            f"0x{'f' * 6000}",
+            "clock_hz.value = a value too long to repeat must be less than or",
         ),
         ('value = "single"', 'value = "half"', "fpu.value = \"half\" must be 'none', 'single' or 'double'"),
-        (
-            "period_share = 0.1",
-            "period_share = 1.5",
-            "budget.period_share = 1.5 must be less than or equal to 1",
-        ),
-        ("period_share = 0.1", "period_share = nan", "budget.period_share = NaN must be a finite number"),
-        (
-            "flash_bytes = 16_384",
-            "flash_bytes = 1_048_577",
-            "budget.flash_bytes = 1048577 must lie in 1..1048576 (flash_bytes.value)",
-        ),
+        ("share = 0.1\n", "share = 1.5\n", "budget.period_share = 1.5 must be less than or equal to 1"),
+        ("share = 0.1\n", "share = nan\n", "budget.period_share = NaN must be a finite number"),
+        ("16_384", "1_048_577", "budget.flash_bytes = 1048577 must lie in 1..1048576 (flash_bytes.value)"),
         (
             "stack_bytes = 1_024",
             "stack_bytes = 195_585",
-            "budget.ram_bytes + stack_bytes = 196609 must lie in 2..196608 (ram_bytes.value)",
+            "ram_bytes + stack_bytes = 196609 must lie in 2..196608",
         ),
         ("stack_bytes = 1_024\n", "", "budget.stack_bytes is missing; add it: stack of one step, in bytes"),
         ("[clock_hz]", "[clok_hz]", "clok_hz is not a key of a board; did you mean clock_hz?"),
-        (
-            "[cycles]",
-            "[cycles]\nodd = 1",
-            "cycles.odd is not a key of a board; its keys are source, confidence",
-        ),
-        (
-            'candidates = ["arm-none-eabi-gcc"]',
-            "candidates = []",
-            "compiler.candidates = [] must have at least 1 item",
-        ),
+        ("[cycles]", "[cycles]\nodd = 1", "cycles.odd is not a key of a board; its keys are source"),
+        ('["arm-none-eabi-gcc"]', "[]", "compiler.candidates = [] must have at least 1 item"),
         ('"-mthumb"', "7", "compiler.flags.1 = 7 must be a valid string"),
-        (
-            'title = "Bitcraze Crazyflie 2.1"',
-            'title = "two\\nlines"',
-            'title = "two\\nlines" must be printable, without line ends and control characters',
-        ),
-        (
-            'value = "single"',
-            f"value{'.a' * 2_000} = 1",
-            "fpu.value = a value too long to repeat must be 'none', 'single' or 'double'",
-        ),
-        (
-            "title =",
-            "fpu_bits = 32\ntitle =",
-            "fpu_bits is not a key of a board; its keys are title, core, fpu",
-        ),
+        ('title = "', 'title = "two\\nlines', "must be printable, without line ends and control characters"),
+        ('= "single"', f"{'.a' * 2_000} = 1", "fpu.value = a value too long to repeat must be 'none'"),
+        ("title =", "bits = 32\ntitle =", "bits is not a key of a board; its keys are title, core, fpu"),
         ("title =", "core = 5\ntitle =", "Cannot overwrite a value; write each section and key once: [core]"),
-        (
-            "title =",
-            'name = "own"\ntitle =',
-            "name is not a key of a board; remove it, the file name is the name",
-        ),
+        ("title =", 'name = "own"\ntitle =', "name is not a key of a board; remove it, the file name"),
         ("title =", "title", "line 3"),
     ],
 )
@@ -267,8 +193,8 @@ def test_a_board_runs_compilers_of_the_path_alone(command: str, tmp_path: Path) 
             "-m a",
             "-mx\n",
             "-m\0x",
-            "",
             "-D$(id)",
+            "",
         ),
     ],
 )
@@ -315,16 +241,7 @@ def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
     assert len(caught.value.faults) == 1 + len(SECTIONS)
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe", b"#" * 64_001, b"a = " + b"[" * 60_000])
-def test_file_that_is_no_toml_is_unreadable(content: bytes, tmp_path: Path) -> None:
-    """Wrong encodings, huge files and deep nesting are refused with a message."""
-    path = tmp_path / "own.toml"
-    path.write_bytes(content)
-    with pytest.raises(UnreadableFileError, match=r"own\.toml: (line 1: )?is "):
-        boards.load(str(path))
-
-
 def test_folder_is_unreadable(tmp_path: Path) -> None:
-    """A folder is not a board."""
+    """A file of a board is read as one of settings, and what is refused there is refused here."""
     with pytest.raises(UnreadableFileError, match="is a folder"):
         boards.load(str(tmp_path))

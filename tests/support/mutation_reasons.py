@@ -6,7 +6,7 @@ from typing import Any, Final
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.settings.model import Settings
-from tests.support.reasons import Reason
+from tests.support.reasons import Reason, always
 
 
 def _steps_stay_short(settings: Settings) -> bool:
@@ -23,16 +23,11 @@ def _steps_stay_long(settings: Settings) -> bool:
     return shortest > 1.01 * optimizer.step_min_rad
 
 
-def _is_float32(settings: Settings) -> bool:
-    return settings.code.scalar == "float32"
+def _has_scalar(scalar: str) -> Callable[[Settings], bool]:
+    return lambda settings: settings.code.scalar == scalar
 
 
-def _is_float64(settings: Settings) -> bool:
-    return settings.code.scalar == "float64"
-
-
-def _is_fixed(settings: Settings) -> bool:
-    return settings.code.scalar == "fixed"
+_is_float32, _is_float64, _is_fixed = map(_has_scalar, ("float32", "float64", "fixed"))
 
 
 def _axes_alike(settings: Settings) -> bool:
@@ -72,49 +67,51 @@ def _does_not_show(of: str, change: int) -> Callable[[Settings], bool]:
     return holds
 
 
+_CONFIG: Final = "include/nmpc_config.h"
 _MOST_WALKED: Final = 8
 """Iterations up to which every path of step sizes is walked: three ways on from each."""
 
 _STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
 _EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
-_REFUSED: Final = "stands for what no format holds; no range contains it, nor its neighbour, nor -2^31"
-_SIGN: Final = "of a slope and of a direction only the sign is read"
+_REFUSED: Final = "saturation value: no range contains it, its neighbours or -2^31"
+_TURNS: Final = (
+    "of all float32 numbers in range, tried one by one, only +-0.78539807 falls into another quadrant; "
+    "its sine and cosine have the same bits in both"
+)
 _THIRD: Final = (
-    "not the same, and out of sight: the third part, 3.5e-27, changes a sine that is nearly zero, and every "
-    "outcome adds a multiple of the cosine to that"
+    "not the same, but without effect: the third part, 3.5e-27, changes a sine that is nearly zero, and "
+    "every outcome adds a multiple of the cosine to that"
 )
-_PROVEN: Final = (
-    "never read before it is written again; written all the same, so that a proof need not know why"
-)
+_PROVEN: Final = "not read before it is written again; it is written so that the proof need not know why"
 _TERMS: Final = "the table grows by a zero, and a polynomial by a term of zero, which changes no bit"
-
-_PARTS: Final = (
-    "the count bounds the loop for all to see; errors change their sign less often, and so end it first"
-)
+_PARTS: Final = "the counter bounds the loop for static analysis; the sign changes run out first"
 _FAINT: Final = (
-    "not the same, and out of sight: no gradient is a single number, 4e-9 or less, unless products of "
+    "not the same, but without effect: a gradient is a single number, 4e-9 or less, only if products of "
     "weights and slopes a million times as large cancel to that"
 )
+_ROUNDED: Final = "rounds to the same steps on every path that the iterations there are can take"
+
+_ABSOLUTE: Final = "return (value < (nmpc_sum_t)0) ? -value : value;"
+_SIGN: Final = "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);"
+_CHANGES: Final = "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {"
+_STEP_MAX: Final = "#define NMPC_STEP_MAX_RAD <{}> /* Delta_max, Table I */"
+_STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
+
+
+def _reasons(
+    file: str, line: str, reason: str, *faults: str, holds: Callable[[Settings], bool] = always
+) -> tuple[Reason, ...]:
+    """Make a row for each of the faults of a line."""
+    return tuple(Reason(file, line, what, reason, holds) for what in faults)
+
+
+_NEAREST: Final = ("one more", "one less")
 
 REASONS: Final[tuple[Reason, ...]] = (
-    *(
-        Reason(
-            "src/nmpc_cost.c",
-            "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {",
-            what,
-            _PARTS,
-        )
-        for what in ("1 -> 0", "1 -> 2", "< -> <=", "++ -> --")
-    ),
-    *(
-        Reason(
-            "src/nmpc_math.h",
-            "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);",
-            what,
-            _FAINT,
-            _is_fixed,
-        )
-        for what in ("0 -> 1", "0 -> (-1) #1")
+    *_reasons("src/nmpc_cost.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
+    *_reasons("src/nmpc_math.h", _SIGN, _FAINT, "0 -> 1", "0 -> (-1) #1", holds=_is_fixed),
+    *_reasons(
+        "src/nmpc_math.h", _SIGN, "only the sign of a slope or direction is read", "1 -> 2", "1 -> 2 #1"
     ),
     *(
         Reason(
@@ -125,121 +122,73 @@ REASONS: Final[tuple[Reason, ...]] = (
         )
         for axis in ("roll", "pitch")
     ),
-    Reason("src/nmpc_optimizer.c", "rprop[k].previous_rad = self->plan_rad[k];", "left out", _PROVEN),
-    Reason(
-        "include/nmpc_config.h",
-        "#define NMPC_STEP_MAX_RAD <real> /* Delta_max, Table I */",
-        "next number",
-        _STEPS,
-        _steps_stay_short,
-    ),
+    *_reasons("src/nmpc_optimizer.c", "rprop[k].previous_rad = self->plan_rad[k];", _PROVEN, "left out"),
+    *_reasons(_CONFIG, _STEP_MAX.format("real"), _STEPS, "next number", holds=_steps_stay_short),
+    *_reasons(_CONFIG, _STEP_MIN.format("real"), _STEPS, "next number", "negative", holds=_steps_stay_long),
+    *_reasons(_CONFIG, _STEP_MAX.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_short),
+    *_reasons(_CONFIG, _STEP_MIN.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_long),
     *(
         Reason(
-            "include/nmpc_config.h",
-            "#define NMPC_STEP_MIN_RAD <real> /* Delta_min, Table I */",
-            what,
-            _STEPS,
-            _steps_stay_long,
-        )
-        for what in ("next number", "negative")
-    ),
-    *(
-        Reason(
-            "include/nmpc_config.h",
-            f"#define NMPC_STEP_{end}_RAD <number> /* Delta_{end.lower()}, Table I */",
-            what,
-            _STEPS,
-            holds,
-        )
-        for end, holds in (("MAX", _steps_stay_short), ("MIN", _steps_stay_long))
-        for what in ("one more", "one less")
-    ),
-    *(
-        Reason(
-            "include/nmpc_config.h",
+            _CONFIG,
             f"#define NMPC_{factor.upper()} <number> /* {symbol}, Table I */",
             what,
-            "rounds to the same steps, on every path that the iterations there are can take",
+            _ROUNDED,
             _does_not_show(factor, change),
         )
         for factor, symbol in (("increase", "eta+"), ("decrease", "eta-"))
         for what, change in (("one more", 1), ("one less", -1))
     ),
-    Reason(
+    *_reasons(
         "src/nmpc_math.h",
-        "return (value < (nmpc_sum_t)0) ? -value : value;",
+        _ABSOLUTE,
+        "a cost that falls by one number has converged either way",
         "0 -> (-1)",
-        "a cost that falls by one number is at rest either way",
-        _tolerates_one,
+        holds=_tolerates_one,
     ),
-    *(
-        Reason("src/nmpc_float.c", "nmpc_real_t number = <number>;", what, _REFUSED)
-        for what in ("one more", "one less")
-    ),
-    Reason(
+    *_reasons("src/nmpc_math.h", _ABSOLUTE, "zero negated is zero", "< -> <=", holds=_is_fixed),
+    *_reasons("src/nmpc_float.c", "nmpc_real_t number = <number>;", _REFUSED, *_NEAREST),
+    *_reasons(
         "src/nmpc_float.c",
         "if ((scaled > -NMPC_NUMBERS_END) && (scaled < NMPC_NUMBERS_END)) {",
-        "> -> >=",
         _REFUSED,
+        "> -> >=",
     ),
-    *(
-        Reason(
-            "src/nmpc_float.c",
-            "status = nmpc_step(self, NULL, NULL, 0, &fixed_command);",
-            what,
-            "null pointers are refused before the thrust is looked at",
-        )
-        for what in ("0 -> 1", "0 -> (-1)")
+    *_reasons(
+        "src/nmpc_float.c",
+        "status = nmpc_step(self, NULL, NULL, 0, &fixed_command);",
+        "null pointers are refused before the thrust is read",
+        "0 -> 1",
+        "0 -> (-1)",
     ),
-    Reason(
-        "src/nmpc_math.h",
-        "return (value < (nmpc_sum_t)0) ? -value : value;",
-        "< -> <=",
-        "zero negated is zero",
-        _is_fixed,
-    ),
-    *(
-        Reason(
-            "src/nmpc_math.h",
-            "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);",
-            what,
-            _SIGN,
-        )
-        for what in ("1 -> 2", "1 -> 2 #1")
-    ),
-    Reason("src/nmpc_math.h", "return (a < b) ? a : b;", "< -> <=", _EQUAL),
-    Reason("src/nmpc_math.h", "return (a > b) ? a : b;", "> -> >=", _EQUAL),
+    *_reasons("src/nmpc_math.h", "return (a < b) ? a : b;", _EQUAL, "< -> <="),
+    *_reasons("src/nmpc_math.h", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
     *(
         Reason("src/nmpc_math.c", f"#define NMPC_{series}_TERMS {terms}", f"{terms} -> {terms + 1}", _TERMS)
         for series, terms in (("SINE", 4), ("COSINE", 5), ("SINE", 8), ("COSINE", 8))
     ),
-    Reason(
+    *_reasons(
         "src/nmpc_math.c",
         "const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));",
+        "with turns = 0 the quadrant is 0, half added or subtracted",
         "< -> <=",
-        "no turn at all, less or more a half, is quadrant 0 either way",
     ),
-    *(
-        Reason("src/nmpc_math.c", line, what, _THIRD, _is_float64)
-        for line, what in (
-            ("<real>, <real>, <real>", "negative #2"),
-            ("<real>, <real>, <real>", "a thousandth more #2"),
-            ("- (count * quarter_turn_rad[2]);", "- -> +"),
-        )
+    *_reasons(
+        "src/nmpc_math.c",
+        "<real>, <real>, <real>",
+        _THIRD,
+        "negative #2",
+        "a thousandth more #2",
+        holds=_is_float64,
     ),
-    Reason(
+    *_reasons("src/nmpc_math.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
+    *_reasons(
         "src/nmpc_predictor.h",
         "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_PER_RESPONSE)",
-        "/ -> *",
         "a wider table, whose further columns nobody reads",
-        _axes_alike,
+        "/ -> *",
+        holds=_axes_alike,
     ),
-    Reason(
-        "src/nmpc_math.c",
-        "const nmpc_real_t half = <real>;",
-        "next number",
-        "of all float32 numbers in range, tried one by one, only +-0.78539807 falls into another quadrant; "
-        "its sine and cosine have the same bits in both",
-        _is_float32,
+    *_reasons(
+        "src/nmpc_math.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32
     ),
 )

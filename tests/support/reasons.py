@@ -10,7 +10,8 @@ Key = tuple[str, str, str]
 """File, line, and what happens there, spelled by `plain`, so that the key stays valid when the line moves."""
 
 
-def _always(_: Settings) -> bool:
+def always(_: Settings) -> bool:
+    """Hold for all settings."""
     return True
 
 
@@ -22,7 +23,7 @@ class Reason:
     line: str
     what: str
     reason: str
-    holds: Callable[[Settings], bool] = _always
+    holds: Callable[[Settings], bool] = always
 
     @property
     def key(self) -> Key:
