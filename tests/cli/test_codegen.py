@@ -10,12 +10,11 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-import typer
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli, command, errors
+from mambo_nmpc.codegen import errors
 from mambo_nmpc.codegen.settings import controller_toml, presets
 from mambo_nmpc.codegen.settings.model import Settings
+from tests.support.command import run
 
 COMMAND = "from mambo_nmpc.codegen import cli, command; app = command.root(); cli.register(app); app()"
 INTERRUPTED = """
@@ -28,70 +27,60 @@ app()
 """
 
 
-@pytest.fixture(scope="module")
-def app() -> typer.Typer:
-    """Build the command with the sub-commands of codegen."""
-    app = command.root()
-    cli.register(app)
-    return app
-
-
-def run(app: typer.Typer, *arguments: str, code: int = 0) -> tuple[str, str]:
-    """Run the command, demand its exit code, and return stdout and stderr."""
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == code, result.output
-    return result.stdout, result.stderr
+def run_script(script: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a script in a process of its own."""
+    line = [sys.executable, "-c", script, *arguments]
+    return subprocess.run(line, capture_output=True, text=True, env=os.environ | environment, check=False)
 
 
 def run_limited(*arguments: str) -> None:
     """Run the command where no file may have more than 1 kB, and demand a message of one line."""
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); "
-    command = [sys.executable, "-c", limit + COMMAND, *arguments]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    result = run_script(limit + COMMAND, *arguments)
     assert (result.returncode, result.stderr.count("\n")) == (2, 1), result.stderr
     assert "cannot be written: File too large" in result.stderr
 
 
-def test_init_writes_the_commented_settings_of_a_preset(app: typer.Typer) -> None:
+def test_init_writes_the_commented_settings_of_a_preset() -> None:
     """The file that init writes reads back as the preset, mambo if none is named."""
-    run(app, "init")
-    run(app, "init", "table1", "-o", "paper.toml")
+    run("init")
+    run("init", "table1", "-o", "paper.toml")
     assert presets.load("controller.toml") == presets.preset("mambo")
     assert presets.load("paper.toml") == presets.preset("table1")
 
 
-def test_init_overwrites_only_by_force(app: typer.Typer) -> None:
+def test_init_overwrites_only_by_force() -> None:
     """A controller.toml somebody worked on stays until --force."""
     Path("controller.toml").write_text("mine", encoding="utf-8")
-    _, talk = run(app, "init", code=2)
+    _, talk = run("init", code=2)
     assert talk == "controller.toml: already exists; name another with -o, or overwrite it with --force\n"
     assert Path("controller.toml").read_text(encoding="utf-8") == "mine"
-    run(app, "init", "--force")
+    run("init", "--force")
     assert presets.load("controller.toml") == presets.preset("mambo")
 
 
-def test_init_to_stdout_prints_the_file_alone(app: typer.Typer) -> None:
+def test_init_to_stdout_prints_the_file_alone() -> None:
     """With -o - the settings are the whole of stdout."""
-    text, talk = run(app, "init", "-o", "-")
+    text, talk = run("init", "-o", "-")
     assert controller_toml.parse(text, "stdout") == presets.preset("mambo")
     assert talk == ""
     assert not Path("controller.toml").exists()
 
 
-def test_init_makes_the_folder_of_its_file(app: typer.Typer) -> None:
+def test_init_makes_the_folder_of_its_file() -> None:
     """A folder that is not there is made, as generate makes it."""
-    run(app, "init", "-o", "made/too/controller.toml")
+    run("init", "-o", "made/too/controller.toml")
     assert [path.name for path in Path("made/too").iterdir()] == ["controller.toml"]
 
 
 @pytest.mark.parametrize("force", [[], ["--force"]])
-def test_init_that_fails_leaves_everything_as_it_was(app: typer.Typer, force: list[str]) -> None:
+def test_init_that_fails_leaves_everything_as_it_was(force: list[str]) -> None:
     """No half file, no folder made for it, and the old file whole; what is no file is not replaced."""
     Path("file").touch()
-    talk = run(app, "init", "-o", "file/controller.toml", *force, code=2)[1]
+    talk = run("init", "-o", "file/controller.toml", *force, code=2)[1]
     assert talk == "file/controller.toml: cannot be written: Not a directory\n"
     Path("folder").mkdir()
-    assert "is not a file" in run(app, "init", "-o", "folder", *force, code=2)[1]
+    assert "is not a file" in run("init", "-o", "folder", *force, code=2)[1]
     Path("controller.toml").write_text("mine", encoding="utf-8")
     run_limited("init", "-o", "new/controller.toml", *force)
     run_limited("init", "-o", "controller.toml", "--force")
@@ -99,124 +88,122 @@ def test_init_that_fails_leaves_everything_as_it_was(app: typer.Typer, force: li
     assert sorted(path.name for path in Path().iterdir()) == ["controller.toml", "file", "folder"]
 
 
-def test_init_writes_where_a_link_leads(app: typer.Typer) -> None:
+def test_init_writes_where_a_link_leads() -> None:
     """Settings kept elsewhere and linked to stay linked to."""
     Path("kept.toml").touch()
     Path("controller.toml").symlink_to("kept.toml")
-    run(app, "init", "--force")
+    run("init", "--force")
     assert Path("controller.toml").is_symlink()
     assert presets.load("kept.toml") == presets.preset("mambo")
 
 
-def test_presets_lists_every_preset_with_its_use(app: typer.Typer) -> None:
+def test_presets_lists_every_preset_with_its_use() -> None:
     """People get a line per preset, machines a JSON object."""
-    lines = run(app, "presets")[0].splitlines()
+    lines = run("presets")[0].splitlines()
     described = {name: presets.description(name) for name in presets.names()}
     assert {line.split()[0]: line.split(maxsplit=1)[1] for line in lines} == described
-    assert json.loads(run(app, "presets", "--json")[0]) == described
+    assert json.loads(run("presets", "--json")[0]) == described
 
 
-def test_schema_prints_the_json_schema(app: typer.Typer) -> None:
+def test_schema_prints_the_json_schema() -> None:
     """What schema prints is a JSON schema that every preset fits."""
-    schema = json.loads(run(app, "schema")[0])
+    schema = json.loads(run("schema")[0])
     for name in presets.names():
         jsonschema.validate(presets.preset(name).model_dump(), schema)
 
 
-def test_generate_reports_what_it_did(app: typer.Typer) -> None:
+def test_generate_reports_what_it_did() -> None:
     """The first run creates; a second, from the bundle's own controller.toml, finds nothing to do."""
-    created, talk = run(app, "generate", "-o", "out")
+    created, talk = run("generate", "-o", "out")
     assert "created src/nmpc.c\n" in created
     assert talk == f"out: written, settings {presets.preset('mambo').digest[:16]}\n"
     assert {line.split()[1] for line in created.splitlines()} == {
         path.relative_to("out").as_posix() for path in Path("out").rglob("*") if path.is_file()
     }
-    assert run(app, "generate", "out/controller.toml", "-o", "out")[0] == ""
+    assert run("generate", "out/controller.toml", "-o", "out")[0] == ""
 
 
-def test_generate_as_json_tells_digest_and_files(app: typer.Typer) -> None:
+def test_generate_as_json_tells_digest_and_files() -> None:
     """Machines get the outcome of a run, dry or not, as one JSON object."""
-    dry = json.loads(run(app, "generate", "-o", "out", "--dry-run", "--json")[0])
+    dry = json.loads(run("generate", "-o", "out", "--dry-run", "--json")[0])
     assert not Path("out").exists()
-    real = json.loads(run(app, "generate", "-o", "out", "--json")[0])
+    real = json.loads(run("generate", "-o", "out", "--json")[0])
     assert (dry.pop("dry_run"), real.pop("dry_run")) == (True, False)
     assert dry == real
     assert real["digest"] == presets.preset("mambo").digest
     assert "manifest.json" in real["created"]
 
 
-def test_check_passes_on_an_up_to_date_folder(app: typer.Typer) -> None:
+def test_check_passes_on_an_up_to_date_folder() -> None:
     """No output and exit code 0 where nothing drifted."""
-    run(app, "generate", "table1", "-o", "out")
-    assert run(app, "generate", "table1", "-o", "out", "--check") == ("", "out: up to date\n")
+    run("generate", "table1", "-o", "out")
+    assert run("generate", "table1", "-o", "out", "--check") == ("", "out: up to date\n")
 
 
-def test_check_shows_drift_and_exits_1(app: typer.Typer) -> None:
+def test_check_shows_drift_and_exits_1() -> None:
     """A changed file is shown as a diff, to machines as JSON, and stays as it is."""
-    run(app, "generate", "-o", "out")
+    run("generate", "-o", "out")
     source = Path("out/src/nmpc.c")
     source.write_text(source.read_text(encoding="utf-8") + "/* by hand */\n", encoding="utf-8")
-    diff, talk = run(app, "generate", "-o", "out", "--check", code=1)
+    diff, talk = run("generate", "-o", "out", "--check", code=1)
     assert "--- src/nmpc.c (on disk)\n+++ src/nmpc.c (generated)\n" in diff
     assert "\n-/* by hand */\n" in diff
     assert talk.startswith("out: not up to date")
-    (drift,) = json.loads(run(app, "generate", "-o", "out", "--check", "--json", code=1)[0])["drifts"]
+    (drift,) = json.loads(run("generate", "-o", "out", "--check", "--json", code=1)[0])["drifts"]
     assert (drift["path"], drift["kind"]) == ("src/nmpc.c", "changed")
     assert "by hand" in source.read_text(encoding="utf-8")
 
 
-def test_generate_keeps_edited_files_until_forced(app: typer.Typer) -> None:
+def test_generate_keeps_edited_files_until_forced() -> None:
     """An edited file is named and kept; --force takes it back."""
-    run(app, "generate", "-o", "out")
+    run("generate", "-o", "out")
     Path("out/Makefile").write_text("mine", encoding="utf-8")
-    assert "Makefile (edited by hand)" in run(app, "generate", "-o", "out", code=2)[1]
-    assert run(app, "generate", "-o", "out", "--force")[0] == "changed Makefile\n"
+    assert "Makefile (edited by hand)" in run("generate", "-o", "out", code=2)[1]
+    assert run("generate", "-o", "out", "--force")[0] == "changed Makefile\n"
 
 
 def test_letters_that_the_terminal_has_not_are_shown_by_number() -> None:
     """An edit in another script, on a terminal of another: the diff is shown, not a traceback."""
-    subprocess.run([sys.executable, "-c", COMMAND, "generate", "-o", "out"], capture_output=True, check=True)
+    run("generate", "-o", "out")
     with Path("out/README.md").open("a", encoding="utf-8") as file:
         file.write("\N{EURO SIGN}\n")
-    command = [sys.executable, "-c", COMMAND, "generate", "-o", "out", "--check"]
-    latin = os.environ | {"PYTHONIOENCODING": "latin-1"}
-    result = subprocess.run(command, capture_output=True, env=latin, check=False)
+    result = run_script(COMMAND, "generate", "-o", "out", "--check", PYTHONIOENCODING="latin-1")
     assert result.returncode == 1, result.stderr
-    assert b"\n-\\u20ac\n" in result.stdout
+    assert "\n-\\u20ac\n" in result.stdout
 
 
-def test_name_of_a_removed_file_moves_no_cursor(app: typer.Typer) -> None:
+def test_name_of_a_removed_file_moves_no_cursor() -> None:
     """A manifest may have come from elsewhere, with any names in it."""
     name = "a\x1b[31m\udcffb"
-    run(app, "generate", "-o", "out")
+    run("generate", "-o", "out")
     Path("out", name).write_bytes(b"")
     listed = json.loads(Path("out/manifest.json").read_text("utf-8"))
     listed["files"][name] = hashlib.sha256(b"").hexdigest()
     Path("out/manifest.json").write_text(json.dumps(listed), "utf-8")
-    assert run(app, "generate", "-o", "out")[0] == "changed manifest.json\nremoved a\\x1b[31m\\udcffb\n"
+    assert run("generate", "-o", "out")[0] == "changed manifest.json\nremoved a\\x1b[31m\\udcffb\n"
 
 
-def test_check_refuses_options_that_write(app: typer.Typer) -> None:
+def test_check_refuses_options_that_write() -> None:
     """--check with --force would promise what it does not do."""
-    assert "--check" in run(app, "generate", "-o", "out", "--check", "--force", code=2)[1]
+    assert "--check" in run("generate", "-o", "out", "--check", "--force", code=2)[1]
 
 
 @pytest.mark.parametrize("prefix", ["roll", "nmpc_left", "left_nmpc"])
-def test_options_override_the_settings_and_the_bundle_remembers(app: typer.Typer, prefix: str) -> None:
+def test_options_override_the_settings_and_the_bundle_remembers(prefix: str) -> None:
     """--prefix and --scalar end up in the bundle's controller.toml, which generates the same bundle."""
-    run(app, "generate", "-o", "out", "--prefix", prefix, "--scalar", "float64")
+    run("generate", "-o", "out", "--prefix", prefix, "--scalar", "float64")
     written = presets.load("out/controller.toml")
     assert (written.code.prefix, written.code.scalar) == (prefix, "float64")
     assert written.cost == Settings().cost
     assert Path(f"out/include/{prefix}.h").is_file()
-    run(app, "generate", "out/controller.toml", "-o", "out", "--check")
+    run("generate", "out/controller.toml", "-o", "out", "--check")
 
 
-def test_amalgamated_bundle_is_one_header_and_one_source(app: typer.Typer) -> None:
+def test_amalgamated_bundle_is_one_header_and_one_source() -> None:
     """--amalgamate puts the library into two files, and replaces a bundle of many only by force."""
-    run(app, "generate", "-o", "out")
-    assert "leave out --amalgamate" in run(app, "generate", "-o", "out", "--amalgamate", code=2)[1]
-    run(app, "generate", "-o", "out", "--amalgamate", "--force")
+    run("generate", "-o", "out")
+    assert "leave out --amalgamate" in run("generate", "-o", "out", "--amalgamate", code=2)[1]
+    run("generate", "-o", "out", "--amalgamate", "--force")
     assert sorted(path.name for path in Path("out").glob("*.[ch]")) == ["nmpc.c", "nmpc.h"]
     assert not Path("out/src").exists()
 
@@ -230,12 +217,10 @@ def test_amalgamated_bundle_is_one_header_and_one_source(app: typer.Typer) -> No
         (["slow.toml"], "slow.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)"),
     ],
 )
-def test_bad_input_gets_a_message_and_exit_code_2(
-    app: typer.Typer, arguments: list[str], message: str
-) -> None:
+def test_bad_input_gets_a_message_and_exit_code_2(arguments: list[str], message: str) -> None:
     """What the user got wrong is said on stderr without a traceback, and nothing is written."""
     Path("slow.toml").write_text("horizon.control = 11", encoding="utf-8")
-    results, talk = run(app, "generate", "-o", "out", *arguments, code=2)
+    results, talk = run("generate", "-o", "out", *arguments, code=2)
     assert results == ""
     assert talk.startswith(message)
     assert "Traceback" not in talk
@@ -244,8 +229,7 @@ def test_bad_input_gets_a_message_and_exit_code_2(
 
 def test_debug_shows_the_traceback() -> None:
     """With --debug an error arrives whole."""
-    command = [sys.executable, "-c", COMMAND, "--debug", "generate", "nope", "-o", "out"]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    result = run_script(COMMAND, "--debug", "generate", "nope", "-o", "out")
     assert "Traceback" in result.stderr
     assert "SourceNotFoundError: nope is neither" in result.stderr
 
@@ -285,29 +269,27 @@ def test_what_the_system_refuses_gets_a_message(error: str, message: str) -> Non
     """An error that no command expects is one line, with --debug a traceback too."""
     script = INTERRUPTED.replace("KeyboardInterrupt", error)
     for debug in ([], ["--debug"]):
-        command = [sys.executable, "-c", script, *debug, "stop"]
-        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        result = run_script(script, *debug, "stop")
         assert result.returncode == 2
         assert result.stderr.endswith(message)
         assert (result.stderr == message) is not bool(debug)
 
 
-def test_root_help_names_the_exit_codes(app: typer.Typer) -> None:
+def test_root_help_names_the_exit_codes() -> None:
     """Whoever writes a script finds them without the source."""
-    text = run(app, "--help")[0]
+    text = run("--help")[0]
     assert all(str(number) in text for number in (errors.BAD_INPUT, errors.INTERRUPTED, errors.NO_READER))
 
 
 def test_ctrl_c_exits_130() -> None:
     """An interrupted command says so by its exit code, without a traceback."""
-    command = [sys.executable, "-c", INTERRUPTED, "stop"]
-    result = subprocess.run(command, capture_output=True, check=False)
-    assert (result.returncode, result.stderr) == (errors.INTERRUPTED, b"")
+    result = run_script(INTERRUPTED, "stop")
+    assert (result.returncode, result.stderr) == (errors.INTERRUPTED, "")
 
 
 @pytest.mark.parametrize("command", ["init", "presets", "schema", "generate"])
-def test_help_teaches_by_example(app: typer.Typer, command: str) -> None:
+def test_help_teaches_by_example(command: str) -> None:
     """Every command explains itself, and those with options show examples."""
-    text = run(app, command, "--help")[0]
+    text = run(command, "--help")[0]
     assert command == "presets" or f"mambo-nmpc {command}" in text
     assert "\x1b" not in text

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import INTERRUPTED
-from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
-from tests.support.command import command
+from tests.support.command import command, run
 
 
 def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
@@ -32,9 +31,7 @@ def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
 
 def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     """CSV and NPZ of the same length, a summary, PNG and SVG; the metrics on stdout."""
-    done = command("fly", "--duration-s", "2", "-o", "out", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "IAE" in done.stdout
+    assert "IAE" in run("fly", "--duration-s", "2", "-o", "out")[0]
     out = tmp_path / "out"
     assert {path.name for path in out.iterdir()} == {
         "trace.csv",
@@ -51,38 +48,32 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     assert "<svg" in (out / "flight.svg").read_text()
 
 
-def test_reference_and_compiled_flights_print_the_same(tmp_path: Path) -> None:
+def test_reference_and_compiled_flights_print_the_same() -> None:
     """--controller reference flies the very same flight as the C."""
-    flights = [
-        command("fly", "--duration-s", "1", "--controller", kind, "--json", "-o", kind, folder=tmp_path)
+    nmpc, reference = (
+        json.loads(run("fly", "--duration-s", "1", "--controller", kind, "--json", "-o", kind)[0])
         for kind in ("nmpc", "reference")
-    ]
-    assert [flight.returncode for flight in flights] == [0, 0], flights[0].stderr
-    metrics = [json.loads(flight.stdout)["metrics"] for flight in flights]
-    assert metrics[0] == metrics[1]
+    )
+    assert nmpc["metrics"] == reference["metrics"]
 
 
 @pytest.mark.parametrize("trajectory", ["gerono", "lissajous", "circle", "hover", "step"])
-def test_every_curve_flies(trajectory: str, tmp_path: Path) -> None:
+def test_every_curve_flies(trajectory: str) -> None:
     """Each named trajectory, with wind, heading, motor lag and a start from the ground."""
     options = ["--wind", "0.2,-0.1", "--yaw-rad", "0.5", "--motor-lag-s", "0.02", "--start", "take-off"]
-    done = command(
-        "fly", "--trajectory", trajectory, *options, "--duration-s", "1", "--json", folder=tmp_path
-    )
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["lost"] is False
+    said, _ = run("fly", "--trajectory", trajectory, *options, "--duration-s", "1", "--json")
+    assert json.loads(said)["lost"] is False
 
 
 def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
     """The same seed gives the same flight, another another; true and seen metrics are told apart."""
     options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "1", "--json"]
     flights = [
-        command("fly", *options, "--seed", seed, "-o", f"{number}", folder=tmp_path)
+        run("fly", *options, "--seed", seed, "-o", f"{number}")[0]
         for number, seed in enumerate(("7", "7", "8"))
     ]
-    assert flights[0].returncode == 0, flights[0].stderr
-    assert flights[0].stdout == flights[1].stdout
-    first, _, third = (json.loads(flight.stdout) for flight in flights)
+    assert flights[0] == flights[1]
+    first, _, third = map(json.loads, flights)
     assert first["metrics"] != first["metrics_as_seen"]
     assert first["metrics"] != third["metrics"]
     assert (first["seed"], first["sensors"], first["wind_m_s2"]) == (7, "mambo", [0, 0])
@@ -93,8 +84,7 @@ def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
 def test_waypoints_fly(tmp_path: Path) -> None:
     """A CSV file is a trajectory."""
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,0,0\n1,0.2,0.1\n")
-    done = command("fly", "--trajectory", "way.csv", "--duration-s", "2", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
+    run("fly", "--trajectory", "way.csv", "--duration-s", "2")
 
 
 @pytest.mark.parametrize(
@@ -125,46 +115,39 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
     (tmp_path / "a-file").write_text("")
     (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.012\n")
     before = sorted(tmp_path.rglob("*"))
-    done = command("fly", *arguments, folder=tmp_path)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert "Traceback" not in done.stderr
+    said, talk = run("fly", *arguments, code=2)
+    assert (said, message in talk, "Traceback" in talk) == ("", True, False), talk
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
     """More than half of the inputs refused: exit 1, with the range that was exceeded."""
     (tmp_path / "deaf.toml").write_text("[ranges]\nthrust_acceleration_min_m_s2 = 20.0\n")
-    done = command("fly", "deaf.toml", "--controller", "reference", "--duration-s", "1", folder=tmp_path)
-    assert done.returncode == 1
-    assert "101 steps: thrust out of range, 9.81..9.81 m/s^2 where ranges" in done.stdout
-    assert "thrust_acceleration_* = 20..50; the last command was kept" in done.stdout
-    assert "NOT CONTROLLED" in done.stdout
+    said, _ = run("fly", "deaf.toml", "--controller", "reference", "--duration-s", "1", code=1)
+    assert "101 steps: thrust out of range, 9.81..9.81 m/s^2 where ranges" in said
+    assert "thrust_acceleration_* = 20..50; the last command was kept" in said
+    assert "NOT CONTROLLED" in said
 
 
-def test_refusals_during_lift_off_are_explained(tmp_path: Path) -> None:
+def test_refusals_during_lift_off_are_explained() -> None:
     """They belong to every start from the ground, which does well."""
     options = ["--controller", "reference", "--start", "take-off", "--duration-s", "0.1"]
-    done = command("fly", *options, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "77 steps during lift-off: thrust out of range" in done.stdout
+    assert "77 steps during lift-off: thrust out of range" in run("fly", *options)[0]
 
 
-def test_a_flight_just_longer_than_the_transient_has_no_second_column(tmp_path: Path) -> None:
+def test_a_flight_just_longer_than_the_transient_has_no_second_column() -> None:
     """10.001 s are flown as 10 s, of which nothing is left after 10 s."""
-    done = command("fly", "--controller", "pd", "--duration-s", "10.001", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "after 10 s" not in done.stdout
+    assert "after 10 s" not in run("fly", "--controller", "pd", "--duration-s", "10.001")[0]
 
 
 def test_the_summary_repeats_the_flight(tmp_path: Path) -> None:
     """Everything asked for is in it, what was not flown is null, and stdout has the same text."""
     options = ["--controller", "pd", "--wind", "90,0", "--duration-s", "40", "--trajectory", "way.csv"]
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,9000,0\n")
-    done = command("fly", *options, "--json", folder=tmp_path)
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert done.stdout == (tmp_path / "flight" / "summary.json").read_text()
-    summary = json.loads(done.stdout, parse_constant=pytest.fail)
+    said, talk = run("fly", *options, "--json", code=1)
+    assert talk.count("\n") == 1
+    assert said == (tmp_path / "flight" / "summary.json").read_text()
+    summary = json.loads(said, parse_constant=pytest.fail)
     assert summary["lost"]
     assert summary["metrics"]["iae_m_s"] is None
     assert len(summary["trajectory_sha256"]) == 64
@@ -186,8 +169,7 @@ def test_pictures_heed_no_settings_of_the_user(tmp_path: Path, monkeypatch: pyte
 
 def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
     """A limit on the size of files stands for it: one line, exit 2, and the old flight is whole."""
-    first = command("fly", "--controller", "pd", "--duration-s", "0.1", folder=tmp_path)
-    assert first.returncode == 0, first.stderr
+    run("fly", "--controller", "pd", "--duration-s", "0.1")
     before = {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()}
     script = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
@@ -199,23 +181,16 @@ def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
     assert {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()} == before
 
 
-def test_a_missing_compiler_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exit 2, and what to install."""
     monkeypatch.setenv("CC", "no-such-compiler")
-    done = command("fly", "--duration-s", "1", folder=tmp_path)
-    assert done.returncode == 2
-    assert "no-such-compiler" in done.stderr
-    assert "Traceback" not in done.stderr
+    _, talk = run("fly", "--duration-s", "1", code=2)
+    assert "no-such-compiler" in talk
+    assert "Traceback" not in talk
 
 
 def test_flying_again_overwrites_our_own_results(tmp_path: Path) -> None:
     """The second flight into a folder replaces the first."""
     for duration in ("0.1", "0.2"):
-        done = command("fly", "--controller", "pd", "--duration-s", duration, folder=tmp_path)
-        assert done.returncode == 0, done.stderr
+        run("fly", "--controller", "pd", "--duration-s", duration)
     assert json.loads((tmp_path / "flight" / "summary.json").read_text())["duration_s"] == 0.2
-
-
-def test_the_default_flight_is_the_table_2_case() -> None:
-    """100 s, as in the paper."""
-    assert Flight.__dataclass_fields__["duration_s"].default == 100.0

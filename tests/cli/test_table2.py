@@ -6,17 +6,14 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.sil.paper.table2 import Claim, Table2Row, Table2Summary, table2_text
-from tests.support.command import command
+from tests.support.command import run
 
 
 @pytest.mark.long
 def test_table2_judges_the_claims(tmp_path: Path) -> None:
     """The PD row is reproduced, table1 and mambo beat the claim, the printed step does not fly."""
-    done = command("table2", "--json", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    verdicts = {
-        claim["text"].split(" improves")[0]: claim["holds"] for claim in json.loads(done.stdout)["claims"]
-    }
+    claims = json.loads(run("table2", "--json")[0])["claims"]
+    verdicts = {claim["text"].split(" improves")[0]: claim["holds"] for claim in claims}
     assert verdicts == {
         "the PD of Table II flies Bernoulli 0.5 rad/s": True,
         "the PD of Table II flies Bernoulli 0.25 rad/s": False,
@@ -27,28 +24,25 @@ def test_table2_judges_the_claims(tmp_path: Path) -> None:
         "table1-printed": False,
     }
     assert (tmp_path / "table2" / "figure3.png").is_file()
-    mixed = command("fly", "-o", "table2", folder=tmp_path)
-    assert (mixed.returncode, "holds results of table2, not of fly" in mixed.stderr) == (2, True)
+    assert "holds results of table2, not of fly" in run("fly", "-o", "table2", code=2)[1]
 
 
 @pytest.mark.long
-def test_table2_flies_the_presets_in_another_scalar_type(tmp_path: Path) -> None:
+def test_table2_flies_the_presets_in_another_scalar_type() -> None:
     """The row of a preset is what `fly` has of it with the same option."""
-    done = command("table2", "--scalar", "fixed", "--json", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
+    summary = json.loads(run("table2", "--scalar", "fixed", "--json")[0])
     assert summary["scalar"] == "fixed"
     row = next(row for row in summary["rows"] if row["controller"] == "mambo")
-    flown = command("fly", "--scalar", "fixed", "--json", folder=tmp_path)
-    assert json.loads(flown.stdout)["metrics"]["iae_m_s"] == row["measured"][0]
+    flown = json.loads(run("fly", "--scalar", "fixed", "--json")[0])
+    assert flown["metrics"]["iae_m_s"] == row["measured"][0]
 
 
 @pytest.mark.parametrize("sensors", [[], ["--sensors"]])
 def test_table2_refuses_an_unknown_scalar_type(sensors: list[str], tmp_path: Path) -> None:
     """Before anything flies or is written, with what there is."""
-    done = command("table2", "--scalar", "flat", *sensors, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith('--scalar: code.scalar = "flat" must be "float32" or ')
+    said, talk = run("table2", "--scalar", "flat", *sensors, code=2)
+    assert said == ""
+    assert talk.startswith('--scalar: code.scalar = "flat" must be "float32" or ')
     assert not list(tmp_path.iterdir())
 
 

@@ -5,16 +5,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-import typer
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from mambo_nmpc.codegen import cli, command
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from tests.support import command
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.strategies import Broken, any_settings, broken_settings, settings_in
@@ -27,14 +25,6 @@ VALID_EACH, BROKEN_EACH = 28, 56
 STEPS = 4
 USUAL_WORK = 10_000
 """Predicted steps times moves times iterations up to which a hundred controllers step side by side."""
-
-
-@pytest.fixture(scope="module")
-def app() -> typer.Typer:
-    """Build the command with the sub-commands of codegen."""
-    app = command.root()
-    cli.register(app)
-    return app
 
 
 def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> None:
@@ -50,12 +40,12 @@ def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> N
     assert differences(expected, found) == {}
 
 
-def is_refused_in_words(app: typer.Typer, broken: Broken, folder: Path) -> None:
+def is_refused_in_words(broken: Broken, folder: Path) -> None:
     """Demand exit code 2, nothing written, and one line that names file, key, value and rule."""
     (folder / "own.toml").write_text(broken.text, "utf-8")
-    result = CliRunner().invoke(app, ["generate", str(folder / "own.toml"), "-o", str(folder / "out")])
-    assert (result.exit_code, result.stdout) == (2, ""), result.output
-    (line,) = result.stderr.splitlines()
+    said, talk = command.run("generate", str(folder / "own.toml"), "-o", str(folder / "out"), code=2)
+    assert said == ""
+    (line,) = talk.splitlines()
     assert line.isprintable()
     name, _, fault = line.partition(": ")
     assert name.endswith("own.toml")
@@ -76,13 +66,13 @@ def over_valid_settings(drawn: st.SearchStrategy[Settings], examples: int) -> Ca
     return test
 
 
-def over_broken_settings(app: typer.Typer, examples: int, folder: Path) -> Callable[[], None]:
+def over_broken_settings(examples: int, folder: Path) -> Callable[[], None]:
     """Return the test of `examples` settings with one broken rule each."""
 
     @settings(max_examples=examples)
     @given(broken_settings())
     def test(broken: Broken) -> None:
-        is_refused_in_words(app, broken, folder)
+        is_refused_in_words(broken, folder)
 
     return test
 
@@ -93,9 +83,9 @@ def test_a_few_settings_go_the_whole_way(scalar: str) -> None:
     over_valid_settings(settings_in(scalar), 2)()
 
 
-def test_some_broken_settings_are_refused_in_words(app: typer.Typer, tmp_path: Path) -> None:
+def test_some_broken_settings_are_refused_in_words(tmp_path: Path) -> None:
     """Any one broken rule: a line that names file, key, value and rule, exit code 2, nothing written."""
-    over_broken_settings(app, 40, tmp_path)()
+    over_broken_settings(40, tmp_path)()
 
 
 @pytest.mark.long
@@ -107,8 +97,6 @@ def test_five_hundred_settings_go_the_whole_way(shard: int) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
-def test_a_thousand_broken_settings_are_refused_in_words(
-    app: typer.Typer, tmp_path: Path, shard: int
-) -> None:
+def test_a_thousand_broken_settings_are_refused_in_words(tmp_path: Path, shard: int) -> None:
     """All shards together: 1000 different ways to break one rule."""
-    seed(shard)(over_broken_settings(app, BROKEN_EACH, tmp_path))()
+    seed(shard)(over_broken_settings(BROKEN_EACH, tmp_path))()
