@@ -50,15 +50,17 @@ def modules() -> dict[str, Path]:
 
 
 @cache
-def tree(module: str) -> ast.Module:
-    """Parse a module."""
-    return ast.parse(modules()[module].read_text("utf-8"))
+def nodes(module: str) -> list[ast.AST]:
+    """Return the imports and classes of a module."""
+    found = ast.walk(ast.parse(modules()[module].read_text("utf-8")))
+    return [node for node in found if isinstance(node, ast.Import | ast.ImportFrom | ast.ClassDef)]
 
 
-def imported(module: str) -> set[str]:
+@cache
+def imported(module: str) -> frozenset[str]:
     """Return the names that a module imports anywhere in it, of ours those of modules and packages."""
     names: set[str] = set()
-    for node in ast.walk(tree(module)):
+    for node in nodes(module):
         if isinstance(node, ast.Import):
             names |= {ours(alias.name) for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -66,7 +68,7 @@ def imported(module: str) -> set[str]:
             source = ours(node.module or "")
             inside = {f"{source}.{alias.name}" for alias in node.names}
             names |= (inside & modules().keys()) | ({source} if inside - modules().keys() else set())
-    return names
+    return frozenset(names)
 
 
 def ours(name: str) -> str:
@@ -125,7 +127,7 @@ def test_one_class_name_is_one_class() -> None:
     homes = defaultdict(list)
     for module in modules():
         if not module.startswith("tests"):
-            for node in ast.walk(tree(module)):
+            for node in nodes(module):
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     homes[node.name].append(module)
     assert not {name: where for name, where in homes.items() if len(where) > 1}

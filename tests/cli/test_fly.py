@@ -57,7 +57,13 @@ def test_reference_and_compiled_flights_print_the_same() -> None:
     assert nmpc["metrics"] == reference["metrics"]
 
 
-@pytest.mark.parametrize("trajectory", ["gerono", "lissajous", "circle", "hover", "step"])
+@pytest.mark.parametrize(
+    "trajectory",
+    [
+        "lissajous",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("gerono", "circle", "hover", "step")),
+    ],
+)
 def test_every_curve_flies(trajectory: str) -> None:
     """Each named trajectory, with wind, heading, motor lag and a start from the ground."""
     options = ["--wind", "0.2,-0.1", "--yaw-rad", "0.5", "--motor-lag-s", "0.02", "--start", "take-off"]
@@ -67,7 +73,7 @@ def test_every_curve_flies(trajectory: str) -> None:
 
 def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
     """The same seed gives the same flight, another another; true and seen metrics are told apart."""
-    options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "1", "--json"]
+    options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "0.2", "--json"]
     flights = [
         run("fly", *options, "--seed", seed, "-o", f"{number}")[0]
         for number, seed in enumerate(("7", "7", "8"))

@@ -36,7 +36,10 @@ def _compilers() -> None:
 @pytest.mark.usefixtures("_compilers")
 @pytest.mark.parametrize(
     "settings",
-    [MAMBO, with_option(settings_case(6, "float64"), "code.prefix", "left_wing")],
+    [
+        pytest.param(MAMBO, marks=pytest.mark.long),
+        with_option(settings_case(6, "float64"), "code.prefix", "left_wing"),
+    ],
     ids=["mambo", "left_wing"],
 )
 def test_every_build_has_the_bits_of_the_reference(settings: Settings, tmp_path: Path) -> None:
@@ -50,7 +53,10 @@ def test_every_build_has_the_bits_of_the_reference(settings: Settings, tmp_path:
 @pytest.mark.usefixtures("_compilers")
 @pytest.mark.parametrize(
     ("scalar", "fault", "word"),
-    [("float32", WRONG_COMMAND, "command_rad"), ("fixed", WRONG_SCALE, "the self-test fails")],
+    [
+        ("float32", WRONG_COMMAND, "command_rad"),
+        pytest.param("fixed", WRONG_SCALE, "the self-test fails", marks=pytest.mark.long),
+    ],
 )
 def test_another_bit_fails(scalar: str, fault: tuple[str, str, str], word: str, tmp_path: Path) -> None:
     """In the controller, and in the functions around it that take floats."""

@@ -43,9 +43,8 @@ def _cppcheck() -> None:
     require("cppcheck", "cppcheck")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name == "mambo" else [pytest.mark.long]) for name in SETTINGS]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> None:
     """MISRA C:2012 and cppcheck's own findings, whatever the settings."""
     its = subject(SETTINGS[name], tmp_path)
