@@ -56,16 +56,13 @@ def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("_no_tool")
 def test_without_tools_the_verdict_is_incomplete(tmp_path: Path) -> None:
     """Exit 1, never "passed", and every package that is missing is named; the C is kept all the same."""
-    said, _ = run("verify", "--only", "warnings,rules,proof", code=1)
+    checks = ["warnings", "rules", "proof", "sanitizers", "fuzzing", "bits"]
+    said, _ = run("verify", "--only", ",".join(checks), code=1)
     lines = said.splitlines()
-    assert [line.split()[:2] for line in lines[:3]] == [
-        ["warnings", "incomplete"],
-        ["rules", "incomplete"],
-        ["proof", "incomplete"],
-    ]
+    assert [line.split()[:2] for line in lines[: len(checks)]] == [[name, "incomplete"] for name in checks]
     for package in ("gcc", "g++", "clang", "cppcheck", "frama-c-base"):
         assert f"Debian's package {package} brings it" in said
-    assert lines[-1].startswith("verdict: incomplete (3 incomplete)")
+    assert lines[-1].startswith("verdict: incomplete (6 incomplete)")
     assert (tmp_path / "verification" / "controller" / "src" / "nmpc.c").is_file()
 
 

@@ -2,31 +2,22 @@
 
 from typing import Final
 
-from mambo_nmpc.codegen.settings.model import Settings
-from tests.support.reasons import Reason
+from tests.support.reasons import Reason, reasons
 
 _SELF_TEST: Final = (
     "a build that computes the bits of the reference passes its self-test: it never finds a difference"
 )
-
-
-def _has_one_move(settings: Settings) -> bool:
-    return settings.horizon.control == 1
-
+_STATUS_AND_ROLL: Final = (
+    "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)"
+)
+_FILE: Final = "src/nmpc_self_test.c"
 
 REASONS: Final[tuple[Reason, ...]] = (
+    *reasons(_FILE, _STATUS_AND_ROLL, _SELF_TEST, "branch 1 never taken", "branch 3 never taken"),
     *(
-        Reason("src/nmpc_self_test.c", line, what, _SELF_TEST)
+        Reason(_FILE, line, what, _SELF_TEST)
         for line, what in (
             ("if ((first_difference == 0)", "branch 1 never taken"),
-            (
-                "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)",
-                "branch 1 never taken",
-            ),
-            (
-                "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)",
-                "branch 3 never taken",
-            ),
             ("&& (command.pitch_rad == expected->command.pitch_rad)", "branch 1 never taken"),
             ("&& (nmpc_last_cost(scratch) == expected->cost)", "branch 1 never taken"),
             ("&& (scratch->gradient[0] == expected->gradient[0])", "branch 1 never taken"),
@@ -34,17 +25,17 @@ REASONS: Final[tuple[Reason, ...]] = (
             ("first_difference = i + 1;", "never run"),
         )
     ),
-    Reason(
+    *reasons(
         "src/nmpc_cost.c",
         "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {",
+        "the counter bounds the loop for static analysis; the sign changes run out first",
         "branch 3 never taken",
-        "the count bounds the loop for all to see; changes of sign run out before",
     ),
-    Reason(
+    *reasons(
         "src/nmpc_predictor.h",
         "const nmpc_real_t *previous_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;",
-        "branch 0 never taken",
         "with one move in the control horizon none follows another",
-        _has_one_move,
+        "branch 0 never taken",
+        holds=lambda settings: settings.horizon.control == 1,
     ),
 )

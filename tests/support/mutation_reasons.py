@@ -6,7 +6,7 @@ from typing import Any, Final
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.settings.model import Settings
-from tests.support.reasons import Reason, always
+from tests.support.reasons import Reason, reasons
 
 
 def _steps_stay_short(settings: Settings) -> bool:
@@ -96,21 +96,12 @@ _SIGN: Final = "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? 
 _CHANGES: Final = "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {"
 _STEP_MAX: Final = "#define NMPC_STEP_MAX_RAD <{}> /* Delta_max, Table I */"
 _STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
-
-
-def _reasons(
-    file: str, line: str, reason: str, *faults: str, holds: Callable[[Settings], bool] = always
-) -> tuple[Reason, ...]:
-    """Make a row for each of the faults of a line."""
-    return tuple(Reason(file, line, what, reason, holds) for what in faults)
-
-
 _NEAREST: Final = ("one more", "one less")
 
 REASONS: Final[tuple[Reason, ...]] = (
-    *_reasons("src/nmpc_cost.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
-    *_reasons("src/nmpc_math.h", _SIGN, _FAINT, "0 -> 1", "0 -> (-1) #1", holds=_is_fixed),
-    *_reasons(
+    *reasons("src/nmpc_cost.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
+    *reasons("src/nmpc_math.h", _SIGN, _FAINT, "0 -> 1", "0 -> (-1) #1", holds=_is_fixed),
+    *reasons(
         "src/nmpc_math.h", _SIGN, "only the sign of a slope or direction is read", "1 -> 2", "1 -> 2 #1"
     ),
     *(
@@ -122,11 +113,11 @@ REASONS: Final[tuple[Reason, ...]] = (
         )
         for axis in ("roll", "pitch")
     ),
-    *_reasons("src/nmpc_optimizer.c", "rprop[k].previous_rad = self->plan_rad[k];", _PROVEN, "left out"),
-    *_reasons(_CONFIG, _STEP_MAX.format("real"), _STEPS, "next number", holds=_steps_stay_short),
-    *_reasons(_CONFIG, _STEP_MIN.format("real"), _STEPS, "next number", "negative", holds=_steps_stay_long),
-    *_reasons(_CONFIG, _STEP_MAX.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_short),
-    *_reasons(_CONFIG, _STEP_MIN.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_long),
+    *reasons("src/nmpc_optimizer.c", "rprop[k].previous_rad = self->plan_rad[k];", _PROVEN, "left out"),
+    *reasons(_CONFIG, _STEP_MAX.format("real"), _STEPS, "next number", holds=_steps_stay_short),
+    *reasons(_CONFIG, _STEP_MIN.format("real"), _STEPS, "next number", "negative", holds=_steps_stay_long),
+    *reasons(_CONFIG, _STEP_MAX.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_short),
+    *reasons(_CONFIG, _STEP_MIN.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_long),
     *(
         Reason(
             _CONFIG,
@@ -138,41 +129,41 @@ REASONS: Final[tuple[Reason, ...]] = (
         for factor, symbol in (("increase", "eta+"), ("decrease", "eta-"))
         for what, change in (("one more", 1), ("one less", -1))
     ),
-    *_reasons(
+    *reasons(
         "src/nmpc_math.h",
         _ABSOLUTE,
         "a cost that falls by one number has converged either way",
         "0 -> (-1)",
         holds=_tolerates_one,
     ),
-    *_reasons("src/nmpc_math.h", _ABSOLUTE, "zero negated is zero", "< -> <=", holds=_is_fixed),
-    *_reasons("src/nmpc_float.c", "nmpc_real_t number = <number>;", _REFUSED, *_NEAREST),
-    *_reasons(
+    *reasons("src/nmpc_math.h", _ABSOLUTE, "zero negated is zero", "< -> <=", holds=_is_fixed),
+    *reasons("src/nmpc_float.c", "nmpc_real_t number = <number>;", _REFUSED, *_NEAREST),
+    *reasons(
         "src/nmpc_float.c",
         "if ((scaled > -NMPC_NUMBERS_END) && (scaled < NMPC_NUMBERS_END)) {",
         _REFUSED,
         "> -> >=",
     ),
-    *_reasons(
+    *reasons(
         "src/nmpc_float.c",
         "status = nmpc_step(self, NULL, NULL, 0, &fixed_command);",
         "null pointers are refused before the thrust is read",
         "0 -> 1",
         "0 -> (-1)",
     ),
-    *_reasons("src/nmpc_math.h", "return (a < b) ? a : b;", _EQUAL, "< -> <="),
-    *_reasons("src/nmpc_math.h", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
+    *reasons("src/nmpc_math.h", "return (a < b) ? a : b;", _EQUAL, "< -> <="),
+    *reasons("src/nmpc_math.h", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
     *(
         Reason("src/nmpc_math.c", f"#define NMPC_{series}_TERMS {terms}", f"{terms} -> {terms + 1}", _TERMS)
         for series, terms in (("SINE", 4), ("COSINE", 5), ("SINE", 8), ("COSINE", 8))
     ),
-    *_reasons(
+    *reasons(
         "src/nmpc_math.c",
         "const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));",
         "with turns = 0 the quadrant is 0, half added or subtracted",
         "< -> <=",
     ),
-    *_reasons(
+    *reasons(
         "src/nmpc_math.c",
         "<real>, <real>, <real>",
         _THIRD,
@@ -180,15 +171,13 @@ REASONS: Final[tuple[Reason, ...]] = (
         "a thousandth more #2",
         holds=_is_float64,
     ),
-    *_reasons("src/nmpc_math.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
-    *_reasons(
+    *reasons("src/nmpc_math.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
+    *reasons(
         "src/nmpc_predictor.h",
         "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_PER_RESPONSE)",
         "a wider table, whose further columns nobody reads",
         "/ -> *",
         holds=_axes_alike,
     ),
-    *_reasons(
-        "src/nmpc_math.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32
-    ),
+    *reasons("src/nmpc_math.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32),
 )

@@ -10,8 +10,7 @@ Key = tuple[str, str, str]
 """File, line, and what happens there, spelled by `plain`, so that the key stays valid when the line moves."""
 
 
-def always(_: Settings) -> bool:
-    """Hold for all settings."""
+def _always(_: Settings) -> bool:
     return True
 
 
@@ -23,12 +22,19 @@ class Reason:
     line: str
     what: str
     reason: str
-    holds: Callable[[Settings], bool] = always
+    holds: Callable[[Settings], bool] = _always
 
     @property
     def key(self) -> Key:
         """The key of the exception."""
         return self.file, self.line, self.what
+
+
+def reasons(
+    file: str, line: str, reason: str, *faults: str, holds: Callable[[Settings], bool] = _always
+) -> tuple[Reason, ...]:
+    """Make an exception for each of the faults of a line."""
+    return tuple(Reason(file, line, what, reason, holds) for what in faults)
 
 
 def is_explained(key: Key, reasons: Iterable[Reason], settings: Settings) -> bool:

@@ -120,12 +120,3 @@ def test_the_command_in_the_harness_works(tmp_path: Path, *, amalgamate: bool) -
     done = subprocess.run(["sh", "-ec", script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "Done 1000 runs" in done.stderr
-
-
-def test_without_clang_the_check_is_incomplete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It names what to install, and never passes."""
-    made = subject(presets.load("mambo"), tmp_path)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    result = fuzzing.check(made)
-    assert result.outcome is CheckOutcome.INCOMPLETE
-    assert "Debian's package clang" in result.evidence
