@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import InvalidSettingsError
 from mambo_nmpc.codegen.fixed_point import LARGEST, formats, raw
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.horizon import horizon_tables
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
@@ -180,19 +181,11 @@ def test_numbers_mean_what_was_given() -> None:
 
 def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) -> None:
     """nmpc_float.h and the macros of nmpc_config.h: statuses, commands and costs of the nearest numbers."""
-    require("gcc", "gcc")
-    one = subject(MAMBO, tmp_path)
-    sources = [str(path) for path in (one.bundle / "src").glob("*.c")]
-    flags = [
-        "-std=c99",
-        "-O2",
-        "-ffp-contract=off",
-        "-Wall",
-        "-Wextra",
-        "-Werror",
-        f"-I{one.bundle / 'include'}",
-    ]
-    subprocess.run(["gcc", *flags, *sources, str(CONVERSIONS), "-o", "convert"], cwd=tmp_path, check=True)
+    bundle = subject(MAMBO, tmp_path).bundle
+    sources = [*(bundle / "src").glob("*.c"), CONVERSIONS]
+    flags = [*COMPILE_FLAGS, "-Wall", "-Wextra", "-Werror", f"-I{bundle / 'include'}"]
+    gcc = require("gcc", "gcc")
+    subprocess.run([gcc, *flags, *sources, "-o", "convert"], cwd=tmp_path, check=True)
     rng = np.random.default_rng(0)
     rows = rng.normal(0, 1, (500, 12)).astype(np.float32)
     rows[:, 4:6] *= 0.2

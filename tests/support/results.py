@@ -55,6 +55,7 @@ def fly_folder(folder: Path, *, lost: bool = False) -> None:
     """Write a flight of a controller with a hostile name."""
     flown = trace(lost=lost)
     write_npz(flown, folder / "trace.npz")
+    scenario = Scenario(duration_s=DURATION_S, wind_speed_m_s=3.0)
     FlySummary(
         controller="nmpc",
         board="crazyflie",
@@ -62,18 +63,8 @@ def fly_folder(folder: Path, *, lost: bool = False) -> None:
         source=HOSTILE,
         settings=Settings().digest,
         update_period_s=0.01,
-        trajectory=HOSTILE,
         trajectory_sha256=None,
-        size_m=2.0,
-        rate_rad_s=0.5,
-        yaw_rad=0.0,
-        wind_m_s2=(0.0, 0.0),
-        wind_speed_m_s=3.0,
-        sensors="none",
-        seed=0,
-        motor_lag_s=0.0,
-        start="hover",
-        duration_s=DURATION_S,
+        **scenario.model_dump(include=set(FlySummary.model_fields)) | {"trajectory": HOSTILE},
         **report.judge(flown, Settings()) | {"refusals": [HOSTILE]},
     ).write(folder)
 
@@ -138,13 +129,8 @@ def footprint_folder(folder: Path) -> None:
 
 def sweep_folder(folder: Path) -> None:
     """Write a sweep of four points, one of which did not fly."""
-    points = [
-        Point(
-            prediction, control, 5, 3000 + prediction, 100, 200.0, 4000.0, 0.1, 3.0 / prediction, control < 2
-        )
-        for prediction in (5, 10)
-        for control in (1, 2)
-    ]
+    flown = ((prediction, control) for prediction in (5, 10) for control in (1, 2))
+    points = [Point(np_, nc, 5, 3000 + np_, 100, 200.0, 4000.0, 0.1, 3.0 / np_, nc < 2) for np_, nc in flown]
     points.append(Point(15, 1, 5, 3015, 100, np.nan, np.nan, np.nan, np.nan, False))
     SweepSummary(
         source=HOSTILE,
@@ -184,17 +170,8 @@ def verify_folder(folder: Path) -> None:
 
 def campaign_folder(folder: Path, *, finished: bool = True) -> None:
     """Write a campaign of four flights, one of which crashes with the second controller."""
-    document = {
-        "seed": 7,
-        "flight": {
-            "trajectory": "bernoulli",
-            "size_m": 2.0,
-            "rate_rad_s": 0.5,
-            "duration_s": 100.0,
-            "sensors": "none",
-        },
-        "controllers": [{"name": name} for name in ("pd", "mambo")],
-    }
+    flight = Scenario().model_dump(include={"trajectory", "size_m", "rate_rad_s", "duration_s", "sensors"})
+    document = {"seed": 7, "flight": flight, "controllers": [{"name": "pd"}, {"name": "mambo"}]}
     identity = {"generator": "mambo-nmpc 0.1.0", "command": "campaign", **document}
     (folder / "campaign.json").write_text(json.dumps(identity), "utf-8")
     columns = [f"{name}_{key}" for name in ("pd", "mambo") for key in ("crashed", "iae_m_s", "trace_sha256")]
