@@ -84,11 +84,12 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
 
 @pytest.mark.parametrize(
     ("board", "scalar"),
+    # avr-gcc's double has 32 bits
     [case for case in itertools.product(CORES, ("float64", "fixed")) if case != ("mega", "float64")],
 )
 def test_other_scalar_types_have_a_bound(board: str, scalar: str, tmp_path: Path) -> None:
     """The analysis covers the compiler's helpers, including those with their own calling convention."""
-    image = load(link_controller(board, tmp_path, scalar=scalar))  # avr-gcc's double has 32 bits
+    image = load(link_controller(board, tmp_path, scalar=scalar))
     machine = start_painted(board, image)
     assert machine.call("run") == 0
     assert 0 <= bound_stack(image, "run").bytes - high_water_bytes(machine) <= UNTOUCHED_BYTES
