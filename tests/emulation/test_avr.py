@@ -33,9 +33,7 @@ static nmpc_t scratch;
 long run(void);
 long run(void) { return nmpc_self_test(&scratch); }
 """
-EFFORT = (
-    "return nmpc_tracking_cost(weight.tracking, distance_m) + nmpc_effort_cost(weight.effort, variation_rad);"
-)
+EFFORT = "return (weight.tracking * distance_m) + (weight.effort * variation_rad);"
 WRONG = "return (weight.effort * variation_rad) + (weight.tracking * (distance_m + (nmpc_real_t)0.001f));"
 ABANDONED = """
 import sys

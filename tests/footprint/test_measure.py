@@ -20,9 +20,12 @@ from mambo_nmpc.sil.footprint.measure import Footprint, measure_footprint
 from tests.support.tools import board_builder, only
 
 MAMBO = presets.load("mambo")
-COST = "return nmpc_tracking_cost(weight.tracking, distance_m)"
-WIDENED = "return 1.0000001 * nmpc_tracking_cost(weight.tracking, distance_m)"
-DIVIDED = "return nmpc_tracking_cost(weight.tracking, distance_m) / weight.effort"
+COST = {
+    "float32": "return (weight.tracking * distance_m)",
+    "fixed": "return nmpc_tracking_cost(weight.tracking, distance_m)",
+}
+WIDENED = "1.0000001 *"
+DIVIDED = "distance_m / weight.effort +"
 
 
 @lru_cache
@@ -152,8 +155,10 @@ def test_wider_arithmetic_is_reported_with_its_caller(
     """The generated C links none; one unsuffixed literal, float or division in it is reported."""
     files = render(with_option(MAMBO, "code.scalar", scalar), with_digest=False)
     source = files["src/nmpc_cost.c"]
-    assert source.count(COST) == 1
-    changed = files | {"src/nmpc_cost.c": source.replace(COST, wrong)}
+    assert source.count(COST[scalar]) == 1
+    changed = files | {
+        "src/nmpc_cost.c": source.replace(COST[scalar], COST[scalar].replace("return", f"return {wrong}"))
+    }
     build = board_builder(name)
     assert find_forbidden(load(build.firmware(files, tmp_path / "good")), scalar) == ()
     image = load(build.firmware(changed, tmp_path / "wrong"))
