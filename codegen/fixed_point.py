@@ -146,7 +146,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     )
     share = _fit(
         tables.displacement_share,
-        *(size for axis in tables.axes for size in map(abs, astuple(axis))),
+        *(size for angle in tables.angles for size in map(abs, astuple(angle))),
     )
     acceleration = _fit(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
     error_limit = min(2 * ranges.position_m, bounds.error) * _MARGIN
@@ -336,15 +336,16 @@ def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
             change = gain * (previous_rad + tilt_rad)
             previous_rad = tilt_rad
             acceleration += 2 * change
-            displacement += change * sum(abs(axis.displacement_share) for axis in tables.axes)
+            displacement += change * sum(abs(angle.displacement_share) for angle in tables.angles)
             deficits = [
-                size + axis.deficit_share * change for size, axis in zip(deficits, tables.axes, strict=True)
+                size + angle.deficit_share * change
+                for size, angle in zip(deficits, tables.angles, strict=True)
             ]
             shared = max(shared, 2 * change, *deficits)
         error += displacement
         error_sum += error
         displacement += acceleration + sum(deficits)
-        deficits = [size * axis.deficit_decay for size, axis in zip(deficits, tables.axes, strict=True)]
+        deficits = [size * angle.deficit_decay for size, angle in zip(deficits, tables.angles, strict=True)]
     return _Bounds(
         acceleration=displacement,
         shared=shared,

@@ -2,9 +2,9 @@
 
 Along each axis of the world the predicted error follows a recurrence that `nmpc_predictor.h` derives: a step
 adds the displacement to the error, and the acceleration, in metres per squared prediction step, to the
-displacement. The acceleration changes only where a move changes the tilt. With attitude lag it has a deficit
-that decays from step to step. So the roll-out takes two additions a step, and two more and two products with
-lag; only the gradient of the distance needs a table.
+displacement. The acceleration changes only where a move changes the tilt. With attitude lag a correction, the
+deficit, is added to the acceleration; it decays from step to step. So the roll-out takes two additions a
+step, and two more and two products with lag; only the gradient of the distance needs a table.
 
 All arithmetic is float64 in a fixed order; the exponential of the lag comes from `decimal`, which rounds
 alike on every machine. Constants are rounded to the scalar type once, where they are spelled or loaded.
@@ -20,12 +20,14 @@ from mambo_nmpc.codegen.settings.sections import Horizon, Sections
 
 
 @dataclass(frozen=True)
-class AxisConstants:
-    """How roll or pitch follows a change of its command; shares of the change of acceleration.
+class AngleConstants:
+    """How the recurrence answers a change of acceleration that roll or pitch follows with its lag.
 
-    displacement_share: added to the displacement of the first step.
-    deficit_share:      withheld from the acceleration after one step.
-    deficit_decay:      factor by which the deficit decays per step.
+    With h = step / lag and c = 1 - exp(-h):
+
+    displacement_share: share of the change in the displacement of the same step, 1/2 - (h - c)/h^2.
+    deficit_share:      share of the change that the deficit takes, (c/h)^2.
+    deficit_decay:      factor of the deficit from one step to the next, exp(-h).
     """
 
     displacement_share: float
@@ -40,20 +42,20 @@ class HorizonTables:
     step_squared_s2:    tau^2, square of the prediction step, in s^2.
     displacement_share: share of a constant acceleration that displaces the drone within the same step:
                         1/2, from tau^2/2 in eq 9, or 1/(2 tau) as printed.
-    axes:               roll and pitch.
+    angles:             roll and pitch.
     has_lag:            whether the measured attitude enters the prediction.
-    axes_per_response:  axes that share a response, 2 if both lags are equal, else 1.
-    response_sum:       (prediction, responses) sum of the response of each move from the first step to each:
-                        twice that, and once in the last row. The response is the change of the error per
-                        unit of acceleration. Moves are ordered roll, pitch of the first, and so on; axes that
-                        share a response share a column. The last move is held.
+    angles_per_response: angles that share a response: 2 if both lags are equal, else 1.
+    response_sum:       (prediction, responses). The response R(i) of a move is the change of the error at the
+                        end of step i per unit of its acceleration, the last move being held. With S(i) =
+                        R(0) + ... + R(i), row i holds 2 S(i), and the last row S. Columns: roll, pitch of
+                        step 0 of the control horizon, then of step 1 ...; one a step if the lags are equal.
     """
 
     step_squared_s2: float
     displacement_share: float
-    axes: tuple[AxisConstants, AxisConstants]
+    angles: tuple[AngleConstants, AngleConstants]
     has_lag: bool
-    axes_per_response: int
+    angles_per_response: int
     response_sum: NDArray[np.float64]
 
     @property
@@ -67,43 +69,43 @@ def horizon_tables(settings: Sections) -> HorizonTables:
     model, period_s = settings.model, settings.horizon.prediction_step_s
     step_squared_s2 = period_s * period_s
     share = 0.5 if model.position_update == "exact" else 0.5 / period_s
-    roll, pitch = (_axis(period_s, lag_s, share) for lag_s in (model.roll_lag_s, model.pitch_lag_s))
+    roll, pitch = (_angle(period_s, lag_s, share) for lag_s in (model.roll_lag_s, model.pitch_lag_s))
     same_lag = model.roll_lag_s == model.pitch_lag_s
     return HorizonTables(
         step_squared_s2=step_squared_s2,
         displacement_share=share,
-        axes=(roll, pitch),
+        angles=(roll, pitch),
         has_lag=model.roll_lag_s > 0 or model.pitch_lag_s > 0,
-        axes_per_response=2 if same_lag else 1,
+        angles_per_response=2 if same_lag else 1,
         response_sum=_response_sum(settings.horizon, (roll,) if same_lag else (roll, pitch)),
     )
 
 
-def _axis(period_s: float, lag_s: float, share: float) -> AxisConstants:
-    """Discretise one axis exactly: an angle that follows its command with a first-order lag.
+def _angle(period_s: float, lag_s: float, share: float) -> AngleConstants:
+    """Discretise exactly an angle that follows its command with a first-order lag.
 
     With h = step / lag and c = 1 - exp(-h), after a unit step of the command position lacks h - c after one
     step, and velocity c, in units of the lag. The second difference of the position then lacks (h * c) - (c *
     (h - c)) = c^2.
     """
     if lag_s == 0:
-        return AxisConstants(displacement_share=share, deficit_share=0.0, deficit_decay=0.0)
+        return AngleConstants(displacement_share=share, deficit_share=0.0, deficit_decay=0.0)
     with localcontext() as context:
         context.prec = 50
         h = Decimal(period_s) / Decimal(lag_s)
         decay = (-h).exp()
         c = 1 - decay
-        return AxisConstants(
+        return AngleConstants(
             displacement_share=share - float((h - c) / (h * h)),
             deficit_share=float((c * c) / (h * h)),
             deficit_decay=float(decay),
         )
 
 
-def _response_sum(horizon: Horizon, axes: tuple[AxisConstants, ...]) -> NDArray[np.float64]:
+def _response_sum(horizon: Horizon, angles: tuple[AngleConstants, ...]) -> NDArray[np.float64]:
     """Roll out a unit of acceleration of each move, which ends at the next move, and sum the errors."""
-    sums = np.zeros((horizon.prediction, horizon.control, len(axes)))
-    for axis, constants in enumerate(axes):
+    sums = np.zeros((horizon.prediction, horizon.control, len(angles)))
+    for angle, constants in enumerate(angles):
         for move in range(horizon.control):
             total = error = displacement = acceleration = deficit = 0.0
             for step in range(horizon.prediction):
@@ -115,6 +117,6 @@ def _response_sum(horizon: Horizon, axes: tuple[AxisConstants, ...]) -> NDArray[
                 displacement = displacement + (acceleration + deficit)
                 deficit = deficit * constants.deficit_decay
                 total = total + error
-                sums[step, move, axis] = total
+                sums[step, move, angle] = total
     sums[:-1] *= 2
     return sums.reshape(horizon.prediction, -1)

@@ -35,7 +35,7 @@ class Arithmetic(Protocol):
     def velocity_product(self, velocity_m_s: Real) -> Real:
         """Return tau * velocity, m/step."""
 
-    def gain_product(self, gain_m_step2: Real, tilt_rad: Real) -> Real:
+    def gain_product(self, gain_m_step2_rad: Real, tilt_rad: Real) -> Real:
         """Return gain * tilt, m/step^2."""
 
     def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
@@ -47,7 +47,7 @@ class Arithmetic(Protocol):
     def error_change(self, displacement_m_step: Real) -> Real:
         """Return a displacement in the format of errors."""
 
-    def distance_gradient(self, gain_m_step2: Real, subgradient: Real) -> Real:
+    def distance_gradient(self, gain_m_step2_rad: Real, subgradient: Real) -> Real:
         """Return the gradient of the distance by the moves (n, moves, 2).
 
         Gains are (n, 2, 1, 2), subgradients by acceleration (n, 2, moves, 2).
@@ -59,7 +59,7 @@ class Arithmetic(Protocol):
     def effort_cost(self, weight: Real, variation_rad: Real) -> Real:
         """Return lambda_2 * variation."""
 
-    def tracking_gradient(self, weight: Real, distance_gradient_m: Real) -> Real:
+    def tracking_gradient(self, weight: Real, distance_gradient_m_rad: Real) -> Real:
         """Return lambda_1 * gradient of the distance."""
 
     def effort_gradient(self, weight: Real) -> Real:
@@ -90,8 +90,8 @@ class FloatArithmetic:
     def velocity_product(self, velocity_m_s: Real) -> Real:
         return self._step_s * velocity_m_s
 
-    def gain_product(self, gain_m_step2: Real, tilt_rad: Real) -> Real:
-        return gain_m_step2 * tilt_rad
+    def gain_product(self, gain_m_step2_rad: Real, tilt_rad: Real) -> Real:
+        return gain_m_step2_rad * tilt_rad
 
     def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
         return share * acceleration_m_step2
@@ -102,8 +102,8 @@ class FloatArithmetic:
     def error_change(self, displacement_m_step: Real) -> Real:
         return displacement_m_step
 
-    def distance_gradient(self, gain_m_step2: Real, subgradient: Real) -> Real:
-        products = gain_m_step2 * subgradient
+    def distance_gradient(self, gain_m_step2_rad: Real, subgradient: Real) -> Real:
+        products = gain_m_step2_rad * subgradient
         return products[:, 0] + products[:, 1]
 
     def tracking_cost(self, weight: Real, distance_m: Real) -> Real:
@@ -112,8 +112,8 @@ class FloatArithmetic:
     def effort_cost(self, weight: Real, variation_rad: Real) -> Real:
         return weight * variation_rad
 
-    def tracking_gradient(self, weight: Real, distance_gradient_m: Real) -> Real:
-        return weight * distance_gradient_m
+    def tracking_gradient(self, weight: Real, distance_gradient_m_rad: Real) -> Real:
+        return weight * distance_gradient_m_rad
 
     def effort_gradient(self, weight: Real) -> Real:
         return weight
@@ -147,9 +147,9 @@ class FixedArithmetic:
         half = 2 ** (f.acceleration - f.error - 1)
         return rounded(self._step_s * velocity_m_s, f.step + f.velocity - f.acceleration) + half
 
-    def gain_product(self, gain_m_step2: Real, tilt_rad: Real) -> Real:
+    def gain_product(self, gain_m_step2_rad: Real, tilt_rad: Real) -> Real:
         f = self._formats
-        return (gain_m_step2 * tilt_rad) >> (f.gain + f.angle - f.acceleration)
+        return (gain_m_step2_rad * tilt_rad) >> (f.gain + f.angle - f.acceleration)
 
     def share_product(self, share: Any, acceleration_m_step2: Real) -> Real:
         return (share * acceleration_m_step2) >> self._formats.share
@@ -161,9 +161,9 @@ class FixedArithmetic:
     def error_change(self, displacement_m_step: Real) -> Real:
         return displacement_m_step >> (self._formats.acceleration - self._formats.error)
 
-    def distance_gradient(self, gain_m_step2: Real, subgradient: Real) -> Real:
+    def distance_gradient(self, gain_m_step2_rad: Real, subgradient: Real) -> Real:
         f = self._formats
-        products = gain_m_step2 * subgradient
+        products = gain_m_step2_rad * subgradient
         gradient: Real = (products[:, 0] + products[:, 1]) >> (f.gain + f.response - f.distance_gradient)
         return gradient
 
@@ -174,8 +174,8 @@ class FixedArithmetic:
         f = self._formats
         return rounded(weight * variation_rad, f.effort + f.angle - f.cost)
 
-    def tracking_gradient(self, weight: Real, distance_gradient_m: Real) -> Real:
-        return weight * distance_gradient_m
+    def tracking_gradient(self, weight: Real, distance_gradient_m_rad: Real) -> Real:
+        return weight * distance_gradient_m_rad
 
     def effort_gradient(self, weight: Real) -> Real:
         return weight * 2 ** (self._formats.gradient - self._formats.effort)

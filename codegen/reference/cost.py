@@ -19,10 +19,10 @@ def evaluate(
     """
     arithmetic = predictor.arithmetic
     distance, subgradient = distance_subgradient(predictor, predictor.errors(prediction, moves_rad))
-    by_move = np.repeat(subgradient, predictor.axes_per_response, axis=2).reshape(
+    by_move = np.repeat(subgradient, predictor.angles_per_response, axis=2).reshape(
         *subgradient.shape[:2], -1, 2
     )
-    distance_gradient = arithmetic.distance_gradient(prediction.gain_m_step2[:, :, None], by_move)
+    distance_gradient = arithmetic.distance_gradient(prediction.gain_m_step2_rad[:, :, None], by_move)
 
     change = moves_rad - np.concatenate([last_command_rad[:, None], moves_rad[:, :-1]], axis=1)
     variation = ordered_sum(np.abs(change).swapaxes(1, 2).reshape(len(change), -1), axis=1)
@@ -39,11 +39,12 @@ def evaluate(
 def distance_subgradient(predictor: Predictor, errors_m: Real) -> tuple[Real, Real]:
     """Return the distance (n,) for errors (prediction, n, 2), and its subgradient (n, 2, responses).
 
-    The subgradient by the acceleration of a move is the sum over the horizon of the response to the move,
-    each term with the sign of the error at that step. With S(i) the sum of the response of steps 0..i, errors
-    of the signs + + - - give 2 S(1) - S(3); `response_sum` holds 2 S(i), and S in its last row. The loop goes
-    from the last change of sign to the first, as if the first error were positive; its sign is multiplied at
-    the end. The sign of an error is its sign bit; if all errors are zero so is the subgradient.
+    The subgradient with respect to the acceleration of a move is the sum over the horizon of the response to
+    the move, each term with the sign of the error at that step. With S(i) the sum of the response of steps
+    0..i, four errors with the signs + + - - give 2 S(1) - S(3); `response_sum` holds 2 S(i), and S in its
+    last row. The loop goes from the last change of sign to the first, as if the first error were positive;
+    then the result is multiplied by the sign of the first error. The sign of an error is its sign bit; if all
+    errors are zero so is the subgradient.
     """
     scalar = errors_m.dtype.type
     distance = ordered_sum(np.abs(errors_m), axis=0)

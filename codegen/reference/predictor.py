@@ -13,14 +13,14 @@ from mambo_nmpc.codegen.reference.math import Real
 class Prediction:
     """What does not change while the plan of a control step is optimized, for n controllers.
 
-    gain_m_step2:         (n, 2, 2) tau^2 times eq 8: acceleration along x, y per radian of roll, pitch.
+    gain_m_step2_rad:     (n, 2, 2) tau^2 times eq 8: acceleration along x, y per radian of roll, pitch.
     tilt_rad:             (n, 2) roll, pitch before the first move: measured, or zero without lag.
     error_m:              (n, 2) position less target along x, y.
     displacement_m_step:  (n, 2) change of the error over the first step at constant tilt.
     acceleration_m_step2: (n, 2) tau^2 times eq 8 at that tilt.
     """
 
-    gain_m_step2: Real
+    gain_m_step2_rad: Real
     tilt_rad: Real
     error_m: Real
     displacement_m_step: Real
@@ -38,10 +38,10 @@ class Predictor:
         self.arithmetic, numbers = arithmetic, arithmetic.numbers
         self._displacement_share = numbers.constant(tables.displacement_share, "share")
         self._has_lag = tables.has_lag
-        self._axes = np.array(
-            [[numbers.constant(share, "share") for share in astuple(axis)] for axis in tables.axes]
+        self._angles = np.array(
+            [[numbers.constant(share, "share") for share in astuple(angle)] for angle in tables.angles]
         ).T
-        self.axes_per_response = tables.axes_per_response
+        self.angles_per_response = tables.angles_per_response
         self.response_sum = np.array(
             [[numbers.constant(value, "response") for value in row] for row in tables.response_sum]
         )
@@ -62,8 +62,8 @@ class Predictor:
         tilt, acceleration = np.zeros_like(displacement), np.zeros_like(displacement)
         if self._has_lag:
             tilt = state[:, 4:6]
-            by_axis = arithmetic.gain_product(gain, tilt[:, None])
-            acceleration = by_axis[:, :, 0] + by_axis[:, :, 1]
+            by_angle = arithmetic.gain_product(gain, tilt[:, None])
+            acceleration = by_angle[:, :, 0] + by_angle[:, :, 1]
             displacement = displacement + arithmetic.share_product(self._displacement_share, acceleration)
         error = arithmetic.initial_error(state[:, 0:2] - target[:, 0:2])
         return Prediction(gain, tilt, error, displacement, acceleration)
@@ -72,20 +72,20 @@ class Predictor:
         """Predict position less target for `moves_rad` (n, control, 2): (prediction, n, 2), in m."""
         error, displacement = prediction.error_m, prediction.displacement_m_step
         acceleration = prediction.acceleration_m_step2
-        (displacement_share, deficit_share, deficit_decay), arithmetic = self._axes, self.arithmetic
-        deficit = np.zeros_like(prediction.gain_m_step2)
+        (displacement_share, deficit_share, deficit_decay), arithmetic = self._angles, self.arithmetic
+        deficit = np.zeros_like(prediction.gain_m_step2_rad)
         errors = np.empty((self._steps, *error.shape), error.dtype)
         previous = prediction.tilt_rad
         for i in range(self._steps):
             if i < self._moves:
                 tilt_change = (moves_rad[:, i] - previous)[:, None]
                 previous = moves_rad[:, i]
-                by_axis = arithmetic.gain_product(prediction.gain_m_step2, tilt_change)
-                change = by_axis[:, :, 0] + by_axis[:, :, 1]
+                by_angle = arithmetic.gain_product(prediction.gain_m_step2_rad, tilt_change)
+                change = by_angle[:, :, 0] + by_angle[:, :, 1]
                 if self._has_lag:
-                    displaced = arithmetic.share_product(displacement_share, by_axis)
+                    displaced = arithmetic.share_product(displacement_share, by_angle)
                     displacement = displacement + (displaced[:, :, 0] + displaced[:, :, 1])
-                    deficit = deficit - arithmetic.share_product(deficit_share, by_axis)
+                    deficit = deficit - arithmetic.share_product(deficit_share, by_angle)
                 else:
                     displacement = displacement + arithmetic.share_product(displacement_share[0], change)
                 acceleration = acceleration + change

@@ -72,8 +72,9 @@ class Horizon(_Section):
         2,
         ge=1,
         le=50,
-        description="N_c, control horizon, in moves of roll and pitch: the unknowns of the optimizer (eq 12, "
-        "Table I). The last move is held to the end of the prediction, so N_c is at most N_p.",
+        description="N_c, control horizon, in prediction steps: their moves of roll and pitch are the "
+        "unknowns of the optimizer (eq 12, Table I). The last moves are held to the end of the prediction, so "
+        "N_c is at most N_p.",
     )
     prediction_step_s: Number = Field(
         0.07,

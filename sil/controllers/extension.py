@@ -35,7 +35,7 @@ typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
 typedef struct { nmpc_real_t error_m, displacement_m_step, acceleration_m_step2; ...; } nmpc_rollout_t;
 typedef struct {
-    nmpc_real_t gain_x_m_step2[2], gain_y_m_step2[2];
+    nmpc_real_t gain_x_m_step2_rad[2], gain_y_m_step2_rad[2];
     nmpc_rollout_t x, y;
     ...;
 } nmpc_prediction_t;

@@ -33,7 +33,8 @@ REASONS: Final[tuple[Reason, ...]] = (
     ),
     *reasons(
         "src/nmpc_predictor.h",
-        "const nmpc_real_t *previous_rad = (i > 0) ? &moves_rad[NMPC_AXES * (i - 1)] : prediction->tilt_rad;",
+        "const nmpc_real_t *previous_rad = "
+        "(i > 0) ? &moves_rad[NMPC_ANGLES * (i - 1)] : prediction->tilt_rad;",
         "with one move in the control horizon none follows another",
         "branch 0 never taken",
         holds=lambda settings: settings.horizon.control == 1,

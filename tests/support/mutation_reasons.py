@@ -159,8 +159,8 @@ REASONS: Final[tuple[Reason, ...]] = (
     ),
     *reasons(
         "src/nmpc_math.c",
-        "const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));",
-        "with turns = 0 the quadrant is 0, half added or subtracted",
+        "const int quadrant = (int)(quarter_turns + ((quarter_turns < (nmpc_real_t)0) ? -half : half));",
+        "with quarter_turns = 0 the quadrant is 0, half added or subtracted",
         "< -> <=",
     ),
     *reasons(
@@ -174,7 +174,7 @@ REASONS: Final[tuple[Reason, ...]] = (
     *reasons("src/nmpc_math.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
     *reasons(
         "src/nmpc_predictor.h",
-        "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_AXES_PER_RESPONSE)",
+        "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_ANGLES_PER_RESPONSE)",
         "a wider table, whose further columns nobody reads",
         "/ -> *",
         holds=_axes_alike,

@@ -31,11 +31,11 @@ INPUTS = inputs_of_steps(BACKTRACKING, CASES, steps=4, seed=0)
 PREDICTOR, PREDICTOR_H, COST = "src/nmpc_predictor.c", "src/nmpc_predictor.h", "src/nmpc_cost.c"
 OPTIMIZER, STEP, HELPERS = "src/nmpc_optimizer.c", "src/nmpc.c", "src/nmpc_math.h"
 FAULTS = {
-    "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2[NMPC_ROLL] = -sine", "gain_x_m_step2[NMPC_ROLL] = sine"),
+    "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
     "the sign of zero is one": (HELPERS, "(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
     "one predicted step too few": (COST, "i < NMPC_PREDICTION_HORIZON; i++)", "i < NMPC_PREDICTION_HORIZON - 1; i++)"),
     "one iteration too many": (OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
-    "pitch takes roll's response": (COST, "subgradient_x[response]", "subgradient_x[response - axis]"),
+    "pitch takes roll's response": (COST, "subgradient_x[response]", "subgradient_x[response - angle]"),
     "roll and pitch change places": (STEP, "command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),
     "effort weighs like tracking in the cost": (COST, "weight.effort * variation_rad", "weight.tracking * variation_rad"),
     "a constant an ulp off": (PREDICTOR_H, "NMPC_ROLL_DEFICIT_DECAY 0.8309504f", "NMPC_ROLL_DEFICIT_DECAY 0.83095044f"),

@@ -99,11 +99,11 @@ def test_mutants_meet_their_fate(tmp_path: Path) -> None:
     for path, wrong, fate in (
         ("src/nmpc.c", "self->command_rad[1] = self->plan_rad[2];", Fate.OTHER_BITS),
         ("include/nmpc_config.h", "#define NMPC_POSITION_RANGE_M 1000.00006f", Fate.OTHER_BITS),
-        ("src/nmpc.c", "for (k = 0; k <= NMPC_AXES; k++) {", Fate.UNDEFINED),
+        ("src/nmpc.c", "for (k = 0; k <= NMPC_ANGLES; k++) {", Fate.UNDEFINED),
         ("include/nmpc_config.h", "#define NMPC_INSTANCE_BYTES 119", Fate.REFUSED),
         (
             "include/nmpc_config.h",
-            "#define NMPC_UPDATE_PERIOD_S 0.010000001f /* from k to k + 1 */",
+            "#define NMPC_UPDATE_PERIOD_S 0.010000001f /* from one call of nmpc_step() to the next */",
             Fate.SAME,
         ),
     ):

@@ -117,10 +117,10 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
             thrust[0],
             prediction,
         )
-        gains = [blocks.unpack(prediction.gain_x_m_step2), blocks.unpack(prediction.gain_y_m_step2)]
+        gains = [blocks.unpack(prediction.gain_x_m_step2_rad), blocks.unpack(prediction.gain_y_m_step2_rad)]
         members = ("error_m", "displacement_m_step", "acceleration_m_step2")
         starts = [[getattr(axis, name) for axis in (prediction.x, prediction.y)] for name in members]
-        assert bits(gains) == bits(expected.gain_m_step2[0].astype(blocks.scalar))
+        assert bits(gains) == bits(expected.gain_m_step2_rad[0].astype(blocks.scalar))
         assert bits(np.array(starts, blocks.scalar)) == bits(
             np.concatenate([getattr(expected, name) for name in members]).astype(blocks.scalar)
         )

@@ -17,9 +17,9 @@ from tests.support.tools import require
 STEP, OPTIMIZER, COST, MATH = "src/nmpc.c", "src/nmpc_optimizer.c", "src/nmpc_cost.c", "src/nmpc_math.h"
 HARMS = {
     "NaN passes a range check": Harm(
-        MATH, r"\(value >= least\);\n(.*)\(value <= most\)", r"!(value < least);\n\1!(value > most)"
+        MATH, r"\(value >= minimum\);\n(.*)\(value <= maximum\)", r"!(value < minimum);\n\1!(value > maximum)"
     ),
-    "infinity passes a range check": Harm(MATH, r"\(value <= most\)", "1"),
+    "infinity passes a range check": Harm(MATH, r"\(value <= maximum\)", "1"),
     "a refused call writes": Harm(STEP, r"    if \(\(state != NULL\)", r"    self->converged = 0U;\n\g<0>"),
     "the heading goes unchecked": Harm(STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1"),
     "a weight goes unchecked": Harm(STEP, r"nmpc_between\(weights->effort, [^;]*?LIMIT\)", "1"),

@@ -30,7 +30,7 @@ HARMS = {
         "src/nmpc_self_test.c", r"    nmpc_init\(scratch\);\n", "    nmpc_last_cost(scratch);\n"
     ),
     "20.7 a parameter without brackets": Harm(
-        "include/nmpc_config.h", r"#define NMPC_AXES 2", r"#define NMPC_TWICE(a) (2 * a)\n\g<0>"
+        "include/nmpc_config.h", r"#define NMPC_ANGLES 2", r"#define NMPC_TWICE(a) (2 * a)\n\g<0>"
     ),
     "2.3 in a file that is not listed": Harm(
         "src/nmpc_optimizer.c", r"\nvoid nmpc", r"\ntypedef int unused_t;\n\g<0>"

@@ -49,15 +49,17 @@ typedef long long nmpc_sum_t;
  * different bundles do not compile together. */
 #define NMPC_SETTINGS_ID 0xD4C905DCUL
 
-/* Horizons. A move is the set-point of one angle at one step of the control horizon. */
+/* Horizons, in prediction steps. A move is the set-point of one angle, roll or pitch, held for one prediction
+ * step: an absolute angle, not a change. The last moves are held to the end of the prediction horizon. */
 #define NMPC_PREDICTION_HORIZON 10 /* N_p, Table I */
 #define NMPC_CONTROL_HORIZON 2 /* N_c, Table I */
-#define NMPC_AXES 2 /* phi and theta */
-#define NMPC_MOVES (NMPC_AXES * NMPC_CONTROL_HORIZON)
+#define NMPC_ANGLES 2 /* roll phi, pitch theta */
+#define NMPC_MOVES (NMPC_ANGLES * NMPC_CONTROL_HORIZON)
 
-/* The paper has one tau, the update time step. Here the steps of the prediction may be longer than the period
- * of the calls of nmpc_step(). */
-#define NMPC_UPDATE_PERIOD_S 0.01f /* from k to k + 1 */
+/* The paper has one tau, 0.01 s. Here a control step, from k to k + 1, and a prediction step, from k + i to
+ * k + i + 1, may differ in length: N_p = 10 prediction steps of 0.01 s end before the Mambo's attitude loop has
+ * answered a move. */
+#define NMPC_UPDATE_PERIOD_S 0.01f /* from one call of nmpc_step() to the next */
 #define NMPC_PREDICTION_STEP_S 1889785610 /* tau, eqs 9 and 11 */
 #define NMPC_PREDICTION_STEP_SQUARED_S2 1663011337 /* tau^2 */
 
@@ -76,10 +78,12 @@ typedef long long nmpc_sum_t;
 #define NMPC_STEP_MIN_RAD 537 /* Delta_min, Table I */
 #define NMPC_TOLERANCE 1677722 /* epsilon, Table I */
 
-/* Limit of every move and command, either way; the paper has none. */
+/* Limit of each angle, roll and pitch, of every move and command, either way; the paper has none. */
 #define NMPC_TILT_LIMIT_RAD 187904819
 
-/* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. */
+/* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. The attitude may
+ * be a little more than half a turn: a range that refuses most values in degrees. Up to the range of yaw the
+ * reduction of the angle in nmpc_sine_cosine() is accurate. */
 #define NMPC_POSITION_RANGE_M 524288000
 #define NMPC_VELOCITY_RANGE_M_S 838860800
 #define NMPC_ATTITUDE_RANGE_RAD 1744830464
@@ -112,8 +116,8 @@ typedef long long nmpc_sum_t;
 #define NMPC_TRACKING(value) NMPC_NUMBER(value, NMPC_TRACKING_BITS)
 #define NMPC_EFFORT(value) NMPC_NUMBER(value, NMPC_EFFORT_BITS)
 
-/* Fractional bits of internal quantities: tau and tau^2; gain, m/step^2 per rad; displacement, acceleration
- * and deficit, m/step and m/step^2; predicted error, m; shares and decays of the lag; sums of responses;
+/* Fractional bits of internal quantities: tau and tau^2; gain, m/tau^2 per rad; displacement, acceleration
+ * and deficit, m/tau and m/tau^2; predicted error, m; shares and decays of the lag; sums of responses;
  * gradient of the distance, m/rad; eta+ and eta-; sine and cosine. */
 #define NMPC_STEP_BITS 35
 #define NMPC_STEP_SQUARED_BITS 39

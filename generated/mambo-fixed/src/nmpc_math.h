@@ -20,7 +20,7 @@ typedef char nmpc_assert_shift_rounds_down[(((-3) >> 1) == -2) ? 1 : -1];
 extern "C" {
 #endif
 
-/* Unrolls the following loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
+/* Ask gcc to unroll the next loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
  * compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
@@ -53,11 +53,12 @@ static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
     return view.bits;
 }
 
-/* One bit per predicted step: bit 0 is the last step, bit NMPC_LAST_STEP the first. */
+/* One bit per prediction step, the first step in the most significant bit, the last in bit 0. Steps count from 0
+ * to NMPC_LAST_STEP, in the paper from 1 to N_p: step i has bit NMPC_LAST_STEP - i. */
 typedef unsigned long nmpc_steps_t;
 #define NMPC_LAST_STEP 9U
 
-/* The sign bit: 1 for negative values and -0, else 0. */
+/* The sign bit: 1 for negative values, else 0. */
 static inline nmpc_steps_t nmpc_is_negative(nmpc_real_t value)
 {
     const nmpc_bits_t sign = nmpc_bits(value) >> 31U;
@@ -101,14 +102,14 @@ static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
     return nmpc_smaller(nmpc_larger(value, -limit), limit);
 }
 
-/* 1 if `least` <= `value` <= `most`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
+/* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
-static inline int nmpc_between(nmpc_real_t value, nmpc_real_t least, nmpc_real_t most)
+static inline int nmpc_between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
 {
-    const int is_enough = (value >= least);
-    const int is_no_more = (value <= most);
+    const int is_at_least = (value >= minimum);
+    const int is_at_most = (value <= maximum);
 
-    return (is_enough != 0) && (is_no_more != 0);
+    return (is_at_least != 0) && (is_at_most != 0);
 }
 
 /* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
@@ -141,10 +142,10 @@ static inline nmpc_real_t nmpc_velocity_product(nmpc_real_t step_s, nmpc_real_t 
            + ((nmpc_real_t)1 << (NMPC_ACCELERATION_BITS - NMPC_ERROR_BITS - 1));
 }
 
-/* The two products of a roll-out, gain and share, are rounded down: that halves the instructions of each. */
-static inline nmpc_real_t nmpc_gain_product(nmpc_real_t gain_m_step2, nmpc_real_t tilt_rad)
+/* The products of a roll-out, with a gain and with a share, are rounded down: that halves the instructions of each. */
+static inline nmpc_real_t nmpc_gain_product(nmpc_real_t gain_m_step2_rad, nmpc_real_t tilt_rad)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)gain_m_step2 * tilt_rad)
+    return (nmpc_real_t)(((nmpc_sum_t)gain_m_step2_rad * tilt_rad)
                          >> (NMPC_GAIN_BITS + NMPC_ANGLE_BITS - NMPC_ACCELERATION_BITS));
 }
 
@@ -168,11 +169,11 @@ static inline nmpc_real_t nmpc_error_change(nmpc_real_t displacement_m_step)
 }
 
 /* Rounded down as well. */
-static inline nmpc_real_t nmpc_distance_gradient(nmpc_real_t gain_x_m_step2, nmpc_real_t subgradient_x,
-                                                 nmpc_real_t gain_y_m_step2, nmpc_real_t subgradient_y)
+static inline nmpc_real_t nmpc_distance_gradient(nmpc_real_t gain_x_m_step2_rad, nmpc_real_t subgradient_x,
+                                                 nmpc_real_t gain_y_m_step2_rad, nmpc_real_t subgradient_y)
 {
-    return (nmpc_real_t)((((nmpc_sum_t)gain_x_m_step2 * subgradient_x)
-                          + ((nmpc_sum_t)gain_y_m_step2 * subgradient_y))
+    return (nmpc_real_t)((((nmpc_sum_t)gain_x_m_step2_rad * subgradient_x)
+                          + ((nmpc_sum_t)gain_y_m_step2_rad * subgradient_y))
                          >> (NMPC_GAIN_BITS + NMPC_RESPONSE_BITS - NMPC_DISTANCE_GRADIENT_BITS));
 }
 
@@ -186,9 +187,9 @@ static inline nmpc_sum_t nmpc_effort_cost(nmpc_real_t weight, nmpc_sum_t variati
     return NMPC_ROUNDED(weight * variation_rad, NMPC_EFFORT_BITS + NMPC_ANGLE_BITS - NMPC_COST_BITS);
 }
 
-static inline nmpc_sum_t nmpc_tracking_gradient(nmpc_real_t weight, nmpc_real_t distance_gradient_m)
+static inline nmpc_sum_t nmpc_tracking_gradient(nmpc_real_t weight, nmpc_real_t distance_gradient_m_rad)
 {
-    return (nmpc_sum_t)weight * distance_gradient_m;
+    return (nmpc_sum_t)weight * distance_gradient_m_rad;
 }
 
 static inline nmpc_sum_t nmpc_effort_gradient(nmpc_real_t weight)
@@ -196,7 +197,7 @@ static inline nmpc_sum_t nmpc_effort_gradient(nmpc_real_t weight)
     return weight * ((nmpc_sum_t)1 << (NMPC_GRADIENT_BITS - NMPC_EFFORT_BITS));
 }
 
-/* The step is shifted first too, and the product rounded down. */
+/* The step size is shifted left first too, and the product is rounded down. */
 static inline nmpc_real_t nmpc_step_product(nmpc_real_t step_rad, nmpc_real_t factor)
 {
     return (nmpc_real_t)(((nmpc_sum_t)factor * (step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS)))) >> 32);

@@ -23,14 +23,14 @@ const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESP
     { 22927514, 31431236, 51246709, 73967608 }
 };
 
-/* Start the roll-out along one axis: velocity and tilt are held. */
-static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_real_t velocity_m_s,
-                          const nmpc_real_t gain_m_step2[NMPC_AXES], const nmpc_real_t tilt_rad[NMPC_AXES])
+/* Start the roll-out along one axis at the measured tilt, which stays constant until the first moves. */
+static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_real_t relative_velocity_m_s,
+                          const nmpc_real_t gain_m_step2_rad[NMPC_ANGLES], const nmpc_real_t tilt_rad[NMPC_ANGLES])
 {
     rollout->error_m = nmpc_initial_error(error_m);
-    rollout->acceleration_m_step2 = nmpc_gain_product(gain_m_step2[NMPC_ROLL], tilt_rad[NMPC_ROLL])
-                                    + nmpc_gain_product(gain_m_step2[NMPC_PITCH], tilt_rad[NMPC_PITCH]);
-    rollout->displacement_m_step = nmpc_velocity_product(NMPC_PREDICTION_STEP_S, velocity_m_s)
+    rollout->acceleration_m_step2 = nmpc_gain_product(gain_m_step2_rad[NMPC_ROLL], tilt_rad[NMPC_ROLL])
+                                    + nmpc_gain_product(gain_m_step2_rad[NMPC_PITCH], tilt_rad[NMPC_PITCH]);
+    rollout->displacement_m_step = nmpc_velocity_product(NMPC_PREDICTION_STEP_S, relative_velocity_m_s)
                                    + nmpc_share_product(NMPC_DISPLACEMENT_SHARE, rollout->acceleration_m_step2);
     rollout->roll_deficit_m_step2 = (nmpc_real_t)0;
     rollout->pitch_deficit_m_step2 = (nmpc_real_t)0;
@@ -45,20 +45,22 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     nmpc_real_t sine_m_step2;
     nmpc_real_t cosine_m_step2;
 
-    /* tau^2 times the matrix of eq 8, sin psi with the sign of eq 3. */
+    /* tau^2 times the matrix of eq 8. Eq 8 prints both sin psi with the opposite sign of what eqs 3 and 6 give. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
     sine_m_step2 = nmpc_sine_product(thrust_m_step2, sine);
     cosine_m_step2 = nmpc_sine_product(thrust_m_step2, cosine);
-    prediction->gain_x_m_step2[NMPC_ROLL] = -sine_m_step2;
-    prediction->gain_x_m_step2[NMPC_PITCH] = -cosine_m_step2;
-    prediction->gain_y_m_step2[NMPC_ROLL] = cosine_m_step2;
-    prediction->gain_y_m_step2[NMPC_PITCH] = -sine_m_step2;
+    prediction->gain_x_m_step2_rad[NMPC_ROLL] = -sine_m_step2;
+    prediction->gain_x_m_step2_rad[NMPC_PITCH] = -cosine_m_step2;
+    prediction->gain_y_m_step2_rad[NMPC_ROLL] = cosine_m_step2;
+    prediction->gain_y_m_step2_rad[NMPC_PITCH] = -sine_m_step2;
 
-    /* Eqs 9-11 without moves. */
+    /* r - Tp and v - Tv, of eqs 9 to 11, at the present control step. */
     prediction->tilt_rad[NMPC_ROLL] = state->roll_rad;
     prediction->tilt_rad[NMPC_PITCH] = state->pitch_rad;
     start_rollout(&prediction->x, state->position_m[0] - target->position_m[0],
-                  state->velocity_m_s[0] - target->velocity_m_s[0], prediction->gain_x_m_step2, prediction->tilt_rad);
+                  state->velocity_m_s[0] - target->velocity_m_s[0],
+                  prediction->gain_x_m_step2_rad, prediction->tilt_rad);
     start_rollout(&prediction->y, state->position_m[1] - target->position_m[1],
-                  state->velocity_m_s[1] - target->velocity_m_s[1], prediction->gain_y_m_step2, prediction->tilt_rad);
+                  state->velocity_m_s[1] - target->velocity_m_s[1],
+                  prediction->gain_y_m_step2_rad, prediction->tilt_rad);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Self-test: 24 consecutive steps of one controller with the results of the reference
- * controller, and many more steps with pseudo-random inputs, of whose results there is a digest.
+ * Self-test: 24 consecutive control steps with the results of the reference, and 100000 control steps with
+ * pseudo-random inputs, of whose results there is a digest.
  * MISRA C:2012: departs from rules 2.5, 8.9 and 10.1, for the reasons in deviations.txt.
  */
 #include "nmpc_self_test.h"
@@ -21,7 +21,7 @@ typedef struct {
     nmpc_status_t status;
     nmpc_command_t command;
     nmpc_sum_t cost;
-    nmpc_sum_t gradient[NMPC_AXES];
+    nmpc_sum_t gradient[NMPC_ANGLES];
 } nmpc_self_test_step_t;
 
 static const nmpc_self_test_step_t self_test_steps[NMPC_SELF_TEST_STEPS] = {
@@ -204,10 +204,10 @@ int nmpc_self_test(nmpc_t *scratch)
 #define NMPC_SELF_TEST_THRUST_M_S2 100663296
 #define NMPC_SELF_TEST_HOVER_M_S2 329168978
 
-/* Consecutive steps with the same input, so that moves reach their limits and searches converge. */
+/* Consecutive control steps with the same input, so that moves reach their limits and searches converge. */
 #define NMPC_SELF_TEST_HELD 4
 
-/* The same for the errors, from large to small. */
+/* Scales of the errors of position and velocity, from large to small; each input draws one of the four. */
 static const nmpc_real_t self_test_error_m[4] = { 10485760, 262144, 26214, 2621 };
 static const nmpc_real_t self_test_error_m_s[4] = { 83886080, 2097152, 209715, 20972 };
 
@@ -336,11 +336,11 @@ unsigned long nmpc_self_test_episode(nmpc_t *scratch, int episode, unsigned long
 {
     unsigned long stream = fold(0UL, (unsigned long)episode + 1UL);
     unsigned long results = 0UL;
-    int tick;
+    int step;
     int repeat;
 
     nmpc_init(scratch);
-    for (tick = 0; tick < NMPC_SELF_TEST_TICKS; tick += NMPC_SELF_TEST_HELD) {
+    for (step = 0; step < NMPC_SELF_TEST_TICKS; step += NMPC_SELF_TEST_HELD) {
         nmpc_state_t state;
         nmpc_target_t target;
         const nmpc_real_t thrust_m_s2 = next_input(&stream, &state, &target);

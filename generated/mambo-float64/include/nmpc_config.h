@@ -45,15 +45,17 @@ typedef double nmpc_sum_t;
  * different bundles do not compile together. */
 #define NMPC_SETTINGS_ID 0x8D00AE40UL
 
-/* Horizons. A move is the set-point of one angle at one step of the control horizon. */
+/* Horizons, in prediction steps. A move is the set-point of one angle, roll or pitch, held for one prediction
+ * step: an absolute angle, not a change. The last moves are held to the end of the prediction horizon. */
 #define NMPC_PREDICTION_HORIZON 10 /* N_p, Table I */
 #define NMPC_CONTROL_HORIZON 2 /* N_c, Table I */
-#define NMPC_AXES 2 /* phi and theta */
-#define NMPC_MOVES (NMPC_AXES * NMPC_CONTROL_HORIZON)
+#define NMPC_ANGLES 2 /* roll phi, pitch theta */
+#define NMPC_MOVES (NMPC_ANGLES * NMPC_CONTROL_HORIZON)
 
-/* The paper has one tau, the update time step. Here the steps of the prediction may be longer than the period
- * of the calls of nmpc_step(). */
-#define NMPC_UPDATE_PERIOD_S 0.01 /* from k to k + 1 */
+/* The paper has one tau, 0.01 s. Here a control step, from k to k + 1, and a prediction step, from k + i to
+ * k + i + 1, may differ in length: N_p = 10 prediction steps of 0.01 s end before the Mambo's attitude loop has
+ * answered a move. */
+#define NMPC_UPDATE_PERIOD_S 0.01 /* from one call of nmpc_step() to the next */
 #define NMPC_PREDICTION_STEP_S 0.055 /* tau, eqs 9 and 11 */
 #define NMPC_PREDICTION_STEP_SQUARED_S2 0.003025 /* tau^2 */
 
@@ -72,10 +74,12 @@ typedef double nmpc_sum_t;
 #define NMPC_STEP_MIN_RAD 1e-06 /* Delta_min, Table I */
 #define NMPC_TOLERANCE 0.05 /* epsilon, Table I */
 
-/* Limit of every move and command, either way; the paper has none. */
+/* Limit of each angle, roll and pitch, of every move and command, either way; the paper has none. */
 #define NMPC_TILT_LIMIT_RAD 0.35
 
-/* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. */
+/* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. The attitude may
+ * be a little more than half a turn: a range that refuses most values in degrees. Up to the range of yaw the
+ * reduction of the angle in nmpc_sine_cosine() is accurate. */
 #define NMPC_POSITION_RANGE_M 1000.0
 #define NMPC_VELOCITY_RANGE_M_S 100.0
 #define NMPC_ATTITUDE_RANGE_RAD 3.25

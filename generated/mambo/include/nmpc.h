@@ -7,8 +7,26 @@
  * aerial vehicles (Manhattan distance, RPROP, simulated on the Parrot Mambo), IEEE. Equations, Table I and
  * symbols cited in this library are the paper's.
  *
+ * Departures from the paper with these settings (measured in docs/paper.md of mambo-nmpc):
+ *   eq 8       both sin psi have the opposite sign, as eqs 3 and 6 give it.
+ *   eq 8       u_1/m is an argument of nmpc_step(); it and psi are constant over the horizon.
+ *   eq 8       phi and theta follow the moves with first-order lags of 0.27 s and 0.15 s, from the
+ *              measured angles on: time constants of the attitude loop, see controller.toml.
+ *   eq 9       tau^2/2, the double integral of the acceleration, where tau/2 is printed.
+ *   eq 9       the velocity is predicted too: v + tau a, at constant acceleration over a prediction step.
+ *   eqs 9, 11  tau is 0.055 s: a horizon of N_p = 10 steps of the paper's 0.01 s ends before the Mambo's
+ *              attitude loop has answered. nmpc_step() is called every 0.01 s.
+ *   eq 12a     the target is Tp_k+i, propagated by eq 11, where Tp_k is printed.
+ *   eq 12b     the first moves change from the last command, u*_k-1.
+ *   N_c        beyond it the last moves are held, up to N_p.
+ *   Omega_k    the previous plan, not shifted; after nmpc_reset() the command given to it.
+ *   RPROP      each angle of every move and command is limited to +/- 0.35 rad.
+ *   RPROP      where the gradient changes sign the stored previous move is restored (RPROP+).
+ *   U_step     the initial step size Delta of every search; the gradient is exact, not a finite difference.
+ *   epsilon    once J changes by less the plan is frozen, but all I_max iterations run (constant work).
+ *
  * Frame: world, north-east-down; thrust acts along minus z of the body; attitude in 3-2-1 Euler angles.
- * Memory: one nmpc_t, owned by the caller. No heap, no globals, no recursion; every loop ends at a constant. Of
+ * Memory: one nmpc_t, owned by the caller. No heap, no globals, no recursion; every loop has a constant bound. Of
  * the C library at most memset and memcpy are needed, where the compiler inserts calls of them.
  * Threads: a function accesses only the nmpc_t that it is given.
  *
@@ -52,7 +70,7 @@ typedef struct {
     nmpc_real_t velocity_m_s[2]; /* Tv_k = vx_ref, vy_ref; within +/- NMPC_VELOCITY_RANGE_M_S */
 } nmpc_target_t;
 
-/* u*_k: the set-points of the attitude loop, within +/- NMPC_TILT_LIMIT_RAD. */
+/* u*_k: the set-points of the attitude loop, each angle within +/- NMPC_TILT_LIMIT_RAD. */
 typedef struct {
     nmpc_real_t roll_rad;  /* phi* */
     nmpc_real_t pitch_rad; /* theta* */
@@ -70,9 +88,9 @@ typedef struct nmpc_controller nmpc_t;
 /* Set the weights of the settings, and level attitude as the last command. A null pointer is ignored. */
 void nmpc_init(nmpc_t *self);
 
-/* Set the last command and the whole plan to `command`, clamped to the tilt limit, for a bumpless transfer
- * from another controller. Call it after nmpc_init(). The weights do not change. Returns NMPC_BAD_COMMAND,
- * and changes nothing, if an angle exceeds NMPC_ATTITUDE_RANGE_RAD or is NaN. */
+/* Set the last command and the whole plan to `command`, each angle clamped to the tilt limit, for a bumpless
+ * transfer from another controller. Call it after nmpc_init(). The weights do not change. Returns
+ * NMPC_BAD_COMMAND, and changes nothing, if an angle exceeds NMPC_ATTITUDE_RANGE_RAD or is NaN. */
 nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command);
 
 /* Replace the weights. Each must lie between 0 and its limit, NMPC_TRACKING_WEIGHT_LIMIT or
@@ -82,16 +100,20 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights);
 /* Compute the command of this control step; call it every NMPC_UPDATE_PERIOD_S. `thrust_acceleration_m_s2` is
  * the thrust over the mass, u_1/m of eq 8: 9.81 in hover.
  *
- * Every input is legal. If one is NaN, infinite or out of range, the status names it, the command repeats the
- * last good one (level before the first good step), and the next good step is computed as usual.
- * Work: NMPC_ITERATIONS evaluations of the cost, of NMPC_PREDICTION_HORIZON predicted steps each, for every
+ * Any input may be passed. If one is NaN, infinite or out of range, the status names it and the command repeats
+ * the last one: that of the last good step or of nmpc_reset(); level after nmpc_init(). The next good input is
+ * processed as usual.
+ * Work: NMPC_ITERATIONS evaluations of the cost, of NMPC_PREDICTION_HORIZON prediction steps each, for every
  * good input; bad input returns before them. */
 nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
                         nmpc_real_t thrust_acceleration_m_s2, nmpc_command_t *command);
 
-/* Results of the last good step: the cost of the plan that the last iteration evaluated, the number of
- * updates of the plan, and whether the search converged: 1 if the cost changed by less than NMPC_TOLERANCE
- * from one iteration to the next, else 0. `self` must not be null. */
+/* Results of the last good control step. `self` must not be null.
+ * nmpc_last_cost() returns J, eq 12, of the plan that the last iteration evaluated, before its update.
+ * nmpc_last_iterations() returns how many iterations updated the plan, which is frozen once the search has
+ * converged; NMPC_ITERATIONS iterations run in any case.
+ * nmpc_has_converged() returns 1 if the cost changed by less than NMPC_TOLERANCE from one iteration to the next,
+ * else 0. */
 nmpc_sum_t nmpc_last_cost(const nmpc_t *self);
 int nmpc_last_iterations(const nmpc_t *self);
 int nmpc_has_converged(const nmpc_t *self);
@@ -101,35 +123,36 @@ const char *nmpc_version(void);
 
 /* Internals: the type of a controller must be complete, so that the caller can own one. */
 
-/* The predicted error along one axis of the world at one step of the horizon; nmpc_predictor.h derives the
- * recurrence. m_step is metres per prediction step tau, m_step2 metres per tau^2. */
+/* Roll-out: the forward simulation of the prediction over the horizon; the word has nothing to do with the roll
+ * angle. This is its state along one axis, x or y, at one prediction step; nmpc_predictor.h derives the recurrence.
+ * As m_s2 is m/s^2, m_step is m/tau, m_step2 is m/tau^2, and m_step2_rad is m/tau^2 per radian. */
 typedef struct {
-    nmpc_real_t error_m;               /* r - Tp, of eqs 9 and 11 */
-    nmpc_real_t displacement_m_step;   /* change of the error over the next step */
-    nmpc_real_t acceleration_m_step2;  /* tau^2 times eq 8, at the commanded tilt */
-    nmpc_real_t roll_deficit_m_step2;  /* minus the part of it that the lag of roll still withholds */
-    nmpc_real_t pitch_deficit_m_step2; /* and the lag of pitch */
+    nmpc_real_t error_m;               /* e = r - Tp, of eqs 9 and 11 */
+    nmpc_real_t displacement_m_step;   /* d: change of the error over the next prediction step */
+    nmpc_real_t acceleration_m_step2;  /* A: tau^2 times eq 8, at the moves */
+    nmpc_real_t roll_deficit_m_step2;  /* D of roll: correction of A, because roll lags behind its move */
+    nmpc_real_t pitch_deficit_m_step2; /* D of pitch */
 } nmpc_rollout_t;
 
 /* What does not change while the plan of a control step is optimized. */
 typedef struct {
-    nmpc_real_t gain_x_m_step2[NMPC_AXES]; /* tau^2 times the row of eq 8 for x: per radian of roll, pitch */
-    nmpc_real_t gain_y_m_step2[NMPC_AXES]; /* and for y */
-    nmpc_real_t tilt_rad[NMPC_AXES];       /* before the first move: phi_k, theta_k */
-    nmpc_rollout_t x;                      /* the start of the roll-out along x */
-    nmpc_rollout_t y;                      /* and along y */
+    nmpc_real_t gain_x_m_step2_rad[NMPC_ANGLES]; /* tau^2 times the row of eq 8 for x: of roll, of pitch */
+    nmpc_real_t gain_y_m_step2_rad[NMPC_ANGLES]; /* tau^2 times the row of eq 8 for y */
+    nmpc_real_t tilt_rad[NMPC_ANGLES];           /* before the first moves: the measured phi_k, theta_k */
+    nmpc_rollout_t x;                            /* the start of the roll-out along x */
+    nmpc_rollout_t y;                            /* the start of the roll-out along y */
 } nmpc_prediction_t;
 
 /* Moves are ordered: roll, pitch of the first step of the control horizon, roll, pitch of the second, ... */
 struct nmpc_controller {
-    nmpc_weights_t weights;             /* lambda_1, lambda_2 */
+    nmpc_weights_t weights;               /* lambda_1, lambda_2 */
     nmpc_prediction_t prediction;
-    nmpc_real_t command_rad[NMPC_AXES]; /* u*_{k-1}: the last command */
-    nmpc_real_t plan_rad[NMPC_MOVES];   /* u_{k+i}, i = 0 .. N_c - 1: the moves */
-    nmpc_sum_t gradient[NMPC_MOVES];    /* dJ/du, 1/rad, of the plan that the last iteration evaluated */
-    nmpc_sum_t cost;                    /* J, eq 12, of that plan */
-    unsigned char iterations;           /* updates of the plan, at most I_max */
-    unsigned char converged;            /* 1 once J changed by less than epsilon */
+    nmpc_real_t command_rad[NMPC_ANGLES]; /* u*_k-1: the last command, NMPC_UPDATE_PERIOD_S ago */
+    nmpc_real_t plan_rad[NMPC_MOVES];     /* u_k+i, i = 0 .. N_c - 1: the moves, tau apart */
+    nmpc_sum_t gradient[NMPC_MOVES];      /* dJ/du, 1/rad, of the plan that the last iteration evaluated */
+    nmpc_sum_t cost;                      /* J, eq 12, of that plan */
+    unsigned char iterations;             /* how many iterations updated the plan, at most I_max */
+    unsigned char converged;              /* 1 once J changed by less than epsilon */
 };
 
 #ifdef __cplusplus

@@ -31,8 +31,8 @@ static const nmpc_real_t cosine_terms[NMPC_COSINE_TERMS] = {
 void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine)
 {
     const nmpc_real_t half = 0.5f;
-    const nmpc_real_t turns = angle_rad * quarter_turns_per_rad;
-    const int quadrant = (int)(turns + ((turns < (nmpc_real_t)0) ? -half : half));
+    const nmpc_real_t quarter_turns = angle_rad * quarter_turns_per_rad;
+    const int quadrant = (int)(quarter_turns + ((quarter_turns < (nmpc_real_t)0) ? -half : half));
     const nmpc_real_t count = (nmpc_real_t)quadrant;
     const nmpc_real_t rest = ((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))
                              - (count * quarter_turn_rad[2]);

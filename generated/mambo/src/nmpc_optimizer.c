@@ -20,14 +20,14 @@ typedef struct {
 } nmpc_rprop_t;
 
 /* Return the updated move, within the tilt limit. RPROP uses the sign of the gradient dJ/du, not its size:
- * while the sign stays the same the step size grows by eta+, where it changes it shrinks by eta-. */
+ * while the sign stays the same the step size is multiplied by eta+, where it changes by eta-. */
 static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int sign)
 {
     const int agreement = sign * rprop->previous_sign;
     nmpc_real_t next_rad = move_rad;
 
     if (agreement < 0) {
-        /* The last update stepped over a minimum: undo it and shorten the step. */
+        /* The last update stepped over a minimum: undo it and reduce the step size. */
         next_rad = rprop->previous_rad;
         rprop->step_rad = nmpc_larger(rprop->step_rad * NMPC_DECREASE, NMPC_STEP_MIN_RAD);
         rprop->previous_sign = 0;
@@ -74,7 +74,7 @@ void nmpc_optimizer_minimize(nmpc_t *self)
             updates++;
         }
         /* After convergence the signs are taken as 0: the plan is frozen, and the iterations still run, so
-         * that the work of a step is constant. */
+         * that the work of a control step is constant. */
         for (k = 0; k < NMPC_MOVES; k++) {
             const int sign = (converged == 0) ? nmpc_sign(self->gradient[k]) : 0;
 

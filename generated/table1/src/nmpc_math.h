@@ -14,11 +14,12 @@
 
 /* Compiler flags that would change the results. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0))
-#error "build without -ffast-math: the input check relies on NaN, the bits on the order of operations"
+#error "build without -ffast-math: the input check needs NaN, and the results depend on the order of operations"
 #endif
 #if defined(__ASSOCIATIVE_MATH__)
 #error "build without -fassociative-math: it changes the order of operations"
 #endif
+/* 0: float and double are evaluated with their own precision; 16: and so is _Float16, which is not used here. */
 #if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ != 0) && (__FLT_EVAL_METHOD__ != 16)
 #error "arithmetic must keep the precision of its type: on x86 build with -mfpmath=sse"
 #endif
@@ -27,7 +28,7 @@
 extern "C" {
 #endif
 
-/* Unrolls the following loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
+/* Ask gcc to unroll the next loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
  * compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
@@ -60,7 +61,8 @@ static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
     return view.bits;
 }
 
-/* One bit per predicted step: bit 0 is the last step, bit NMPC_LAST_STEP the first. */
+/* One bit per prediction step, the first step in the most significant bit, the last in bit 0. Steps count from 0
+ * to NMPC_LAST_STEP, in the paper from 1 to N_p: step i has bit NMPC_LAST_STEP - i. */
 typedef unsigned long nmpc_steps_t;
 #define NMPC_LAST_STEP 9U
 
@@ -112,14 +114,14 @@ static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
     return nmpc_smaller(nmpc_larger(value, -limit), limit);
 }
 
-/* 1 if `least` <= `value` <= `most`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
+/* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
-static inline int nmpc_between(nmpc_real_t value, nmpc_real_t least, nmpc_real_t most)
+static inline int nmpc_between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
 {
-    const int is_enough = (value >= least);
-    const int is_no_more = (value <= most);
+    const int is_at_least = (value >= minimum);
+    const int is_at_most = (value <= maximum);
 
-    return (is_enough != 0) && (is_no_more != 0);
+    return (is_at_least != 0) && (is_at_most != 0);
 }
 
 /* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */

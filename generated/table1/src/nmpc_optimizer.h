@@ -15,7 +15,8 @@
 extern "C" {
 #endif
 
-/* Improve `self->plan_rad` by I_max iterations, starting from its present value. */
+/* Run I_max iterations of RPROP on `self->plan_rad`, starting from its present value. The cost may rise from one
+ * iteration to the next; the plan after the last update is not evaluated. */
 void nmpc_optimizer_minimize(nmpc_t *self);
 
 #ifdef __cplusplus

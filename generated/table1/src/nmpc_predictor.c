@@ -23,11 +23,11 @@ const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESP
     { 50.0f, 142.5f }
 };
 
-/* Start the roll-out along one axis: velocity is held; the acceleration stays 0, as nmpc_init() set it. */
-static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_real_t velocity_m_s)
+/* Start the roll-out along one axis without moves: the acceleration stays 0, as nmpc_init() set it. */
+static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_real_t relative_velocity_m_s)
 {
     rollout->error_m = error_m;
-    rollout->displacement_m_step = NMPC_PREDICTION_STEP_S * velocity_m_s;
+    rollout->displacement_m_step = NMPC_PREDICTION_STEP_S * relative_velocity_m_s;
 }
 
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
@@ -39,16 +39,16 @@ void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *targ
     nmpc_real_t sine_m_step2;
     nmpc_real_t cosine_m_step2;
 
-    /* tau^2 times the matrix of eq 8, sin psi with the sign of eq 3. */
+    /* tau^2 times the matrix of eq 8. Eq 8 prints both sin psi with the opposite sign of what eqs 3 and 6 give. */
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
     sine_m_step2 = thrust_m_step2 * sine;
     cosine_m_step2 = thrust_m_step2 * cosine;
-    prediction->gain_x_m_step2[NMPC_ROLL] = -sine_m_step2;
-    prediction->gain_x_m_step2[NMPC_PITCH] = -cosine_m_step2;
-    prediction->gain_y_m_step2[NMPC_ROLL] = cosine_m_step2;
-    prediction->gain_y_m_step2[NMPC_PITCH] = -sine_m_step2;
+    prediction->gain_x_m_step2_rad[NMPC_ROLL] = -sine_m_step2;
+    prediction->gain_x_m_step2_rad[NMPC_PITCH] = -cosine_m_step2;
+    prediction->gain_y_m_step2_rad[NMPC_ROLL] = cosine_m_step2;
+    prediction->gain_y_m_step2_rad[NMPC_PITCH] = -sine_m_step2;
 
-    /* Eqs 9-11 without moves. */
+    /* r - Tp and v - Tv, of eqs 9 to 11, at the present control step. */
     start_rollout(&prediction->x, state->position_m[0] - target->position_m[0],
                   state->velocity_m_s[0] - target->velocity_m_s[0]);
     start_rollout(&prediction->y, state->position_m[1] - target->position_m[1],
