@@ -73,8 +73,8 @@ class Horizon(_Section):
         ge=1,
         le=50,
         description="N_c, control horizon, in prediction steps: their moves of roll and pitch are the "
-        "unknowns of the optimizer (eq 12, Table I). The last moves are held to the end of the prediction, so "
-        "N_c is at most N_p.",
+        "unknowns of the optimizer (eq 12, Table I). The last moves are held to the end of the prediction, "
+        "so N_c is at most N_p.",
     )
     prediction_step_s: Number = Field(
         0.07,
