@@ -1,4 +1,4 @@
-"""Read and write controller.toml: text to settings, reporting all faults at once, and settings to text."""
+"""Read and write controller.toml: text to settings, all faults reported at once, and back."""
 
 import textwrap
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
-from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, spelled
+from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, spell
 from mambo_nmpc.codegen.settings.messages import faults
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
@@ -20,7 +20,7 @@ _TITLE = "Settings of a mambo-nmpc controller."
 def read(path: Path) -> Settings:
     """Read the settings in the file at `path`.
 
-    Raises UnreadableFileError for what is not TOML, InvalidSettingsError for settings that break a rule.
+    Raises UnreadableFileError if it is not TOML, InvalidSettingsError if settings break a rule.
     """
     return parse(read_text(path), echo(str(path)))
 
@@ -30,10 +30,10 @@ def parse(text: str, source: str) -> Settings:
 
     Raises UnreadableFileError for bad syntax, InvalidSettingsError with all faults for bad settings.
     """
-    return validated(parse_document(text, source), source)
+    return validate(parse_document(text, source), source)
 
 
-def validated(document: Mapping[str, object], source: str) -> Settings:
+def validate(document: Mapping[str, object], source: str) -> Settings:
     """Return the settings in `document`; raises InvalidSettingsError with all faults, after `source`."""
     try:
         return Settings.model_validate(document)
@@ -42,19 +42,18 @@ def validated(document: Mapping[str, object], source: str) -> Settings:
 
 
 def with_option(settings: Settings, path: str, value: object, source: str = "settings") -> Settings:
-    """Return `settings` with `value` at the dotted `path`, under the rules of the file.
+    """Return `settings` with `value` at the dotted `path`, checked like a file.
 
-    `source` begins the message; for an option of the command line it is the option. Raises
-    InvalidSettingsError.
+    `source` begins the message, such as the option of the command line. Raises InvalidSettingsError.
     """
     section, name = path.split(".")
     document = settings.model_dump()
     document[section][name] = value
-    return validated(document, source)
+    return validate(document, source)
 
 
 def to_toml(settings: Settings, title: str = _TITLE) -> str:
-    """Return a complete controller.toml, a comment above every key; reading it gives equal settings."""
+    """Return a complete controller.toml with a comment above every key; reading it gives equal settings."""
     parts = [_comment(title), _comment("A missing key takes the value of preset table1.")]
     values = settings.model_dump()
     for section, about in SECTIONS.items():
@@ -62,7 +61,7 @@ def to_toml(settings: Settings, title: str = _TITLE) -> str:
         for name, value in values[section].items():
             key = KEYS[f"{section}.{name}"]
             admits = _comment(f"{key.kind.capitalize()}: {key.domain}.")
-            parts += ["", _comment(key.description), admits, f"{name} = {spelled(value)}"]
+            parts += ["", _comment(key.description), admits, f"{name} = {spell(value)}"]
     return "\n".join(parts) + "\n"
 
 

@@ -1,4 +1,4 @@
-"""The keys of controller.toml, read from the JSON schema of the settings: for messages and comments."""
+"""The keys of controller.toml, from the JSON schema of the settings; messages and comments use them."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,10 +8,10 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 @dataclass(frozen=True)
 class Key:
-    """One setting: its dotted path, its description and its admissible values.
+    """One setting: its dotted path, its description and its allowed values.
 
-    `kind` is "whole number", "number", "one of" or "text"; `domain` is the admissible values in words; `rule`
-    follows "must" in a message; `low` and `high` bound a number and are None for text.
+    `kind` is "whole number", "number", "one of" or "text"; `domain` says in words which values are allowed;
+    `rule` follows "must" in a message; `low` and `high` bound a number and are None for text.
     """
 
     path: str
@@ -23,8 +23,8 @@ class Key:
     high: float | None = None
 
 
-def spelled(value: object) -> str:
-    """Return a setting's value as TOML spells it: the shortest decimal, text in quotes."""
+def spell(value: object) -> str:
+    """Spell a setting's value as TOML: a number as its shortest decimal, text in quotes."""
     if isinstance(value, float):
         return repr(value).replace("e-0", "e-")
     return f'"{value}"' if isinstance(value, str) else str(value)
@@ -34,7 +34,7 @@ def _key(path: str, schema: dict[str, Any]) -> Key:
     """Return the key at `path` from its JSON schema."""
     description = schema["description"]
     if "enum" in schema:
-        choices = " or ".join(spelled(choice) for choice in schema["enum"])
+        choices = " or ".join(spell(choice) for choice in schema["enum"])
         return Key(path, description, "one of", choices, f"be {choices}")
     if "pattern" in schema:
         words = f"lower-case letters, digits and single inner underscores, at most {schema['maxLength']}"
@@ -44,12 +44,12 @@ def _key(path: str, schema: dict[str, Any]) -> Key:
     if "not" in schema:
         domain = f"0 or {schema['not']['exclusiveMaximum']:.10g}..{high:.10g}"
         return Key(path, description, kind, domain, f"be {domain}", low, high)
-    domain = f"{spelled(low)}..{high:.10g}"
+    domain = f"{spell(low)}..{high:.10g}"
     return Key(path, description, kind, domain, f"lie in {domain}", low, high)
 
 
 SECTIONS: dict[str, str] = {name: field.description or "" for name, field in Settings.model_fields.items()}
-"""What each section is about, in the order of the file."""
+"""The description of each section, in the order of the file."""
 
 KEYS: dict[str, Key] = {
     f"{section}.{name}": _key(f"{section}.{name}", schema)

@@ -1,4 +1,4 @@
-"""Turn what pydantic finds wrong with settings into sentences: key, value, rule and fix, one per fault."""
+"""Turn the errors of pydantic into one sentence per fault: key, value, rule and fix."""
 
 import difflib
 import json
@@ -14,29 +14,29 @@ from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key
 
 
 def faults(error: ValidationError, document: Mapping[str, object]) -> tuple[str, ...]:
-    """Return one sentence for each fault that `error` found in `document`, without the name of its source."""
+    """Return one sentence for each fault of `document`, without the name of its source."""
     return tuple(
         _fault(details, document) for details in error.errors(include_url=False, include_context=False)
     )
 
 
 def _fault(details: ErrorDetails, document: Mapping[str, object]) -> str:
-    """Say which key is wrong, with its value, and what to write instead."""
+    """Name the wrong key and its value, and say what to write instead."""
     names = [str(part) for part in details["loc"]]
-    dotted = ".".join(_spelled_name(name) for name in names)
+    dotted = ".".join(_spell_name(name) for name in names)
     if details["type"] == "extra_forbidden":
         return _unknown(names, dotted)
     value = details["input"]
     if len(names) == 1:
-        return f"{dotted} = {_spelled_value(value)} must be a section; write [{dotted}] and its keys below"
+        return f"{dotted} = {_spell_value(value)} must be a section; write [{dotted}] and its keys below"
     key = KEYS[dotted]
     section = document.get(names[0])
     default = "" if isinstance(section, Mapping) and names[1] in section else " (the default)"
-    return f"{dotted} = {_spelled_value(value)}{default} {_rule(details, key)}"
+    return f"{dotted} = {_spell_value(value)}{default} {_rule(details, key)}"
 
 
 def _rule(details: ErrorDetails, key: Key) -> str:
-    """Return what the value must be, from "must" on."""
+    """Return the rule that the value breaks, for most errors from "must" on."""
     value = details["input"]
     match details["type"]:
         case "int_type" | "float_type" if not (isinstance(value, int) and not isinstance(value, bool)):
@@ -52,7 +52,7 @@ def _rule(details: ErrorDetails, key: Key) -> str:
 
 
 def _unit_hint(value: float, key: Key) -> str:
-    """Return a hint for a number in the unit that people use instead of ours, or nothing."""
+    """Return a hint if the number fits in Hz instead of seconds, or in degrees instead of radians."""
     if key.low is None or key.high is None or not key.high < value < 1e6:
         return ""
     if key.path.endswith(("_period_s", "_step_s")) and key.low <= 1 / value <= key.high:
@@ -63,7 +63,7 @@ def _unit_hint(value: float, key: Key) -> str:
 
 
 def _unknown(names: list[str], dotted: str) -> str:
-    """Say that a section or key does not exist, with the nearest one that does."""
+    """Say that a section or key does not exist, and name the most similar one."""
     if len(names) == 1:
         return f"{dotted} is not a section{_suggestion(names[0], list(SECTIONS))}"
     siblings = [path.removeprefix(f"{names[0]}.") for path in KEYS if path.startswith(f"{names[0]}.")]
@@ -71,19 +71,19 @@ def _unknown(names: list[str], dotted: str) -> str:
 
 
 def _suggestion(name: str, siblings: list[str]) -> str:
-    """Return what the writer of `name` may have meant: a sibling, a key of another section, or the choice."""
+    """Suggest a similar sibling of `name`, else the same key of another section, else list the siblings."""
     elsewhere = [path for path in KEYS if path.endswith(f".{name}")]
     near = difflib.get_close_matches(name, siblings, n=1) or elsewhere[:1]
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(siblings)}"
 
 
-def _spelled_name(name: str) -> str:
-    """Return a key as TOML spells it, bare if it can be."""
+def _spell_name(name: str) -> str:
+    """Spell a key as TOML, without quotes if possible."""
     return echo(name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name, ensure_ascii=False))
 
 
-def _spelled_value(value: object) -> str:
-    """Return a value as TOML spells it, shortened; a whole table or list only by its kind."""
+def _spell_value(value: object) -> str:
+    """Spell a value as TOML, shortened; a table or list only as its type."""
     match value:
         case dict():
             return "a table"

@@ -1,4 +1,4 @@
-"""The settings of one controller: its sections, the rule that joins them, and their digest."""
+"""The settings of one controller: its sections, the rule between sections, and their digest."""
 
 import hashlib
 import json
@@ -33,7 +33,7 @@ class Settings(Sections):
 
     @property
     def digest(self) -> str:
-        """The SHA-256 of the values in hexadecimal: the same for equal settings, wherever they came from."""
+        """The SHA-256 of the values, in hexadecimal; equal settings have equal digests."""
         canonical = json.dumps(self.model_dump(), sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()
 

@@ -1,4 +1,4 @@
-"""The named presets: small TOML files that hold only what departs from the defaults, and say why."""
+"""The presets: TOML files that hold and explain only what differs from the defaults."""
 
 import difflib
 from importlib import resources
@@ -22,14 +22,14 @@ def preset(name: str) -> Settings:
 
 
 def description(name: str) -> str:
-    """Return what the preset `name` is for, in one line; raises SourceNotFoundError."""
+    """Return the purpose of the preset `name`, in one line; raises SourceNotFoundError."""
     return _text(name).splitlines()[0].removeprefix("# ")
 
 
 def load(name_or_path: str) -> Settings:
-    """Return the settings of a preset, or else of the file at a path (./mambo is a file, mambo a preset).
+    """Return the settings of a preset or of a file; `mambo` is the preset, `./mambo` a file.
 
-    Raises SourceNotFoundError if there is neither, and the errors of `controller_toml.read`.
+    Raises SourceNotFoundError if there is neither, and what `controller_toml.read` raises.
     """
     if name_or_path in names():
         return preset(name_or_path)

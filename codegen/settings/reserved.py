@@ -1,4 +1,4 @@
-"""Names that C, C++, their libraries and POSIX define: none of them may be a prefix."""
+"""Names of C, C++, their libraries and POSIX, which `code.prefix` must not be."""
 
 _KEYWORDS = """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
@@ -41,7 +41,7 @@ _WIDTHS = [
 ]
 
 KEYWORDS = frozenset(_KEYWORDS.split())
-"""The words of C23 and C++23, the contextual ones included."""
+"""The keywords of C23 and C++23, including those with a meaning in some contexts only."""
 
 STANDARD_NAMES = frozenset(
     [
@@ -56,4 +56,4 @@ STANDARD_NAMES = frozenset(
         *(f"pthread_{word}" for word in _PTHREAD.split()),
     ]
 )
-"""Prefixes that would shadow a header of the C library (stdio.h) or take a name of it or of POSIX (pid_t)."""
+"""Prefixes that would hide a C library header (stdio.h) or redefine one of its or POSIX's types (pid_t)."""

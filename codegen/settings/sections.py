@@ -1,8 +1,8 @@
 """The sections of the settings: every key of controller.toml, its default, bounds, unit and source.
 
 The attribute path is the TOML path (`settings.horizon.prediction` is `prediction` under `[horizon]`).
-The defaults are preset `table1`: Table I of the paper, and where the paper is silent the documented choice.
-The descriptions below are the text of the commented controller.toml, the JSON schema and the reference.
+The defaults are preset `table1`: Table I of the paper, and where the paper says nothing, a documented choice.
+The descriptions are the comments of controller.toml and part of the JSON schema.
 """
 
 import math
@@ -21,7 +21,7 @@ from pydantic_core import PydanticCustomError
 from mambo_nmpc.codegen.settings import reserved
 
 SHORTEST_LAG_S = 0.001
-"""An attitude lag is 0 (none) or at least this: below it the exact discretisation is a unit step."""
+"""An attitude lag is 0 (none) or at least this; a shorter one is negligible."""
 
 
 def _without_minus_zero(value: float) -> float:
@@ -30,7 +30,7 @@ def _without_minus_zero(value: float) -> float:
 
 
 def _none_or_lag(value: float) -> float:
-    """Return `value`, an attitude lag in seconds; refuse those that round to no lag at all."""
+    """Return an attitude lag in seconds; refuse one between 0 and SHORTEST_LAG_S."""
     if 0 < value < SHORTEST_LAG_S:
         raise PydanticCustomError("lag", f"must be 0 or lie in {SHORTEST_LAG_S}..2; 0 means no lag")
     return value
@@ -46,7 +46,7 @@ Lag = Annotated[
 
 
 class _Section(BaseModel):
-    """What all sections share: frozen, no unknown keys, no silent conversion, finite numbers only."""
+    """The rules of all sections: read-only, no unknown keys, no conversion of types, finite numbers."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -59,37 +59,35 @@ class _Section(BaseModel):
 
 
 class Horizon(_Section):
-    """How far the controller looks ahead, and how often it runs."""
+    """How far the controller predicts, and how often it runs."""
 
     prediction: int = Field(
         10,
         ge=1,
         le=50,
-        description="N_p, prediction horizon, in prediction steps: the states that the cost weighs "
-        "(eq 12, Table I).",
+        description="N_p, the prediction horizon: number of predicted states in the cost (eq 12, Table I).",
     )
     control: int = Field(
         2,
         ge=1,
         le=50,
-        description="N_c, control horizon, in prediction steps: their moves of roll and pitch are the "
-        "unknowns of the optimizer (eq 12, Table I). The last moves are held to the end of the prediction, "
-        "so N_c is at most N_p.",
+        description="N_c, the control horizon, in prediction steps: the optimizer chooses a move of roll and pitch "
+        "for each (eq 12, Table I). At most N_p; the last move is held to the end of the prediction horizon.",
     )
     prediction_step_s: Number = Field(
         0.07,
         ge=0.001,
         le=1,
-        description="tau of the predictor, in seconds: the time between two predicted states (eqs 9-11). "
-        "The paper prints 0.01 s, a horizon shorter than the attitude loop's lag, which does not fly on the "
-        "Mambo.",
+        description="tau, the prediction step, in seconds: time between two predicted states (eqs 9-11). "
+        "The paper prints 0.01 s; the horizon is then shorter than the lag of the Mambo's attitude loop, and "
+        "the drone is lost.",
     )
     update_period_s: Number = Field(
         0.01,
         ge=0.001,
         le=1,
-        description="Update period, in seconds: the time between two calls of the step function (100 Hz in "
-        "the paper, section on simulation).",
+        description="Update period, in seconds: time between two calls of the step function (100 Hz in "
+        "the paper).",
     )
 
     @field_validator("control")
@@ -102,27 +100,29 @@ class Horizon(_Section):
 
 
 class Model(_Section):
-    """How the predictor moves the drone."""
+    """The prediction model of the drone."""
 
     position_update: Literal["exact", "printed"] = Field(
         "exact",
-        description='How acceleration moves the position (eq 9): "exact" adds tau^2/2 times it, as units '
-        'ask; "printed" adds tau/2 times it, as the paper prints.',
+        description='Factor of the acceleration in the position update (eq 9): tau^2/2 for "exact"; tau/2, '
+        'as the paper prints it, for "printed", whose units do not match.',
     )
     yaw_convention: Literal["rotation", "printed"] = Field(
         "rotation",
-        description='Signs of the yaw psi in eq 8: "rotation" takes them from the rotation matrix (eq 3, '
-        'NED); "printed" takes them as eq 8 prints them, which flies away at 45 degrees of yaw.',
+        description='Signs of the terms with yaw psi in eq 8: "rotation" takes those of the rotation matrix '
+        '(eq 3, NED); "printed" takes those that eq 8 prints, with which the drone is lost at 45 degrees of '
+        "yaw.",
     )
     roll_lag_s: Lag = Field(
         0.0,
-        description="Time constant of the roll loop, in seconds: a first-order lag between commanded and "
-        "predicted roll phi, 0 for none (not in the paper; identified on the Mambo's attitude loop).",
+        description="Time constant of the first-order lag from commanded to predicted roll phi, in seconds; "
+        "0 for no lag, as in the paper. Preset mambo has the lag identified on the Mambo's roll loop.",
     )
     pitch_lag_s: Lag = Field(
         0.0,
-        description="Time constant of the pitch loop, in seconds: a first-order lag between commanded and "
-        "predicted pitch theta, 0 for none (not in the paper; identified on the Mambo's attitude loop).",
+        description="Time constant of the first-order lag from commanded to predicted pitch theta, in "
+        "seconds; 0 for no lag, as in the paper. Preset mambo has the lag identified on the Mambo's "
+        "pitch loop.",
     )
 
     @field_validator("roll_lag_s", "pitch_lag_s")
@@ -131,70 +131,70 @@ class Model(_Section):
         if lag > 0 and info.data.get("position_update") == "printed":
             raise PydanticCustomError(
                 "lag",
-                'must be 0 with model.position_update = "printed", which knows no lag; '
+                'must be 0 with model.position_update = "printed", which has no lag; '
                 'write 0 here or position_update = "exact"',
             )
         return lag
 
 
 class Cost(_Section):
-    """What the controller pays for: distance from the target and moves of the attitude command."""
+    """The weights of the cost: distance from the target, and changes of the attitude command."""
 
     tracking_weight: Number = Field(
         2250.0,
         ge=0.001,
         le=1e6,
-        description="lambda_1, per metre: weight of the 1-norm of the distance between predicted and target "
+        description="lambda_1, in 1/m: weight of the 1-norm of the distance between predicted and target "
         "position (eq 12, Table I).",
     )
     effort_weight: Number = Field(
         1.0,
         ge=0,
         le=1e6,
-        description="lambda_2, per radian: weight of the 1-norm of the change from one move to the next (eq "
-        "12, Table I). A larger one calms the commands and costs tracking.",
+        description="lambda_2, in 1/rad: weight of the 1-norm of the change from one move to the next "
+        "(eq 12, Table I). A larger weight gives calmer commands and larger tracking errors.",
     )
 
 
 class Optimizer(_Section):
-    """The resilient backpropagation (RPROP) that searches the moves."""
+    """The search for the moves by resilient backpropagation (RPROP)."""
 
     variant: Literal["rprop+", "irprop-"] = Field(
         "rprop+",
-        description='What follows a slope that changes sign: "rprop+" takes the last move back (Riedmiller '
-        'and Braun 1993), "irprop-" stays and takes a smaller step next (Igel and Huesken 2000).',
+        description='What RPROP does when a gradient changes its sign: "rprop+" restores the previous move '
+        '(Riedmiller and Braun 1993), "irprop-" keeps the move and makes a smaller step in the next '
+        "iteration (Igel and Huesken 2000).",
     )
     iterations: int = Field(
         5,
         ge=1,
         le=100,
-        description="I_max, iterations in every control step: always as many evaluations of the cost "
-        "(Table I).",
+        description="I_max, iterations in every control step; each evaluates the cost once (Table I).",
     )
     tolerance: Number = Field(
         0.05,
         ge=0,
         le=1e6,
-        description="epsilon, in units of the cost: once an iteration changes the cost by less, the plan is "
-        "frozen and reported as converged (Table I).",
+        description="epsilon, in units of the cost: when the cost changes by less from one iteration to the "
+        "next, the search has converged and the plan no longer changes (Table I).",
     )
     initial_step_rad: Number = Field(
         0.01,
         ge=1e-6,
         le=1,
-        description="U_step or Delta_0, in radians: step size at the start of every control step (Table I).",
+        description="U_step or Delta_0, in radians: initial step size of every search (Table I).",
     )
     increase: Number = Field(
         1.2,
         ge=1,
         le=10,
-        description="eta+, a factor: growth of the step size while the slope keeps its sign (Table I).",
+        description="eta+: factor of the step size while the gradient keeps its sign (Table I).",
     )
     decrease: Number = Field(
         0.8,
         ge=0.01,
         le=1,
-        description="eta-, a factor: shrinkage of the step size when the slope changes sign (Table I).",
+        description="eta-: factor of the step size when the gradient changes its sign (Table I).",
     )
     step_max_rad: Number = Field(
         0.1, ge=1e-6, le=1, description="Delta_max, in radians: the largest step size (Table I)."
@@ -204,8 +204,8 @@ class Optimizer(_Section):
     )
     warm_start: Literal["last_command", "plan"] = Field(
         "last_command",
-        description='Omega_k, where every control step begins: "last_command" starts all moves at the '
-        'command last applied, "plan" at the plan last found (the paper does not say).',
+        description='Omega_k, the initial guess of every search: "last_command" sets all moves to the last '
+        'command, "plan" keeps the last plan. The paper does not say which.',
     )
 
     @field_validator("step_max_rad")
@@ -214,7 +214,7 @@ class Optimizer(_Section):
         initial = info.data.get("initial_step_rad", step_max)
         if step_max < initial:
             raise PydanticCustomError(
-                "step", f"must lie in {initial!r}..1 (from optimizer.initial_step_rad up)"
+                "step", f"must lie in {initial!r}..1 (at least optimizer.initial_step_rad)"
             )
         return step_max
 
@@ -224,49 +224,49 @@ class Optimizer(_Section):
         initial = info.data.get("initial_step_rad", step_min)
         if step_min > initial:
             raise PydanticCustomError(
-                "step", f"must lie in 1e-9..{initial!r} (up to optimizer.initial_step_rad)"
+                "step", f"must lie in 1e-9..{initial!r} (at most optimizer.initial_step_rad)"
             )
         return step_min
 
 
 class Limits(_Section):
-    """What the controller may command."""
+    """The limits of the commands."""
 
     tilt_rad: Number = Field(
         0.35,
         ge=0.01,
         le=1.2,
-        description="Tilt limit, in radians: every move of roll and pitch is clamped to plus and minus this "
-        "in each iteration (not in the paper; without it no bound on the command can be proven).",
+        description="Tilt limit, in radians: each iteration clamps every move of roll and pitch to plus or "
+        "minus this value. Not in the paper; without it no bound on the command can be proven.",
     )
 
 
 class Ranges(_Section):
-    """What the controller accepts: an input outside is refused with a status and the last good command."""
+    """The ranges of the inputs; a step refuses an input out of range with a status."""
 
     position_m: Number = Field(
         1000.0,
         ge=1,
         le=10000,
-        description="Largest magnitude of a position of drone or target, in metres, per axis.",
+        description="Largest absolute position of drone and target along each axis, in metres.",
     )
     velocity_m_s: Number = Field(
         100.0,
         ge=0.1,
         le=1000,
-        description="Largest magnitude of a velocity of drone or target, in metres per second, per axis.",
+        description="Largest absolute velocity of drone and target along each axis, in metres per second.",
     )
     thrust_acceleration_min_m_s2: Number = Field(
         1.0,
         ge=0.1,
         le=100,
-        description="Smallest thrust over mass, u_1/m of eq 8, in metres per second squared; hover is 9.81.",
+        description="Smallest thrust over mass, u_1/m in eq 8, in metres per second squared; hover is 9.81.",
     )
     thrust_acceleration_max_m_s2: Number = Field(
         50.0,
         ge=0.1,
         le=1000,
-        description="Largest thrust over mass, u_1/m of eq 8, in metres per second squared; above the "
+        description="Largest thrust over mass, u_1/m in eq 8, in metres per second squared; more than the "
         "smallest.",
     )
 
@@ -282,19 +282,19 @@ class Ranges(_Section):
 
 
 class Code(_Section):
-    """How the C is spelled."""
+    """Types and names of the C."""
 
     scalar: Literal["float32", "float64", "fixed"] = Field(
         "float32",
-        description="Type of every number in the C: float32 is C's float, float64 its double, fixed whole "
-        "numbers of 32 bits, for processors without an FPU.",
+        description="Scalar type of the C: float32 is float, float64 is double, fixed is fixed point with "
+        "32-bit integers, for processors without an FPU.",
     )
     prefix: str = Field(
         "nmpc",
         max_length=24,
         pattern=r"^[a-z][a-z0-9]*(_[a-z0-9]+)*$",
-        description="How public names begin, as in nmpc_step and NMPC_OK: controllers with different "
-        "prefixes live in one image.",
+        description="Prefix of all public names, as in nmpc_step and NMPC_OK; with different prefixes "
+        "several controllers can be linked into one firmware.",
     )
 
     @field_validator("prefix")
@@ -313,16 +313,14 @@ class Code(_Section):
 
 
 class Sections(_Section):
-    """All sections; `Settings` adds the rule that joins them."""
+    """All sections; `Settings` adds the rule between them."""
 
-    horizon: Horizon = Field(
-        Horizon(), description="How far the controller looks ahead, and how often it runs."
-    )
-    model: Model = Field(Model(), description="How the predictor moves the drone.")
-    cost: Cost = Field(Cost(), description="What the controller pays for: distance and effort.")
+    horizon: Horizon = Field(Horizon(), description="How far the controller predicts, and how often it runs.")
+    model: Model = Field(Model(), description="The prediction model of the drone.")
+    cost: Cost = Field(Cost(), description="The weights of the cost: distance and effort.")
     optimizer: Optimizer = Field(Optimizer(), description="The RPROP search for the moves.")
-    limits: Limits = Field(Limits(), description="What the controller may command.")
+    limits: Limits = Field(Limits(), description="The limits of the commands.")
     ranges: Ranges = Field(
-        Ranges(), description="What the controller accepts; anything outside is refused with a status."
+        Ranges(), description="The ranges of the inputs; a step refuses an input out of range with a status."
     )
-    code: Code = Field(Code(), description="How the C is spelled.")
+    code: Code = Field(Code(), description="Types and names of the C.")

@@ -1,4 +1,4 @@
-"""Read TOML files that people write, and say in their words what is wrong with one."""
+"""Read TOML files, with messages that name file and line."""
 
 import re
 import tomllib
@@ -25,7 +25,7 @@ def read_text(path: Path) -> str:
     except OSError as error:
         raise UnreadableFileError(f"{name}: cannot be read: {error.strerror}") from error
     if len(content) > LARGEST_FILE_BYTES:
-        raise UnreadableFileError(f"{name}: is larger than 64 kB; such files take a few")
+        raise UnreadableFileError(f"{name}: is larger than 64 kB; a settings file needs a few kB")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -34,9 +34,9 @@ def read_text(path: Path) -> str:
 
 
 def parse_document(text: str, source: str) -> dict[str, Any]:
-    """Return what TOML `text` says; `source` begins every message. Raises UnreadableFileError."""
+    """Parse TOML; `source` begins every message. Raises UnreadableFileError."""
     try:
-        return tomllib.loads(text + "\n")  # else a fault at the end of the last line has no line number
+        return tomllib.loads(text + "\n")  # without "\n" a fault at the end has no line number
     except RecursionError:
         raise UnreadableFileError(
             f"{source}: is nested too deeply; write [section] and key = value"
@@ -46,7 +46,7 @@ def parse_document(text: str, source: str) -> dict[str, Any]:
 
 
 def _syntax_fault(message: str, text: str) -> str:
-    """Put the place that tomllib reports last in front, as compilers do, and repeat the line at fault."""
+    """Put the line number that tomllib reports at the front, as compilers do, and quote the line."""
     found = _PLACE.fullmatch(message)
     if found is None:
         return f"is not TOML: {echo(message)}"

@@ -86,7 +86,7 @@ class Tuning:
             section, name = path.split(".")
             whole = KEYS[path].kind == "whole number"
             document[section][name] = int(value) if whole else round_value(value)
-        return controller_toml.validated(document, "the search")
+        return controller_toml.validate(document, "the search")
 
     def draw_flights(self) -> list[Draw]:
         """Return the draws of the flights that every trial flies."""

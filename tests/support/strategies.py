@@ -9,7 +9,7 @@ from typing import Any
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mambo_nmpc.codegen.settings.keys import KEYS, Key, spelled
+from mambo_nmpc.codegen.settings.keys import KEYS, Key, spell
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
 from tests.support.cases import SCALARS
@@ -115,7 +115,7 @@ def nested(values: Values) -> dict[str, Values]:
 
 def toml(values: Values) -> str:
     """Return TOML text of {"section.key": value}."""
-    return "".join(f"{path} = {spelled(value)}\n" for path, value in values.items())
+    return "".join(f"{path} = {spell(value)}\n" for path, value in values.items())
 
 
 def _bounds(key: Key) -> tuple[float, float]:
@@ -149,7 +149,7 @@ def _with(values: Values, path: str, value: Any, rule: str, spelling: str | None
     """Return `values` with `value` at `path`, which breaks `rule`."""
     told = spelling or (f'"{value}"' if isinstance(value, str) else str(value))
     text = toml({key: other for key, other in values.items() if key != path})
-    return Broken(f"{text}{path} = {spelling or spelled(value)}\n", path, f" = {told} ", rule)
+    return Broken(f"{text}{path} = {spelling or spell(value)}\n", path, f" = {told} ", rule)
 
 
 def _beyond(draw: st.DrawFn, values: Values) -> Broken:
@@ -242,9 +242,9 @@ def _steps_at_odds(draw: st.DrawFn, values: Values) -> Broken:
     }
     if path == "optimizer.step_max_rad":
         step = draw(st.floats(1e-6, initial, exclude_max=True))
-        return _with(rest, path, step, f"must lie in {initial!r}..1 (from optimizer.initial_step_rad up)")
+        return _with(rest, path, step, f"must lie in {initial!r}..1 (at least optimizer.initial_step_rad)")
     step = draw(st.floats(initial, 1, exclude_min=True))
-    return _with(rest, path, step, f"must lie in 1e-9..{initial!r} (up to optimizer.initial_step_rad)")
+    return _with(rest, path, step, f"must lie in 1e-9..{initial!r} (at most optimizer.initial_step_rad)")
 
 
 def _lag_at_odds(draw: st.DrawFn, values: Values) -> Broken:
