@@ -1,4 +1,4 @@
-"""Write files whole or not at all: each is written beside its place first, then renamed into it."""
+"""Write files whole or not at all: a new file is written next to its destination, then renamed onto it."""
 
 import contextlib
 import os
@@ -10,17 +10,17 @@ _NEW = ".mambo-nmpc-new"
 
 
 def put(place: Path, content: bytes) -> None:
-    """Write one file whole or not at all, its folder made if it is missing; raises OSError."""
-    with staged({place: content}):
+    """Write one file whole or not at all; make its folder if it is missing. Raises OSError."""
+    with stage({place: content}):
         pass
 
 
 @contextlib.contextmanager
-def staged(files: Mapping[Path, bytes | None]) -> Iterator[None]:
-    """Write new files to the disk beside their places; on leaving rename them, in the order of `files`.
+def stage(files: Mapping[Path, bytes | None]) -> Iterator[None]:
+    """Write new files next to their destinations; when the block ends, rename them in the order of `files`.
 
-    None in place of a content removes the file, and its folder if that is empty then. An error up to the
-    first rename leaves every place as it was. Raises OSError that names the place.
+    A content of None removes the file, and then its folder if that is empty. An error before the first
+    rename leaves every destination as it was. Raises OSError with the destination as its file name.
     """
     missing = {folder for place in files for folder in place.parents if not folder.exists()}
     new = {place: place.with_name(f".{place.name}.{os.getpid()}{_NEW}") for place in files}
@@ -47,12 +47,12 @@ def staged(files: Mapping[Path, bytes | None]) -> Iterator[None]:
 
 
 def is_left_over(path: str) -> bool:
-    """Whether a killed run left the new file `path` beside its place."""
+    """Whether `path` is a new file that a killed run did not rename."""
     return path.endswith(_NEW)
 
 
 def _write(new: Path, place: Path, content: bytes) -> None:
-    """Bring `new` to the disk, with permissions and owner of the file at `place` if there is one."""
+    """Write and sync the file `new`; it takes permissions and owner of the file at `place`, if any."""
     try:
         if not place.parent.exists():
             place.parent.mkdir(parents=True, exist_ok=True)

@@ -1,8 +1,8 @@
-"""Put a bundle on disk, and compare one: the manifest tells our files from everybody else's.
+"""Write a bundle to disk, and compare one on disk with its settings.
 
-A bundle is {relative POSIX path: text}, written as UTF-8 with the line ends it has. Its manifest holds the
-generator's version and the SHA-256 of every file. A file in the folder that is not in the manifest, or no
-longer has its SHA-256, is the user's work: it is overwritten only with `force`.
+A bundle is {relative POSIX path: text}, written as UTF-8 without change of line ends. Its manifest holds the
+generator's version and the SHA-256 of every file. A file that is not in the manifest, or whose SHA-256 has
+changed, is the user's work: it is overwritten only with `force`.
 """
 
 import difflib
@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from typing import Literal
 
 from mambo_nmpc.codegen import __version__
-from mambo_nmpc.codegen.atomic import is_left_over, staged
+from mambo_nmpc.codegen.atomic import is_left_over, stage
 from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, UnwritableError, echo
 
 MANIFEST = "manifest.json"
@@ -24,7 +24,7 @@ GENERATOR = "mambo-nmpc"
 
 @dataclass(frozen=True)
 class Changes:
-    """What writing a bundle does to its folder, as sorted paths; `kept` are the user's own files."""
+    """What `write` changes in a folder, as sorted paths; `kept` are files outside the bundle."""
 
     created: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
@@ -34,13 +34,13 @@ class Changes:
 
     @property
     def any(self) -> bool:
-        """Whether anything on disk is to change."""
+        """Whether a file is created, changed or removed."""
         return bool(self.created or self.changed or self.removed)
 
 
 @dataclass(frozen=True)
 class Drift:
-    """One file on disk that is not what the bundle says; `diff` is a unified diff for a changed one."""
+    """One file on disk that differs from the bundle; `diff` is a unified diff if its text changed."""
 
     path: str
     kind: Literal["missing", "changed", "stale"]
@@ -56,12 +56,12 @@ def manifest(files: Mapping[str, str]) -> str:
 def write(
     files: Mapping[str, str], directory: Path, *, force: bool = False, dry_run: bool = False
 ) -> Changes:
-    """Bring `directory` to the bundle `files`, file by file, and return what changed.
+    """Make `directory` hold the bundle `files`, file by file, and return what changed.
 
-    All new files are on the disk before the first is renamed into its place; the manifest comes last. A run
-    killed in between leaves C files of two bundles, which do not compile together; the same run, repeated,
-    finishes the work. With `dry_run` nothing is written. Raises, unless `force`, ForeignFilesError if a path
-    of the bundle holds the user's work and LayoutError if the folder holds a bundle of the other layout;
+    All new files are on the disk before the first one is renamed; the manifest is renamed last. A run killed
+    between the renames leaves C files of two bundles, which do not compile together; repeating the run
+    completes the bundle. With `dry_run` nothing is written. Without `force`, raises ForeignFilesError if it
+    would overwrite the user's work, and LayoutError if the folder holds a bundle of the other layout. Raises
     UnwritableError if the file system refuses.
     """
     contents = _contents(files)
@@ -81,7 +81,7 @@ def write(
 
 
 def check(files: Mapping[str, str], directory: Path) -> tuple[Drift, ...]:
-    """Return how `directory` differs from the bundle `files`, byte for byte; foreign files are no drift.
+    """Return how `directory` differs from the bundle `files`, byte for byte; ignore other files.
 
     Raises UnwritableError if a file cannot be read.
     """
@@ -102,7 +102,7 @@ def check(files: Mapping[str, str], directory: Path) -> tuple[Drift, ...]:
 
 
 def _contents(files: Mapping[str, str]) -> dict[str, bytes]:
-    """Return the bytes of bundle and manifest, sorted by path; raises ValueError for an unsafe path."""
+    """Return {path: bytes} of bundle and manifest, sorted by path; raises ValueError for an unsafe path."""
     unsafe = [path for path in files if not _is_safe(path) or path == MANIFEST]
     if unsafe:
         raise ValueError(f"not a path of a bundle: {unsafe[0]!r}")
@@ -117,7 +117,10 @@ def _is_safe(path: str) -> bool:
 
 
 def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool) -> Changes:
-    """Decide what happens to every file of ours; raises ForeignFilesError and LayoutError."""
+    """Decide what to do with every file of the old and the new bundle.
+
+    Raises ForeignFilesError and LayoutError.
+    """
     _refuse_blocked(contents, target, name)
     known = _known(target)
     found = {path: _content(target / path) for path in {*contents, *known}}
@@ -138,9 +141,9 @@ def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool
 
 
 def _apply(contents: Mapping[str, bytes], changes: Changes, target: Path, name: str, *, force: bool) -> None:
-    """Remove what a killed run left, and do what `changes` says.
+    """Remove the new files of a killed run, then carry out `changes`.
 
-    Dropped files go after the renames, headers after the sources that include them; the manifest comes last.
+    Removals follow the renames, and sources go before the headers that they include; the manifest comes last.
     """
     for path in _files_in(target):
         if is_left_over(path):
@@ -148,13 +151,13 @@ def _apply(contents: Mapping[str, bytes], changes: Changes, target: Path, name: 
     rank = {path: 1 + path.endswith(".h") for path in changes.removed} | {MANIFEST: 3}
     differing = (*changes.created, *changes.changed, *changes.removed)
     ordered = sorted(differing, key=lambda path: rank.get(path, 0))
-    with staged({target / path: contents.get(path) for path in ordered}):
+    with stage({target / path: contents.get(path) for path in ordered}):
         if _plan(contents, target, name, force=force) != changes:
-            raise UnwritableError(f"{name}: somebody changed files during the run; run it again")
+            raise UnwritableError(f"{name}: files changed during the run; run it again")
 
 
 def _refuse_blocked(contents: Mapping[str, bytes], target: Path, name: str) -> None:
-    """Refuse folders where a file belongs, files or links where a folder does: no force removes them."""
+    """Refuse a folder at the path of a file, and a file or link at the path of a folder, even with force."""
     blocked = {path for path in contents if (target / path).is_dir() and not (target / path).is_symlink()}
     folders = {folder for path in contents for folder in _folders_of(path)}
     blocked |= {
@@ -165,13 +168,13 @@ def _refuse_blocked(contents: Mapping[str, bytes], target: Path, name: str) -> N
     if blocked:
         names = ", ".join(echo(path) for path in sorted(blocked))
         raise ForeignFilesError(
-            f"{name}: {names} stands where the bundle has a file or folder; move it away",
+            f"{name}: {names} is in the way of a file or folder of the bundle; move it away",
             tuple(sorted(blocked)),
         )
 
 
 def _refuse_other_layout(contents: Iterable[str], known: Iterable[str], name: str) -> None:
-    """Refuse to turn a bundle of folders into an amalgamated one, or back, for want of an option."""
+    """Refuse to change the layout, folders or amalgamated: a forgotten option would remove every file."""
     old, new = ({"/" in path for path in paths if path.endswith(".h")} for paths in (known, contents))
     if len(old) == len(new) == 1 and old != new:
         is_now, change = (
@@ -181,7 +184,7 @@ def _refuse_other_layout(contents: Iterable[str], known: Iterable[str], name: st
 
 
 def _refuse_foreign(foreign: tuple[str, ...], known: Iterable[str], name: str) -> None:
-    """Refuse to overwrite the files `foreign`, if any."""
+    """Refuse to overwrite the files `foreign`, if there are any."""
     if foreign:
         edited = "\n".join(
             f"  {echo(path)} ({'edited by hand' if path in known else 'not ours'})" for path in foreign
@@ -193,9 +196,9 @@ def _refuse_foreign(foreign: tuple[str, ...], known: Iterable[str], name: str) -
 
 
 def _known(target: Path) -> dict[str, object]:
-    """Return {path: SHA-256} of what we wrote into `target`, by its manifest; nothing if that is not ours.
+    """Return {path: SHA-256} of the files that the manifest in `target` lists; {} without a manifest of ours.
 
-    No path in it leads out of `target`.
+    Paths that lead out of `target` are left out.
     """
     content = _content(target / MANIFEST) or b""
     try:
@@ -213,21 +216,21 @@ def _known(target: Path) -> dict[str, object]:
 
 
 def _folders_of(path: str) -> list[PurePosixPath]:
-    """Return the folders inside the bundle that lead to `path`."""
+    """Return the parent folders of `path`, without the bundle's own."""
     return list(PurePosixPath(path).parents)[:-1]
 
 
 def _files_in(folder: Path) -> list[str]:
     """Return the relative POSIX path of everything in `folder` that is not itself a folder, sorted."""
     files = []
-    for here, folders, names in os.walk(folder):  # passes over what somebody removes meanwhile
+    for here, folders, names in os.walk(folder):  # skips what is removed meanwhile
         links = [name for name in folders if (Path(here) / name).is_symlink()]
         files += [(Path(here) / name).relative_to(folder).as_posix() for name in (*names, *links)]
     return sorted(files)
 
 
 def _content(path: Path) -> bytes | None:
-    """Return the bytes of a regular file; None for anything else: nothing there, a folder, a link."""
+    """Return the bytes of a regular file; None if there is no file, or a folder or link."""
     try:
         return path.read_bytes() if path.is_file() and not path.is_symlink() else None
     except FileNotFoundError:
@@ -239,7 +242,7 @@ def _sha256(content: bytes) -> str:
 
 
 def _diff(path: str, found: bytes, expected: bytes) -> str:
-    """Return a unified diff from the disk to the bundle, with everything unprintable made visible."""
+    """Return a unified diff from the disk to the bundle, with unprintable characters escaped."""
     old, new = (
         [_visible(line) for line in content.decode(errors="backslashreplace").split("\n")]
         for content in (found, expected)

@@ -43,7 +43,7 @@ def init(
     ),
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> None:
-    """Write a controller.toml to start from, every setting in it and explained."""
+    """Write a controller.toml that holds and explains every setting."""
     from mambo_nmpc.codegen.atomic import put
     from mambo_nmpc.codegen.settings import controller_toml, presets
 
@@ -67,7 +67,7 @@ def init(
 
 
 def list_presets(as_json: AsJson = False) -> None:
-    """List the presets, each with what it is for."""
+    """List the presets and their purpose."""
     from mambo_nmpc.codegen.settings import presets
 
     described = {name: presets.description(name) for name in presets.names()}
@@ -80,7 +80,7 @@ def list_presets(as_json: AsJson = False) -> None:
 
 
 def schema() -> None:
-    """Print the JSON schema of controller.toml, for editors that check and complete TOML."""
+    """Print the JSON schema of controller.toml; editors check and complete TOML with it."""
     from mambo_nmpc.codegen.settings.model import Settings
 
     typer.echo(json.dumps(Settings.json_schema(), indent=2))
@@ -94,15 +94,17 @@ def generate(
         bool,
         typer.Option("--check", help="Write nothing; exit 1 with a diff if the folder is not up to date."),
     ] = False,
-    prefix: Annotated[str | None, typer.Option(help="Begin public names with this (code.prefix).")] = None,
+    prefix: Annotated[str | None, typer.Option(help="Prefix of public names (code.prefix).")] = None,
     scalar: Scalar = None,
-    amalgamate: Annotated[bool, typer.Option("--amalgamate", help="One header and one source.")] = False,
+    amalgamate: Annotated[
+        bool, typer.Option("--amalgamate", help="Join the C into one header and one source.")
+    ] = False,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Overwrite files edited by hand; files of other names always stay."),
+        typer.Option("--force", help="Overwrite files edited by hand; other files in the folder stay."),
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would change and write nothing.")
+        bool, typer.Option("--dry-run", help="Print what would change and write nothing.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -1,6 +1,6 @@
-"""The root of `mambo-nmpc`, where errors become a message and an exit code, and what its commands share.
+"""The root of `mambo-nmpc`, which turns errors into a message and an exit code; options that commands share.
 
-Results go to stdout, messages to stderr. Nothing here is slow to import: `--help` answers at once.
+Results go to stdout, messages to stderr. This module imports nothing slow, because `--help` imports it.
 """
 
 import errno
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from mambo_nmpc.codegen.settings.model import Settings
 
 EXIT_CODES = (
-    "Exit codes: 0 good; 1 a check failed or a flight was lost; 2 bad input, or the system refuses; "
-    "130 interrupted; 141 nobody reads the output."
+    "Exit codes: 0 success; 1 a check failed or a flight was lost; 2 bad input or a system error; "
+    "130 interrupted; 141 the reader of the output closed it."
 )
 
 Source = Annotated[str, typer.Argument(help="A preset or a controller.toml.")]
 Scalar = Annotated[
-    str | None, typer.Option(help="Type of the numbers (code.scalar).", metavar="float32|float64|fixed")
+    str | None, typer.Option(help="Scalar type of the C (code.scalar).", metavar="float32|float64|fixed")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
 
 
 class RootGroup(TyperGroup):
-    """The root of the command: errors become a message and an exit code, without a traceback."""
+    """The root command: an error becomes a message and an exit code, without a traceback."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Run a command line, help and version included, up to the last byte on stdout."""
+        """Run a command line, help and version included, and flush stdout."""
         try:
             if sys.stdout is None:
                 raise OSError(errno.EBADF, "is closed", "stdout")
@@ -48,12 +48,12 @@ class RootGroup(TyperGroup):
         except OSError as error:
             sys.exit(_exit_code(error))
         except SystemExit as leaving:
-            if isinstance(leaving.__context__, BrokenPipeError):  # typer and rich meet it first, and exit 1
+            if isinstance(leaving.__context__, BrokenPipeError):  # typer and rich catch it and exit 1
                 sys.exit(_exit_code(leaving.__context__))
             raise
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
-        """Run a command; with `--debug` an error shows its traceback first."""
+        """Run a command; with `--debug` print the traceback of an error first."""
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()
@@ -65,12 +65,12 @@ class RootGroup(TyperGroup):
 
 
 def _exit_code(error: BaseException) -> int:
-    """Return the exit code of a command that ended in `error`, and say why on stderr."""
+    """Print why the command ended in `error`, and return its exit code."""
     match error:
         case KeyboardInterrupt():
             return INTERRUPTED
         case MemoryError():
-            typer.echo("there is not enough memory", err=True)
+            typer.echo("out of memory", err=True)
         case LookupError():  # jinja2.TemplateNotFound is an OSError too, but a bug of ours
             raise error
         case OSError():
@@ -86,7 +86,7 @@ def _exit_code(error: BaseException) -> int:
 
 
 def _silence_broken_stdout() -> bool:
-    """Send what stdout cannot take to nowhere, lest it fail again at exit; return whether that was so."""
+    """Redirect stdout to /dev/null if it is broken, lest it fail again at exit; return whether it was."""
     if sys.stdout is None:
         return False
     try:
@@ -98,7 +98,7 @@ def _silence_broken_stdout() -> bool:
 
 
 def root() -> typer.Typer:
-    """Return the command without sub-commands, for `register` of each package to fill."""
+    """Return the root command without sub-commands, which `codegen.cli` and `sil.cli` add."""
     return typer.Typer(
         name="mambo-nmpc",
         cls=RootGroup,
@@ -124,11 +124,11 @@ def _root_options(
         typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version),
     ] = False,
 ) -> None:
-    """Generate a static-memory C99 NMPC for a very small drone, and fly it in software."""
+    """Generate a static-memory C99 NMPC for a very small drone, and fly it in simulation."""
 
 
 def load(source: str, scalar: str | None) -> "Settings":
-    """Load a preset or a controller.toml, with another scalar type if one is named."""
+    """Load a preset or a controller.toml; replace its scalar type unless `scalar` is None."""
     from mambo_nmpc.codegen.settings import controller_toml, presets
 
     settings = presets.load(source)
@@ -138,5 +138,5 @@ def load(source: str, scalar: str | None) -> "Settings":
 
 
 def examples(*lines: str) -> str:
-    """Return an epilog of example commands, one paragraph each, so that help keeps them on their lines."""
+    """Return a help epilog of example commands, one paragraph each, because help joins the lines of one."""
     return "\n\n".join(("Examples:", *lines))

@@ -1,7 +1,7 @@
 """The design of one controller: everything that is derived from its settings, derived once.
 
-Rendering, self-test, digest and reference controller are handed the same design, so that none of them can
-compute with other numbers than the C.
+Rendering, self-test, digest and reference controller take the same design, so that all of them compute with
+the numbers of the C.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
 
 @dataclass(frozen=True)
 class Design:
-    """The numbers of the controller with `settings`; each is derived when it is first read, and kept."""
+    """What follows from `settings`; each property is derived at its first use and cached."""
 
     settings: Settings
 
@@ -28,17 +28,17 @@ class Design:
 
     @cached_property
     def numbers(self) -> Representation:
-        """The scalar type of the C, and with fixed point the format of each quantity."""
+        """The scalar type of the C, and in fixed point the format of each quantity."""
         scalar = self.settings.code.scalar
         return Representation(scalar, formats(self.settings, self.tables) if scalar == "fixed" else None)
 
     @cached_property
     def limits(self) -> InputLimits:
-        """The limits of inputs and commands, in the numbers of the C."""
+        """The limits of inputs and commands, rounded to the numbers of the C."""
         return self.numbers.limits(self.settings)
 
     @cached_property
     def trigonometry(self) -> Any:
-        """The constants of sine and cosine: `Trigonometry`, or `FixedTrigonometry` with fixed point."""
+        """The constants of sine and cosine: `Trigonometry`, or `FixedTrigonometry` in fixed point."""
         found = self.numbers.formats
         return trigonometry(self.settings.code.scalar) if found is None else fixed_trigonometry(found)

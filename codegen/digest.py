@@ -1,8 +1,8 @@
-"""The self-test digest: one checksum of many control steps, which every build must reproduce bit by bit.
+"""The self-test digest: a checksum of many control steps; a build with other bits has another digest.
 
-An episode is one controller, stepped TICKS times from nmpc_init. Its inputs come from a random number
-generator in whole numbers, so that C and NumPy make the same ones. `templates/src/nmpc_self_test.c.j2` runs
-the episodes one after the other; here they run side by side, when the C is generated.
+An episode is TICKS steps of one controller after nmpc_init. Its inputs come from an integer random number
+generator, so that C and NumPy draw the same ones. The C (`templates/src/nmpc_self_test.c.j2`) runs the
+episodes one after the other; this module runs them in parallel arrays when the C is generated.
 """
 
 from collections.abc import Iterator
@@ -28,16 +28,16 @@ HOVER_M_S2: Final = 9.81
 
 _MOST_EPISODES: Final = 1000
 _USUAL_WORK: Final = 100
-"""Predicted steps times moves times iterations up to which a digest covers _MOST_EPISODES."""
+"""Largest Np x Nc x iterations for which the digest covers _MOST_EPISODES."""
 _LEAST_WORK: Final = 20
-"""Predicted steps times moves below which the reference gets no faster: the overhead of NumPy."""
+"""Np x Nc below which the reference is not faster, because NumPy's overhead per operation dominates."""
 _SIDE_BY_SIDE: Final = 250
-"""Episodes computed at once: few enough for the processor's caches, many enough to hide NumPy's overhead."""
+"""Episodes per array: few enough for the processor's caches, many enough to outweigh NumPy's overhead."""
 _UNIT_BITS: Final = 23
 _UNIT: Final = 1 << _UNIT_BITS
-"""A random number is a whole number in -_UNIT.._UNIT - 1, which every scalar type holds exactly."""
+"""Random numbers are integers in -_UNIT.._UNIT - 1, which every scalar type represents exactly."""
 _MULTIPLIER: Final = 2654435761
-"""The prime next to 2**32 over the golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
+"""The prime nearest to 2**32 / golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
 
 Words = NDArray[np.uint32]
 StepInputs = tuple[Real, Real, Real]
@@ -46,10 +46,10 @@ StepInputs = tuple[Real, Real, Real]
 
 @dataclass(frozen=True)
 class InputScales:
-    """Factors from random numbers to inputs; errors between drone and target come in four sizes.
+    """Factors from random integers to inputs; errors between drone and target have four sizes.
 
-    In floating point they are per unit of a random number. In fixed point, which has no format for numbers as
-    small as that, they are per _UNIT.
+    In floating point an input is integer x factor. In fixed point, whose formats cannot represent factors
+    that small, it is integer x factor / _UNIT.
     """
 
     target_position_m: float
@@ -63,7 +63,7 @@ class InputScales:
 
 
 def input_scales(settings: Settings) -> InputScales:
-    """Scale the inputs to those of a flight, within the ranges of `settings`."""
+    """Return the factors that give inputs as in a flight, within the ranges of `settings`."""
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
     near = 0.25, 0.025, 0.0025
@@ -88,15 +88,15 @@ def input_scales(settings: Settings) -> InputScales:
 
 
 def episode_count(settings: Settings) -> int:
-    """Return how many episodes the digest of a bundle covers: fewer for long horizons, for equal run time."""
+    """Return how many episodes the digest covers: fewer for long horizons, which keeps the run time equal."""
     horizon = settings.horizon
     work = max(horizon.prediction * horizon.control, _LEAST_WORK) * settings.optimizer.iterations
     return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
 
 
-@lru_cache(maxsize=64)  # rendering a bundle takes 1.5 s with the digest, 0.1 s when it is known
+@lru_cache(maxsize=64)  # a bundle renders in 0.1 s instead of 1.5 s
 def self_test_digest(design: Design, count: int) -> int:
-    """Return the digest of the first `count` episodes, 32 bits, as the reference computes it."""
+    """Run the first `count` episodes on the reference controller, and return their digest of 32 bits."""
     digest = np.zeros(1, np.uint32)
     for first in range(0, count, _SIDE_BY_SIDE):
         episodes = np.arange(first, min(first + _SIDE_BY_SIDE, count), dtype=np.uint32)
@@ -106,7 +106,7 @@ def self_test_digest(design: Design, count: int) -> int:
 
 
 def episode_inputs(design: Design, episodes: Words) -> Iterator[StepInputs]:
-    """Yield the inputs of every step of n episodes, by their numbers (n,)."""
+    """Yield the inputs of each of TICKS steps; `episodes` (n,) are the indices of the episodes."""
     generator, scales = _Generator(episodes), input_scales(design.settings)
     for _ in range(TICKS // TICKS_PER_INPUT):
         inputs = _next_inputs(design, scales, generator)
@@ -130,14 +130,14 @@ class _Generator:
         return number
 
     def draw(self, numbers: Representation, scale: Real) -> Real:
-        """Return the upper 24 of the next 32 bits, signed, times `scale`: rounded once."""
+        """Return the upper 24 of the next 32 bits as a signed integer times `scale`, rounded once."""
         whole = ((self.next() >> 8).astype(np.int32) - _UNIT).astype(numbers.computed)
         drawn: Real = whole * scale if numbers.formats is None else rounded(whole * scale, _UNIT_BITS)
         return drawn
 
 
 def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> StepInputs:
-    """Draw states, targets and thrusts; five in 64 are out of range."""
+    """Draw states, targets and thrusts; five steps in 64 have an input out of range."""
     numbers, limits = design.numbers, design.limits
     choice = generator.next()
     size = choice & 3
@@ -172,7 +172,7 @@ def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> 
 
 
 def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, Any, Any, Any]:
-    """Return a position that is no number, and an attitude, a yaw and a velocity out of range."""
+    """Return a position, an attitude, a yaw and a velocity out of range; the position is NaN in float."""
     if numbers.formats is not None:
         return LARGEST, LARGEST, LARGEST, -LARGEST
     two = numbers.scalar(2)
@@ -180,7 +180,7 @@ def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, An
 
 
 def _episode_digests(design: Design, episodes: Words) -> Words:
-    """Return the digest of each of n episodes (n,)."""
+    """Run n episodes, and return the digest of each (n,)."""
     controller = ReferenceController(design, len(episodes))
     digests = np.zeros_like(episodes)
     for inputs in episode_inputs(design, episodes):
@@ -190,7 +190,7 @@ def _episode_digests(design: Design, episodes: Words) -> Words:
 
 
 def _words(numbers: Representation, step: Step) -> Iterator[Words]:
-    """Yield the outcome of a step in words of 32 bits (n,); of a number of 64 bits the upper word first."""
+    """Yield the outcome of a step as 32-bit words (n,); a 64-bit number gives its upper word first."""
     for count in (step.status, step.iterations, step.converged):
         yield count.astype(np.uint32)
     for name in OUTCOME:
@@ -200,7 +200,7 @@ def _words(numbers: Representation, step: Step) -> Iterator[Words]:
 
 
 def _fold(digest: NDArray[Any], word: NDArray[Any]) -> Words:
-    """Mix a word into a digest: different words give different digests, and upper bits change lower ones."""
+    """Mix a word into a digest; for a given digest, different words give different results."""
     mixed = (digest ^ word) * np.uint32(_MULTIPLIER)
     folded: Words = mixed ^ (mixed >> np.uint32(15))
     return folded

@@ -1,17 +1,17 @@
-"""Every exception of generating C, one class per thing a caller would do differently."""
+"""The exceptions of generating C, one class for each thing that a caller would do differently."""
 
 import json
 from typing import ClassVar
 
 BAD_INPUT, INTERRUPTED, NO_READER = 2, 130, 141
-"""Exit codes beside 0 and 1; the last two are what a shell makes of SIGINT and SIGPIPE."""
+"""Exit codes beside 0 and 1; the last two are 128 + SIGINT and 128 + SIGPIPE, as in a shell."""
 
 LONGEST_ECHO = 60
-"""Characters of a foreign value that a message repeats."""
+"""Most characters of a user's text that a message repeats."""
 
 
 def echo(text: str) -> str:
-    """Return `text` fit for one line of a terminal: control characters escaped, a long middle cut out."""
+    """Return `text` for one line of a terminal: escape control characters, cut out a long middle."""
     visible = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:1000])
     if len(visible) <= LONGEST_ECHO:
         return visible
@@ -21,15 +21,15 @@ def echo(text: str) -> str:
 
 
 def echo_value(value: object) -> str:
-    """Return a value of a TOML file as JSON spells it, fit for one line of a terminal."""
+    """Return a value of a TOML file as JSON, for one line of a terminal."""
     try:
         return echo(json.dumps(value, ensure_ascii=False, default=str))
-    except (ValueError, RecursionError):  # a number of thousands of digits, a thousand tables in each other
+    except (ValueError, RecursionError):  # thousands of digits or of nested tables
         return "a value too long to repeat"
 
 
 class MamboNmpcError(Exception):
-    """Something the user can put right; its text is the whole message, without a traceback."""
+    """An error that the user can correct; its text is the whole message, without a traceback."""
 
     exit_code: ClassVar[int] = BAD_INPUT
 
@@ -51,7 +51,7 @@ class InvalidSettingsError(MamboNmpcError):
 
 
 class FileExistsRefusedError(MamboNmpcError):
-    """A file is already there, and nobody said that it may be overwritten."""
+    """A file already exists, and --force is not given."""
 
 
 class UnwritableError(MamboNmpcError):
@@ -59,7 +59,7 @@ class UnwritableError(MamboNmpcError):
 
 
 class ForeignFilesError(MamboNmpcError):
-    """A bundle would overwrite work that is not the generator's; `paths` names the files."""
+    """A bundle would overwrite foreign or edited files; `paths` names them."""
 
     def __init__(self, message: str, paths: tuple[str, ...]) -> None:
         super().__init__(message)
@@ -67,14 +67,14 @@ class ForeignFilesError(MamboNmpcError):
 
 
 class BuildError(MamboNmpcError):
-    """The C cannot be compiled here: no compiler, no headers, or the compiler refused."""
+    """The C cannot be compiled: no compiler, no headers, or an error of the compiler."""
 
 
 class DriftError(MamboNmpcError):
-    """A bundle on disk is not what its settings generate."""
+    """A bundle on disk differs from what its settings generate."""
 
     exit_code = 1
 
 
 class LayoutError(MamboNmpcError):
-    """A bundle in folders would become an amalgamated one, or the other way round, and nobody said so."""
+    """A bundle in folders would become an amalgamated one, or vice versa, and --force is not given."""

@@ -1,16 +1,16 @@
 """The fixed point formats of a controller: the number of fractional bits of each quantity.
 
-A number of format b is an integer of 32 bits, its value times 2^b. Each quantity has the most fractional bits
-with which none of its values overflows. Those values are bounded by the sum of the absolute values of all
-terms (`_bounds`), not sampled. That costs two bits compared with the largest values that occur, and lets a
-proof by intervals find the same bounds in the C.
+A number of format b is a 32-bit integer that stands for integer / 2^b. Each quantity has as many fractional
+bits as possible without overflow. Its largest value is not sampled, but bounded by the sum of the absolute
+values of all terms (`_bounds`). That costs two bits compared with the largest values that occur, but a proof
+by intervals finds the same bound in the C.
 
-No plan can change the sign of a position error that is larger than all displacements over the horizon
-together: such an error is clamped. That changes neither the gradient nor a difference of costs, and leaves
-the bits to smaller errors.
+No plan can change the sign of a position error that exceeds the sum of all displacements over the horizon,
+so such an error is clamped. Clamping changes neither the gradient nor a difference of costs, and leaves more
+fractional bits for smaller errors.
 
-The absolute errors of a whole horizon are summed in one word. Distance, cost and gradient have 64 bits, of
-which they use at most 53, so that a double holds them exactly.
+The absolute errors of the whole horizon are summed in one 32-bit word. Distance, cost and gradient are 64-bit
+integers; cost and gradient use at most 53 bits, so that a double holds them exactly.
 """
 
 import math
@@ -28,19 +28,19 @@ WORD_BITS: Final = 31
 """Bits of a number without its sign."""
 
 LARGEST: Final = 2**WORD_BITS - 1
-"""The largest number: the saturation value of an input, outside every input range, so it is refused."""
+"""Saturation value of an input: outside every input range, so the step refuses it."""
 
 SINE_BITS: Final = 30
-"""Format of sine and cosine, whose largest value is 1."""
+"""Format of sine and cosine, which are at most 1."""
 
 UPPER_BITS: Final = 32
-"""Right shift of the products of shares and of eta: one factor is shifted left before."""
+"""Right shift of products with shares and eta; one factor is shifted left first to keep the format."""
 
 SUM_BITS: Final = 53
-"""Bits of cost and gradient without the sign: those of a double, so that logs and tests are exact."""
+"""Most bits of cost and gradient without the sign: those of a double, so that logs and tests are exact."""
 
 _PRODUCT_BITS: Final = 62
-"""Bits of a product without its sign: one less than the type has, because rounding adds to it."""
+"""Most bits of a product without its sign: one less than the type has, because rounding adds half a unit."""
 
 _MARGIN: Final = 1.01
 """Every bound is enlarged by 1 %, a thousand times more than all roundings over a horizon add."""
@@ -50,10 +50,10 @@ _WEIGHT_HEADROOM: Final = 4.0
 1, or as the tracking weight if that is less."""
 
 _COARSEST_ERROR_BITS: Final = 10
-"""Errors have a resolution of 1 mm or better."""
+"""Fewest fractional bits of an error: its resolution is 1 mm or better."""
 
-_FEWEST_WEIGHT: Final = 512
-"""A weight smaller than this number would be rounded by more than a thousandth."""
+_SMALLEST_WEIGHT: Final = 512
+"""Smallest integer for a weight: rounding changes a larger one by less than a thousandth."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ class Formats:
     distance_gradient:  gradient of the distance, m/rad.
     tracking, effort:   lambda_1 and lambda_2, 1/m and 1/rad.
     factor:             eta+ and eta-.
-    cost, gradient:     of 64 bits.
-    error_limit:        largest initial error, a number of the format of positions.
-    tracking_limit, effort_limit: largest weights.
+    cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
+    error_limit:        limit to which the initial error is clamped, an integer of the format of positions.
+    tracking_limit, effort_limit: largest weights, integers of their formats.
     """
 
     position: int
@@ -107,11 +107,11 @@ class _Bounds:
     """Bounds of absolute values over the horizon.
 
     acceleration: of acceleration, displacement, deficit, and every sum of them, m/step^2 and m/step.
-    shared:       of what is multiplied by a share: the acceleration of a change of tilt or of the measured
-                  tilt, and the deficit, m/step^2.
+    shared:       of the factors of shares: the acceleration due to a change of tilt or to the measured tilt,
+                  and the deficit, m/step^2.
     error:        of the change of the error over the horizon, m.
     error_sum:    of the sum of that change over all steps, m.
-    response:     of the sum of the responses to a move, with any signs and over any steps.
+    response:     of the sum of the responses to a move over any steps, each with any sign.
     """
 
     acceleration: float
@@ -123,7 +123,7 @@ class _Bounds:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why settings have no fixed point controller: the key to change, and the rule, from "must" on."""
+    """Why fixed point cannot represent settings: the key to change, and the rule that it breaks."""
 
     section: str
     name: str
@@ -131,59 +131,66 @@ class Refusal:
 
 
 def formats(settings: Sections, tables: HorizonTables) -> Formats:
-    """Choose the formats of `settings`; where `refusals` finds faults, they are too coarse to use."""
+    """Choose the formats of `settings`; `refusals` says whether they are fine enough."""
     ranges, optimizer, tilt = settings.ranges, settings.optimizer, settings.limits.tilt_rad
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
     bounds = _bounds(settings, tables)
 
-    factor = _fit(optimizer.increase)
-    angle = _fit(
+    factor = _fractional_bits(optimizer.increase)
+    angle = _fractional_bits(
         ATTITUDE_LIMIT_RAD + (tilt if tables.has_lag else 0),
         2 * tilt,
         tilt + optimizer.step_max_rad,
         optimizer.step_max_rad * optimizer.increase,
         math.ldexp(optimizer.step_max_rad, UPPER_BITS - factor),
     )
-    share = _fit(
+    share = _fractional_bits(
         tables.displacement_share,
         *(size for angle in tables.angles for size in map(abs, astuple(angle))),
     )
-    acceleration = _fit(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
+    acceleration = _fractional_bits(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
     error_limit = min(2 * ranges.position_m, bounds.error) * _MARGIN
-    error = min(_fit(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1)
-    position = min(_fit(2 * ranges.position_m), error)
+    error = min(
+        _fractional_bits(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1
+    )
+    position = min(_fractional_bits(2 * ranges.position_m), error)
     gradient_bound = 2 * gain * bounds.response
-    distance_gradient = _fit(gradient_bound)
+    distance_gradient = _fractional_bits(gradient_bound)
 
     distance = 2 * settings.horizon.prediction * (error_limit + bounds.error)
     variation = 4 * settings.horizon.control * tilt
     cost = settings.cost
     effort_limit = _WEIGHT_HEADROOM * (cost.effort_weight or min(1.0, cost.tracking_weight))
-    effort = min(_fit(effort_limit), _PRODUCT_BITS - _whole(variation, effort_limit) - angle)
+    effort = min(
+        _fractional_bits(effort_limit), _PRODUCT_BITS - _integer_bits(variation, effort_limit) - angle
+    )
     tracking_limit = _WEIGHT_HEADROOM * cost.tracking_weight
     tracking = min(
-        _fit(tracking_limit),
-        SUM_BITS - 1 - max(_whole(tracking_limit, distance), _whole(effort_limit, variation)) - error,
+        _fractional_bits(tracking_limit),
         SUM_BITS
         - 1
-        - max(_whole(tracking_limit, gradient_bound), _whole(effort_limit, 2))
+        - max(_integer_bits(tracking_limit, distance), _integer_bits(effort_limit, variation))
+        - error,
+        SUM_BITS
+        - 1
+        - max(_integer_bits(tracking_limit, gradient_bound), _integer_bits(effort_limit, 2))
         - distance_gradient,
         effort + angle - error - 1,
     )
     effort = min(effort, tracking + distance_gradient)
     return Formats(
         position=position,
-        velocity=_fit(2 * ranges.velocity_m_s),
-        thrust=_fit(ranges.thrust_acceleration_max_m_s2),
-        yaw=_fit(YAW_LIMIT_RAD),
+        velocity=_fractional_bits(2 * ranges.velocity_m_s),
+        thrust=_fractional_bits(ranges.thrust_acceleration_max_m_s2),
+        yaw=_fractional_bits(YAW_LIMIT_RAD),
         angle=angle,
-        step=_fit(step_s),
-        step_squared=_fit(tables.step_squared_s2),
-        gain=_fit(gain),
+        step=_fractional_bits(step_s),
+        step_squared=_fractional_bits(tables.step_squared_s2),
+        gain=_fractional_bits(gain),
         acceleration=acceleration,
         error=error,
         share=share,
-        response=_fit(2 * bounds.response),  # one bit spare: gcc shifts by less than 32 in fewer instructions
+        response=_fractional_bits(2 * bounds.response),  # a spare bit: gcc shifts by less than 32 faster
         distance_gradient=distance_gradient,
         tracking=tracking,
         effort=effort,
@@ -197,36 +204,38 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
 
 
 def raw(value: float, bits: int) -> int:
-    """Return the number of format `bits` nearest to `value`, ties away from zero.
+    """Return the integer of format `bits` nearest to `value`, ties away from zero, at most 2^62.
 
-    Beyond 2^62 it returns that: no cost comes near, and only a tolerance may be set so far.
+    Only a tolerance can exceed 2^62; no cost does.
     """
     size: int = min(math.floor(math.ldexp(abs(value), bits) + 0.5), 2**_PRODUCT_BITS)
     return -size if value < 0 else size
 
 
 def refusals(settings: Sections) -> list[Refusal]:
-    """Return what fixed point cannot represent in `settings`, each with the nearest value that it can."""
+    """Return which values of `settings` fixed point cannot represent, each with the nearest it can."""
     tables = horizon_tables(settings)
     found = formats(settings, tables)
-    if not _fine_errors(found):
-        return [_too_wide(settings, tables)]
+    if not _resolves_errors(found):
+        return [_refuse_range(settings, tables)]
     refused = [
-        Refusal("cost", name, _too_small(settings, tables, name))
+        Refusal("cost", name, _weight_rule(settings, tables, name))
         for name in ("tracking_weight", "effort_weight")
-        if not _fine_weight(settings, found, name)
+        if not _resolves_weight(settings, found, name)
     ]
     optimizer = settings.optimizer
     least = math.ldexp(1, -found.cost)
     if 0 < optimizer.tolerance < least:
-        rule = f'must be 0 or at least {_up(least)} with code.scalar = "fixed", the resolution of the cost'
+        rule = (
+            f'must be 0 or at least {_round_up(least)} with code.scalar = "fixed", the resolution of the cost'
+        )
         refused.append(Refusal("optimizer", "tolerance", rule))
     least = math.ldexp(1, -found.angle)
     refused.extend(
         Refusal(
             "optimizer",
             name,
-            f'must be at least {_up(least)} with code.scalar = "fixed", the resolution of angles',
+            f'must be at least {_round_up(least)} with code.scalar = "fixed", the resolution of angles',
         )
         for name in ("initial_step_rad", "step_max_rad", "step_min_rad")
         if getattr(optimizer, name) < least
@@ -234,18 +243,18 @@ def refusals(settings: Sections) -> list[Refusal]:
     return refused
 
 
-def _fine_errors(found: Formats) -> bool:
+def _resolves_errors(found: Formats) -> bool:
     return found.error >= _COARSEST_ERROR_BITS
 
 
-def _fine_weight(settings: Sections, found: Formats, name: str) -> bool:
+def _resolves_weight(settings: Sections, found: Formats, name: str) -> bool:
     weight: float = getattr(settings.cost, name)
     bits = found.tracking if name == "tracking_weight" else found.effort
-    return weight == 0 or math.ldexp(weight, bits) >= _FEWEST_WEIGHT
+    return weight == 0 or math.ldexp(weight, bits) >= _SMALLEST_WEIGHT
 
 
-def _too_wide(settings: Sections, tables: HorizonTables) -> Refusal:
-    """Name the range that adds most to the errors over the horizon."""
+def _refuse_range(settings: Sections, tables: HorizonTables) -> Refusal:
+    """Refuse the range that contributes most to the errors over the horizon."""
     horizon, ranges = settings.horizon, settings.ranges
     error_m = _bounds(settings, tables).error
     by_speed = 2 * ranges.velocity_m_s * horizon.prediction_step_s * horizon.prediction
@@ -253,10 +262,10 @@ def _too_wide(settings: Sections, tables: HorizonTables) -> Refusal:
     end = math.nextafter(least, math.inf)
     if by_speed > error_m / 2:
         name, least, end = "velocity_m_s", 0.0, 0.1
-    fits = _nearest(settings, "ranges", name, end, lambda changed: _fine_errors(formats(changed, tables)))
+    fits = _nearest(settings, "ranges", name, end, lambda changed: _resolves_errors(formats(changed, tables)))
     way_out = "write a smaller horizon.prediction_step_s"
-    if fits and float(_down(fits)) > least:
-        way_out = f"write at most {_down(fits)}"
+    if fits and float(_round_down(fits)) > least:
+        way_out = f"write at most {_round_down(fits)}"
     rule = (
         f"lets errors reach {error_m:.3g} m over the horizon, coarser than 1 mm with "
         f'code.scalar = "fixed"; {way_out}'
@@ -264,27 +273,27 @@ def _too_wide(settings: Sections, tables: HorizonTables) -> Refusal:
     return Refusal("ranges", name, rule)
 
 
-def _too_small(settings: Sections, tables: HorizonTables, name: str) -> str:
-    """Return the rule that a weight breaks which is too small beside the other one."""
+def _weight_rule(settings: Sections, tables: HorizonTables, name: str) -> str:
+    """Return the rule for a weight that is too small compared with the other one."""
     fits = _nearest(
         settings,
         "cost",
         name,
         WEIGHT_LIMIT,
-        lambda changed: _fine_weight(changed, formats(changed, tables), name),
+        lambda changed: _resolves_weight(changed, formats(changed, tables), name),
     )
     other = "effort_weight" if name == "tracking_weight" else "tracking_weight"
     return (
-        f"must not be so small beside cost.{other} = {getattr(settings.cost, other):g} with "
-        f'code.scalar = "fixed", which would round it by more than a thousandth; '
-        + (f"write at least {_up(fits)}" if fits else f"write a smaller cost.{other}")
+        f"is too small compared with cost.{other} = {getattr(settings.cost, other):g}: "
+        f'code.scalar = "fixed" would round it by more than a thousandth; '
+        + (f"write at least {_round_up(fits)}" if fits else f"write a smaller cost.{other}")
     )
 
 
 def _nearest(
     settings: Sections, section: str, name: str, end: float, fits: Callable[[Sections], bool]
 ) -> float | None:
-    """Bisect from the value of a key, which does not fit, to `end`; None if `end` does not fit either."""
+    """Bisect from the present value, which does not fit, to `end`; None if `end` does not fit either."""
     document = settings.model_dump()
     bad, good = document[section][name], end
 
@@ -299,19 +308,19 @@ def _nearest(
     return float(good)
 
 
-def _up(value: float) -> str:
-    """Spell a value with three digits, rounded up."""
-    return f"{_three_digits(value, math.ceil):g}"
+def _round_up(value: float) -> str:
+    """Spell a value with three significant digits, rounded up."""
+    return f"{_round_to_three_digits(value, math.ceil):g}"
 
 
-def _down(value: float) -> str:
-    """Spell a value with three digits, rounded down."""
-    return f"{_three_digits(value, math.floor):g}"
+def _round_down(value: float) -> str:
+    """Spell a value with three significant digits, rounded down."""
+    return f"{_round_to_three_digits(value, math.floor):g}"
 
 
-def _three_digits(value: float, rounded: Callable[[float], int]) -> float:
+def _round_to_three_digits(value: float, to_integer: Callable[[float], int]) -> float:
     digits = 2 - math.floor(math.log10(value))
-    return float(f"{rounded(value * 10.0**digits)}e{-digits}")
+    return float(f"{to_integer(value * 10.0**digits)}e{-digits}")
 
 
 def _largest_gain(settings: Sections, tables: HorizonTables) -> float:
@@ -319,7 +328,7 @@ def _largest_gain(settings: Sections, tables: HorizonTables) -> float:
 
 
 def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
-    """Bound a roll-out along one axis of the world: absolute values for values, sums for differences."""
+    """Roll out the largest absolute values along one axis of the world, and add where the C subtracts."""
     tilt_rad, steps = settings.limits.tilt_rad, settings.horizon.prediction
     measured_rad = ATTITUDE_LIMIT_RAD if tables.has_lag else 0.0
     gain = _largest_gain(settings, tables)
@@ -355,11 +364,11 @@ def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
     )
 
 
-def _fit(*sizes: float) -> int:
-    """Return the most fractional bits with which numbers of these absolute values fit in a word."""
-    return WORD_BITS - _whole(max(sizes), 1.0)
+def _fractional_bits(*sizes: float) -> int:
+    """Return the most fractional bits with which values of these sizes fit in a word."""
+    return WORD_BITS - _integer_bits(max(sizes), 1.0)
 
 
-def _whole(a: float, b: float) -> int:
-    """Return the integer bits of the product of two bounds."""
+def _integer_bits(a: float, b: float) -> int:
+    """Return the integer bits that the product of two bounds needs."""
     return math.frexp(a * b * _MARGIN)[1]

@@ -1,4 +1,4 @@
-"""Flags of compilers and analysers for a bundle, the same in its Makefile and in `sil`."""
+"""Flags of compilers and analysers, used by the Makefile of a bundle and by `sil`."""
 
 from typing import Final
 
@@ -41,7 +41,7 @@ PROOFS: Final = {
         "-eva-precision 0",
     ),
 }
-"""Frama-C's options of each proof, by entry function."""
+"""Frama-C's options of each proof, by its entry function, in floating point."""
 
 _WHOLE_NUMBERS: Final = (
     "-warn-signed-overflow",
@@ -62,10 +62,10 @@ FIXED_PROOFS: Final = {
         "-main turn_everywhere",
         "-eva",
         "-eva-precision 0",
-        "-eva-min-loop-unroll 1400",  # all quarter turns of a heading
+        "-eva-min-loop-unroll 1400",  # more than the quarter turns of all headings
     ),
 }
-"""The same for fixed point: there is no NaN, signed overflow is an alarm."""
+"""The same in fixed point, where no NaN exists and signed overflow is an alarm."""
 
 PROOF_FLAGS: Final = (
     "-machdep x86_32",

@@ -6,8 +6,9 @@ displacement. The acceleration changes only where a move changes the tilt. With 
 deficit, is added to the acceleration; it decays from step to step. So the roll-out takes two additions a
 step, and two more and two products with lag; only the gradient of the distance needs a table.
 
-All arithmetic is float64 in a fixed order; the exponential of the lag comes from `decimal`, which rounds
-alike on every machine. Constants are rounded to the scalar type once, where they are spelled or loaded.
+All arithmetic is float64 in a fixed order; the exponential of the lag comes from `decimal`, because
+`math.exp` rounds differently between machines. Constants are rounded to the scalar type once, when they are
+spelled as C or loaded by the reference.
 """
 
 from dataclasses import dataclass
@@ -84,9 +85,9 @@ def horizon_tables(settings: Sections) -> HorizonTables:
 def _angle(period_s: float, lag_s: float, share: float) -> AngleConstants:
     """Discretise exactly an angle that follows its command with a first-order lag.
 
-    With h = step / lag and c = 1 - exp(-h), after a unit step of the command position lacks h - c after one
-    step, and velocity c, in units of the lag. The second difference of the position then lacks (h * c) - (c *
-    (h - c)) = c^2.
+    Let h = step / lag and c = 1 - exp(-h). One prediction step after a unit step of the command, the lag has
+    withheld h - c of the position and c of the velocity, in units of the lag. So it withholds
+    (h * c) - (c * (h - c)) = c^2 of the second difference of the position.
     """
     if lag_s == 0:
         return AngleConstants(displacement_share=share, deficit_share=0.0, deficit_decay=0.0)

@@ -31,7 +31,7 @@ _STATEMENT_START: Final = ("=", "(", ",", "return")
 
 
 def infix(text: str) -> str:
-    """Return `text` with every product written out, in brackets where it is part of an expression."""
+    """Return `text` with every call written as a product, in brackets where it is an operand."""
     while call := _CALL.search(text):
         arguments, end = _arguments(text, call.end())
         form = _FORMS[call[1]]
@@ -45,7 +45,7 @@ def infix(text: str) -> str:
 
 
 def _arguments(text: str, start: int) -> tuple[list[str], int]:
-    """Return the arguments of the call whose brackets open before `start`, and the index behind the call."""
+    """Return the arguments of the call whose brackets open before `start`, and the index after the call."""
     arguments, depth, begin = [], 0, start
     for index in range(start, len(text)):
         if depth == 0 and text[index] in ",)":

@@ -1,4 +1,4 @@
-"""Spell Python values as C tokens: the one place that knows C's lexical rules."""
+"""Spell Python numbers as C literals."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
@@ -19,9 +19,9 @@ _SUFFIXES: Final[dict[str, str]] = {"float32": "f", "float64": ""}
 
 
 class Spelling:
-    """How one controller's constants are spelled, by the quantity that each is of.
+    """How the constants of one controller are spelled.
 
-    Floating point has one format for all. In fixed point `bits` names those of each quantity.
+    In floating point all quantities have one format; in fixed point `bits` has the format of each.
     """
 
     def __init__(self, scalar: str, bits: Mapping[str, int] | None = None) -> None:
@@ -29,18 +29,18 @@ class Spelling:
         self._bits = bits
 
     def real(self, value: float, quantity: str = "") -> str:
-        """Spell one number; of no quantity, one for the user's own arithmetic, always floating point."""
+        """Spell one number; one without a quantity is for the user's code, and always floating point."""
         if self._bits is None:
             return real(value, self._scalar)
         return fixed(value, self._bits[quantity]) if quantity else real(value, "float32")
 
     def rows(self, values: Iterable[Sequence[float]], quantity: str = "") -> str:
-        """Spell a two-dimensional table, a brace-enclosed row for each sequence."""
+        """Spell a two-dimensional table, each row in braces."""
         return ",\n".join(_row([self.real(value, quantity) for value in row]) for row in values)
 
     def row(self, values: Sequence[float], quantity: str = "", indent: int = _INDENT) -> str:
         """Spell a one-dimensional table without its braces."""
-        return _wrapped([self.real(value, quantity) for value in values], " " * indent)
+        return _wrap([self.real(value, quantity) for value in values], " " * indent)
 
 
 def real(value: float, scalar: str) -> str:
@@ -55,17 +55,17 @@ def real(value: float, scalar: str) -> str:
 
 
 def fixed(value: float, bits: int) -> str:
-    """Spell the number of format `bits` nearest to `value`, of 64 bits if it does not fit in 32."""
+    """Spell the number of format `bits` nearest to `value`; one beyond 32 bits gets the suffix LL."""
     number = raw(value, bits)
     return f"{number}LL" if abs(number) > LARGEST else str(number)
 
 
 def _row(words: list[str]) -> str:
     margin = " " * _INDENT
-    return f"{margin}{{ {_wrapped(words, margin + '  ').lstrip()} }}"
+    return f"{margin}{{ {_wrap(words, margin + '  ').lstrip()} }}"
 
 
-def _wrapped(words: list[str], margin: str) -> str:
+def _wrap(words: list[str], margin: str) -> str:
     lines = [margin]
     for word in (*(f"{word}," for word in words[:-1]), words[-1]):
         if lines[-1] != margin and len(lines[-1]) + len(word) + 1 > _WIDTH:

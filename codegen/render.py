@@ -1,4 +1,4 @@
-"""Render the templates: settings in, {path: text} of a bundle out; a pure function, no clock and no path."""
+"""Render the templates: settings in, {path: text} of a bundle out; no clock and no path of the machine."""
 
 import hashlib
 import math
@@ -41,7 +41,7 @@ PROJECT: Final = {
     "nmpc_proof.c": "proof/nmpc_proof.c",
 }
 DEVIATIONS: Final = "deviations.txt"
-"""Names files of a bundle in folders, which an amalgamated one has not."""
+"""It names files of the layout in folders, so an amalgamated bundle has none."""
 
 _OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
 _OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
@@ -51,14 +51,14 @@ _REFUSAL: Final = """
 #endif
 """
 _BYTES: Final = {"float32": (4, 4), "float64": (8, 8), "fixed": (4, 8)}
-"""Size of a number and of a sum."""
+"""Bytes of nmpc_real_t and of nmpc_sum_t."""
 
 
 def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = True) -> dict[str, str]:
     """Render the bundle of `settings`: {relative POSIX path: text}.
 
-    With `amalgamate` the library is one header and one source in the bundle's folder. Only `with_digest` does
-    the header state the self-test digest, which takes a second: what is only compiled here does not need it.
+    With `amalgamate` the library is one header and one source in the bundle's folder. Without `with_digest`
+    the header does not state the self-test digest, which takes a second to compute; flights do not need it.
     """
     design = Design(settings)
     environment = _environment()
@@ -74,14 +74,14 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
 
     context = _context(design) | {
         "amalgamated": amalgamate,
-        "frozen_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
+        "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
     }
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if design.numbers.formats is None:
         text = {name: infix(content) for name, content in text.items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
-        library = _amalgamated(text, public, code)
+        library = _join(text, public, code)
     else:
         layout = {
             "header_folder": "include/",
@@ -95,20 +95,20 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     files = library | {path: template.render(context | layout) for path, template in project.items()}
     prefix, settings_id = settings.code.prefix, _settings_id(settings)
     named = {
-        with_prefix(path, prefix): with_prefix(_guarded(path, text, settings_id), prefix)
+        with_prefix(path, prefix): with_prefix(_add_guard(path, text, settings_id), prefix)
         for path, text in files.items()
     }
     return named | {"controller.toml": to_toml(settings)}
 
 
 def with_prefix(text: str, prefix: str) -> str:
-    """Give every name of the controller its prefix: nmpc_step becomes prefix_step, NMPC_OK PREFIX_OK."""
+    """Replace nmpc in every name of the controller: nmpc_step becomes prefix_step, NMPC_OK PREFIX_OK."""
     return _OWN_NAME.sub(lambda name: prefix if name[1] == "nmpc" else prefix.upper(), text)
 
 
 @cache
 def _environment() -> jinja2.Environment:
-    """Return what holds the compiled templates; "spelling" of the context says how numbers are spelled."""
+    """Return the Jinja environment; its number filters use the `Spelling` under "spelling" in the context."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("mambo_nmpc.templates", ""),
         undefined=jinja2.StrictUndefined,
@@ -117,23 +117,23 @@ def _environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,
     )
-    environment.filters |= {name: _spelled(name) for name in ("real", "row", "rows")}
+    environment.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
     return environment
 
 
-def _spelled(name: str) -> Callable[..., str]:
-    """Return a filter: the method `name` of the spelling that the context has."""
+def _number_filter(name: str) -> Callable[..., str]:
+    """Return a filter that calls the method `name` of the context's `Spelling`."""
 
     @jinja2.pass_context
-    def spelled(context: jinja2.runtime.Context, *arguments: Any, **options: Any) -> str:
+    def spell(context: jinja2.runtime.Context, *arguments: Any, **options: Any) -> str:
         text: str = getattr(context["spelling"], name)(*arguments, **options)
         return text
 
-    return spelled
+    return spell
 
 
 def _context(design: Design) -> dict[str, object]:
-    """Decide everything that the templates only arrange."""
+    """Return all values that the templates insert."""
     settings, numbers = design.settings, design.numbers
     scalar = settings.code.scalar
     return {
@@ -143,7 +143,7 @@ def _context(design: Design) -> dict[str, object]:
             (f"{section}.{key}", value)
             for section, values in settings.model_dump().items()
             for key, value in values.items()
-            if key != "prefix"  # the one text of the user's; the names show it
+            if key != "prefix"  # every public name shows it
         ],
         "version": __version__,
         "digest": settings.digest[:16],
@@ -171,7 +171,7 @@ def _context(design: Design) -> dict[str, object]:
         "episodes": episode_count(settings),
         "ticks": TICKS,
         "held": TICKS_PER_INPUT,
-        "frozen_steps": TICKS * episode_count(settings),
+        "self_test_steps": TICKS * episode_count(settings),
         "spread": input_scales(settings),
         "boards": [
             {
@@ -194,13 +194,13 @@ def _context(design: Design) -> dict[str, object]:
 
 
 def _settings_id(settings: Settings) -> str:
-    """Return a C constant of 32 bits, another one for other settings or another version of the generator."""
+    """Return a C constant, 32 bits of a hash of the settings and of the generator's version."""
     digest = hashlib.sha256(f"{__version__} {settings.digest}".encode()).hexdigest()
     return f"0x{digest[:8].upper()}UL"
 
 
-def _guarded(path: str, text: str, settings_id: str) -> str:
-    """Let a file of C refuse the headers of another bundle, once it has included its own."""
+def _add_guard(path: str, text: str, settings_id: str) -> str:
+    """Make a C file stop the compiler, after its includes, if they are headers of another bundle."""
     includes = list(_OWN_INCLUDE.finditer(text))
     if not path.endswith((".c", ".h")) or not includes:
         return text
@@ -209,7 +209,7 @@ def _guarded(path: str, text: str, settings_id: str) -> str:
 
 
 def _powers(numbers: Representation, sign: int) -> dict[str, str]:
-    """Spell by quantity the numbers per unit, or with sign -1 the units per number, for floats."""
+    """Spell 2^(sign * bits) of each quantity as float: integers per unit; for sign -1 units per integer."""
     bits = numbers.bits or {}
     return {
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
@@ -219,7 +219,7 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
 
 
 def _instance_bytes(settings: Settings, *, has_lag: bool) -> int:
-    """Count the members of nmpc_t: numbers, sums, single bytes, each padded to what follows."""
+    """Return the size of nmpc_t: its numbers, sums and single bytes, with padding."""
     moves = 2 * settings.horizon.control
     weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if has_lag else 3), 2
     flags = 2
@@ -229,8 +229,8 @@ def _instance_bytes(settings: Settings, *, has_lag: bool) -> int:
     return -(-(before_flags + flags) // sum_bytes) * sum_bytes
 
 
-def _amalgamated(text: dict[str, str], public: Sequence[str], code: Sequence[str]) -> dict[str, str]:
-    """Join the library into one header and one source: each file once, in order, without our own includes."""
+def _join(text: dict[str, str], public: Sequence[str], code: Sequence[str]) -> dict[str, str]:
+    """Join the library into one header and one source, in order, without its own includes."""
     header = [text[name] for name in public]
     source = [text[f"{block}.h"] for block in SUB_BLOCKS] + [text[name] for name in code]
     return {

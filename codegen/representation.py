@@ -1,7 +1,7 @@
-"""How a controller represents numbers, and how values in SI units become its numbers and back.
+"""Convert between values in SI units and the numbers of a controller.
 
 Outside the controller, values are floating point in SI units. A float32 or float64 controller rounds them to
-its type; a fixed point controller takes whole numbers, in a format for each quantity.
+its type; a fixed point controller takes integers, in a format for each quantity.
 """
 
 import math
@@ -30,7 +30,7 @@ OUTCOME: Final = {"command_rad": "angle", "cost": "cost", "gradient": "gradient"
 
 @dataclass(frozen=True)
 class InputLimits:
-    """The largest magnitudes of inputs and commands, and both limits of thrust, as the C compares them."""
+    """The largest magnitudes of inputs and commands, and both limits of thrust, in the numbers of the C."""
 
     position: Any
     velocity: Any
@@ -49,7 +49,7 @@ class Representation:
     wide:     type of nmpc_sum_t, cost and gradient.
     computed: type that the reference computes with.
     formats:  the formats of fixed point, None in floating point.
-    bits:     bits behind the point by quantity, None in floating point.
+    bits:     fractional bits by quantity, None in floating point.
     tracking_limit, effort_limit: largest weights, in SI units.
     """
 
@@ -66,11 +66,11 @@ class Representation:
             self.effort_limit = math.ldexp(formats.effort_limit, -formats.effort)
 
     def constant(self, value: float, quantity: str) -> Any:
-        """Round a constant of the settings, in the type that the reference computes with."""
+        """Round `value` in SI units to a number of the C, in the type that the reference computes with."""
         return self.scalar(value) if self.bits is None else np.int64(raw(value, self.bits[quantity]))
 
     def limits(self, settings: Sections) -> InputLimits:
-        """Return the limits of inputs and commands."""
+        """Return the limits of inputs and commands that `settings` give."""
         ranges = settings.ranges
         return InputLimits(
             position=self.constant(ranges.position_m, "position"),
@@ -88,8 +88,8 @@ class Representation:
     def quantize(self, values: ArrayLike, quantities: Sequence[str]) -> NDArray[Any]:
         """Convert `values` in SI units, whose last axis holds `quantities`, to numbers of the C.
 
-        In fixed point that is the nearest number, ties away from zero. NaN and values too large for their
-        format saturate at the largest number, which is outside every input range, so it is rejected.
+        Fixed point rounds to nearest, ties away from zero. NaN and values too large for their format become
+        the largest integer, which is outside every input range, so the controller refuses it.
         """
         if self.bits is None:
             return np.ascontiguousarray(values, self.scalar)
@@ -102,9 +102,9 @@ class Representation:
         return np.where(fits, rounded, LARGEST).astype(self.scalar)
 
     def to_si(self, numbers: NDArray[Any], *quantities: str) -> NDArray[Any]:
-        """Convert `numbers` of the C to SI units; with fixed point in float64, exactly.
+        """Convert `numbers` of the C to SI units; from fixed point exactly, as float64.
 
-        The last axis holds `quantities`, or all numbers are of one quantity.
+        The last axis holds `quantities`; a single one applies to all numbers.
         """
         if self.bits is None:
             return numbers
@@ -112,7 +112,7 @@ class Representation:
         return values
 
     def from_si(self, values: NDArray[Any], name: str) -> NDArray[Any]:
-        """Convert a result of a step, by its name in OUTCOME, back to the numbers that `to_si` was given."""
+        """Convert the result `name` of a step (a key of OUTCOME) from SI units back to numbers of the C."""
         if self.bits is None:
             return values
         kind = self.wide if name in ("cost", "gradient") else self.scalar

@@ -1,4 +1,4 @@
-"""Self-test vectors of a bundle: the inputs of consecutive steps, and the results of the reference."""
+"""The self-test vectors of a bundle: inputs of consecutive steps, and the results of the reference."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _GOLDEN_RATIO: Final = 0.6180339887498949
 
 @dataclass(frozen=True)
 class SelfTestStep:
-    """One step: state (7,), target (4,), thrust in; status, command (2,), cost, gradient (2,) out."""
+    """One step: inputs state (7,), target (4,), thrust; results status, command (2,), cost, gradient (2,)."""
 
     state: tuple[float, ...]
     target: tuple[float, ...]
@@ -29,18 +29,17 @@ class SelfTestStep:
 
 
 def self_test(design: Design) -> list[SelfTestStep]:
-    """Run the reference controller through STEPS inputs in the range of a flight.
+    """Run the reference controller through STEPS inputs of a typical flight.
 
-    The first one has a position error below the smallest normal number: a board that flushes such numbers to
-    zero fails there. Of the others every seventh is out of range, in turn its state, its target and its
-    thrust. The values are a Weyl sequence, because the stream of a library's random number generator may
-    change with its version.
+    The first input has a position error below the smallest normal number, so that a board that flushes such
+    numbers to zero fails. Every seventh input is out of range: first a state, then a target, then a thrust.
+    The values are a Weyl sequence; a library's random numbers may change with its version.
     """
     settings = design.settings
     controller = ReferenceController(design)
     ranges = settings.ranges
     position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
-    spread = _spread()
+    spread = _weyl_sequence()
     scalar = settings.code.scalar
     tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
     steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, hover_thrust(settings))]
@@ -63,7 +62,7 @@ def self_test(design: Design) -> list[SelfTestStep]:
 
 
 def hover_thrust(settings: Settings, offset_m_s2: float = 0.0) -> float:
-    """Return the thrust acceleration of hover, in m/s^2, or the nearest that the settings admit."""
+    """Return the thrust acceleration of hover plus the offset, m/s^2, clamped to the range of `settings`."""
     ranges = settings.ranges
     thrust = 9.81 + offset_m_s2
     return min(max(thrust, ranges.thrust_acceleration_min_m_s2), ranges.thrust_acceleration_max_m_s2)
@@ -86,8 +85,8 @@ def _step(
     )
 
 
-def _spread() -> Iterator[float]:
-    """Yield a low-discrepancy sequence in 0..1."""
+def _weyl_sequence() -> Iterator[float]:
+    """Yield the Weyl sequence of the golden ratio, in 0..1."""
     fraction = 0.5
     while True:
         fraction = (fraction + _GOLDEN_RATIO) % 1.0
@@ -95,5 +94,5 @@ def _spread() -> Iterator[float]:
 
 
 def _next(spread: Iterator[float], scale: float) -> float:
-    """Draw the next value in -scale..scale, rounded to three digits so that the vectors can be read."""
+    """Return the next value in -scale..scale, rounded to three decimals to keep the vectors readable."""
     return round(scale * (2 * next(spread) - 1), 3)

@@ -1,8 +1,8 @@
 """Constants of the controller's own sine and cosine.
 
-The C libraries of the world disagree on the last bit of `sinf`; a Taylor series with stated terms does
-not. The argument is reduced by quarter turns, with pi/2 in three parts of which the first two have so few
-bits that their product with the number of quarter turns is exact (Cody and Waite 1980).
+C libraries differ in the last bit of `sinf`, so the controller has a Taylor series of its own. First it
+subtracts whole quarter turns from the angle. For that pi/2 is split into three parts; the first two have so
+few bits that their product with the number of quarter turns is exact (Cody and Waite 1980).
 """
 
 from dataclasses import dataclass
@@ -26,9 +26,9 @@ _FINE_BITS: Final = 40
 
 @dataclass(frozen=True)
 class Trigonometry:
-    """What `nmpc_sine_cosine` computes with, each value exact in the scalar type.
+    """Constants of `nmpc_sine_cosine`, each exact in the scalar type.
 
-    With r the angle less its quarter turns, |r| <= pi/4:
+    Let r be the angle minus its whole quarter turns, |r| <= pi/4:
     sin r = r + r * r^2 * (sine[0] + r^2 * (sine[1] + ...)), cos r = 1 + r^2 * (cosine[0] + ...).
     """
 
@@ -40,10 +40,10 @@ class Trigonometry:
 
 @dataclass(frozen=True)
 class FixedTrigonometry:
-    """The same in whole numbers: coefficients and rest in the format SINE_BITS.
+    """The same as integers; coefficients and r have the format SINE_BITS.
 
-    quarter_turns_per_rad: 2/pi; an angle times that has `quarter_turns_bits` behind the point.
-    quarter_turn:          pi/2 in the format `fine_bits`, which an angle times 2^`finer_bits` has too.
+    quarter_turns_per_rad: 2/pi; its product with an angle has the format `quarter_turns_bits`.
+    quarter_turn:          pi/2 in the format `fine_bits`; an angle times 2^`finer_bits` has that format too.
     """
 
     quarter_turns_per_rad: int
@@ -56,7 +56,7 @@ class FixedTrigonometry:
 
 
 def fixed_trigonometry(formats: Formats) -> FixedTrigonometry:
-    """Derive the constants for yaws of the format of `formats`."""
+    """Derive the constants for the format of yaw in `formats`."""
     return FixedTrigonometry(
         quarter_turns_per_rad=round(2**WORD_BITS / _QUARTER_TURN),
         quarter_turns_bits=WORD_BITS + formats.yaw,
@@ -69,7 +69,7 @@ def fixed_trigonometry(formats: Formats) -> FixedTrigonometry:
 
 
 def _fixed_taylor(first_power: int) -> tuple[int, ...]:
-    """Collect coefficients until a term at pi/4 is below a quarter of the resolution."""
+    """Return the coefficients of all terms that exceed a quarter of the resolution at pi/4."""
     coefficients: list[int] = []
     power, sign = first_power, -1
     while (_QUARTER_TURN / 2) ** power / factorial(power) > Fraction(1, 2 ** (SINE_BITS + 2)):
@@ -79,29 +79,29 @@ def _fixed_taylor(first_power: int) -> tuple[int, ...]:
 
 
 def trigonometry(scalar: str) -> Trigonometry:
-    """Derive the constants for `scalar`: as many terms as its precision can show."""
+    """Derive the constants for `scalar`, "float32" or "float64"."""
     return Trigonometry(
-        quarter_turns_per_rad=_rounded(1 / _QUARTER_TURN, scalar),
+        quarter_turns_per_rad=_round(1 / _QUARTER_TURN, scalar),
         quarter_turn_rad=_split(scalar),
         sine=_taylor(3, scalar),
         cosine=_taylor(2, scalar),
     )
 
 
-def _rounded(value: Fraction, scalar: str) -> float:
+def _round(value: Fraction, scalar: str) -> float:
     return float(SCALARS[scalar](float(value)))
 
 
 def _split(scalar: str) -> tuple[float, float, float]:
-    """Cut pi/2 into two short parts and the rest."""
+    """Split pi/2 into two parts of few bits and the remainder."""
     bits = np.finfo(SCALARS[scalar]).nmant + 1 - _TURN_BITS
-    high = _chopped(_QUARTER_TURN, bits)
-    middle = _chopped(_QUARTER_TURN - high, bits)
-    return float(high), float(middle), _rounded(_QUARTER_TURN - high - middle, scalar)
+    high = _truncate(_QUARTER_TURN, bits)
+    middle = _truncate(_QUARTER_TURN - high, bits)
+    return float(high), float(middle), _round(_QUARTER_TURN - high - middle, scalar)
 
 
-def _chopped(value: Fraction, bits: int) -> Fraction:
-    """Keep the leading `bits` bits of a positive value below 2."""
+def _truncate(value: Fraction, bits: int) -> Fraction:
+    """Truncate a positive value below 2 to its leading `bits` bits."""
     unit = Fraction(1, 2**bits)
     while value / unit < 2 ** (bits - 1):
         unit /= 2
@@ -109,12 +109,12 @@ def _chopped(value: Fraction, bits: int) -> Fraction:
 
 
 def _taylor(first_power: int, scalar: str) -> tuple[float, ...]:
-    """Collect coefficients until a term at pi/4 is below a sixteenth of the precision."""
+    """Return the coefficients of all terms that exceed a sixteenth of the precision at pi/4."""
     smallest = Fraction(float(np.finfo(SCALARS[scalar]).eps)) / 16
     largest_angle = _QUARTER_TURN / 2
     coefficients: list[float] = []
     power, sign = first_power, -1
     while largest_angle**power / factorial(power) > smallest:
-        coefficients.append(_rounded(Fraction(sign, factorial(power)), scalar))
+        coefficients.append(_round(Fraction(sign, factorial(power)), scalar))
         power, sign = power + 2, -sign
     return tuple(coefficients)

@@ -261,7 +261,7 @@ def test_stdout_that_takes_nothing_gets_a_message(arguments: list[str]) -> None:
 @pytest.mark.parametrize(
     ("error", "message"),
     [
-        ("MemoryError", "there is not enough memory\n"),
+        ("MemoryError", "out of memory\n"),
         ("OSError(28, 'No space left on device', 'trace.csv')", "trace.csv: No space left on device\n"),
     ],
 )

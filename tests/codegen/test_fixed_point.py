@@ -105,11 +105,11 @@ def test_intermediates_use_their_formats(name: str) -> None:
     [
         (
             "[cost]\ntracking_weight = 0.01\neffort_weight = 5000.0",
-            "cost.tracking_weight = 0.01 must not be so small beside cost.effort_weight = 5000",
+            "cost.tracking_weight = 0.01 is too small compared with cost.effort_weight = 5000",
         ),
         (
             "[cost]\ntracking_weight = 1e6\neffort_weight = 1e-5",
-            "cost.effort_weight = 1e-05 must not be so small beside cost.tracking_weight = 1e+06",
+            "cost.effort_weight = 1e-05 is too small compared with cost.tracking_weight = 1e+06",
         ),
         ("[optimizer]\ntolerance = 1e-12", "optimizer.tolerance = 1e-12 must be 0 or at least"),
         ("[optimizer]\nstep_min_rad = 1e-9", "optimizer.step_min_rad = 1e-09 must be at least 1.87e-09"),
@@ -229,5 +229,5 @@ def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
 
 def test_a_changed_value_obeys_the_rule_between_sections() -> None:
     """`with_option` refuses what a file with that value would be refused for."""
-    with pytest.raises(InvalidSettingsError, match=r"cost.effort_weight = 1e-06 must not be so small"):
+    with pytest.raises(InvalidSettingsError, match=r"cost.effort_weight = 1e-06 is too small"):
         with_option(MAMBO, "cost.effort_weight", 1e-6)
