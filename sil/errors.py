@@ -1,47 +1,47 @@
-"""What can go wrong while flying, one class per thing a caller would do differently."""
+"""The exceptions of `sil`, one class for each thing that a caller would do differently."""
 
 from mambo_nmpc.codegen.errors import MamboNmpcError
 
 
 class TrajectoryError(MamboNmpcError):
-    """A trajectory that cannot be flown; the message names file, line and rule."""
+    """A trajectory is invalid; the message names file, line and rule."""
 
 
 class ScenarioError(MamboNmpcError):
-    """A file that holds no record of a flight; the message names file, key and rule."""
+    """A file is not the record of a flight; the message names file, key and rule."""
 
 
 class FlightError(MamboNmpcError):
-    """A flight that cannot be simulated as described."""
+    """A flight cannot be simulated with these options."""
 
 
 class TraceError(MamboNmpcError):
-    """A file that holds no trace; the message names it."""
+    """A file is not a trace; the message names it."""
 
 
 class ResultsError(MamboNmpcError):
-    """A folder that holds no results of ours, or broken ones; the message names it and what was expected."""
+    """A folder has no results, or damaged ones; the message names it and what was expected."""
 
 
 class CacheError(MamboNmpcError):
-    """The compile cache cannot be used, or others may write to it."""
+    """The compile cache cannot be used, or other users can write to it."""
 
 
 class BusyError(MamboNmpcError):
-    """Another run holds the result folder."""
+    """Another run is using the result folder."""
 
 
 class EmulatorError(MamboNmpcError):
-    """A program cannot be emulated here: the emulator is missing, or the core too small for it."""
+    """A program cannot be emulated: the emulator is missing, or the core's memory is too small."""
 
 
 class EmulationError(MamboNmpcError):
-    """The program on the emulated core died, or did not return in time."""
+    """The program on the emulated core crashed, or exceeded its time limit."""
 
 
 class WorkerError(MamboNmpcError):
-    """Work given to other processes or machines did not come back."""
+    """A worker process or machine stopped before it returned its result."""
 
 
 class StudyError(MamboNmpcError):
-    """A study cannot be searched or kept: Optuna is missing, or the storage refuses."""
+    """A study cannot be opened: Optuna is missing, or its storage fails."""

@@ -54,7 +54,7 @@ class Pool:
                 if reason is None:
                     raise
                 raise WorkerError(
-                    f"{reason}; the flights finished so far are kept, and the same command goes on from there"
+                    f"{reason}; the flights finished so far are kept, and the same command continues from there"
                 ) from error
             yield asked[future], result
 

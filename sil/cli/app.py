@@ -1,4 +1,4 @@
-"""All commands joined: the whole of `mambo-nmpc`."""
+"""The command line `mambo-nmpc` with all its commands."""
 
 import os
 from collections.abc import Callable
@@ -68,11 +68,11 @@ mambo-nmpc tune --storage postgresql://db/studies -o tuned
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html
 """
-"""What the help of a command shows."""
+"""The examples that the help of each command shows."""
 
 
 def app() -> typer.Typer:
-    """Return the command with all its sub-commands."""
+    """Return the root command with all its sub-commands."""
     joined = root()
     generating.register(joined)
     for name, command in COMMANDS.items():
@@ -84,5 +84,5 @@ def app() -> typer.Typer:
 
 def main() -> None:
     """Run the command line."""
-    os.environ["MPLBACKEND"] = "agg"  # pictures go to files; the library stops at a backend it does not know
+    os.environ["MPLBACKEND"] = "agg"  # plots go to files; matplotlib fails on a backend it does not know
     app()()

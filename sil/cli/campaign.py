@@ -1,4 +1,4 @@
-"""The command `campaign`: many drawn flights, and statistics of all of them."""
+"""The command `campaign`: many random flights and their statistics."""
 
 import contextlib
 import os
@@ -18,23 +18,26 @@ if TYPE_CHECKING:
 
 def campaign(
     source: Annotated[
-        Path | None, typer.Argument(help="A campaign.toml; without one the default campaign is flown.")
+        Path | None, typer.Argument(help="A campaign.toml; the default campaign if none is named.")
     ] = None,
     *,
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Folder for the results; a campaign begun there goes on."),
+        typer.Option("--output", "-o", help="Folder for the results; a campaign started there is continued."),
     ] = Path("campaign"),
-    flights: Annotated[int, typer.Option(help="Flights in all.", min=1, max=100_000)] = 1000,
+    flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=100_000)] = 1000,
     workers: Workers = None,
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a running Dask scheduler, whose workers fly instead.")
+        str | None,
+        typer.Option(help="Address of a running Dask scheduler; its workers fly, not this machine."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly many drawn flights with several controllers, and say how they compare; goes on where it stopped."""
+    """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
     if workers is not None and scheduler is not None:
-        raise typer.BadParameter("it names the workers: leave out --workers", param_hint="--scheduler")
+        raise typer.BadParameter(
+            "the scheduler has its own workers: leave out --workers", param_hint="--scheduler"
+        )
     from mambo_nmpc.sil.campaign import file
     from mambo_nmpc.sil.campaign.executors import cluster, processes
     from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text, finish
@@ -53,7 +56,7 @@ def campaign(
 
 
 def _fly(chosen: "Campaign", store: "FlightStore", flights: int, pool: "Pool") -> None:
-    """Fly what is missing; say on Ctrl-C what is kept."""
+    """Fly the missing flights; on Ctrl-C print how many are finished."""
     from mambo_nmpc.sil.campaign.run import fly_missing
     from mambo_nmpc.sil.cli.progress import counting_bar
 
@@ -64,7 +67,7 @@ def _fly(chosen: "Campaign", store: "FlightStore", flights: int, pool: "Pool") -
         with contextlib.suppress(OSError):
             typer.echo(
                 f"{echo(str(store.folder))}: stopped with {len(store.lines)} of {flights} flights finished; "
-                "the same command goes on from there",
+                "the same command continues from there",
                 err=True,
             )
         raise

@@ -1,4 +1,4 @@
-"""The command `doctor`: which tools are here."""
+"""The command `doctor`: which tools are installed."""
 
 import json
 from dataclasses import asdict
@@ -9,7 +9,7 @@ from mambo_nmpc.sil.cli.options import AsJson
 
 
 def doctor(*, as_json: AsJson = False) -> None:
-    """Say which compilers, emulators and analysers are here, and what a missing one would bring."""
+    """List which compilers, emulators and analysers are installed, and what needs those that are missing."""
     from mambo_nmpc.sil.firmware.doctor import doctor_text, examine
 
     findings = examine()

@@ -1,4 +1,4 @@
-"""The command `faults`: what becomes of flights in which something goes wrong."""
+"""The command `faults`: flights with faults, and how they end."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def faults(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly with faults of sensors, timing, target and operator; exit 1 if one crashes the drone."""
+    """Fly with faults of sensors, timing, target and operator; exit 1 if the drone crashes."""
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.controllers.compiled import CompiledController
     from mambo_nmpc.sil.errors import FlightError

@@ -1,4 +1,4 @@
-"""What `fly` does with its options: the flight they describe, on whom they name."""
+"""Run the flight that the options of `fly` describe."""
 
 import hashlib
 import math
@@ -40,9 +40,9 @@ FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
 
 
 def fly_once(options: FlyOptions) -> None:
-    """Fly what the options say; exit 1 if the flight does not end well.
+    """Fly once as `options` say and write the results; exit 1 if the drone is lost or the bits differ.
 
-    Raises FlightError, TrajectoryError and what loading settings or boards and building the C raises.
+    Raises FlightError, TrajectoryError, and the errors of loading settings or boards and of building the C.
     """
     settings = load(options.source, options.scalar)
     name, period_s = echo(options.source), settings.horizon.update_period_s
@@ -69,7 +69,8 @@ def fly_once(options: FlyOptions) -> None:
         )
     except FlightError as error:
         raise FlightError(
-            f"{name}: horizon.{error}; only the simulation, whose stock loops run at 200 Hz, asks for this"
+            f"{name}: horizon.{error}; only the simulation requires this, because its stock loops run at "
+            "200 Hz"
         ) from error
     if options.controller != "pd":
         _check_ranges(flight, settings, options.trajectory)
@@ -101,7 +102,7 @@ def fly_once(options: FlyOptions) -> None:
 
 def write_flight(trace: Trace, title: str, folder: Path) -> None:
     """Write `FLIGHT_FILES`."""
-    from mambo_nmpc.sil.flight.plots import draw_flights  # loaded when drawing
+    from mambo_nmpc.sil.flight.plots import draw_flights  # matplotlib is slow to import
 
     write_csv(trace, folder / "trace.csv")
     write_npz(trace, folder / "trace.npz")
@@ -109,7 +110,7 @@ def write_flight(trace: Trace, title: str, folder: Path) -> None:
 
 
 def finish(summary: FlightSummary, options: FlyOptions, files: tuple[str, ...]) -> None:
-    """Print what was found and written; exit 1 if the flight does not end well."""
+    """Print the results and the files written; exit 1 unless the summary is good."""
     show(summary, flight_text(summary), as_json=options.as_json)
     typer.echo(f"{echo(str(options.output))}: {', '.join(files)}", err=True)
     if not summary.good:
@@ -127,10 +128,10 @@ def _controller(options: FlyOptions, settings: Settings) -> PositionController:
 
 
 def _on_board(options: FlyOptions, settings: Settings) -> EmulatedController:
-    """Build the C for a board and put it on the board's emulated core."""
+    """Build the C for a board, and load it into the board's emulated core."""
     board = str(options.on)
     if options.controller != "nmpc":
-        raise FlightError(f"--on {echo(board)} runs the C: it goes with --controller nmpc alone")
+        raise FlightError(f"--on {echo(board)} runs the C: use it with --controller nmpc only")
     chosen = boards.load(board)
     core = chosen.emulated_core.value
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
@@ -151,7 +152,7 @@ def _trajectory(options: FlyOptions) -> Trajectory:
 
 
 def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
-    """Raise FlightError if the controller would refuse a target, compared in its own scalar type."""
+    """Raise FlightError if the controller, in its scalar type, would refuse a target of the flight."""
     design, ranges = Design(settings), settings.ranges
     numbers, limits = design.numbers, design.limits
     given = np.abs(flight.targets()[:, :1]).max(axis=0)

@@ -1,10 +1,10 @@
-"""The command `fly`: one flight on the model of the Mambo, or a recorded one again."""
+"""The command `fly`: one simulated flight of the Mambo, or the replay of a recorded one."""
 
 from mambo_nmpc.sil.cli.options import FlyOptions
 
 
 def fly(options: FlyOptions) -> None:
-    """Fly once on the model of the Mambo: trace, metrics and pictures."""
+    """Simulate one flight of the Mambo; write trace, metrics and plots."""
     if options.replay is not None:
         from mambo_nmpc.sil.cli.replay import fly_again
 

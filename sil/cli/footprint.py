@@ -1,4 +1,4 @@
-"""The command `footprint`: what a controller takes of a board."""
+"""The command `footprint`: flash, RAM, stack and instructions of a controller on a board."""
 
 import contextlib
 from typing import Annotated
@@ -26,11 +26,11 @@ def footprint(
     board: Annotated[
         str, typer.Option(help=f"{', '.join(BOARD_NAMES)}, all, or a board's TOML file.")
     ] = "all",
-    optimisation: Annotated[str, typer.Option(help="Optimisation of the compiler.")] = "-O2",
+    optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
     output: OptionalResults = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure flash, RAM, stack and instructions on a board, and hold them against its budget."""
+    """Measure flash, RAM, stack and instructions on boards; exit 1 if one exceeds its budget."""
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
     from mambo_nmpc.sil.footprint.measure import measure_boards

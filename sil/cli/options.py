@@ -1,4 +1,4 @@
-"""What commands share: types of options, one record of options as a command, and how results are printed."""
+"""What commands share: option types, a command from a record of options, and printing of results."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 __all__ = ["AsJson", "Scalar", "Source", "load"]
 
 _OUTPUT: Final = typer.Option(
-    "--output", "-o", help="Folder for the results; earlier ones there are overwritten."
+    "--output", "-o", help="Folder for the results; earlier results there are overwritten."
 )
 Results = Annotated[Path, _OUTPUT]
 OptionalResults = Annotated[Path | None, _OUTPUT]
 Workers = Annotated[
     int | None,
-    typer.Option(help="Processes on this machine; one for each processor by default.", min=1, max=1024),
+    typer.Option(help="Processes on this machine; by default one for each processor.", min=1, max=1024),
 ]
 
 BOARD_NAMES: Final = tuple(
@@ -40,13 +40,14 @@ Options = TypeVar("Options")
 
 @dataclass(frozen=True)
 class FlyOptions:
-    """The parameters of `fly`; `context` knows which of them were given."""
+    """The parameters of `fly`; `context` tells which of them the user gave."""
 
     context: typer.Context
     source: Source = "mambo"
     output: Results = Path("flight")
     controller: Annotated[
-        ControllerName, typer.Option(help="The generated C (nmpc), the stock PD, or the reference in Python.")
+        ControllerName,
+        typer.Option(help="The generated C (nmpc), the stock PD controller, or the reference in Python."),
     ] = "nmpc"
     trajectory: Annotated[
         str,
@@ -54,44 +55,46 @@ class FlyOptions:
     ] = "bernoulli"
     size_m: Annotated[float, typer.Option(help="Half-width, radius or step of the curve, in m.")] = 2.0
     rate_rad_s: Annotated[float, typer.Option(help="Angular rate of the curve, in rad/s.")] = 0.5
-    yaw_rad: Annotated[float, typer.Option(help="Heading, in rad, held throughout.")] = 0.0
+    yaw_rad: Annotated[float, typer.Option(help="Constant yaw, in rad.")] = 0.0
     wind: Annotated[
         str,
         typer.Option(
-            help="Steady push of the wind along x (north), y (east), in m/s^2; or `gusts`: moving air, "
-            "light turbulence towards north.",
+            help="Constant acceleration by wind along x (north), y (east), in m/s^2; or `gusts`: a mean "
+            "wind towards north with light turbulence.",
             metavar="X,Y|gusts",
         ),
     ] = "0,0"
     sensors: Annotated[
         SensorsName,
         typer.Option(
-            help="What controller and stock loops see the state through: the truth, or the Mambo's sensors "
-            "and estimators, without or with the rotation taken out of the optical flow."
+            help="State that controller and stock loops get: the true one, or that of the Mambo's sensors "
+            "and estimators, without or with compensation of the rotation in the optical flow."
         ),
     ] = "none"
-    seed: Annotated[int, typer.Option(help="Of gusts and sensor noise, 0 or more.")] = 0
+    seed: Annotated[int, typer.Option(help="Seed of gusts and sensor noise, 0 or more.")] = 0
     motor_lag_s: Annotated[float, typer.Option(help="Time constant of the motors, in s.")] = 0.0
-    start: Annotated[Start, typer.Option(help="In the air, or 5 s earlier on the ground.")] = "hover"
+    start: Annotated[Start, typer.Option(help="Start hovering in the air, or 5 s earlier on the ground.")] = (
+        "hover"
+    )
     duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0
     scalar: Scalar = None
     on: Annotated[
         str | None,
         typer.Option(
-            help="Board on whose emulated core the C runs; the same flight on this machine follows."
+            help="Board on whose emulated core the C runs; a flight on this machine must have the same bits."
         ),
     ] = None
     replay: Annotated[
         Path | None,
         typer.Option(
-            help="Record of a flight to fly again, with the optimizer's inner steps.", metavar="FILE"
+            help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
         ),
     ] = None
     as_json: AsJson = False
 
 
 def command_of(options: type[Options], run: Callable[[Options], None]) -> Callable[..., None]:
-    """Return `run` as a command whose parameters are the fields of the dataclass `options`."""
+    """Return a command that calls `run`; its parameters are the fields of the dataclass `options`."""
 
     def command(**given: Any) -> None:
         run(options(**given))
@@ -109,5 +112,5 @@ def load_boards(name: str) -> "Sequence[Board]":
 
 
 def show(summary: "Summary", text: str, *, as_json: bool) -> None:
-    """Print a summary as JSON, or else its text."""
+    """Print `summary` as JSON, or `text`."""
     typer.echo(summary.text() if as_json else text, nl=not as_json)

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on a terminal's stderr, silence anywhere else."""
+"""Progress bars on stderr if it is a terminal; otherwise no output."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ from rich.text import Text
 
 @contextmanager
 def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
-    """Show `text` and a bar; the yielded function takes the share done, 0 to 1."""
+    """Show `text` and a bar; yield a function that takes the finished share, 0 to 1."""
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
     shown = sys.stderr.isatty()
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
@@ -33,16 +33,16 @@ def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
 
 
 class _RateColumn(ProgressColumn):
-    """Things finished in a second."""
+    """Column with the number of finished things per second."""
 
     def render(self, task: Task) -> Text:
-        """Return the rate, once there is one."""
+        """Return the rate, nothing before it is known."""
         return Text("" if task.speed is None else f"{task.speed:.3g}/s")
 
 
 @contextmanager
 def counting_bar(text: str, things: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Show `text`, a bar, a count of `things`, their rate and the time left; the function takes the count."""
+    """Show `text`, a bar, count and rate of `things`, and the time left; yield a setter of the count."""
     columns = (
         *(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(things)),
         *(_RateColumn(), TimeRemainingColumn()),
@@ -56,7 +56,7 @@ def counting_bar(text: str, things: str, total: int) -> Iterator[Callable[[int],
 
         def count(finished: int) -> None:
             nonlocal task
-            if task is None:  # what an earlier run has finished is no part of the rate
+            if task is None:  # the rate excludes what an earlier run finished
                 task = progress.add_task(text, total=total, completed=finished)
             progress.update(task, completed=finished)
 

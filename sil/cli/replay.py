@@ -1,4 +1,4 @@
-"""`fly --replay`: a recorded flight, flown again tick by tick with the optimizer's inner steps."""
+"""`fly --replay`: repeat a recorded flight, and record every iteration of the optimizer."""
 
 from pathlib import Path
 
@@ -15,27 +15,27 @@ from mambo_nmpc.sil.flight.report import ReplaySummary, judge
 from mambo_nmpc.sil.flight.scenario import flight_of, read_record
 
 INNER_STEPS = "inner-steps.npz"
-BESIDE = frozenset({"replay", "output", "as_json"})
-"""Options that go with --replay: the record says everything else."""
+ALLOWED = frozenset({"replay", "output", "as_json"})
+"""Options allowed with --replay; the record contains all others."""
 
 
 def fly_again(options: FlyOptions, file: Path) -> None:
-    """Fly what the record in `file` says, with the reference in place of the C; exit 1 if it differs.
+    """Repeat the flight recorded in `file`, with the reference instead of the C; exit 1 if a bit differs.
 
     Raises FlightError and ScenarioError.
     """
     context = options.context
-    for name in context.params.keys() - BESIDE:
+    for name in context.params.keys() - ALLOWED:
         given = context.get_parameter_source(name)
         if given is not None and given.name == "COMMANDLINE":
             option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
-            raise FlightError(f"--replay {echo(str(file))} says how to fly: leave out {option}")
+            raise FlightError(f"--replay {echo(str(file))} contains the whole flight: leave out {option}")
     record = read_record(file)
     watched = WatchedController(record.settings) if record.controller != "pd" else None
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(options.output, ReplaySummary.command, files) as folder:
-        with progress_bar("flying again") as progress:
+        with progress_bar("replaying") as progress:
             trace = simulate(flight, PdController() if watched is None else watched, progress)
         write_flight(trace, file.name, folder)
         if watched is not None:

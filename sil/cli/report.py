@@ -1,4 +1,4 @@
-"""The command `report`: one page of whatever has been run."""
+"""The command `report`: one HTML page of the results of other commands."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,27 +8,29 @@ import typer
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
 
 MARK = '<meta name="generator" content="mambo-nmpc">'
-"""What marks a page as ours, which may be written anew."""
+"""Marks a page as a report, which may be overwritten."""
 
 
 def report(
     folders: Annotated[
-        list[Path], typer.Argument(help="Result folders, as the other commands write them.", metavar="DIR...")
+        list[Path], typer.Argument(help="Result folders of other commands.", metavar="DIR...")
     ],
     *,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="HTML file; an earlier report there is overwritten.")
     ] = Path("report.html"),
 ) -> None:
-    """Show results on one HTML page that needs no network and no other file."""
+    """Collect results on one HTML page that needs no network and no other file."""
     from mambo_nmpc.codegen.atomic import put
     from mambo_nmpc.sil.report.page import report_page
 
     name = echo(str(output))
     try:
         if output.is_file() and MARK.encode() not in output.read_bytes()[:1000]:
-            raise FileExistsRefusedError(f"{name}: is not a report of ours; name another file with -o")
-        page = report_page(folders).encode("utf-8", "replace")  # a folder's name need not be text
+            raise FileExistsRefusedError(
+                f"{name}: exists and is no report of mambo-nmpc; name another file with -o"
+            )
+        page = report_page(folders).encode("utf-8", "replace")  # a folder's name may be invalid UTF-8
         put(output, page)
     except OSError as error:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}") from error

@@ -1,4 +1,4 @@
-"""The command `same-bits`: the digest of the same steps from every build at hand."""
+"""The command `same-bits`: compare the self-test digest of all builds."""
 
 import json
 from dataclasses import asdict
@@ -20,12 +20,12 @@ def same_bits(
         int | None,
         typer.Option(
             min=100,
-            help="Frozen steps, a hundred at a time; those of the bundle's own digest if none are named.",
+            help="Self-test steps, in hundreds; by default as many as the bundle's self-test digest covers.",
         ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run the same frozen steps in every build at hand; exit 1 unless all digests are one."""
+    """Run the self-test steps in every build that this machine can make; exit 1 if a digest differs."""
     from mambo_nmpc.codegen.digest import TICKS, episode_count
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.footprint.same_bits import REFERENCE, BuildDigest, count_builds, run_everywhere
@@ -50,7 +50,8 @@ def same_bits(
         typer.echo(json.dumps(document, indent=2))
     else:
         typer.echo(
-            f"{len(ran) - len(others)} of {len(ran)} have the bits of the reference over {total} steps; "
+            f"{len(ran) - len(others)} of {len(ran)} builds have the digest of the reference over {total} "
+            "self-test steps; "
             f"{len(found) - len(ran)} not run"
         )
     if others:

@@ -1,4 +1,4 @@
-"""The command `sweep`: footprint and tracking over a grid of horizons and iterations."""
+"""The command `sweep`: footprint and tracking error over a grid of horizons and iterations."""
 
 from pathlib import Path
 from typing import Annotated
@@ -23,12 +23,12 @@ def sweep(
     iterations: Annotated[str, typer.Option(help="Iterations.", metavar="N,N")] = "3,5,10",
     fit: Annotated[
         bool,
-        typer.Option("--fit", help="Answer with the largest horizon within the board's budget.", metavar=""),
+        typer.Option("--fit", help="Print only the largest horizon within the board's budget.", metavar=""),
     ] = False,
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
-    """Measure footprint and tracking over a grid of horizons and iterations."""
+    """Measure footprint and tracking error over a grid of horizons and iterations."""
     from mambo_nmpc.codegen import boards
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
@@ -95,6 +95,6 @@ def _numbers(option: str, text: str, most: int) -> tuple[int, ...]:
         numbers = ()
     if not numbers or min(numbers) < 1 or max(numbers) > most:
         raise InvalidSettingsError(
-            (f"{option} {echo(text)} must be numbers in 1..{most}, as 5:30, 5:30:5 or 1,3,5",)
+            (f"{option} {echo(text)} must be numbers in 1..{most}, such as 5:30, 5:30:5 or 1,3,5",)
         )
     return numbers

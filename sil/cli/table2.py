@@ -1,4 +1,4 @@
-"""The command `table2`: Table II of the paper, flown again."""
+"""The command `table2`: fly the cases of Table II of the paper."""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,13 +18,13 @@ def table2(
     sensors: Annotated[
         bool,
         typer.Option(
-            "--sensors", help="Fly the Table II case through the Mambo's sensors and estimators instead."
+            "--sensors", help="Fly the Table II case with the Mambo's sensors and estimators instead."
         ),
     ] = False,
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly Table II of the paper with PD and every preset, and judge its claims."""
+    """Fly Table II of the paper with the PD controller and every preset, and check the paper's claims."""
     from mambo_nmpc.codegen.settings import presets
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
@@ -34,7 +34,7 @@ def table2(
     from mambo_nmpc.sil.paper.table2 import Table2Summary, fly_table2, judge_table2, table2_text
 
     if sensors:
-        _through_sensors(output, scalar, as_json=as_json)
+        _fly_with_sensors(output, scalar, as_json=as_json)
         return
     settings = {name: load(name, scalar) for name in presets.names()}
     files = {name: f"{name.lower()}.npz" for name in (PD, *settings)}
@@ -50,7 +50,7 @@ def table2(
     typer.echo(f"{echo(str(output))}: {', '.join(PICTURES)} and the traces", err=True)
 
 
-def _through_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
+def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
     from mambo_nmpc.sil.paper.sensed import PRESETS, SensedSummary, fly_sensed, text

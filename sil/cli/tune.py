@@ -1,4 +1,4 @@
-"""The command `tune`: search settings on drawn flights."""
+"""The command `tune`: search for settings on random flights."""
 
 import contextlib
 import os
@@ -21,20 +21,21 @@ CONTROLLER, FRONT = "controller.toml", "front"
 
 def tune(
     source: Annotated[
-        Path | None, typer.Argument(help="A tune.toml; without one the default study is searched.")
+        Path | None, typer.Argument(help="A tune.toml; the default study if none is named.")
     ] = None,
     *,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder for the results; a study begun there goes on.")
+        Path,
+        typer.Option("--output", "-o", help="Folder for the results; a study started there is continued."),
     ] = Path("tune"),
-    trials: Annotated[int, typer.Option(help="Trials in all.", min=1, max=100_000)] = 100,
+    trials: Annotated[int, typer.Option(help="Total number of trials.", min=1, max=100_000)] = 100,
     workers: Workers = None,
     storage: Annotated[
         str | None,
-        typer.Option(help="URL of a database that machines share, instead of a file in the folder."),
+        typer.Option(help="URL of a database that several machines share, instead of a file in the folder."),
     ] = None,
 ) -> None:
-    """Search settings that track well with calm commands, on drawn flights; goes on where it stopped."""
+    """Search for settings that track well with calm commands; continue an interrupted search."""
     from mambo_nmpc.sil.campaign.store import claim, convert_os_errors
     from mambo_nmpc.sil.files.folders import lock
     from mambo_nmpc.sil.tuning import file
@@ -54,14 +55,14 @@ def tune(
     for name, one in (*(("base", one) for one in _base(tuning, found)), ("chosen", best)):
         typer.echo(
             f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
-            f"{one.command_variation_rad:9.4g} rad an update   {one.crashed} of {tuning.file.flights} crashed"
+            f"{one.command_variation_rad:9.4g} rad per update   {one.crashed} of {tuning.file.flights} crashed"
         )
     typer.echo(f"chosen by the rule: {RULE}")
     typer.echo(f"{echo(str(output))}: {CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg", err=True)
 
 
 def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers: int) -> None:
-    """Search until there are enough trials; say on Ctrl-C what is kept."""
+    """Search until `trials` are finished; on Ctrl-C print how many are."""
     from mambo_nmpc.sil.campaign.executors import processes
     from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.tuning.study import finished_trials, search
@@ -75,19 +76,19 @@ def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers
         with contextlib.suppress(OSError):
             typer.echo(
                 f"{echo(str(folder))}: stopped with {len(finished_trials(study))} of {trials} trials "
-                "finished; the same command goes on from there",
+                "finished; the same command continues from there",
                 err=True,
             )
         raise
 
 
 def _base(tuning: "Tuning", found: "list[FinishedTrial]") -> "list[FinishedTrial]":
-    """Return the trial of the base: the first, unless a kill has cost it."""
+    """Return the trial with the base settings: the first one, unless the run was killed during it."""
     return [one for one in found if one.values == tuning.start][:1]
 
 
 def _finish(tuning: "Tuning", found: "list[FinishedTrial]", folder: Path) -> None:
-    """Write what follows from the trials, the controller last."""
+    """Write Pareto front, plot and, last, the chosen controller."""
     from mambo_nmpc.codegen.atomic import put
     from mambo_nmpc.sil.campaign.store import convert_os_errors
     from mambo_nmpc.sil.tuning.front import controller_text, front_csv, pareto_front

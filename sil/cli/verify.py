@@ -1,4 +1,4 @@
-"""The command `verify`: every check of the generated C, one verdict, and a folder of evidence."""
+"""The command `verify`: run all checks of the generated C, give a verdict, and keep the evidence."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,20 +19,19 @@ if TYPE_CHECKING:
 CONTROLLER, REPORTS = "controller/", "checks/"
 NAMES = ", ".join(entry.name for entry in CHECKS)
 EXIT_CODES = (
-    "Exit codes: 0 passed; 1 failed, or incomplete because a tool is missing; 2 bad input, or the system "
-    "refuses."
+    "Exit codes: 0 passed; 1 failed, or incomplete because a tool is missing; 2 bad input or a system error."
 )
 
 
 def verify(
     source: Source = "mambo",
     *,
-    only: Annotated[str | None, typer.Option(help=f"Checks to run, of {NAMES}.", metavar="NAME,NAME")] = None,
+    only: Annotated[str | None, typer.Option(help=f"Run only these of {NAMES}.", metavar="NAME,NAME")] = None,
     output: Results = Path("verification"),
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Prove and test the C that a controller's settings generate, and keep the evidence."""
+    """Generate the C of a controller, prove and test it, and keep the evidence."""
     from mambo_nmpc.codegen import bundle
     from mambo_nmpc.codegen.render import render
     from mambo_nmpc.sil.files.folders import SUMMARY, new_results
@@ -62,12 +61,14 @@ def _chosen(only: str | None) -> "Sequence[Entry]":
     names = only.split(",")
     for name in names:
         if name not in {entry.name for entry in CHECKS}:
-            raise InvalidSettingsError((f"--only {echo(only)}: {echo(name)} is no check; there are {NAMES}",))
+            raise InvalidSettingsError(
+                (f"--only {echo(only)}: {echo(name)} is not a check; the checks are {NAMES}",)
+            )
     return [entry for entry in CHECKS if entry.name in names]
 
 
 def _run(chosen: "Sequence[Entry]", settings: "Settings", folder: Path, *, aloud: bool) -> "list[Verified]":
-    """Run the checks one after the other, each in a folder of its own; say how each ended."""
+    """Run the checks one after the other, each in its own folder; with `aloud` print each result."""
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.verify.check import Subject
     from mambo_nmpc.sil.verify.report import Verified, line

@@ -1,4 +1,4 @@
-"""What a flight found: the record that is written and read, and its text."""
+"""The summary of a flight as a record and as text."""
 
 from dataclasses import fields
 from typing import Any
@@ -19,7 +19,7 @@ _UNITS |= {"_rad": "rad", "_m": "m"}
 
 
 class FlightSummary(Summary):
-    """What every flight found."""
+    """The results of any flight."""
 
     controller: str
     settings: str
@@ -35,7 +35,7 @@ class FlightSummary(Summary):
 
     @property
     def columns(self) -> dict[str, dict[str, float]]:
-        """The metrics by the heading of their column."""
+        """The sets of metrics by the heading of their column."""
         columns = {
             "whole flight": self.metrics,
             "after 10 s": self.metrics_without_transient,
@@ -45,7 +45,7 @@ class FlightSummary(Summary):
 
     @property
     def good(self) -> bool:
-        """Whether the flight ended in the air and controlled, with the bits it should have."""
+        """Whether the drone stayed under control, and an emulated flight has the bits of the host."""
         return not self.lost and not self.mostly_refused and self.same_bits_as_host is not False
 
     @model_serializer(mode="wrap")
@@ -55,7 +55,7 @@ class FlightSummary(Summary):
 
 
 class FlySummary(FlightSummary):
-    """A flight; `trajectory_sha256` is of a file of waypoints."""
+    """The results of `fly`; `trajectory_sha256` is the hash of a waypoint file."""
 
     command = "fly"
 
@@ -77,7 +77,7 @@ class FlySummary(FlightSummary):
 
 
 class ReplaySummary(FlightSummary):
-    """A recorded flight, flown again."""
+    """The results of repeating a recorded flight."""
 
     command = "fly --replay"
 
@@ -87,17 +87,17 @@ class ReplaySummary(FlightSummary):
 
     @property
     def good(self) -> bool:
-        """Whether the flight ended in the air and controlled, and equals the recorded one."""
+        """Whether the drone stayed under control, and the flight equals the recorded one in every bit."""
         return super().good and self.same_bits_as_recorded is not False
 
 
 def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
-    """Return the metrics of one flight by name."""
+    """Return the metrics of the flight with index `flight`, by name."""
     return {field.name: float(getattr(metrics, field.name)[flight]) for field in fields(metrics)}
 
 
 def refusals(trace: Trace, settings: Settings) -> list[str]:
-    """Say how often the controller of the first flight refused its input, and which range was exceeded."""
+    """Say how often the controller of the first flight refused an input, and which range it exceeded."""
     if isinstance(trace, SensedTrace):
         trace = trace.as_seen()
     status, ranges = trace.status[:, 0], settings.ranges
@@ -111,7 +111,7 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
         beyond = refused & (largest > limit)
         if beyond.any():
             sentences.append(
-                f"{beyond.sum()} steps: the vehicle's {words}, up to {largest[beyond].max():.4g} {unit}, "
+                f"{beyond.sum()} steps: the drone's {words}, up to {largest[beyond].max():.4g} {unit}, "
                 f"exceeds ranges.{key} = {limit:g}"
             )
     refused = status == Status.BAD_THRUST
@@ -120,14 +120,14 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
         during = " during lift-off" if (trace.time_s[refused] < 0.0).all() else ""
         sentences.append(
             f"{refused.sum()} steps{during}: thrust out of range, {thrust.min():.4g}..{thrust.max():.4g} "
-            f"m/s^2 where ranges.thrust_acceleration_* = {ranges.thrust_acceleration_min_m_s2:g}.."
+            f"m/s^2, but ranges.thrust_acceleration_* = {ranges.thrust_acceleration_min_m_s2:g}.."
             f"{ranges.thrust_acceleration_max_m_s2:g}"
         )
-    return [f"{sentence}; the last command was kept" for sentence in sentences]
+    return [f"{sentence}; the drone kept the last command" for sentence in sentences]
 
 
 def judge(trace: Trace, settings: Settings) -> dict[str, Any]:
-    """Return the keys of a `FlightSummary` that follow from the trace."""
+    """Return the fields of a `FlightSummary` that follow from the trace."""
     status = trace.status[:, 0]
     names = {NOT_CALLED: "NOT_CALLED", **{int(each): each.name for each in Status}}
     counts = {name: int((status == value).sum()) for value, name in names.items()}
@@ -145,7 +145,7 @@ def judge(trace: Trace, settings: Settings) -> dict[str, Any]:
 
 
 def flight_text(summary: FlightSummary) -> str:
-    """Spell the summary of a flight: a metric a line, with and without the start transient, and as seen."""
+    """Format a summary: a metric per line, columns with and without the transient, and as seen."""
     columns = summary.columns
     lines = [f"{'':22}" + "".join(f"{heading:>14}" for heading in columns)]
     for key in summary.metrics:
@@ -160,21 +160,19 @@ def flight_text(summary: FlightSummary) -> str:
         lines += [f"  {sentence}" for sentence in summary.refusals]
     if isinstance(summary, ReplaySummary) and summary.same_bits_as_recorded is not None:
         same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
-        lines.append(f"flown again: the trace {same} the recorded one, bit for bit")
+        lines.append(f"replay: the trace {same} the recorded one, bit for bit")
     if isinstance(summary, FlySummary) and summary.same_bits_as_host is not None:
         same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
-        lines.append(
-            f"flown on the core of {summary.board}: the trace {same} that of this machine, bit for bit"
-        )
+        lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")
     if summary.lost:
-        lines.append("LOST: the vehicle left the world before the end of the flight")
+        lines.append("LOST: the drone diverged before the end of the flight")
     elif summary.mostly_refused:
         lines.append("NOT CONTROLLED: the controller refused more than half of its inputs")
     return "\n".join(lines)
 
 
 def named(key: str) -> tuple[str, str]:
-    """Return the words and the unit of a metric's key, as rms_error_m."""
+    """Split the key of a metric, such as rms_error_m, into its name and its unit."""
     suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
     name = key.removesuffix(suffix).replace("_", " ")
     words = [word.upper() if word in ("iae", "ise", "itse", "itae") else word for word in name.split()]

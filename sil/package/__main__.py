@@ -4,9 +4,9 @@ import sys
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C exits with 130, also while modules are still being imported."""
+    """Run the command line; Ctrl-C exits with 130, also during imports."""
     try:
-        from mambo_nmpc.sil.cli import app  # noqa: PLC0415 - importing takes long enough to be interrupted
+        from mambo_nmpc.sil.cli import app  # noqa: PLC0415 - Ctrl-C during the import must exit with 130
 
         app.main()
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""The kinds of results: the record that a command writes, and the section that shows it."""
+"""The kinds of results: the record that a command writes, and the section of the report that shows it."""
 
 import json
 from collections.abc import Callable
@@ -41,27 +41,27 @@ _FINISHED: Final[dict[type[Summary], Callable[[Path, Any], Section]]] = {
 _SECTIONS: Final = _FINISHED | {UnfinishedCampaign: campaign_section}
 
 _UNFINISHED: Final = "campaign.json"
-"""The file that a campaign begins with; its summary comes last."""
+"""The file that a campaign writes first; it writes its summary last."""
 
 
 def section(folder: Path, summary: Summary) -> Section:
-    """Return what the page shows of a result folder; raises ResultsError and TraceError."""
+    """Return the section of the report on a result folder; raises ResultsError and TraceError."""
     return _SECTIONS[type(summary)](folder, summary)
 
 
 def read_summary(folder: Path) -> Summary:
-    """Return the summary of a result folder, which names the command; raises ResultsError."""
+    """Read the summary in a result folder; raises ResultsError."""
     if (folder / SUMMARY).is_file():
         return _read(folder / SUMMARY, *_FINISHED)
     if (folder / _UNFINISHED).is_file():
         return _read(folder / _UNFINISHED, UnfinishedCampaign)
-    what = f"holds no {SUMMARY}" if folder.is_dir() else "is no folder"
+    what = f"has no {SUMMARY}" if folder.is_dir() else "is not a folder"
     commands = ", ".join(kind.command for kind in _FINISHED)
-    raise ResultsError(f"{echo(str(folder))}: {what}; expected is a result folder of {commands}")
+    raise ResultsError(f"{echo(str(folder))}: {what}; name a result folder of {commands}")
 
 
 def _read(path: Path, *kinds: type[Summary]) -> Summary:
-    """Return the summary at `path`, of one of the `kinds`; raises ResultsError."""
+    """Read the summary at `path` as one of `kinds`; raises ResultsError."""
     name = echo(str(path))
     try:
         document: Any = json.loads(path.read_text("utf-8"))

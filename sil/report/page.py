@@ -1,4 +1,4 @@
-"""One page of whatever has been run: result folders in, HTML out; a pure function of the folders."""
+"""Render result folders as one HTML page, which depends on nothing but the folders."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ from mambo_nmpc.sil.show.page import render_page
 
 
 def report_page(folders: Sequence[Path]) -> str:
-    """Return a page of result folders, in their order; raises ResultsError and TraceError."""
+    """Return the HTML page of `folders`, in their order; raises ResultsError and TraceError."""
     summaries = [read_summary(folder) for folder in folders]
     sections = [section(folder, summary) for folder, summary in zip(folders, summaries, strict=True)]
     context = {

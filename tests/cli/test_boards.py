@@ -140,7 +140,7 @@ def test_a_missing_emulator_is_named(
     ("arguments", "message"),
     [
         (["fly", "--on", "crazyfly"], "did you mean crazyflie?"),
-        (["fly", "--on", "crazyflie", "--controller", "pd"], "it goes with --controller nmpc alone"),
+        (["fly", "--on", "crazyflie", "--controller", "pd"], "use it with --controller nmpc only"),
         (["footprint", "--board", "teensy"], "did you mean teensy41?"),
         (["footprint", "mamba"], "did you mean mambo"),
         (["footprint", "--board", "odd.toml"], "odd.toml: title is missing; add it: the name of the board"),

@@ -84,7 +84,7 @@ def test_an_earlier_run_is_replaced_and_nothing_else(tmp_path: Path) -> None:
     [
         (
             ["--only", "rules,prove"],
-            "--only rules,prove: prove is no check; there are warnings, rules, proof",
+            "--only rules,prove: prove is not a check; the checks are warnings, rules, proof",
         ),
         (["mamba"], "did you mean mambo?"),
     ],

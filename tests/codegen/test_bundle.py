@@ -182,11 +182,11 @@ def test_bundle_cannot_point_outside_its_folder(tmp_path: Path, path: str) -> No
 def test_folder_or_link_in_the_way_is_refused_even_with_force(folder: Path) -> None:
     """A folder where a file belongs, a file or link where a folder belongs: no force removes them."""
     (folder / "src" / "b.c").mkdir()
-    with pytest.raises(ForeignFilesError, match=r"src/b\.c stands where"):
+    with pytest.raises(ForeignFilesError, match=r"src/b\.c is in the way"):
         bundle.write(NEXT, folder, force=True)
     for in_the_way in (Path.touch, lambda place: place.symlink_to(folder / "src")):
         in_the_way(folder / "example")
-        with pytest.raises(ForeignFilesError, match="example stands where"):
+        with pytest.raises(ForeignFilesError, match="example is in the way"):
             bundle.write({**FILES, "example/main.c": ""}, folder, force=True)
         (folder / "example").unlink()
 

@@ -178,5 +178,5 @@ def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
     refused = command("fly", "--replay", "good.json", "--seed", "3", folder=tmp_path)
     assert (refused.returncode, refused.stderr) == (
         2,
-        "--replay good.json says how to fly: leave out --seed\n",
+        "--replay good.json contains the whole flight: leave out --seed\n",
     )

@@ -113,7 +113,7 @@ def test_the_command_writes_table_and_pictures_and_answers_with_the_largest(tmp_
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--prediction", "x"], "--prediction x must be numbers in 1..50, as 5:30, 5:30:5 or 1,3,5"),
+        (["--prediction", "x"], "--prediction x must be numbers in 1..50, such as 5:30, 5:30:5 or 1,3,5"),
         (["--prediction", "5:30:0"], "--prediction 5:30:0 must be numbers in 1..50"),
         (["--prediction", "0:3"], "--prediction 0:3 must be numbers in 1..50"),
         (["--prediction", "30:5"], "--prediction 30:5 must be numbers in 1..50"),

@@ -273,7 +273,7 @@ def test_a_study_resumes_after_ctrl_c(source: Path, whole: Path, tmp_path: Path)
     assert done.returncode == INTERRUPTED
     assert done.stdout == ""
     assert done.stderr.endswith(
-        f"stopped with 1 of {TRIALS} trials finished; the same command goes on from there\n"
+        f"stopped with 1 of {TRIALS} trials finished; the same command continues from there\n"
     )
     assert done.stderr.count("\n") == 1
     assert command(*arguments).returncode == 0
