@@ -20,7 +20,7 @@ from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.errors import MamboNmpcError, echo
 from mambo_nmpc.sil.errors import WorkerError
 
-PATIENCE_S: Final = 5.0
+TIME_LIMIT_S: Final = 5.0
 """Time within which a scheduler must answer."""
 
 
@@ -54,7 +54,7 @@ class Pool:
                 if reason is None:
                     raise
                 raise WorkerError(
-                    f"{reason}; the flights finished so far are kept, and the same command continues from there"
+                    f"{reason}; the finished flights are kept, and the same command continues from there"
                 ) from error
             yield asked[future], result
 
@@ -108,10 +108,10 @@ def cluster(address: str) -> Iterator[Pool]:
     for name in ("distributed", "distributed.client"):  # errors arrive as exceptions
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        asyncio.run(asyncio.wait_for(_knock(address), PATIENCE_S))
-        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+        asyncio.run(asyncio.wait_for(_knock(address), TIME_LIMIT_S))
+        client = Client(address, timeout=TIME_LIMIT_S, set_as_default=False)
     except (OSError, ValueError) as error:
-        reason = str(error) or f"no answer within {PATIENCE_S:g} s"
+        reason = str(error) or f"no answer within {TIME_LIMIT_S:g} s"
         raise WorkerError(
             f"{option}: no Dask scheduler answers there ({echo(reason)}); "
             "start one with `dask scheduler`, and give its address as in tcp://host:8786"
@@ -140,5 +140,5 @@ async def _knock(address: str) -> None:
     """Connect to a scheduler and disconnect; unlike Client, this gives up if nothing answers."""
     from distributed.core import connect  # noqa: PLC0415 - an optional extra
 
-    connection = await connect(address, timeout=PATIENCE_S)
+    connection = await connect(address, timeout=TIME_LIMIT_S)
     await connection.close()

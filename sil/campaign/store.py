@@ -45,7 +45,7 @@ class FlightStore:
         columns = self._columns[1:]
         lines = {flight: _csv_line([flight, *(row[key] for key in columns)]) for flight, row in rows.items()}
         with convert_os_errors(
-            self._table, "; the flights finished so far are kept, and the same command continues from there"
+            self._table, "; the finished flights are kept, and the same command continues from there"
         ):
             left = memoryview("".join(lines.values()).encode())
             while left:

@@ -55,7 +55,8 @@ def tune(
     for name, one in (*(("base", one) for one in _base(tuning, found)), ("chosen", best)):
         typer.echo(
             f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
-            f"{one.command_variation_rad:9.4g} rad per update   {one.crashed} of {tuning.file.flights} crashed"
+            f"{one.command_variation_rad:9.4g} rad per update   "
+            f"{one.crashed} of {tuning.file.flights} crashed"
         )
     typer.echo(f"chosen by the rule: {RULE}")
     typer.echo(f"{echo(str(output))}: {CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg", err=True)

@@ -11,7 +11,7 @@ from typing import IO, Final
 
 from mambo_nmpc.sil.errors import EmulationError
 
-PATIENCE_S: Final = 10.0
+TIME_LIMIT_S: Final = 10.0
 """Time limit of the emulator's start and of every request that does not run the guest."""
 
 _MIN_WAIT_S: Final = 0.01
@@ -68,16 +68,16 @@ class GdbStub:
         """Run until the guest stops; returns False if it reached the time limit.
 
         The limit is processor time, which a busy machine does not use up. A guest that uses none, such as one
-        asleep, is stopped PATIENCE_S after the limit has passed on the wall clock.
+        asleep, is stopped TIME_LIMIT_S after the limit has passed on the wall clock.
         """
         self._send("c")
         end_s = self._processor_time_s() + time_limit_s
-        patience = time.monotonic() + time_limit_s + PATIENCE_S
+        patience = time.monotonic() + time_limit_s + TIME_LIMIT_S
         while (left_s := end_s - self._processor_time_s()) > 0 and time.monotonic() < patience:
             if self._receive(max(left_s, _MIN_WAIT_S)) is not None:
                 return True
         self._write_pipe(b"\x03")
-        if self._receive(PATIENCE_S) is None:
+        if self._receive(TIME_LIMIT_S) is None:
             raise self._fail("does not stop")
         return False
 
@@ -95,7 +95,7 @@ class GdbStub:
 
     def _request(self, text: str) -> str:
         self._send(text)
-        answer = self._receive(PATIENCE_S)
+        answer = self._receive(TIME_LIMIT_S)
         if answer is None:
             raise self._fail(f"does not answer {text[:20]}")
         return answer

@@ -20,7 +20,7 @@ from mambo_nmpc.codegen.toolchain import host_toolchain
 LIBFUZZER: Final = "libFuzzer"
 """Clang's library for fuzzing; not a command."""
 
-PATIENCE_S: Final = 5.0
+TIME_LIMIT_S: Final = 5.0
 """Time limit of one tool's --version, in seconds."""
 
 Registry = Literal["Debian", "PyPI"]
@@ -41,7 +41,7 @@ class Finding:
 
 
 def examine() -> tuple[Finding, ...]:
-    """Look for every tool, each for at most PATIENCE_S; never raises."""
+    """Look for every tool, each for at most TIME_LIMIT_S; never raises."""
     needs = _needs()
     with ThreadPoolExecutor(len(needs)) as pool:
         return tuple(pool.map(_find, needs))
@@ -149,7 +149,7 @@ def _libfuzzer_version() -> str | None:
 
 
 def _capture_stdout(command: Sequence[str]) -> str | None:
-    """Return the stdout of a command, None if it cannot run or does not end within PATIENCE_S."""
+    """Return the stdout of a command, None if it cannot run or does not end within TIME_LIMIT_S."""
     try:
         done = subprocess.run(
             command,
@@ -157,7 +157,7 @@ def _capture_stdout(command: Sequence[str]) -> str | None:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=PATIENCE_S,
+            timeout=TIME_LIMIT_S,
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired):

@@ -1,4 +1,4 @@
-"""Check: optimised builds of gcc and clang have the bits of the reference in all cases."""
+"""Check: builds of gcc and clang at several optimisation levels compute the bits of the reference."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -6,11 +6,11 @@ from typing import Final, NamedTuple
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.cases import cases
-from mambo_nmpc.sil.verify.check import Result, Subject, joined
+from mambo_nmpc.sil.verify.check import Result, Subject, combine
 
 
 class Build(NamedTuple):
-    """A name, a compiler, its flags."""
+    """A build of the C: its name, compiler and flags."""
 
     name: str
     tool: str
@@ -24,14 +24,14 @@ BUILDS: Final = tuple(
 
 
 def check(subject: Subject) -> Result:
-    """Play the cases on every build."""
+    """Run the cases in every build."""
     return play(subject, BUILDS, "bits of the reference")
 
 
 def play(subject: Subject, builds: Sequence[Build], finding: str) -> Result:
-    """Play the cases on every build; one that reports an error or has other bits than the reference fails.
+    """Run the cases in every build; fail if one reports an error or differs from the reference in a bit.
 
-    `finding` ends the evidence when all builds pass.
+    `finding` is what passing builds show; it ends the line of evidence.
     """
     tapes, expected = cases(subject.settings)
     calls = sum(len(tape) for tape in tapes)
@@ -48,7 +48,7 @@ def play(subject: Subject, builds: Sequence[Build], finding: str) -> Result:
         try:
             program = replay.build(subject, build.tool, build.flags, folder)
         except BuildError as error:
-            faults.append(f"{build.name}: does not build: {error}")
+            faults.append(f"{build.name}: does not compile: {error}")
             continue
         played = replay.play(program, tapes_file, subject.settings, tapes)
         (folder / "report.txt").write_text(played.report)
@@ -57,6 +57,6 @@ def play(subject: Subject, builds: Sequence[Build], finding: str) -> Result:
             faults.append(f"{build.name}: {fault}; {folder / 'report.txt'}")
         else:
             good.append(build.name)
-    counted = f"{calls} calls of {len(tapes)} tapes under {len(good)} of {len(builds)} builds, {finding}"
+    counted = f"{calls} calls of {len(tapes)} tapes in {len(good)} of {len(builds)} builds: {finding}"
     figures = {"tapes": len(tapes), "calls": calls, "builds": good, "faults": faults, "missing": gaps}
-    return joined(faults, gaps, counted, figures)
+    return combine(faults, gaps, counted, figures)

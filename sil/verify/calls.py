@@ -1,7 +1,7 @@
-"""Calls of the C interface as bytes, and the outcomes of the reference.
+"""Calls of the C interface as bytes, and what the reference returns for them.
 
-A call is one byte and twelve numbers of the controller's scalar type, as `fuzz/nmpc_fuzz.c` of a bundle
-decodes them. A tape is a sequence of calls of one controller, which is initialised before the first.
+A call is one byte and twelve numbers of the controller's scalar type, which `fuzz/nmpc_fuzz.c` of a bundle
+decodes. A tape is a sequence of calls of one controller, which is initialised before the first call.
 """
 
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ Tape = NDArray[Any]
 """A sequence of calls, an array of `call_type`."""
 
 Outcomes = NDArray[Any]
-"""The outcome of every call of a tape, an array of `outcome_type`."""
+"""The outcomes of the calls of a tape, an array of `outcome_type`."""
 
 UNWRITTEN_RAD: Final = 9.0
-"""The value of a command that no call has written."""
+"""Value of the command before each call; it remains if the call does not write."""
 
 NULL_SELF: Final = 1
 NULL_FIRST: Final = 2
@@ -33,7 +33,7 @@ NULL_COMMAND: Final = 8
 
 
 class ApiFunction(IntEnum):
-    """Which function is called."""
+    """The function of the C interface that a call calls."""
 
     STEP = 0
     RESET = 1
@@ -79,7 +79,7 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
 
 
 def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls: int = 0) -> Tape:
-    """Return a call of `function` for each row of values (n, 1..12), with `nulls` among its pointers."""
+    """Return a call of `function` for each row of values (n, 1..12); `nulls` is the mask of null pointers."""
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
     quantities = _QUANTITIES[function][: values.shape[1]]
@@ -88,13 +88,13 @@ def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls
 
 
 def tape_from(settings: Settings, content: bytes) -> Tape:
-    """Return the complete calls in `content`; the harness too ignores the bytes after them."""
+    """Return the complete calls in `content`; like the harness, ignore the bytes after them."""
     layout = call_type(settings)
     return np.frombuffer(content, layout, len(content) // layout.itemsize)
 
 
 def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
-    """Play all `tapes` on reference controllers side by side, and return the outcomes."""
+    """Run all `tapes` at once, each on its own reference controller, and return the outcomes."""
     longest = max((len(tape) for tape in tapes), default=0)
     padded = np.zeros((len(tapes), longest), call_type(settings))
     padded["call"] = ApiFunction.RESET | (NULL_SELF << 2)
@@ -106,9 +106,10 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
 
 
 class _Runs:
-    """n reference controllers, of which each call may go to another function.
+    """n reference controllers; at each call, each of them may have another function called.
 
-    A controller that is not called by a function gets NaN as its input, which changes nothing.
+    Every function is called for all controllers. Those that it is not meant for get NaN as input, which the
+    reference refuses without changing its memory.
     """
 
     def __init__(self, settings: Settings, n: int) -> None:
@@ -119,7 +120,7 @@ class _Runs:
         self._fresh = self._controller.memory
 
     def make(self, now: Tape) -> Outcomes:
-        """Make one call for each controller."""
+        """Make one call (n,) on each controller, and return the outcomes (n,)."""
         function = now["call"] & 3
         nulls = (now["call"] >> 2) & 15
         null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0

@@ -1,4 +1,4 @@
-"""The cases that the run-time checks play: random tapes, and tapes for every edge."""
+"""The cases that the run-time checks run: random tapes, and tapes for every limit and special value."""
 
 import itertools
 import math
@@ -36,25 +36,25 @@ RANDOM_TAPES: Final = 1000
 
 @lru_cache(maxsize=2)
 def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
-    """Return the tapes of all cases, and the outcomes of the reference."""
+    """Return the tapes of all cases, and the outcomes of the reference for each."""
     rng = np.random.default_rng(0)
     tapes = (
         *random_tapes(settings, RANDOM_TAPES),
-        *_edges(settings, rng),
+        *_limits(settings, rng),
         *_nulls(settings, rng),
-        *_seams(settings, rng),
-        *_at_rest(settings),
-        *_meeting(settings),
-        *_ends(settings, rng),
+        *_quadrants(settings, rng),
+        *_convergence(settings),
+        *_zero_errors(settings),
+        *_largest_inputs(settings, rng),
     )
     return tapes, tuple(answers(settings, tapes))
 
 
 def random_tapes(settings: Settings, n: int) -> list[Tape]:
-    """Step through random inputs, with a reset and new weights on the way.
+    """Return `n` tapes of eight steps with random inputs, a reset and a change of weights.
 
-    Every fourth tape keeps its input for two steps. Every fifth is so close to the target that the last
-    bits of the prediction tables matter.
+    Every fourth tape holds each input for two steps. In every fifth tape the drone is so close to the target
+    that the last bits of the prediction constants matter.
     """
     rng = np.random.default_rng(0)
     draws = [_rows(random_inputs(settings, n, rng)) for _ in range(8)]
@@ -81,10 +81,10 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     return list(np.stack(columns, axis=1))
 
 
-def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Set one input to an end of its range, the next number inside or outside, or a special value.
+def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Set one input to a limit of its range, to the number next to the limit, or to a special value.
 
-    A good step precedes it, and two follow.
+    One good step precedes the step with that input, and two follow.
     """
     ranges, tilt = settings.ranges, settings.limits.tilt_rad
     symmetric = [
@@ -99,7 +99,7 @@ def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     bounds.append((ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2))
     for index, (quantity, ends) in enumerate(zip((*STATE, *TARGET, *THRUST), bounds, strict=True)):
         for value in _around(settings, quantity, *ends):
-            good = _good(settings, rng, 4)
+            good = _good_steps(settings, rng, 4)
             good[1, index] = value
             yield calls(settings, ApiFunction.STEP, good)
     numbers = Design(settings).numbers
@@ -112,11 +112,11 @@ def _edges(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
             for value in _around(settings, quantities[index], lows[index], highs[index]):
                 pair = np.full((1, 2), 0.1 * tilt)
                 pair[0, index] = value
-                yield _between(settings, rng, calls(settings, function, pair))
+                yield _surround(settings, rng, calls(settings, function, pair))
 
 
 def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Pass every combination of null pointers to every function, and initialise again."""
+    """Pass every combination of null pointers to every function; initialise a used controller."""
     every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
     for function, pointers in (
         (ApiFunction.STEP, every),
@@ -126,11 +126,11 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     ):
         for nulls in range(pointers + 1):
             made = calls(settings, function, np.array([[0.1, 0.2]]), nulls)
-            yield _between(settings, rng, made)
+            yield _surround(settings, rng, made)
 
 
-def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
-    """Yaw by eighths of a turn and their neighbours: there the quadrant of sine and cosine changes."""
+def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
+    """Yaw by eighths of a turn and neighbouring numbers, where the quadrant of the sine changes."""
     scalar = _floating(settings)
     eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 4)])
     yaws = [(eighths * (np.pi / 4)).astype(scalar)]
@@ -142,19 +142,19 @@ def _seams(settings: Settings, rng: np.random.Generator) -> list[Tape]:
         ]
     columns = []
     for yaw in yaws:
-        good = _good(settings, rng, len(eighths))
+        good = _good_steps(settings, rng, len(eighths))
         good[:, 6] = yaw
         columns.append(calls(settings, ApiFunction.STEP, good))
     return list(np.stack(columns, axis=1))
 
 
-def _at_rest(settings: Settings) -> list[Tape]:
-    """Let the cost change by exactly the tolerance, as nearly as the numbers allow.
+def _convergence(settings: Settings) -> list[Tape]:
+    """Choose weights with which the cost changes by the tolerance between two iterations, up to rounding.
 
-    Next to the target the first move overshoots, and the cost changes by about the tracking weight times a
-    constant. Bisection finds the largest weight with which that counts as converged; it and its neighbours
-    are the cases. In fixed point one unit of that weight is many units of the cost, so bisection finds the
-    effort weight too, whose unit is finer than that of the cost.
+    Close to the target the first iteration overshoots, and the cost changes by about the tracking weight
+    times a constant. Bisection finds the largest weight with which the search converges; that weight and its
+    neighbours are the cases. In fixed point one unit of that weight changes the cost by many units, so
+    bisection also finds the effort weight, whose unit is finer than that of the cost.
     """
     n, scalar, numbers = 16, _floating(settings), Design(settings).numbers
     near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
@@ -188,8 +188,8 @@ def _at_rest(settings: Settings) -> list[Tape]:
     return found
 
 
-def _meeting(settings: Settings) -> Iterator[Tape]:
-    """Meet the target exactly at the first predicted step, from both sides along both axes."""
+def _zero_errors(settings: Settings) -> Iterator[Tape]:
+    """Let the predicted error be exactly 0 after one step, from both sides along both axes."""
     scalar = _floating(settings)
     advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
     for axis in range(2):
@@ -200,10 +200,10 @@ def _meeting(settings: Settings) -> Iterator[Tape]:
             yield calls(settings, ApiFunction.STEP, steps)
 
 
-def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Set every input to an end of its range, where numbers of fixed point are largest.
+def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """In fixed point set every input to a limit of its range, where intermediate values are largest.
 
-    Then start one unit from the tilt limit and be pulled towards it: the smallest change of tilt.
+    Then start one unit below the tilt limit with a target that wants more tilt: the smallest change of tilt.
     """
     numbers = Design(settings).numbers
     if numbers.bits is None:
@@ -237,15 +237,15 @@ def _ends(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     yield from np.stack(columns, axis=1)
 
 
-def _between(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
-    """Put a call between good steps; a refused step after it repeats the last command."""
-    steps = calls(settings, ApiFunction.STEP, _good(settings, rng, 4))
+def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
+    """Put a call between good steps; the refused step after it shows the last command."""
+    steps = calls(settings, ApiFunction.STEP, _good_steps(settings, rng, 4))
     refused = calls(settings, ApiFunction.STEP, np.full((1, 12), np.nan))
     return np.concatenate([steps[:2], made, refused, steps[2:]])
 
 
-def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
-    """Draw good steps (n, 12)."""
+def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
+    """Draw inputs of steps within the ranges (n, 12)."""
     ranges = settings.ranges
     position_m, speed_m_s = min(1.0, ranges.position_m / 4), min(1.0, ranges.velocity_m_s / 4)
     scale = np.array([position_m] * 2 + [speed_m_s] * 2 + [0.3, 0.3, 3.0])
@@ -256,7 +256,7 @@ def _good(settings: Settings, rng: np.random.Generator, n: int) -> Array:
 
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
-    """Return both ends of a range and their neighbours, NaN, infinities, zeros and the smallest numbers."""
+    """Return both limits of a range, their neighbours, NaN, infinities, zeros and the smallest numbers."""
     scalar, numbers = _floating(settings), Design(settings).numbers
     ends = np.array([low, high], scalar)
     beyond = np.array([-np.inf, np.inf], scalar)
@@ -271,10 +271,10 @@ def _around(settings: Settings, quantity: str, low: float, high: float) -> Array
 
 
 def _floating(settings: Settings) -> Scalar:
-    """Return the type in which neighbours are found: float64 for fixed point."""
+    """Return the scalar type, or float64 for fixed point; neighbours of a number are found in it."""
     return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]
 
 
 def _rows(inputs: StepInputs) -> Array:
-    """Join state, target and thrust to rows (n, 12)."""
+    """Join state, target and thrust into rows (n, 12)."""
     return np.concatenate([inputs.state, inputs.target, inputs.thrust[:, None]], axis=1)

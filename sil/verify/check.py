@@ -1,4 +1,4 @@
-"""What a check of the generated C is: a function from a subject to a result."""
+"""A check of the generated C: a function that takes a subject and returns a result."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 
 
 class CheckOutcome(StrEnum):
-    """How a check ended; INCOMPLETE is never as good as PASSED."""
+    """How a check ended; INCOMPLETE means that a tool is missing and no fault was found."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -19,11 +19,11 @@ class CheckOutcome(StrEnum):
 
 @dataclass(frozen=True)
 class Subject:
-    """What is checked.
+    """What a check examines.
 
-    settings: of the controller.
-    bundle:   folder of its generated C, read only.
-    folder:   of this check, empty and writable: reports and logs stay there as evidence.
+    settings: the settings of the controller.
+    bundle:   folder of its generated C; a check does not write there.
+    folder:   empty folder for the reports and logs of this check, which are kept as evidence.
     """
 
     settings: Settings
@@ -35,9 +35,9 @@ class Subject:
 class Result:
     """How a check ended.
 
-    evidence: a line for people: what was counted, what is wrong, or which package brings a missing tool.
+    evidence: one line of text: what was checked, what is wrong, or which package has a missing tool.
     figures:  the same for programs; JSON types only.
-    tools:    name and version of every tool that took part.
+    tools:    {name: version} of tools beyond those in the registry.
     """
 
     outcome: CheckOutcome
@@ -47,11 +47,11 @@ class Result:
 
 
 Check = Callable[[Subject], Result]
-"""A check raises only for what the user must correct before it can start, never for what it finds."""
+"""A check raises only errors that the user must correct before it can start; faults of the C are results."""
 
 
 def passed(evidence: str, figures: Mapping[str, Any]) -> Result:
-    """Return the result of a check that found nothing."""
+    """Return the result of a check that found no fault."""
     return Result(CheckOutcome.PASSED, evidence, figures)
 
 
@@ -65,7 +65,7 @@ def incomplete(evidence: str, figures: Mapping[str, Any] | None = None) -> Resul
     return Result(CheckOutcome.INCOMPLETE, evidence, figures or {})
 
 
-def joined(faults: Sequence[str], gaps: Sequence[str], counted: str, figures: Mapping[str, Any]) -> Result:
-    """Return the result of several builds: what is wrong, what is missing, and what was counted."""
+def combine(faults: Sequence[str], gaps: Sequence[str], counted: str, figures: Mapping[str, Any]) -> Result:
+    """Return the result of several builds: failed if there are faults, incomplete if tools are missing."""
     outcome = CheckOutcome.FAILED if faults else CheckOutcome.INCOMPLETE if gaps else CheckOutcome.PASSED
     return Result(outcome, "; ".join([*faults, *dict.fromkeys(gaps), counted]), figures)

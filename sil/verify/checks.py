@@ -1,4 +1,4 @@
-"""The registry: every check that `mambo-nmpc verify` runs, in this order."""
+"""The registry of checks, in the order in which `mambo-nmpc verify` runs them."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -8,17 +8,17 @@ if TYPE_CHECKING:
 
 
 class Entry(NamedTuple):
-    """A check by name, what it is about in one line, and the tools whose versions are evidence."""
+    """A check: its name, what it checks in one line, and the tools whose versions the evidence lists."""
 
     name: str
     about: str
     tools: tuple[str, ...]
     module: str
-    """Where the check is; imported when it runs."""
+    """Module of the check, imported when it runs."""
 
     @property
     def check(self) -> "Check":
-        """The check itself."""
+        """The function of the check."""
         check: Check = import_module(f"{__package__}.{self.module}").check
         return check
 
@@ -26,26 +26,33 @@ class Entry(NamedTuple):
 _COMPILERS: Final = ("clang", "gcc")
 
 CHECKS: Final = (
-    Entry("warnings", "no warning in any dialect of C or C++", (*_COMPILERS, "clang++", "g++"), "dialects"),
-    Entry("rules", "MISRA C:2012 by cppcheck, except for the listed deviations", ("cppcheck",), "rules"),
+    Entry(
+        "warnings",
+        "no compiler warning in six dialects of C and C++",
+        (*_COMPILERS, "clang++", "g++"),
+        "dialects",
+    ),
+    Entry(
+        "rules", "MISRA C:2012, checked by cppcheck, except for the listed deviations", ("cppcheck",), "rules"
+    ),
     Entry(
         "proof",
-        "Frama-C: no run-time error, no stored NaN, no command beyond the limit, for every input",
+        "proven by Frama-C for every input: no run-time error, no stored NaN, no command beyond the limit",
         ("frama-c",),
         "proof",
     ),
     Entry(
         "sanitizers",
-        "no undefined behaviour in thousands of calls, bits of the reference",
+        "no undefined behaviour in thousands of calls, same bits as the reference",
         _COMPILERS,
         "sanitizers",
     ),
     Entry(
         "fuzzing",
-        "half a million inputs chosen by a fuzzer: every promise kept, bits of the reference",
+        "half a million runs of a fuzzer: every promise of nmpc.h holds, same bits as the reference",
         ("clang",),
         "fuzzing",
     ),
-    Entry("bits", "optimised builds have the bits of the reference", _COMPILERS, "bits"),
-    Entry("faults", "bounded commands and recovery from faults in flight", (), "faults"),
+    Entry("bits", "gcc and clang at all optimisation levels: same bits as the reference", _COMPILERS, "bits"),
+    Entry("faults", "flights with faults: bounded commands, and recovery", (), "faults"),
 )

@@ -1,4 +1,4 @@
-"""Check: no compiler warns about the C, in any dialect that firmware is built in."""
+"""Check: no compiler warns about the C, in any dialect in which firmware is built."""
 
 import tempfile
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import WARNING_FLAGS
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.check import Result, Subject, joined
+from mambo_nmpc.sil.verify.check import Result, Subject, combine
 from mambo_nmpc.sil.verify.tools import missing, run
 
 _UNSUFFIXED: Final = "-Wunsuffixed-float-constants"
@@ -16,14 +16,14 @@ _CXX: Final = ("-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversi
 
 @dataclass(frozen=True)
 class Dialect:
-    """A way to compile: every warning on, each an error."""
+    """A compiler, the Debian package that has it, and flags; warnings are errors."""
 
     compiler: str
     package: str
     flags: tuple[str, ...]
 
     def command(self, settings: Settings) -> list[str]:
-        """Return compiler and flags; C has no suffix for a double, so gcc must not ask for one."""
+        """Return compiler and flags, without the check of suffixes except in float32: double has none."""
         suffixes = settings.code.scalar == "float32"
         flags = [flag for flag in self.flags if suffixes or flag != _UNSUFFIXED]
         return [self.compiler, *flags, "-Werror", "-O2", "-ffp-contract=off"]
@@ -40,7 +40,7 @@ DIALECTS: Final = {
 
 
 def check(subject: Subject) -> Result:
-    """Compile library, self-test, example and proof in every dialect; a warning is a failure."""
+    """Compile library, self-test, example and proof in every dialect; any warning is a fault."""
     bundle = subject.bundle.resolve()
     sources = sorted(path for part in ("src", "example", "proof") for path in bundle.glob(f"{part}/*.c"))
     gaps, silent, faults = [], [], []
@@ -65,4 +65,4 @@ def check(subject: Subject) -> Result:
             faults.append(f"{name}: {first or f'exit code {done.returncode}'}")
     (subject.folder / "compilers.txt").write_text("\n".join(log), "utf-8")
     counted = f"{len(sources)} files, {len(silent)} of {len(DIALECTS)} dialects without a warning"
-    return joined(faults, gaps, counted, {"files": len(sources), "silent": silent, "faults": faults})
+    return combine(faults, gaps, counted, {"files": len(sources), "silent": silent, "faults": faults})

@@ -1,4 +1,4 @@
-"""Check: with every fault in flight commands stay bounded, bad input is refused, and the drone recovers."""
+"""Check: under every fault in flight, commands stay bounded, bad input is refused, and the drone recovers."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -19,7 +19,7 @@ from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, pas
 
 
 def check(subject: Subject) -> Result:
-    """Fly every fault; raises BuildError, CacheError and FlightError."""
+    """Fly with every fault; raises BuildError, CacheError and FlightError."""
     settings = subject.settings
     verdicts = fly_faults(settings, partial(controller, subject))
     (subject.folder / "faults.md").write_text(table(verdicts) + "\n", "utf-8")
@@ -28,9 +28,9 @@ def check(subject: Subject) -> Result:
 
 
 def controller(subject: Subject, n: int) -> CompiledController:
-    """Return n controllers of the C in the subject's bundle; raises BuildError and CacheError.
+    """Compile the C in the subject's bundle, and return n controllers; raises BuildError and CacheError.
 
-    The extension knows only the prefix nmpc: a bundle with another is generated again with that prefix.
+    The compiled extension requires the prefix nmpc: for another prefix the C is generated again with nmpc.
     """
     settings = subject.settings
     if settings.code.prefix != "nmpc":
@@ -45,9 +45,9 @@ def controller(subject: Subject, n: int) -> CompiledController:
 
 
 def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
-    """Judge the verdicts on the flights of a controller.
+    """Return the result of the flights of one controller.
 
-    A controller that strays without a fault cannot show that it comes back: INCOMPLETE, unless it failed.
+    It is INCOMPLETE if the drone strays without any fault, because then no recovery can be judged.
     """
     design = Design(settings)
     limit = float(design.numbers.to_si(np.array([design.limits.tilt]), "angle")[0])
@@ -63,12 +63,14 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
         if verdict.end is End.CRASHED and not strays:
             wrong.append(f"{where}: crashed")
         if verdict.end is End.AWAY and not strays and verdict.fault in ending:
-            wrong.append(f"{where}: never came back")
+            wrong.append(f"{where}: did not recover")
     figures = finite({"wrong": wrong, "flights": [asdict(verdict) for verdict in verdicts]})
     if wrong:
         return failed("; ".join(wrong[:3]) + (f"; {len(wrong)} in all" if wrong[3:] else ""), figures)
     if strays:
-        return incomplete(f"strays further than {STRAY_M:g} m without a fault: no recovery to judge", figures)
+        return incomplete(
+            f"the drone strays more than {STRAY_M:g} m without a fault, so recovery cannot be judged", figures
+        )
     return passed(_evidence(verdicts, ending), figures)
 
 
@@ -78,5 +80,5 @@ def _evidence(verdicts: Sequence[Verdict], ending: set[str]) -> str:
     return (
         f"{len(verdicts)} faults: no crash, command at most "
         f"{max(verdict.largest_command_rad for verdict in verdicts):.4g} rad, {len(back)} back on course, "
-        f"the slowest {slowest.recovery_s:.1f} s after '{slowest.fault}'"
+        f"the last {slowest.recovery_s:.1f} s after '{slowest.fault}'"
     )

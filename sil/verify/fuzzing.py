@@ -1,4 +1,4 @@
-"""Check: a coverage-guided fuzzer searches for calls that break a promise or the bits of the reference."""
+"""Check: a coverage-guided fuzzer finds no call that breaks a promise of nmpc.h or has other bits."""
 
 import re
 import subprocess
@@ -19,7 +19,7 @@ RUNS: Final = 500_000
 SEED: Final = 1
 SEEDS: Final = 32
 LONGEST_TAPE: Final = 12
-"""Most calls in a tape of the fuzzer."""
+"""Most calls in a tape that the fuzzer makes."""
 
 FLAGS: Final = (
     "-g",
@@ -30,7 +30,7 @@ FLAGS: Final = (
 
 
 def check(subject: Subject, *, runs: int = RUNS) -> Result:
-    """Fuzz the bundle's harness for a fixed number of runs, then replay all it kept against the reference."""
+    """Run the fuzzer `runs` times, then compare all tapes that it kept with the reference."""
     gap = replay.missing("clang", FLAGS, subject.folder)
     if gap:
         return incomplete(gap)
@@ -40,7 +40,7 @@ def check(subject: Subject, *, runs: int = RUNS) -> Result:
     try:
         done = _fuzz(subject, runs)
     except BuildError as error:
-        return failed(f"the harness does not build: {error}")
+        return failed(f"the harness does not compile: {error}")
     log = done.stderr.decode(errors="replace")
     (subject.folder / "fuzzer.txt").write_text(log)
     files = sorted([*seeds.iterdir(), *corpus.iterdir()])
@@ -59,13 +59,13 @@ def check(subject: Subject, *, runs: int = RUNS) -> Result:
         return failed(fault, figures)
     return passed(
         f"{made} runs from seed {SEED} broke no promise; {figures['replayed_calls']} calls of the "
-        f"{len(files)} tapes kept have the bits of the reference",
+        f"{len(files)} tapes kept have the same bits as the reference",
         figures,
     )
 
 
 def _write_seeds(settings: Settings, folder: Path) -> None:
-    """Write tapes to start from; they depend on the settings."""
+    """Write the random tapes from which the fuzzer starts."""
     folder.mkdir()
     for index, tape in enumerate(random_tapes(settings, SEEDS)):
         (folder / f"seed-{index:02}").write_bytes(tape.tobytes())
@@ -88,7 +88,7 @@ def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
             f"-max_len={longest}",
             "-len_control=0",
             "-reload=0",
-            "-use_cmp=0",  # its table of compared values holds addresses, so no two runs would be the same
+            "-use_cmp=0",  # its table contains addresses, so runs would not repeat
             "-timeout=20",
             "-print_final_stats=1",
             "-artifact_prefix=./",
@@ -102,18 +102,18 @@ def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
 
 
 def _broken_promise(folder: Path, returncode: int, log: str) -> str | None:
-    """Return what the fuzzer found, and the command that repeats it."""
+    """Return the fault that the fuzzer found and the command that repeats it; None if it found none."""
     if returncode == 0:
         return None
     words = re.search(r"broken promise.*|runtime error:.*|ERROR: .*", log)
     artifact = re.search(r"Test unit written to \./(\S+)", log)
     what = words[0] if words else f"the fuzzer ended with {returncode}"
     where = f"; repeat it with {folder / 'fuzz'} {folder / artifact[1]}" if artifact else ""
-    return f"{what}{where}; all it said: {folder / 'fuzzer.txt'}"
+    return f"{what}{where}; its output: {folder / 'fuzzer.txt'}"
 
 
 def _other_bits(subject: Subject, files: Sequence[Path], tapes: Sequence[Tape]) -> str | None:
-    """Play tapes on the C; return the first difference from the reference and the file that has it."""
+    """Run tapes in the C; return the first difference from the reference and the file of its tape."""
     program = replay.build(subject, "clang", ("-O2",), subject.folder)
     joined = subject.folder / "tapes.bin"
     replay.write_tapes(subject.settings, tapes, joined)

@@ -1,4 +1,4 @@
-"""Inputs of steps: seeded random values, and the corners that random values miss."""
+"""Inputs of steps: random values from a seed, and special cases that random values miss."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class StepInputs:
 
 
 def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepInputs:
-    """Draw inputs with errors from 0.1 mm to 10 m, a tenth of them with a corner."""
+    """Draw inputs with errors from 0.1 mm to 10 m; make a tenth of them special cases."""
     ranges = settings.ranges
     scale = 10.0 ** rng.uniform(-4, 1, (n, 1))
     target = rng.normal(0, 1, (n, 4)) * [2, 2, 1, 1]
@@ -44,31 +44,33 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
     thrust[::3] = np.clip(9.81, low, high)
 
     for row in np.flatnonzero(rng.random(n) < 0.1):
-        _corner(settings, state[row], target[row], thrust[row : row + 1], rng)
+        _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
     return StepInputs(state, target, thrust)
 
 
-def _corner(settings: Settings, state: Array, target: Array, thrust: Array, rng: np.random.Generator) -> None:
-    """Put a corner into one row, in place."""
+def _make_special(
+    settings: Settings, state: Array, target: Array, thrust: Array, rng: np.random.Generator
+) -> None:
+    """Make one row a special case, in place."""
     ranges = settings.ranges
     bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0])
     match rng.integers(10):
-        case 0:  # no error at all: every slope is zero
+        case 0:  # no error: every gradient is zero
             state[:4] = target
             state[4:6] = 0
-        case 1:  # an error along one axis only, heading along it
+        case 1:  # an error along one axis only, yaw 0
             state[:4] = target
             state[0] += 0.1
             state[4:] = 0
-        case 2:  # equal errors, equal slopes
+        case 2:  # equal errors, equal gradients
             state[:4] = target + 0.25
-        case 3:  # headings at the seams of the sine, and far around
+        case 3:  # yaws where the quadrant of the sine changes, and large ones
             turned = rng.integers(-600, 601) * np.pi / 2
             state[6] = rng.choice([turned, -1000.0, 1000.0, -1024.0, 1024.0, 0.0, -0.0])
-        case 4:  # at the very end of a range, and just beyond
+        case 4:  # at the limit of a range, and just beyond
             axis = rng.integers(7)
             state[axis] = rng.choice([-1, 1]) * bounds[axis] * rng.choice([1, 1.001])
-        case 5:  # as far from the target as can be
+        case 5:  # as far from the target as the ranges allow
             state[:2], target[:2] = ranges.position_m, -ranges.position_m
         case 6:
             state[rng.integers(7)] = rng.choice(NOT_IN_RANGE)
@@ -77,5 +79,5 @@ def _corner(settings: Settings, state: Array, target: Array, thrust: Array, rng:
         case 8:
             low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
             thrust[0] = rng.choice([*NOT_IN_RANGE, 0.0, -0.0, -9.81, low, high])
-        case _:  # too small for a normal number
+        case _:  # errors below the smallest normal number
             target[:], state[:4] = 0, rng.normal(0, 1, 4) * 1e-40

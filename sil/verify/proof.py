@@ -1,4 +1,4 @@
-"""Check: Frama-C's plug-in Eva proves what `proof/nmpc_proof.c` of the bundle promises, for every input."""
+"""Check: Frama-C's plug-in Eva proves the promises of `proof/nmpc_proof.c` of the bundle for every input."""
 
 import csv
 import shlex
@@ -11,17 +11,17 @@ from typing import Final
 from mambo_nmpc.codegen.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
 from mambo_nmpc.codegen.render import with_prefix
 from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, passed
-from mambo_nmpc.sil.verify.tools import PATIENCE_S, missing, number, run
+from mambo_nmpc.sil.verify.tools import TIME_LIMIT_S, missing, number, run
 
 _SHOWN: Final = 5
-"""Alarms that the evidence names; all are in the reports."""
+"""Most alarms in the line of evidence; the reports list all."""
 _PROMISE: Final = "user assertion"
-_GRANTED: Final = "postcondition"
+_ASSUMED: Final = "postcondition"
 
 
 @dataclass(frozen=True)
 class Property:
-    """What Eva concluded about one assertion, its own or the driver's."""
+    """One assertion, of Eva or of the driver, and its status."""
 
     place: str
     function: str
@@ -31,7 +31,7 @@ class Property:
 
 
 def check(subject: Subject) -> Result:
-    """Prove the absence of run-time errors and the promises of the driver; every alarm is a failure."""
+    """Prove that no run-time error occurs and that the driver's promises hold; every alarm is a fault."""
     absent = missing("frama-c", "frama-c-base")
     if absent:
         return incomplete(absent)
@@ -43,11 +43,11 @@ def check(subject: Subject) -> Result:
         try:
             done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
         except subprocess.TimeoutExpired:
-            return incomplete(f"frama-c did not end within {PATIENCE_S:g} s")
+            return incomplete(f"frama-c did not end within {TIME_LIMIT_S:g} s")
         log = done.stdout + done.stderr
         (subject.folder / f"{name}.txt").write_text(log, "utf-8")
         if done.returncode != 0 or not report.is_file():
-            return failed(f"frama-c refused the code: {_complaint(log)}")
+            return failed(f"frama-c failed: {_complaint(log)}")
         properties += read_properties(report)
         statements += number(log, r"(\d+) statements reached")
 
@@ -63,9 +63,9 @@ def check(subject: Subject) -> Result:
     if alarms:
         return failed(_alarm_text(alarms), figures)
     if proven < promised:
-        return failed(f"{promised - proven} of {promised} promises were never reached", figures)
+        return failed(f"{promised - proven} of {promised} promises were not reached", figures)
     return passed(
-        f"no alarm in {statements} statements, whatever the inputs and the order of calls: no run-time "
+        f"no alarm in {statements} statements for any inputs and any order of calls: no run-time "
         f"error, {'no overflow' if fixed else 'no NaN or infinity stored'}, no command beyond the tilt limit",
         figures,
     )
@@ -86,9 +86,10 @@ def command(subject: Subject, name: str) -> list[str]:
 
 
 def unproven(properties: Sequence[Property]) -> list[Property]:
-    """Return what does not hold in every execution; a promise may be unreached in one proof, not in both.
+    """Return the properties that are not proven.
 
-    What one proof takes for granted of a function, its postconditions, is shown by the other.
+    A promise may be unreachable in one proof if the other one proves it. A postcondition that one proof
+    assumes of a function must be proven by the other.
     """
     proven = {one.place for one in properties if one.status == "Valid"}
     return [
@@ -96,12 +97,12 @@ def unproven(properties: Sequence[Property]) -> list[Property]:
         for one in properties
         if one.status not in ("Valid", "Considered valid")
         and not (_is_promise(one) and one.status == "Dead" and one.place in proven)
-        and not (one.kind == _GRANTED and one.status != "Invalid" and one.place in proven)
+        and not (one.kind == _ASSUMED and one.status != "Invalid" and one.place in proven)
     ]
 
 
 def read_properties(report: Path) -> list[Property]:
-    """Read Frama-C's table of properties; those of its own library are left out."""
+    """Read Frama-C's table of properties, without those of its own library."""
     with report.open(encoding="utf-8", newline="") as file:
         return [
             Property(
@@ -117,7 +118,7 @@ def read_properties(report: Path) -> list[Property]:
 
 
 def _is_promise(one: Property) -> bool:
-    """Tell whether the driver states it: its own assertion, or what a call in it must hold to."""
+    """Whether the driver states it: an assertion of the driver, or a precondition of a function it calls."""
     return one.kind == _PROMISE or one.kind.startswith("precondition of ")
 
 

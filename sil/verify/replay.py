@@ -1,4 +1,4 @@
-"""Build a bundle's C with any compiler and flags, play tapes on it, and compare with the reference."""
+"""Compile a bundle's C with any compiler and flags, run tapes in it, and compare with the reference."""
 
 import re
 import subprocess
@@ -22,7 +22,7 @@ LIMIT_S: Final = 600
 """Limit of the processor time of a program, in seconds."""
 
 PACKAGES: Final = {"gcc": "gcc", "clang": "libclang-rt-dev"}
-"""Debian's package of the sanitizers' run-time libraries, by compiler."""
+"""Debian's package with the run-time libraries of the sanitizers, by compiler."""
 
 _SELF_TEST_FAILED: Final = 3
 _REPORT: Final = re.compile(r"runtime error:|ERROR: |WARNING: ")
@@ -32,7 +32,7 @@ FLAGS: Final = ("-std=c99", "-ffp-contract=off", "-D_POSIX_C_SOURCE=200809L")
 
 @dataclass(frozen=True)
 class Replay:
-    """How a program ended: the outcomes of the calls that it made, its return code and its report."""
+    """What a program returned: the outcomes of its calls, its exit code and its error output."""
 
     outcomes: list[Outcomes]
     returncode: int
@@ -61,7 +61,7 @@ def sources(subject: Subject) -> list[Path]:
 
 
 def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
-    """Return what is missing to build with gcc or clang and `flags`, with its package, None if nothing is."""
+    """Return which tool and package is missing to build with `flags`; None if gcc or clang can do it."""
     gap = missing_tool(tool, tool)
     if gap:
         return gap
@@ -77,7 +77,7 @@ def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
 
 
 def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
-    """Build the program that plays tapes in `folder`, and return it; raises BuildError."""
+    """Compile the program that runs tapes into `folder`, and return its path; raises BuildError."""
     program = write_program(subject.settings.code.prefix, folder)
     includes = [f"-I{(subject.bundle / part).resolve()}" for part in ("include", "fuzz")]
     units = [str(path.resolve()) for path in sources(subject)]
@@ -86,7 +86,7 @@ def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Pa
 
 
 def write_program(prefix: str, folder: Path) -> Path:
-    """Write the C that plays tapes into `folder`."""
+    """Write the C source of the program that runs tapes into `folder`."""
     text = resources.files("mambo_nmpc.sil.verify").joinpath("replay.c").read_text("utf-8")
     program = folder / "replay.c"
     program.write_text(with_prefix(text, prefix), "utf-8")
@@ -94,7 +94,7 @@ def write_program(prefix: str, folder: Path) -> Path:
 
 
 def write_tapes(settings: Settings, tapes: Sequence[Tape], path: Path) -> None:
-    """Write tapes into one file, each after an initialisation."""
+    """Write tapes into one file; a call of nmpc_init precedes each."""
     init = calls(settings, ApiFunction.INIT, np.zeros((1, 1)))
     path.write_bytes(b"".join(init.tobytes() + tape.tobytes() for tape in tapes))
 
@@ -102,7 +102,7 @@ def write_tapes(settings: Settings, tapes: Sequence[Tape], path: Path) -> None:
 def play(
     program: Path, tapes_file: Path, settings: Settings, tapes: Sequence[Tape], limit_s: int = LIMIT_S
 ) -> Replay:
-    """Run `program` on the tapes that `write_tapes` put into a file, for `limit_s` of processor time."""
+    """Run `program` on the file that `write_tapes` wrote, for at most `limit_s` of processor time."""
     done = subprocess.run(
         [str(program.resolve()), str(tapes_file.resolve()), str(limit_s)],
         capture_output=True,
@@ -117,7 +117,7 @@ def play(
 
 
 def fault(played: Replay, expected: Sequence[Outcomes]) -> str | None:
-    """Return what is wrong: a sanitizer's report, another bit, or a failed self-test; None if nothing is."""
+    """Return the fault: a sanitizer's report, a different bit or a failed self-test; None without a fault."""
     if played.returncode not in {0, _SELF_TEST_FAILED}:
         reports = [line.strip() for line in played.report.splitlines() if _REPORT.search(line)]
         return reports[0] if reports else f"ended with {played.returncode}"
@@ -128,7 +128,7 @@ def fault(played: Replay, expected: Sequence[Outcomes]) -> str | None:
 
 
 def difference(expected: Sequence[Outcomes], found: Sequence[Outcomes]) -> Difference | None:
-    """Find the first call whose outcome has another bit than expected; None if there is none."""
+    """Return the first call whose outcome differs from the expected one in a bit; None if there is none."""
     for tape, (ours, theirs) in enumerate(zip(expected, found, strict=True)):
         if ours.tobytes() == theirs.tobytes():
             continue
@@ -138,5 +138,5 @@ def difference(expected: Sequence[Outcomes], found: Sequence[Outcomes]) -> Diffe
                 first = names[0]
                 what = f"{', '.join(names)} differ ({first} {wrong[first]}, reference {right[first]})"
                 return Difference(tape, call, what)
-        return Difference(tape, len(theirs), "was not made")
+        return Difference(tape, len(theirs), "has no outcome")
     return None

@@ -1,4 +1,4 @@
-"""The results of a verification as a record, as lines and as a page."""
+"""The results of a verification as a record, as text and as an HTML page."""
 
 import hashlib
 from collections import Counter
@@ -21,7 +21,7 @@ PAGE: Final = "verify.html"
 
 @dataclass(frozen=True)
 class Verified:
-    """A check that was run, and its result; `figures` are for programs."""
+    """A check that ran, and its result; `figures` are for programs."""
 
     name: str
     about: str
@@ -32,7 +32,7 @@ class Verified:
 
 
 class VerifySummary(Summary):
-    """A verification; `files` has the SHA-256 of every file of the folder."""
+    """The results of `verify`; `files` has the SHA-256 of every file in the folder."""
 
     command = "verify"
 
@@ -48,19 +48,19 @@ class VerifySummary(Summary):
 
 
 def verdict(found: Sequence[Verified]) -> CheckOutcome:
-    """Return the worst outcome."""
+    """Return the worst outcome of all checks."""
     outcomes = {one.outcome for one in found}
     worst_first = (CheckOutcome.FAILED, CheckOutcome.INCOMPLETE, CheckOutcome.PASSED)
     return next(outcome for outcome in worst_first if outcome in outcomes)
 
 
 def line(one: Verified) -> str:
-    """Spell one check in a line."""
+    """Format one check as a line."""
     return f"{one.name:12}{one.outcome:12}{one.evidence}"
 
 
 def closing(found: Sequence[Verified]) -> str:
-    """Spell the verdict, and the checks that were not run."""
+    """Format the verdict and the list of checks that did not run."""
     counted = Counter(one.outcome for one in found)
     counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in CheckOutcome if counted[outcome])
     left_out = _left_out(found)
@@ -68,7 +68,7 @@ def closing(found: Sequence[Verified]) -> str:
 
 
 def summarise(found: Sequence[Verified], source: str, settings: Settings) -> VerifySummary:
-    """Return everything that was found, without the digests of the files."""
+    """Return the summary of all checks, without the digests of the files."""
     return VerifySummary(
         source=source,
         digest=settings.digest[:16],

@@ -1,4 +1,4 @@
-"""Check: builds with sanitizers play the cases, report nothing, and have the bits of the reference."""
+"""Check: builds with sanitizers run the cases without a report, and compute the bits of the reference."""
 
 from typing import Final
 
@@ -25,5 +25,5 @@ BUILDS: Final = (
 
 
 def check(subject: Subject) -> Result:
-    """Play the cases on every build with sanitizers."""
+    """Run the cases in every build with sanitizers."""
     return play(subject, BUILDS, "nothing reported")

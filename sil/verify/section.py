@@ -1,4 +1,4 @@
-"""A verification on a page."""
+"""The section of the report on a verification."""
 
 from pathlib import Path
 

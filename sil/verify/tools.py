@@ -1,4 +1,4 @@
-"""The tools of the checks: which package brings one, how one is run, and what is read off its log."""
+"""Find and run the tools of the checks, and read numbers from their logs."""
 
 import os
 import re
@@ -10,31 +10,32 @@ from typing import Final
 
 from mambo_nmpc.sil.firmware.doctor import command_version
 
-PATIENCE_S: Final = 3600.0
+TIME_LIMIT_S: Final = 3600.0
 """Time limit of a tool, in seconds."""
 
 
 def missing(tool: str, package: str) -> str | None:
-    """Say which package brings `tool`; None if it is here."""
+    """Return a message with the package of `tool` if it is not installed, else None."""
     return None if shutil.which(tool) else f"{tool} is missing; Debian's package {package} brings it"
 
 
 def versions(tools: Sequence[str]) -> dict[str, str]:
-    """Return {tool: version} of those that are here."""
+    """Return {tool: version} of the installed ones."""
     return {tool: version for tool in tools if (version := command_version(tool)) is not None}
 
 
 def run(command: Sequence[str], folder: Path) -> "subprocess.CompletedProcess[str]":
-    """Run `command` in `folder`, in English; raises TimeoutExpired after PATIENCE_S."""
+    """Run `command` in `folder`, with English messages; raises TimeoutExpired after TIME_LIMIT_S."""
     return subprocess.run(
         command,
         cwd=folder,
-        env=os.environ | {"PWD": str(folder.resolve()), "LC_ALL": "C.UTF-8"},  # Frama-C believes PWD
+        env=os.environ
+        | {"PWD": str(folder.resolve()), "LC_ALL": "C.UTF-8"},  # Frama-C takes its folder from PWD
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         errors="replace",
-        timeout=PATIENCE_S,
+        timeout=TIME_LIMIT_S,
         check=False,
     )
 

@@ -242,7 +242,7 @@ VERDICT = Verdict(
         ({"largest_command_rad": math.nan}, CheckOutcome.FAILED, "a command of nan rad"),
         ({"expected": False}, CheckOutcome.FAILED, "statuses"),
         ({"end": End.CRASHED}, CheckOutcome.FAILED, "crashed"),
-        ({"end": End.AWAY, "recovery_s": math.nan}, CheckOutcome.FAILED, "never came back"),
+        ({"end": End.AWAY, "recovery_s": math.nan}, CheckOutcome.FAILED, "did not recover"),
         ({"band_m": 17.0, "end": End.AWAY}, CheckOutcome.INCOMPLETE, "without a fault"),
         ({"band_m": math.nan, "end": End.CRASHED}, CheckOutcome.INCOMPLETE, "without a fault"),
     ],

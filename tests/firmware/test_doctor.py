@@ -101,7 +101,7 @@ def test_a_broken_tool_is_here_without_version(
     content: str, bare: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A tool that hangs or cannot run is reported as here, without a version."""
-    monkeypatch.setattr(doctor, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(doctor, "TIME_LIMIT_S", 0.2)
     put(bare, "cmake", content)
     found = finding_of("cmake")
     assert (found.here, found.version) == (True, "")

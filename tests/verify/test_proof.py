@@ -113,7 +113,7 @@ def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
     """No report is no proof."""
     result = check(subject(presets.load("mambo"), tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
     assert result.outcome is CheckOutcome.FAILED
-    assert "frama-c refused the code" in result.evidence
+    assert "frama-c failed" in result.evidence
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: 
     """A driver that ends before its promises, or leaves one out, proves nothing."""
     result = check(subject(presets.load("mambo"), tmp_path, Harm("proof/nmpc_proof.c", right, wrong)))
     assert result.outcome is CheckOutcome.FAILED
-    assert "Dead" in result.evidence or "never reached" in result.evidence
+    assert "Dead" in result.evidence or "not reached" in result.evidence
 
 
 @pytest.mark.long
