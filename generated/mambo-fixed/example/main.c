@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Example: run the self-test, print its digest, then fly a point mass to a target that moves along x. The point mass has
- * no attitude lag; `mambo-nmpc fly` simulates the drone.
+ * Example: run the self-test and its digest, then fly a point mass to a target that moves along x. The point mass takes
+ * the commanded attitude at once; `mambo-nmpc fly` simulates the whole drone.
  */
 #include <stdio.h>
 
@@ -72,14 +72,14 @@ int main(void)
                      (double)command.pitch_rad, (double)nmpc_float_last_cost(&controller));
         for (step = 0; step < STEPS_PER_LINE; step++) {
             if (nmpc_float_step(&controller, &state, &target, THRUST_ACCELERATION_M_S2, &command) != NMPC_OK) {
-                refused++; /* out of range: the command repeats the last one */
+                refused++; /* an input is out of range: the command is the last good one */
             }
             fly(&state, &command);
             target.position_m[0] += NMPC_UPDATE_PERIOD_S * target.velocity_m_s[0];
         }
     }
     if (refused != 0) {
-        (void)printf("%d steps found the state out of range\n", refused);
+        (void)printf("%d steps refused an input out of range\n", refused);
     }
     return 0;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Fuzzing: any bytes become calls of the controller, and every promise of nmpc.h is checked after each call.
- * With clang and its run-time library (Debian: clang, libclang-rt-*-dev), in the folder of the bundle:
+ * Fuzzing: decodes any bytes as calls of the controller, and checks every promise of nmpc.h after each call. It needs
+ * clang and its run-time library (Debian: clang, libclang-rt-*-dev). In the folder of the bundle:
  *
  *   mkdir -p build/corpus
  *   clang -std=c99 -g -O1 -ffp-contract=off -fno-sanitize-recover=all \
@@ -10,8 +10,8 @@
  *       src/nmpc_math.c src/nmpc_predictor.c src/nmpc_cost.c src/nmpc_optimizer.c src/nmpc.c src/nmpc_self_test.c src/nmpc_float.c
  *   build/fuzz -seed=1 -runs=1000000 -artifact_prefix=build/ build/corpus
  *
- * It stops at the first broken promise, says which, and leaves the bytes in build/crash-*, for
- * `build/fuzz build/crash-*` to repeat. No part of the library.
+ * It stops at the first broken promise, prints it, and writes the bytes to build/crash-*; `build/fuzz build/crash-*`
+ * repeats them. Not part of the library.
  */
 #include <stddef.h>
 #include <stdint.h>
@@ -84,7 +84,7 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     return call;
 }
 
-/* Make `call`; `command` becomes what the step wrote, if it is one. */
+/* Make `call`; a step writes `command`. */
 static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *call, nmpc_command_t *command)
 {
     nmpc_t *self = ((call->nulls & NMPC_FUZZ_NULL_SELF) != 0U) ? 0 : controller;
@@ -124,7 +124,7 @@ static int nmpc_fuzz_is_good_point(const nmpc_real_t position_m[2], const nmpc_r
            && nmpc_fuzz_lies_in(velocity_m_s[1], -NMPC_VELOCITY_RANGE_M_S, NMPC_VELOCITY_RANGE_M_S);
 }
 
-/* Return the status of a step that has all its pointers, as nmpc.h promises it. */
+/* Return the status that nmpc.h promises for a step without null pointers. */
 static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
 {
     const nmpc_real_t tilt_rad = NMPC_ATTITUDE_RANGE_RAD;
@@ -146,7 +146,7 @@ static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
     return status;
 }
 
-/* Return the status that nmpc.h promises for `call`; nmpc_init() has none, and is always good. */
+/* Return the status that nmpc.h promises for `call`; NMPC_OK for nmpc_init(), which returns none. */
 static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
 {
     const nmpc_real_t tilt_rad = NMPC_ATTITUDE_RANGE_RAD;
@@ -177,13 +177,13 @@ static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
     return ((call->nulls & pointers) != 0U) ? NMPC_NULL_POINTER : status;
 }
 
-/* Tell whether two numbers have the same bits. */
+/* Return whether two numbers have the same bits. */
 static int nmpc_fuzz_same(nmpc_real_t a, nmpc_real_t b)
 {
     return memcmp(&a, &b, sizeof(a)) == 0;
 }
 
-/* Return `value` within the tilt limit. */
+/* Return `value` clamped to the tilt limit. */
 static nmpc_real_t nmpc_fuzz_limited(nmpc_real_t value)
 {
     if (value > NMPC_TILT_LIMIT_RAD) {
@@ -192,8 +192,8 @@ static nmpc_real_t nmpc_fuzz_limited(nmpc_real_t value)
     return (value < -NMPC_TILT_LIMIT_RAD) ? -NMPC_TILT_LIMIT_RAD : value;
 }
 
-/* Make `call` on `self`, and if it is good on `twin`, which sees no other; check every promise. `last` is the
- * command that a refused step repeats. */
+/* Make `call` on `self`, and if it is good also on `twin`, which gets good calls only; check every promise. `last` is
+ * the command that a refused step repeats. */
 static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *call, nmpc_command_t *last)
 {
     const nmpc_status_t promised = nmpc_fuzz_promised(call);
@@ -228,10 +228,10 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
             last->roll_rad = (nmpc_real_t)0;
             last->pitch_rad = (nmpc_real_t)0;
         } else {
-            /* New weights leave the command. */
+            /* New weights do not change the command. */
         }
     } else {
-        /* Nothing to initialise. */
+        /* nmpc_init(NULL) does nothing. */
     }
 
     NMPC_FUZZ_REQUIRE(nmpc_step(self, 0, 0, (nmpc_real_t)0, &command) == NMPC_NULL_POINTER);
@@ -246,7 +246,7 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 
-/* The two controllers start in memory that differs, and that no board clears. */
+/* The two controllers start in memory with different, nonzero content. */
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
     static nmpc_t self;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * What `make proof` examines, by abstract interpretation with Frama-C's plug-in Eva: whatever the numbers, and in
- * whatever order the functions are called, as often as you like, there is no access to memory out of bounds or
- * uninitialised, no overflow, no division by zero, no shift too far, and no command beyond the tilt limit.
+ * `make proof` proves, by abstract interpretation with Frama-C's plug-in Eva: for any inputs, and any number of calls
+ * in any order, there is no access out of bounds or to uninitialised memory, no overflow, no division by zero, no shift
+ * beyond the type, and no command beyond the tilt limit.
  *
- * take_numbers() calls everything, and takes for granted what turn_everywhere() shows: that sine and cosine, of
- * any heading, do not overflow and are not larger than one, but for rounding.
+ * take_numbers() calls every function, and assumes of sine and cosine what turn_everywhere() proves for every heading:
+ * no overflow, and a magnitude of at most one plus rounding.
  *
- * Settings c69ced21572a3204. Not for firmware: Eva takes every read of a volatile variable for any value of its type.
+ * Settings c69ced21572a3204. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
  */
 #include <stddef.h>
 
@@ -22,7 +22,7 @@
 static volatile nmpc_real_t any_real;
 static volatile int any_int;
 
-/* What rounding may add to one, and more. */
+/* One plus more than rounding can add. */
 #define SINE_LIMIT ((nmpc_real_t)1075000000)
 
 /*@ requires is_a_heading: -NMPC_YAW_RANGE_RAD <= angle_rad <= NMPC_YAW_RANGE_RAD;
@@ -89,7 +89,7 @@ static nmpc_weights_t weights_of(const nmpc_real_t input[INPUTS])
     return weights;
 }
 
-/* Step with pointers that may be null. The command is uninitialised before: the step must set it. */
+/* Step with pointers that may be null. The command is uninitialised, so the step must write it. */
 static void step(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_state_t state = state_of(input);
@@ -118,7 +118,7 @@ static void set_weights(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_set_weights(self, (any_int != 0) ? &weights : NULL);
 }
 
-static void look(const nmpc_t *self)
+static void read_results(const nmpc_t *self)
 {
     (void)nmpc_last_cost(self);
     (void)nmpc_last_iterations(self);
@@ -147,7 +147,7 @@ void take_numbers(void)
             set_weights(self, input);
             break;
         case 3:
-            look(&controller);
+            read_results(&controller);
             break;
         default:
             step(self, input);
@@ -156,7 +156,7 @@ void take_numbers(void)
     }
 }
 
-/* The first angle that counts to quarter turn `quadrant`. */
+/* Return the smallest angle whose nearest quarter turn is `quadrant`. */
 static nmpc_sum_t start_of(nmpc_sum_t quadrant)
 {
     const nmpc_sum_t turns = ((2 * quadrant) - 1) * ((nmpc_sum_t)1 << (30 + NMPC_YAW_BITS));
@@ -179,7 +179,7 @@ static void turn(nmpc_sum_t first_rad, nmpc_sum_t last_rad)
     }
 }
 
-/* Every heading is in one of these halves of a quarter turn. */
+/* Try every heading, by halves of a quarter turn. */
 void turn_everywhere(void)
 {
     int quadrant;

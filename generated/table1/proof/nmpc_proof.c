@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * What `make proof` proves, by abstract interpretation with Frama-C's plug-in Eva: whatever the inputs, NaN and
- * infinities included, and in whatever order the functions are called, as often as you like, there is no
- * run-time error (memory out of bounds or uninitialised, overflow, division by zero, conversion out of range),
- * nothing but finite numbers is stored, and no command exceeds the tilt limit.
+ * `make proof` proves, by abstract interpretation with Frama-C's plug-in Eva: for any inputs, including NaN and
+ * infinity, and any number of calls in any order, there is no run-time error (access out of bounds or to uninitialised
+ * memory, overflow, division by zero, conversion out of range), only finite numbers are stored, and no command exceeds
+ * the tilt limit.
  *
- * Two proofs make it up. take_numbers() calls everything with numbers, infinite ones included; there, an
- * operation that could give NaN is an alarm. refuse_nan() calls with NaN: each call is refused, and writes
- * nothing into the controller, so that it leads to no state that take_numbers() does not know.
+ * There are two proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
+ * result in NaN is an alarm. refuse_nan() passes NaN: each call is refused and writes nothing into the controller, so
+ * the states that take_numbers() covers are all states there are.
  *
- * Settings 1b8bfce44e6fc1aa. Not for firmware: Eva takes every read of a volatile variable for any value of its type.
+ * Settings 1b8bfce44e6fc1aa. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
  */
 #include <stddef.h>
 
@@ -24,8 +24,7 @@
 static volatile nmpc_real_t any_real;
 static volatile int any_int;
 
-/* Any number, infinities included: the contract is all there is of this function.
- */
+/* Returns any number or infinity. It has no body; Eva uses its contract. */
 /*@ assigns \result \from any_int;
     ensures is_a_number: !\is_NaN(\result);
 */
@@ -86,7 +85,7 @@ static nmpc_weights_t weights_of(const nmpc_real_t input[INPUTS])
     return weights;
 }
 
-/* Step with pointers that may be null. The command is uninitialised before: the step must set it. */
+/* Step with pointers that may be null. The command is uninitialised, so the step must write it. */
 static void step(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_state_t state = state_of(input);
@@ -115,7 +114,7 @@ static void set_weights(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_set_weights(self, (any_int != 0) ? &weights : NULL);
 }
 
-static void look(const nmpc_t *self)
+static void read_results(const nmpc_t *self)
 {
     (void)nmpc_last_cost(self);
     (void)nmpc_last_iterations(self);
@@ -123,7 +122,7 @@ static void look(const nmpc_t *self)
     (void)nmpc_version();
 }
 
-/* Look at every number that is stored: the members of nmpc_t up to its single bytes. */
+/* Check every stored number: all members of nmpc_t before its single bytes. */
 static void check(const nmpc_t *self)
 {
     const nmpc_real_t *stored = (const nmpc_real_t *)(const void *)self;
@@ -156,7 +155,7 @@ void take_numbers(void)
             set_weights(self, input);
             break;
         case 3:
-            look(&controller);
+            read_results(&controller);
             break;
         default:
             step(self, input);
@@ -166,7 +165,7 @@ void take_numbers(void)
     }
 }
 
-/* A controller in any state whatever, which nobody may write into. */
+/* A controller in any state, in memory that must not be written. */
 extern const nmpc_t untouchable;
 
 void refuse_nan(void)
@@ -203,7 +202,7 @@ void refuse_nan(void)
         /*@ assert step_refuses_nan: status != NMPC_OK; */
         (void)status;
 
-        /* The same beside a null pointer. */
+        /* The same together with a null pointer. */
         (void)nmpc_reset(NULL, &command);
         (void)nmpc_set_weights(NULL, &weights);
         (void)nmpc_step(NULL, &state, &target, input[11], &command);
