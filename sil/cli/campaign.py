@@ -36,7 +36,7 @@ def campaign(
     """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
     if workers is not None and scheduler is not None:
         raise typer.BadParameter(
-            "the scheduler has its own workers: leave out --workers", param_hint="--scheduler"
+            "it has its own workers: leave out --workers", param_hint="--scheduler"
         )
     from mambo_nmpc.sil.campaign import file
     from mambo_nmpc.sil.campaign.executors import cluster, processes

@@ -176,7 +176,7 @@ def test_same_bits_compares_and_says_what_did_not_run() -> None:
     text, _ = run("same-bits", *options)
     assert reference["digest"] in text
     assert "no compiler for Arduino Mega 2560 found" in text
-    assert "over 100 steps" in text.splitlines()[-1]
+    assert "over 100 self-test steps" in text.splitlines()[-1]
     assert "24 not run" in text.splitlines()[-1]
 
 
