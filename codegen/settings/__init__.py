@@ -1,1 +1,1 @@
-"""The settings of a controller: the validated model, and controller.toml as a way to write it down."""
+"""The settings of a controller: sections, rules, presets, and controller.toml."""

@@ -35,9 +35,7 @@ def campaign(
 ) -> None:
     """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
     if workers is not None and scheduler is not None:
-        raise typer.BadParameter(
-            "it has its own workers: leave out --workers", param_hint="--scheduler"
-        )
+        raise typer.BadParameter("it has its own workers: leave out --workers", param_hint="--scheduler")
     from mambo_nmpc.sil.campaign import file
     from mambo_nmpc.sil.campaign.executors import cluster, processes
     from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text, finish

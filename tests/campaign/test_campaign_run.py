@@ -128,7 +128,7 @@ def test_a_stopped_campaign_resumes_to_the_same_bytes(
     done = command(*arguments, script=STOPPED.replace("STOP", stop))
     assert (done.returncode, done.stdout) == (code, "")
     if code == INTERRUPTED:
-        message = f"stopped with 3 of {FLIGHTS} flights finished; the same command goes on from there\n"
+        message = f"stopped with 3 of {FLIGHTS} flights finished; the same command continues from there\n"
         assert done.stderr.endswith(message)
         assert done.stderr.count("\n") == 1
     before = (tmp_path / "flights.csv").read_text().splitlines()

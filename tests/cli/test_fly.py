@@ -130,8 +130,8 @@ def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
     """More than half of the inputs refused: exit 1, with the range that was exceeded."""
     (tmp_path / "deaf.toml").write_text("[ranges]\nthrust_acceleration_min_m_s2 = 20.0\n")
     said, _ = run("fly", "deaf.toml", "--controller", "reference", "--duration-s", "1", code=1)
-    assert "101 steps: thrust out of range, 9.81..9.81 m/s^2 where ranges" in said
-    assert "thrust_acceleration_* = 20..50; the last command was kept" in said
+    assert "101 steps: thrust out of range, 9.81..9.81 m/s^2, but ranges" in said
+    assert "thrust_acceleration_* = 20..50; the drone kept the last command" in said
     assert "NOT CONTROLLED" in said
 
 

@@ -17,7 +17,7 @@ from mambo_nmpc.codegen.errors import (
     echo,
 )
 from mambo_nmpc.codegen.settings import controller_toml
-from mambo_nmpc.codegen.settings.keys import KEYS, Key, spelled
+from mambo_nmpc.codegen.settings.keys import KEYS, Key, spell
 from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.strategies import NUMBERS, RESERVED, any_settings, nested, toml
 
@@ -93,7 +93,7 @@ def test_bounds_are_closed(key: Key) -> None:
             line for line in faults_of(toml({key.path: beyond})) if line.startswith(f"slow.toml: {key.path}")
         ]
         assert f"{key.path} = {beyond} must {key.rule}" in fault
-        companions = COMPANIONS.get(f"{key.path} = {spelled(bound)}", {})
+        companions = COMPANIONS.get(f"{key.path} = {spell(bound)}", {})
         if (key.path, bound) != ("ranges.thrust_acceleration_max_m_s2", 0.1):
             controller_toml.parse(toml({key.path: bound, **companions}), "at the bound")
 
@@ -113,15 +113,15 @@ def test_bounds_are_closed(key: Key) -> None:
         ("horizon.control = true", "must be a whole number and lie in 1..50"),
         ("cost.effort_weight = false", "must be a number and lie in 0..1000000"),
         ('optimizer.variant = "rprop"', 'must be "rprop+" or "irprop-"'),
-        ("optimizer.step_max_rad = 0.005", "must lie in 0.01..1 (from optimizer.initial_step_rad up)"),
-        ("optimizer.step_min_rad = 0.02", "must lie in 1e-9..0.01 (up to optimizer.initial_step_rad)"),
+        ("optimizer.step_max_rad = 0.005", "must lie in 0.01..1 (at least optimizer.initial_step_rad)"),
+        ("optimizer.step_min_rad = 0.02", "must lie in 1e-9..0.01 (at most optimizer.initial_step_rad)"),
         (
             "ranges.thrust_acceleration_max_m_s2 = 1",
             "must be more than 1.0 (ranges.thrust_acceleration_min_m_s2)",
         ),
         (
             'model.position_update = "printed"\nmodel.roll_lag_s = 0.2',
-            'must be 0 with model.position_update = "printed", which knows no lag; '
+            'must be 0 with model.position_update = "printed", which has no lag; '
             'write 0 here or position_update = "exact"',
         ),
         ("model.pitch_lag_s = 0.0001", "must be 0 or lie in 0.001..2; 0 means no lag"),
@@ -219,13 +219,13 @@ def test_digest_depends_on_every_value(key: Key) -> None:
     default = Settings().model_dump()[section][name]
     match key.kind:
         case "one of":
-            value = next(choice for choice in key.domain.split(" or ") if choice != spelled(default))
+            value = next(choice for choice in key.domain.split(" or ") if choice != spell(default))
         case "text":
             value = '"roll"'
         case "whole number":
             value = "3"
         case _:
-            value = spelled(default * 0.9 or 0.1)
+            value = spell(default * 0.9 or 0.1)
     changed = controller_toml.parse(f"{key.path} = {value}", "changed")
     assert changed.digest != Settings().digest
 
@@ -273,7 +273,7 @@ def test_schema_is_valid_and_refuses_what_the_rules_refuse() -> None:
         (b"a = [1\n", "is not TOML: Unclosed array"),
         (b"a = " + b"[" * 20000, "is nested too deeply; write [section] and key = value"),
         (b"# caf\xe9", "line 1: is not UTF-8; save the file as UTF-8"),
-        (b"#" * 64_001, "is larger than 64 kB; such files take a few"),
+        (b"#" * 64_001, "is larger than 64 kB; a settings file needs a few kB"),
     ],
 )
 def test_file_that_is_not_toml_is_refused(tmp_path: Path, content: bytes, message: str) -> None:

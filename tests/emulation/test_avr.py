@@ -71,7 +71,7 @@ def test_the_self_test_detects_a_wrong_controller_on_eight_bits(mega: Builder, t
 @pytest.mark.parametrize(
     ("preset", "scalar"), [("mambo", "float32"), ("table1", "float32"), ("mambo", "fixed")]
 )
-def test_frozen_steps_have_their_digest_on_eight_bits(
+def test_self_test_steps_have_their_digest_on_eight_bits(
     preset: str, scalar: str, mega: Builder, tmp_path: Path
 ) -> None:
     """The digest of two episodes equals that of the reference."""

@@ -190,7 +190,7 @@ def test_a_lost_flight_is_shown_as_far_as_it_went() -> None:
     ("change", "message"),
     [
         (lambda folder: folder.rename("flight"), "fly: is no folder; expected is a result folder of fly"),
-        (lambda folder: (folder / SUMMARY).unlink(), "fly: holds no summary.json; expected is"),
+        (lambda folder: (folder / SUMMARY).unlink(), "fly: has no summary.json; name a result folder"),
         (lambda folder: (folder / SUMMARY).write_text("{"), "summary.json: cannot be read as JSON"),
         (lambda folder: (folder / SUMMARY).write_text("[]"), "command = None must be one of fly, "),
         (
@@ -261,7 +261,7 @@ def test_only_a_report_is_overwritten() -> None:
     """A file of somebody's stays as it is."""
     made("verify")
     Path("notes.html").write_text("mine")
-    assert "notes.html: is not a report of ours" in run("verify", "-o", "notes.html", code=2)
+    assert "notes.html: exists and is no report of mambo-nmpc" in run("verify", "-o", "notes.html", code=2)
     assert Path("notes.html").read_text() == "mine"
     run("verify")
     run("verify")
