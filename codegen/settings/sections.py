@@ -71,8 +71,9 @@ class Horizon(_Section):
         2,
         ge=1,
         le=50,
-        description="N_c, the control horizon, in prediction steps: the optimizer chooses a move of roll and pitch "
-        "for each (eq 12, Table I). At most N_p; the last move is held to the end of the prediction horizon.",
+        description="N_c, the control horizon, in prediction steps: the optimizer chooses a move of roll and "
+        "pitch for each (eq 12, Table I). At most N_p; the last move is held to the end of the prediction "
+        "horizon.",
     )
     prediction_step_s: Number = Field(
         0.07,

@@ -71,7 +71,7 @@ int main(void)
                      (double)command.pitch_rad, (double)nmpc_last_cost(&controller));
         for (step = 0; step < STEPS_PER_LINE; step++) {
             if (nmpc_step(&controller, &state, &target, THRUST_ACCELERATION_M_S2, &command) != NMPC_OK) {
-                refused++; /* an input is out of range: the command is the last good one */
+                refused++; /* out of range: the command repeats the last one */
             }
             fly(&state, &command);
             target.position_m[0] += NMPC_UPDATE_PERIOD_S * target.velocity_m_s[0];
