@@ -149,7 +149,7 @@ def test_a_campaign_resumes_after_a_full_disk(source: Path, whole: Path, tmp_pat
             resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
 
     try:
-        with pytest.raises(UnwritableError, match=r"flights\.csv.*: File too large; the flights finished"):
+        with pytest.raises(UnwritableError, match=r"flights\.csv.*: File too large; the finished flights"):
             fly_on_threads(source, tmp_path, batch=1, progress=fill)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -216,7 +216,7 @@ def test_a_dead_worker_is_reported(source: Path, tmp_path: Path) -> None:
     campaign = file.read(source)
     with (
         open_campaign(campaign, tmp_path) as store,
-        pytest.raises(WorkerError, match="a worker process has died; the flights finished so far are kept"),
+        pytest.raises(WorkerError, match="a worker process has died; the finished flights are kept"),
         processes(1) as pool,
     ):
         list(pool.run(os._exit, [(1,)]))

@@ -26,8 +26,8 @@ FAULTS = {
     ),
     "NaN passes": (
         "src/nmpc_math.h",
-        "(value >= least);\n    const int is_no_more = (value <= most);",
-        "!(value < least);\n    const int is_no_more = !(value > most);",
+        "(value >= minimum);\n    const int is_at_most = (value <= maximum);",
+        "!(value < minimum);\n    const int is_at_most = !(value > maximum);",
     ),
     "a bad weight half taken": (
         "src/nmpc.c",
