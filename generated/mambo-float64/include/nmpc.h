@@ -7,13 +7,14 @@
  * aerial vehicles (Manhattan distance, RPROP, simulated on the Parrot Mambo), IEEE. Equations, Table I and
  * symbols cited in this library are the paper's.
  *
- * Departures from the paper with these settings (measured in docs/paper.md of mambo-nmpc):
+ * Departures from the paper, and choices where it is silent, with these settings (measured in the
+ * documentation of mambo-nmpc, docs/paper.md):
  *   eq 8       both sin psi have the opposite sign, as eqs 3 and 6 give it.
  *   eq 8       u_1/m is an argument of nmpc_step(); it and psi are constant over the horizon.
  *   eq 8       phi and theta follow the moves with first-order lags of 0.27 s and 0.15 s, from the
  *              measured angles on: time constants of the attitude loop, see controller.toml.
  *   eq 9       tau^2/2, the double integral of the acceleration, where tau/2 is printed.
- *   eq 9       the velocity is predicted too: v + tau a, at constant acceleration over a prediction step.
+ *   eq 9       the velocity is predicted too: the integral of the acceleration over each prediction step.
  *   eqs 9, 11  tau is 0.055 s: a horizon of N_p = 10 steps of the paper's 0.01 s ends before the Mambo's
  *              attitude loop has answered. nmpc_step() is called every 0.01 s.
  *   eq 12a     the target is Tp_k+i, propagated by eq 11, where Tp_k is printed.

@@ -16,14 +16,16 @@
  *     e(i+1) = e(i) + d(i),   d(i+1) = d(i) + A(i) + s dA(i+1),   dA(i+1) = A(i+1) - A(i).
  *
  * These hold if roll and pitch equal their moves. Here each follows its move with a first-order lag T (not in the
- * paper). Let A be tau^2 times eq 8 at the moves, and dA the part of its change that one angle makes, roll or pitch.
+ * paper). Let A be tau^2 times eq 8 at the moves, before them at the measured tilt, and dA the part of its change that
+ * one angle makes, roll or pitch.
  * With h = tau/T and c = 1 - exp(-h) the exact solution, for moves held over a prediction step, is
  *
  *     d(i+1) = d(i) + A(i) + D(i) + s_T dA(i+1),       s_T = 1/2 - (h - c)/h^2,
- *     D(i+1) = exp(-h) D(i) - (c/h)^2 dA(i+1),         D(0) = 0 before the first moves.
+ *     D(i+1) = exp(-h) D(i) - (c/h)^2 dA(i+1),         D(-1) = 0: none before the first moves.
  *
- * D, the deficit, corrects the increment of d: it is minus the shortfall of the acceleration behind A, averaged over
- * the prediction steps i and i + 1. Roll and pitch have terms s_T dA and D each. A prediction step is four additions
+ * D, the deficit, corrects the increment of d: it is minus the shortfall of the acceleration behind A in the
+ * prediction steps i and i + 1, averaged with a weight that rises to the instant between them and falls from there.
+ * Roll and pitch have terms s_T dA and D each. A prediction step is four additions
  * and two products an axis; products with dA are needed only where a move changes.
  */
 #ifndef NMPC_PREDICTOR_H
@@ -55,7 +57,7 @@ extern "C" {
 /* The response R(i) of a move is the change of the error e(i+1) per unit of A of that move. S(i) = R(0) + ... + R(i).
  * Row i of the table holds 2 S(i); the last row holds S. Columns: roll, pitch of step 0 of the control horizon,
  * then of step 1, and so on. */
-#define NMPC_ANGLES_PER_RESPONSE 1
+#define NMPC_ANGLES_PER_RESPONSE 1 /* 2 if roll and pitch have one response, else 1 */
 #define NMPC_RESPONSES (NMPC_MOVES / NMPC_ANGLES_PER_RESPONSE)
 extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES];
 

@@ -16,7 +16,8 @@ extern "C" {
 #endif
 
 /* Run I_max iterations of RPROP on `self->plan_rad`, starting from its present value. The cost may rise from one
- * iteration to the next; the plan after the last update is not evaluated. */
+ * iteration to the next; the plan after the last update is not evaluated, unless the search
+ * has converged. */
 void nmpc_optimizer_minimize(nmpc_t *self);
 
 #ifdef __cplusplus

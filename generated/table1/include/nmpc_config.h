@@ -55,7 +55,7 @@ typedef float nmpc_sum_t;
 /* The paper has one tau, 0.01 s. Here a control step, from k to k + 1, and a prediction step, from k + i to
  * k + i + 1, may differ in length: N_p = 10 prediction steps of 0.01 s end before the Mambo's attitude loop has
  * answered a move. */
-#define NMPC_UPDATE_PERIOD_S 0.01f /* from one call of nmpc_step() to the next */
+#define NMPC_UPDATE_PERIOD_S 0.01f /* for the caller: from one call of nmpc_step() to the next */
 #define NMPC_PREDICTION_STEP_S 0.07f /* tau, eqs 9 and 11 */
 #define NMPC_PREDICTION_STEP_SQUARED_S2 0.0049f /* tau^2 */
 

@@ -40,7 +40,7 @@ extern "C" {
 /* The response R(i) of a move is the change of the error e(i+1) per unit of A of that move. S(i) = R(0) + ... + R(i).
  * Row i of the table holds 2 S(i); the last row holds S. Columns: steps of the control horizon; roll and pitch,
  * which have equal lags, share one. */
-#define NMPC_ANGLES_PER_RESPONSE 2
+#define NMPC_ANGLES_PER_RESPONSE 2 /* 2 if roll and pitch have one response, else 1 */
 #define NMPC_RESPONSES (NMPC_MOVES / NMPC_ANGLES_PER_RESPONSE)
 extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES];
 
