@@ -103,7 +103,8 @@ def test_mutants_meet_their_fate(tmp_path: Path) -> None:
         ("include/nmpc_config.h", "#define NMPC_INSTANCE_BYTES 119", Fate.REFUSED),
         (
             "include/nmpc_config.h",
-            "#define NMPC_UPDATE_PERIOD_S 0.010000001f /* from one call of nmpc_step() to the next */",
+            "#define NMPC_UPDATE_PERIOD_S 0.010000001f "
+            "/* for the caller: from one call of nmpc_step() to the next */",
             Fate.SAME,
         ),
     ):
