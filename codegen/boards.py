@@ -8,8 +8,6 @@ program and no file.
 import difflib
 import re
 from collections.abc import Sequence
-from importlib import resources
-from pathlib import Path
 from typing import Annotated, Any, Final, Generic, Literal, TypeVar
 
 from pydantic import (
@@ -24,9 +22,8 @@ from pydantic import (
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo, echo_value
-from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
+from mambo_nmpc.codegen.settings.toml_file import BOARDS, existing_path, parse_document, read_text, shipped
 
-_FOLDER = resources.files("mambo_nmpc.codegen") / "data" / "boards"
 _PYDANTIC_SUBJECTS: Final = ("Input should", "String should", "Tuple should")
 
 Value = TypeVar("Value")
@@ -166,7 +163,7 @@ class Board(BaseModel):
 
 def names() -> tuple[str, ...]:
     """Return the names of the boards, sorted."""
-    return tuple(sorted(file.name.removesuffix(".toml") for file in _FOLDER.iterdir()))
+    return tuple(shipped(BOARDS))
 
 
 def load(name_or_path: str) -> Board:
@@ -175,15 +172,10 @@ def load(name_or_path: str) -> Board:
     Raises SourceNotFoundError if there is neither, UnreadableFileError if the file is not TOML, and
     InvalidSettingsError with all broken rules.
     """
-    if name_or_path in names():
-        text = (_FOLDER / f"{name_or_path}.toml").read_text("utf-8")
-        return _parse(text, f"board {name_or_path}", name_or_path)
-    path = Path(name_or_path)
-    try:
-        found = path.exists()
-    except OSError:
-        found = False
-    if not found:
+    if ours := shipped(BOARDS).get(name_or_path):
+        return _parse(ours.read_text("utf-8"), f"board {name_or_path}", name_or_path)
+    path = existing_path(name_or_path)
+    if path is None:
         raise _not_found(name_or_path)
     return _parse(read_text(path), echo(name_or_path), path.stem)
 

@@ -1,19 +1,16 @@
 """The presets: TOML files that hold and explain only what differs from the defaults."""
 
 import difflib
-from importlib import resources
-from pathlib import Path
 
 from mambo_nmpc.codegen.errors import SourceNotFoundError, echo
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.model import Settings
-
-_FOLDER = resources.files("mambo_nmpc.codegen") / "data" / "presets"
+from mambo_nmpc.codegen.settings.toml_file import PRESETS, existing_path, shipped
 
 
 def names() -> tuple[str, ...]:
     """Return the names of the presets, sorted."""
-    return tuple(sorted(file.name.removesuffix(".toml") for file in _FOLDER.iterdir()))
+    return tuple(shipped(PRESETS))
 
 
 def preset(name: str) -> Settings:
@@ -33,19 +30,17 @@ def load(name_or_path: str) -> Settings:
     """
     if name_or_path in names():
         return preset(name_or_path)
-    try:
-        found = Path(name_or_path).exists()
-    except OSError:
-        found = False
-    if not found:
+    path = existing_path(name_or_path)
+    if path is None:
         raise _not_found(name_or_path, "neither a preset nor a file")
-    return controller_toml.read(Path(name_or_path))
+    return controller_toml.read(path)
 
 
 def _text(name: str) -> str:
-    if name not in names():
+    ours = shipped(PRESETS).get(name)
+    if ours is None:
         raise _not_found(name, "not a preset")
-    return (_FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    return ours.read_text("utf-8")
 
 
 def _not_found(name: str, what: str) -> SourceNotFoundError:

@@ -2,14 +2,33 @@
 
 import re
 import tomllib
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 from mambo_nmpc.codegen.errors import UnreadableFileError, echo
 
 LARGEST_FILE_BYTES = 64_000
+BOARDS, PRESETS = "boards", "presets"
+"""The kinds of TOML files that the package holds."""
 
 _PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>line (?P<line>\d+), column \d+)\)", re.DOTALL)
+
+
+def shipped(kind: str) -> dict[str, Traversable]:
+    """Return the TOML files of a kind that the package holds, {name: file}, sorted by name."""
+    folder = resources.files("mambo_nmpc.codegen") / "data" / kind
+    files = {file.name.removesuffix(".toml"): file for file in folder.iterdir()}
+    return dict(sorted(files.items()))
+
+
+def existing_path(text: str) -> Path | None:
+    """Return the path in `text` if something is there, else None."""
+    try:
+        return path if (path := Path(text)).exists() else None
+    except OSError:  # too long a name, for example
+        return None
 
 
 def read_text(path: Path) -> str:

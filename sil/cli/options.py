@@ -3,13 +3,13 @@
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
 from mambo_nmpc.codegen.command import AsJson, Scalar, Source, load
+from mambo_nmpc.codegen.settings.toml_file import BOARDS, shipped
 from mambo_nmpc.sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
 
 if TYPE_CHECKING:
@@ -28,12 +28,7 @@ Workers = Annotated[
     typer.Option(help="Processes on this machine; by default one for each processor.", min=1, max=1024),
 ]
 
-BOARD_NAMES: Final = tuple(
-    sorted(
-        file.name.removesuffix(".toml")
-        for file in (files("mambo_nmpc.codegen") / "data" / "boards").iterdir()
-    )
-)
+BOARD_NAMES: Final = tuple(shipped(BOARDS))
 
 Options = TypeVar("Options")
 

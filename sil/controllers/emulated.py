@@ -59,17 +59,17 @@ class EmulatedController:
         sizes = [self._instance_bytes, *(width * np.dtype(self.scalar).itemsize for width in (7, 4, 1))]
         sizes += [values.nbytes for values in one.values()]
         overhead = len(sizes) * (self.machine.word_bytes + _MAX_PADDING) + _MAX_PADDING  # pointers, alignment
-        room = (self.machine.free_bytes - overhead) // sum(sizes)
+        room = (self.machine.arena.free_bytes - overhead) // sum(sizes)
         self._batch_size = min(n, max(1, _MAX_WORK // work), room)
         if self._batch_size < 1:
             raise EmulatorError(
                 f"a controller with its inputs and outputs takes {sum(sizes)} B, "
-                f"but the emulated core has only {self.machine.free_bytes} B free"
+                f"but the emulated core has only {self.machine.arena.free_bytes} B free"
             )
-        addresses = [self.machine.allocate(self._batch_size * size) for size in sizes]
+        addresses = [self.machine.arena.allocate(self._batch_size * size) for size in sizes]
         self._controller, self._inputs, outputs = addresses[0], addresses[1:4], addresses[4:]
         self._outputs = dict(zip(one, outputs, strict=True))
-        self._outcome = self.machine.allocate(len(outputs) * self.machine.word_bytes)
+        self._outcome = self.machine.arena.allocate(len(outputs) * self.machine.word_bytes)
         self.machine.write(self._outcome, np.array(outputs, f"<u{self.machine.word_bytes}").tobytes())
         self._instances = bytearray(DIRT * (n * self._instance_bytes))
         for batch in self._batches():
@@ -109,7 +109,7 @@ def digest_emulated(settings: Settings, elf: Path, core: str, episodes: int) -> 
     """Return the self-test digest, computed by a program of `build_guest` on an emulated core."""
     limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * _work(settings) * TICKS
     machine = start(elf, core, limit_s)
-    scratch = machine.allocate(machine.call("nmpc_batch_instance_bytes"))
+    scratch = machine.arena.allocate(machine.call("nmpc_batch_instance_bytes"))
     digest = 0
     for episode in range(episodes):
         digest = machine.call("nmpc_self_test_episode", scratch, episode, Long(digest))

@@ -16,6 +16,7 @@ from elftools.elf.elffile import ELFFile
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
+from mambo_nmpc.sil.emulation.arena import Arena
 from mambo_nmpc.sil.emulation.gdb import GdbStub
 from mambo_nmpc.sil.errors import EmulationError, EmulatorError
 from mambo_nmpc.sil.files.cache import build_cached
@@ -62,8 +63,8 @@ class AvrMachine:
                 raise EmulatorError(f"{tool}, needed to emulate {_PART}, is missing (Debian: {package})")
         flash, data, self._symbols = _read_program(elf)
         used = max((start + len(content) for start, content in data), default=_RAM.start)
-        self._next = -(-used // _ALIGNMENT) * _ALIGNMENT
-        if self.free_bytes < 0:
+        self.arena = Arena(used, self.stack.start - len(_GUARD), _ALIGNMENT)
+        if self.arena.free_bytes < 0:
             size, stack = used - _RAM.start, _STACK_BYTES
             raise EmulatorError(
                 f"{size} B of data and {stack} B of stack do not fit the {len(_RAM)} B of {_PART}"
@@ -88,21 +89,9 @@ class AvrMachine:
         self.write(self.stack.start - len(_GUARD), _GUARD)
 
     @property
-    def free_bytes(self) -> int:
-        """Return the bytes left to allocate."""
-        return self.stack.start - len(_GUARD) - self._next
-
-    @property
     def stack(self) -> range:
         """Return the address range of the stack, including the return address."""
         return _RAM[-_STACK_BYTES:]
-
-    def allocate(self, size: int) -> int:
-        """Allocate `size` bytes; returns their address."""
-        address = self._next
-        self._next += -(-size // _ALIGNMENT) * _ALIGNMENT
-        assert self.free_bytes >= 0
-        return address
 
     def write(self, address: int, content: bytes) -> None:
         """Write data memory; `address` with or without the offset of ELF files."""

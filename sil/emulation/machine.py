@@ -19,7 +19,7 @@ CORES: Final = (*MODELS, AVR)
 Machine = AvrMachine | UnicornMachine
 """A core with a program, a stack, and memory to allocate.
 
-`word_bytes` is the size of int and of a pointer, `free_bytes` the memory left to allocate, `stack` the
+`word_bytes` is the size of int and of a pointer, `arena` the memory left to allocate, `stack` the
 address range of the stack, including the return address if calls push it.
 """
 

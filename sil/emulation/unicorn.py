@@ -11,6 +11,7 @@ import unicorn
 from elftools.elf.elffile import ELFFile
 from unicorn import arm_const, riscv_const
 
+from mambo_nmpc.sil.emulation.arena import Arena
 from mambo_nmpc.sil.errors import EmulationError
 from mambo_nmpc.sil.firmware.disassembly import disassemble
 from mambo_nmpc.sil.firmware.elf import load
@@ -97,7 +98,7 @@ class UnicornMachine:
             self._engine.mem_write(address, content)
         if "__global_pointer$" in self._symbols:
             self._engine.reg_write(riscv_const.UC_RISCV_REG_GP, self._symbols["__global_pointer$"])
-        self._next = _STACK_TOP
+        self.arena = Arena(_STACK_TOP, _STACK_TOP + _DATA_BYTES, _ALIGNMENT)
         self._block_counts: Counter[tuple[int, int]] = Counter()
         if counting:
             self._starts = sorted(disassemble(load(elf)).instructions)
@@ -105,21 +106,9 @@ class UnicornMachine:
             self._engine.hook_add(unicorn.UC_HOOK_BLOCK, self._record_block)
 
     @property
-    def free_bytes(self) -> int:
-        """Return the bytes left to allocate."""
-        return _STACK_TOP + _DATA_BYTES - self._next
-
-    @property
     def stack(self) -> range:
         """Return the address range of the stack."""
         return range(_RAM_ADDRESS, _STACK_TOP - _ALIGNMENT)
-
-    def allocate(self, size: int) -> int:
-        """Allocate `size` bytes; returns their address."""
-        address = self._next
-        self._next += -(-size // _ALIGNMENT) * _ALIGNMENT
-        assert self.free_bytes >= 0
-        return address
 
     def write(self, address: int, content: bytes) -> None:
         """Write memory."""

@@ -16,7 +16,7 @@ TIME_LIMIT_S: Final = 3600.0
 
 def missing(tool: str, package: str) -> str | None:
     """Return a message with the package of `tool` if it is not installed, else None."""
-    return None if shutil.which(tool) else f"{tool} is missing; Debian's package {package} brings it"
+    return None if shutil.which(tool) else f"{tool} is missing (Debian: {package})"
 
 
 def versions(tools: Sequence[str]) -> dict[str, str]:

@@ -85,7 +85,7 @@ def test_memory_holds_what_is_written(mega: Builder, tmp_path: Path) -> None:
     elf = mega.guest({}, "long seen = 3; long run(void); long run(void) { return seen; }", ("run",), tmp_path)
     machine = start(elf, "avr")
     content = bytes(range(256)) * 12
-    address = machine.allocate(len(content))
+    address = machine.arena.allocate(len(content))
     machine.write(address, content)
     assert machine.read(address, len(content)) == content
     assert machine.call("run") == 3

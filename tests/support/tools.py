@@ -27,14 +27,14 @@ def require(tool: str, package: str) -> str:
     """Return the path of `tool`; without it skip the test, or fail it where CI is true."""
     path = shutil.which(tool)
     if path is None:
-        _miss(f"{tool} is missing; Debian's package {package} brings it")
+        _miss(f"{tool} is missing (Debian: {package})")
     return path
 
 
 def require_module(name: str) -> None:
     """Skip the test, or fail it where CI is true, without the Python package `name`."""
     if importlib.util.find_spec(name) is None:
-        _miss(f"{name} is missing; pip install {name} brings it")
+        _miss(f"{name} is missing (pip install {name})")
 
 
 def _miss(message: str) -> NoReturn:
