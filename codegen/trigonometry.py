@@ -82,7 +82,7 @@ def trigonometry(scalar: str) -> Trigonometry:
     """Derive the constants for `scalar`, "float32" or "float64"."""
     return Trigonometry(
         quarter_turns_per_rad=_round(1 / _QUARTER_TURN, scalar),
-        quarter_turn_rad=_split(scalar),
+        quarter_turn_rad=split_quarter_turn(scalar, _TURN_BITS),
         sine=_taylor(3, scalar),
         cosine=_taylor(2, scalar),
     )
@@ -92,9 +92,9 @@ def _round(value: Fraction, scalar: str) -> float:
     return float(SCALARS[scalar](float(value)))
 
 
-def _split(scalar: str) -> tuple[float, float, float]:
-    """Split pi/2 into two parts of few bits and the remainder."""
-    bits = np.finfo(SCALARS[scalar]).nmant + 1 - _TURN_BITS
+def split_quarter_turn(scalar: str, turn_bits: int) -> tuple[float, float, float]:
+    """Split pi/2 into a remainder and two parts whose products with integers of `turn_bits` are exact."""
+    bits = np.finfo(SCALARS[scalar]).nmant + 1 - turn_bits
     high = _truncate(_QUARTER_TURN, bits)
     middle = _truncate(_QUARTER_TURN - high, bits)
     return float(high), float(middle), _round(_QUARTER_TURN - high - middle, scalar)

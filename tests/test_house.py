@@ -31,6 +31,17 @@ WINGS = [
     "cli",
     "package",
 ]
+# Wings whose results must have the same bits on every processor, and what of them only draws or prints.
+EXACT_WINGS = {"plant", "sensors", "flight", "controllers", "paper", "faults", "campaign"}
+ROUNDED = {"sil.flight.animation", "sil.faults.section"}
+# NumPy and math have these with other bits on other processors.
+INEXACT = {
+    *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "arcsin", "arccos", "arctan", "arctan2"),
+    *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "arcsinh", "arccosh", "arctanh", "hypot", "sinc"),
+    *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "pow", "power", "float_power", "cbrt"),
+    *("erf", "erfc", "gamma", "lgamma", "logaddexp", "logaddexp2", "dist", "sumprod", "fma"),
+    *("dot", "vdot", "inner", "matmul", "einsum", "tensordot", "linalg", "fft", "polyfit", "polyval"),
+}
 # What else a top-level folder imports of ours.
 ALLOWED = {
     "codegen": set(),
@@ -105,6 +116,27 @@ def test_wings_import_one_way() -> None:
 def test_no_import_runs_in_a_circle() -> None:
     """Not even through an import inside a function."""
     TopologicalSorter({module: imported(module) & modules().keys() for module in modules()}).prepare()
+
+
+def test_flights_use_only_exact_functions() -> None:
+    """Sine, exponential and powers are those of sil.plant.elementary: those of NumPy and C differ."""
+    for module, path in modules().items():
+        if not module.startswith("sil.") or wing(module) not in EXACT_WINGS or module in ROUNDED:
+            continue
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            place = f"{module}, line {getattr(node, 'lineno', 0)}"
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                assert node.value.id not in {"np", "math"} or node.attr not in INEXACT, (
+                    f"{place}: {node.attr}"
+                )
+            if isinstance(node, ast.ImportFrom) and node.module in {"math", "numpy"}:
+                assert not {alias.name for alias in node.names} & INEXACT, place
+            if isinstance(node, ast.BinOp):
+                assert not isinstance(node.op, ast.MatMult), place
+                whole = isinstance(node.right, ast.Constant | ast.Name) and isinstance(
+                    node.left, ast.Constant
+                )
+                assert not isinstance(node.op, ast.Pow) or whole, f"{place}: a power of a variable"
 
 
 def test_generating_needs_neither_compiler_nor_plot() -> None:

@@ -2,11 +2,15 @@
 
 A quantile function maps one uniform random number to one draw. Every parameter uses exactly one number of its
 flight's stream, so changing the distribution of one parameter does not change the draws of the others.
+
+Exponential, logarithm and the normal distribution come from `decimal` and are rounded once: those of the C
+library differ between processors.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from decimal import Decimal, localcontext
 from statistics import NormalDist
 from typing import Any, Final, Literal
 
@@ -17,6 +21,11 @@ _SHAPES: Final = (
     "or { choice = [value, ...] }"
 )
 _MOST_CHOICES: Final = 1000
+_DIGITS: Final = 40
+_ROOT_TWO_PI: Final = Decimal("2.506628274631000502415765284811045253006986740609938")
+_FARTHEST: Final = 9
+"""Deviations from the mean beyond which less than `_LEAST_SHARE` of a normal distribution lies."""
+_LEAST_SHARE: Final = Decimal("1e-16")
 
 
 @dataclass(frozen=True)
@@ -50,7 +59,10 @@ class Distribution:
             case "uniform":
                 return numbers[0] + share * (numbers[1] - numbers[0])
             case "log_uniform":
-                return numbers[0] * math.exp(share * math.log(numbers[1] / numbers[0]))
+                with localcontext() as context:
+                    context.prec = _DIGITS
+                    low, high = (Decimal(number) for number in numbers)
+                    return float(low * (Decimal(share) * (high / low).ln()).exp())
             case "normal":
                 return self._normal_quantile(share)
             case "choice":
@@ -60,14 +72,50 @@ class Distribution:
         mean, deviation = self.numbers
         if deviation == 0.0:
             return mean
-        normal, domain = NormalDist(mean, deviation), self.domain
-        below, above = normal.cdf(domain.low), normal.cdf(domain.high)
-        inner = min(max(below + share * (above - below), 1e-16), 1.0 - 1e-16)
-        return min(max(normal.inv_cdf(inner), domain.low), domain.high)
+        domain = self.domain
+        with localcontext() as context:
+            context.prec = _DIGITS
+            below, above = (
+                _share_below((Decimal(limit) - Decimal(mean)) / Decimal(deviation))
+                for limit in (domain.low, domain.high)
+            )
+            inner = below + Decimal(share) * (above - below)
+            quantile = _standard_quantile(min(max(inner, _LEAST_SHARE), 1 - _LEAST_SHARE))
+        return min(max(mean + deviation * quantile, domain.low), domain.high)
 
     def document(self) -> float | dict[str, list[float]]:
         """Return the distribution as written in campaign.toml."""
         return self.numbers[0] if self.kind == "constant" else {self.kind: list(self.numbers)}
+
+
+def _density(z: Decimal) -> Decimal:
+    """Return the density of the standard normal distribution, in the precision of the context."""
+    return (-z * z / 2).exp() / _ROOT_TWO_PI
+
+
+def _share_below(z: Decimal) -> Decimal:
+    """Return the share of the standard normal distribution below z, in the precision of the context.
+
+    It is 1/2 + density * (z + z^3/3 + z^5/(3 * 5) + ...).
+    """
+    if abs(z) > _FARTHEST:
+        return Decimal(int(z > 0))
+    total, term, odd = Decimal(0), z, 1
+    while total + term != total:
+        total, odd = total + term, odd + 2
+        term = term * z * z / odd
+    return Decimal("0.5") + _density(z) * total
+
+
+def _standard_quantile(share: Decimal) -> float:
+    """Return the quantile of the standard normal distribution, rounded once.
+
+    Two steps of Newton's method improve a float64, whatever its last bits, beyond the digits of the result.
+    """
+    z = Decimal(NormalDist().inv_cdf(float(share)))
+    for _ in range(2):
+        z -= (_share_below(z) - share) / _density(z)
+    return float(z)
 
 
 def parse(value: Any, domain: Domain) -> Distribution:

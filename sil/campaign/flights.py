@@ -22,6 +22,7 @@ from mambo_nmpc.sil.flight.metrics import Metrics, measure
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.elementary import sine_cosine
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
@@ -98,6 +99,8 @@ def detect_crashes(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Return which flights (n,) were lost, tilted beyond `CRASH_TILT_RAD` or on the ground after t = 0."""
     flown = trace.time_s >= 0.0
     angles_rad: FloatArray = trace.euler_rad[flown]
-    level = np.cos(angles_rad[..., 0]) * np.cos(angles_rad[..., 1])
-    aloft = (level > np.cos(CRASH_TILT_RAD)) & (trace.position_m[flown][..., 2] < 0.0)
+    _, (cos_roll, cos_pitch) = sine_cosine(np.moveaxis(angles_rad[..., :2], -1, 0))
+    aloft = ((cos_roll * cos_pitch) > sine_cosine(CRASH_TILT_RAD)[1]) & (
+        trace.position_m[flown][..., 2] < 0.0
+    )
     return np.asarray(~aloft.all(axis=0))

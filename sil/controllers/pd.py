@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.elementary import sine_cosine
 
 POSITION_P_RAD_M = 0.24
 POSITION_D_RAD_S_M = 0.1
@@ -40,7 +41,7 @@ class PdController:
 
         The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy] in m, m/s and rad.
         """
-        sine, cosine = np.sin(state[:, 6]), np.cos(state[:, 6])
+        sine, cosine = sine_cosine(state[:, 6])
         error_x, error_y = target[:, 0] - state[:, 0], target[:, 1] - state[:, 1]
         velocity_x, velocity_y = state[:, 2], state[:, 3]
         forward = np.clip(cosine * error_x + sine * error_y, -ERROR_LIMIT_M, ERROR_LIMIT_M)

@@ -31,6 +31,7 @@ from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover, Trajectories, Trajectory
 from mambo_nmpc.sil.paper.table2 import CASES
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.elementary import arc_cosine, sine_cosine
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 from mambo_nmpc.sil.plant.loops import THRUST_LIMIT_N, WEIGHT_N
 from mambo_nmpc.sil.plant.vehicle import Vehicle
@@ -39,7 +40,7 @@ DURATION_S: Final = 100.0
 ONSETS_S: Final = (20.0, 23.1, 26.3, 29.4)
 """Times at which a fault begins, one flight each: a quarter of the figure of eight apart."""
 
-CRASH_TILT_RAD: Final = math.acos(WEIGHT_N / THRUST_LIMIT_N)
+CRASH_TILT_RAD: Final = float(arc_cosine(WEIGHT_N / THRUST_LIMIT_N))
 """Tilt beyond which the altitude loop's thrust limit no longer carries the weight: 59 degrees."""
 
 STRAY_M: Final = 10.0
@@ -228,8 +229,8 @@ def _judge_flight(
     back = not len(outside) or outside[-1] < len(error_m[flown]) - 1
     lasts = 0 if scenario.duration_s == TO_THE_END else sortie.end - sortie.begin
     late = int(outside[-1]) + 1 - lasts if len(outside) else 0
-    angles_rad = trace.euler_rad[flown, row]
-    tilt_rad = np.arccos(np.cos(angles_rad[:, 0]) * np.cos(angles_rad[:, 1]))
+    _, (cos_roll, cos_pitch) = sine_cosine(trace.euler_rad[flown, row, :2].T)
+    tilt_rad = arc_cosine(cos_roll * cos_pitch)
     crashed = not (tilt_rad.max() < CRASH_TILT_RAD and trace.position_m[flown, row, 2].max() < 0.0)
     return Verdict(
         course=sortie.course,

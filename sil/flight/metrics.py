@@ -11,6 +11,7 @@ import numpy as np
 
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.elementary import hypotenuse
 
 TRANSIENT_S = 10.0
 """Length of the initial transient that metrics may leave out."""
@@ -45,7 +46,7 @@ class Metrics:
 def horizontal_error_m(trace: Trace) -> FloatArray:
     """Return e (k, n), the horizontal distance to the target in m."""
     offset_m = trace.target[..., :2] - trace.position_m[..., :2]
-    return np.hypot(offset_m[..., 0], offset_m[..., 1])
+    return hypotenuse(offset_m[..., 0], offset_m[..., 1])
 
 
 def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
@@ -61,12 +62,13 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
     error_m = horizontal_error_m(trace)[measured]
     weight_s = time_s[:, np.newaxis]
     span_s = time_s[-1] - time_s[0]
-    ise_m2_s = _integral(error_m**2, time_s)
+    squared_m2 = error_m * error_m
+    ise_m2_s = _integral(squared_m2, time_s)
     effort_rad = np.abs(command_rad[:-1]).sum(axis=-1)
     return Metrics(
         iae_m_s=_integral(error_m, time_s),
         ise_m2_s=ise_m2_s,
-        itse_m2_s2=_integral(weight_s * error_m**2, time_s),
+        itse_m2_s2=_integral(weight_s * squared_m2, time_s),
         itae_m_s2=_integral(weight_s * error_m, time_s),
         rms_error_m=np.sqrt(ise_m2_s / span_s),
         max_error_m=error_m.max(axis=0),

@@ -18,6 +18,7 @@ from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.errors import TrajectoryError
 from mambo_nmpc.sil.flight.names import CurveName
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.elementary import sine_cosine
 
 STEP_TIME_S = 1.0
 COLUMNS = ("time_s", "x_m", "y_m")
@@ -60,7 +61,7 @@ class Bernoulli:
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
         phase = self.angular_rate_rad_s * np.maximum(time_s, 0.0)
-        sine, cosine = np.sin(phase), np.cos(phase)
+        sine, cosine = sine_cosine(phase)
         denominator = 1.0 + cosine * cosine
         x = self.half_width_m * sine / denominator
         speed = self.half_width_m * self.angular_rate_rad_s / (denominator * denominator)
@@ -80,9 +81,9 @@ class Lissajous:
         """Return [x, y, vx, vy] (..., 4)."""
         rate, width, height = self.angular_rate_rad_s, self.half_width_m, self.height * self.half_width_m
         phase = rate * np.maximum(time_s, 0.0)
-        x, y = width * np.sin(phase), height * np.sin(2.0 * phase)
-        vx, vy = width * rate * np.cos(phase), 2.0 * height * rate * np.cos(2.0 * phase)
-        return _rest_before_start(time_s, x, y, vx, vy)
+        (sine, cosine), (sine_2, cosine_2) = sine_cosine(phase), sine_cosine(2.0 * phase)
+        vx, vy = width * rate * cosine, 2.0 * height * rate * cosine_2
+        return _rest_before_start(time_s, width * sine, height * sine_2, vx, vy)
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,8 @@ class Circle:
         """Return [x, y, vx, vy] (..., 4)."""
         rate = self.angular_rate_rad_s
         phase = rate * np.maximum(time_s, 0.0)
-        x, y = self.radius_m * np.cos(phase), self.radius_m * np.sin(phase)
+        sine, cosine = sine_cosine(phase)
+        x, y = self.radius_m * cosine, self.radius_m * sine
         return _rest_before_start(time_s, x, y, -rate * y, rate * x)
 
 

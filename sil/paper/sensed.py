@@ -24,6 +24,7 @@ from mambo_nmpc.sil.paper.table2 import (
     four,
     report_part,
 )
+from mambo_nmpc.sil.plant.elementary import hypotenuse
 from mambo_nmpc.sil.sensors.instruments import Sensors
 from mambo_nmpc.sil.show.numbers import digits
 
@@ -98,7 +99,7 @@ def _judge(name: str, view: str, trace: Trace) -> SensedRow:
     seen, drift_m = tracked, np.zeros(trace.flights)
     if isinstance(trace, SensedTrace):
         seen = measure(trace.as_seen())
-        drift_m = np.hypot(*(trace.seen_position_m - trace.position_m)[-1, :, :2].T)
+        drift_m = hypotenuse(*(trace.seen_position_m - trace.position_m)[-1, :, :2].T)
     return SensedRow(
         controller=name,
         view=view,

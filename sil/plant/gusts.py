@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.elementary import exponential, logarithm, sine_cosine
 from mambo_nmpc.sil.plant.randomness import Draws, Purpose
 
 FOOT_M: Final = 0.3048
@@ -37,7 +38,7 @@ MIN_SPEED_M_S: Final = 0.1
 def mean_speed_m_s(speed_20ft_m_s: FloatArray, height_m: float) -> FloatArray:
     """Return the mean wind (n,) in m/s at a height of at least 3 ft, from that at 20 ft (n,)."""
     height_ft = height_m / FOOT_M
-    profile = math.log(height_ft / ROUGHNESS_FT) / math.log(REFERENCE_FT / ROUGHNESS_FT)
+    profile = logarithm(height_ft / ROUGHNESS_FT) / logarithm(REFERENCE_FT / ROUGHNESS_FT)
     return np.asarray(speed_20ft_m_s * profile)
 
 
@@ -55,7 +56,8 @@ def low_altitude_scales(height_m: float) -> Scales:
     """Return length and intensity of the horizontal gusts at a height."""
     height_ft = max(height_m / FOOT_M, MIN_HEIGHT_FT)
     factor = 0.177 + 0.000823 * height_ft
-    return Scales(height_ft / factor**1.2 * FOOT_M, 0.1 / factor**0.4)
+    power = float(exponential(0.4 * logarithm(factor)))
+    return Scales(height_ft / (power * power * power) * FOOT_M, 0.1 / power)
 
 
 _A_GAIN: Final = math.sqrt(3.0 / 2.0)
@@ -87,9 +89,9 @@ class Gusts:
         scales = low_altitude_scales(height_m)
         self._mean = mean_speed_m_s(speed_20ft, height_m)
         self._sigma = scales.intensity * speed_20ft
-        self._heading = np.cos(heading), np.sin(heading)
+        self._heading = sine_cosine(heading)
         x = step_s * np.maximum(np.abs(self._mean), MIN_SPEED_M_S) / scales.length_m
-        self._decay, self._x = np.exp(-x), x
+        self._decay, self._x = exponential(-x), x
         # Stationary covariance for w of intensity 2: E aa = 1, E ab = 1/2, E bb = 1/2.
         # aa, ab, bb: covariance of the increment; the roots are its Cholesky factor.
         decay_squared = self._decay * self._decay
@@ -109,7 +111,7 @@ class Gusts:
         """Return the air velocity in m/s along world x (n,) and y (n,); advance the filters by a tick."""
         along = self._mean + self._sigma * self._u
         across = self._sigma * (_A_GAIN * self._a + _B_GAIN * self._b)
-        cosine, sine = self._heading
+        sine, cosine = self._heading
         drawn = self._draws.next()
         self._u = self._decay * self._u + self._root_aa * drawn[0]
         self._b = self._decay * (self._b + self._x * self._a) + (

@@ -20,12 +20,16 @@ import numpy as np
 
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.elementary import sine_cosine
 
 POSITION = slice(0, 3)
 VELOCITY = slice(3, 6)
 EULER = slice(6, 9)
 RATES = slice(9, 12)
 STATE_ROWS = 12
+
+SineCosine = tuple[FloatArray, FloatArray]
+"""Sines and cosines of roll, pitch, yaw, each (3, n)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +47,16 @@ class RigidBody:
     air_m_s: tuple[PerFlight, PerFlight] | None = None
     """Air velocity along x and y of the world; None is still air."""
 
-    def derivative(self, state: FloatArray, wrench: FloatArray) -> FloatArray:
-        """Return the time derivative (12, n) of a state (12, n) under a wrench (4, n)."""
-        sin_roll, sin_pitch, sin_yaw = sines = np.sin(state[EULER])
-        cos_roll, cos_pitch, cos_yaw = cosines = np.cos(state[EULER])
+    def derivative(
+        self, state: FloatArray, wrench: FloatArray, known: SineCosine | None = None
+    ) -> FloatArray:
+        """Return the time derivative (12, n) of a state (12, n) under a wrench (4, n).
+
+        `known` holds sines and cosines of the state's angles, if they have been computed already.
+        """
+        sines, cosines = known or sine_cosine(state[EULER])
+        sin_roll, sin_pitch, sin_yaw = sines
+        cos_roll, cos_pitch, cos_yaw = cosines
         u, v, w = state[VELOCITY]
         p, q, r = state[RATES]
         thrust, roll_torque, pitch_torque, yaw_torque = wrench
@@ -90,11 +100,6 @@ class RigidBody:
         return rate
 
 
-def world_velocity(state: FloatArray) -> FloatArray:
-    """Return the velocity (3, n) in m/s in the world frame (equation 2) of a state (12, n)."""
-    return to_world(np.sin(state[EULER]), np.cos(state[EULER]), state[VELOCITY])
-
-
 def to_world(sines: FloatArray, cosines: FloatArray, vector: FloatArray) -> FloatArray:
     """Return R (eq 3) times a body vector (3, n), given sines and cosines (3, n) of roll, pitch, yaw."""
     sin_roll, sin_pitch, sin_yaw = sines
@@ -112,8 +117,7 @@ def to_world(sines: FloatArray, cosines: FloatArray, vector: FloatArray) -> Floa
 
 def to_body(euler_rad: FloatArray, vector: FloatArray) -> FloatArray:
     """Return R transposed times a world vector (3, n), given roll, pitch, yaw (3, n)."""
-    sin_roll, sin_pitch, sin_yaw = np.sin(euler_rad)
-    cos_roll, cos_pitch, cos_yaw = np.cos(euler_rad)
+    (sin_roll, sin_pitch, sin_yaw), (cos_roll, cos_pitch, cos_yaw) = sine_cosine(euler_rad)
     x, y, z = vector
     heading_x = cos_yaw * x + sin_yaw * y
     heading_y = cos_yaw * y - sin_yaw * x

@@ -11,6 +11,7 @@ import numpy as np
 
 from mambo_nmpc.sil.plant.airframe import Airframe
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.elementary import exponential
 
 WRENCH_SIGNS = np.array(
     [
@@ -51,7 +52,7 @@ class Rotors:
         lag_s = np.atleast_1d(self.lag_s)
         lagging = lag_s > 0.0
         exponent = time_s[:, np.newaxis] / np.where(lagging, lag_s, 1.0)
-        return np.asarray(np.where(lagging, np.exp(-exponent), 0.0)[:, np.newaxis, :])
+        return np.asarray(np.where(lagging, exponential(-exponent), 0.0)[:, np.newaxis, :])
 
     def wrench(self, speed_rad_s: FloatArray) -> FloatArray:
         """Return the wrenches (4, k, n) of rotor speeds (k, 4, n)."""

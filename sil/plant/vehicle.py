@@ -8,6 +8,7 @@ import numpy as np
 from mambo_nmpc.sil.plant import loops
 from mambo_nmpc.sil.plant.airframe import MAMBO, Airframe
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.elementary import sine_cosine
 from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
 from mambo_nmpc.sil.plant.rigid_body import (
     EULER,
@@ -16,8 +17,9 @@ from mambo_nmpc.sil.plant.rigid_body import (
     STATE_ROWS,
     VELOCITY,
     RigidBody,
+    SineCosine,
     to_body,
-    world_velocity,
+    to_world,
 )
 from mambo_nmpc.sil.plant.rotors import Rotors, mix
 
@@ -36,6 +38,11 @@ class VehicleState:
     attitude_integral_rad_s: FloatArray
     """Integral states of the attitude loop (2, n), roll then pitch."""
 
+    @cached_property
+    def sine_cosine(self) -> SineCosine:
+        """Sines and cosines of roll, pitch, yaw, each (3, n)."""
+        return sine_cosine(self.body[EULER])
+
 
 @dataclass(frozen=True, eq=False)
 class Seen:
@@ -53,7 +60,8 @@ class Seen:
 def truth(state: VehicleState) -> Seen:
     """Return the true state in the form that controllers receive."""
     body = state.body
-    return Seen(body[POSITION], world_velocity(body), body[EULER], body[RATES])
+    velocity_m_s = to_world(*state.sine_cosine, body[VELOCITY])
+    return Seen(body[POSITION], velocity_m_s, body[EULER], body[RATES])
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,4 +156,8 @@ class Vehicle:
             mass_kg = self.airframe.mass_kg + moment.payload_kg
             body = replace(body, mass_kg=mass_kg, air_m_s=moment.air_m_s)
         inputs = (wrenches[:, 0], wrenches[:, 1], wrenches[:, 2])
-        return bogacki_shampine(body.derivative, state.body, inputs, STEP_S), speeds[3]
+
+        def derivative(stage: FloatArray, wrench: FloatArray) -> FloatArray:
+            return body.derivative(stage, wrench, state.sine_cosine if stage is state.body else None)
+
+        return bogacki_shampine(derivative, state.body, inputs, STEP_S), speeds[3]

@@ -13,6 +13,7 @@ import numpy as np
 
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.elementary import arc_sine, arc_tangent, sine_cosine
 from mambo_nmpc.sil.plant.rigid_body import to_body, to_world
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
 from mambo_nmpc.sil.sensors.instruments import PA_PER_M, SONAR_MIN_M, Instruments, Readings, Sensors
@@ -72,28 +73,27 @@ class Attitude:
 
     def __init__(self, euler_rad: FloatArray) -> None:
         self.euler_rad = euler_rad.copy()
+        self.sines, self.cosines = sine_cosine(self.euler_rad)
         self._forces: list[FloatArray] = []
 
     def update(self, imu: FloatArray) -> None:
         """Advance the angles by one tick with specific force and rates (6, n)."""
         roll, pitch, yaw = self.euler_rad
         p, q, r = imu[3:]
-        sin_roll, cos_roll, cos_pitch = np.sin(roll), np.cos(roll), np.cos(pitch)
+        (sin_roll, sin_pitch, _), (cos_roll, cos_pitch, _) = self.sines, self.cosines
         yaw_rate = (sin_roll * q + cos_roll * r) / cos_pitch
-        roll = roll + STEP_S * (p + np.sin(pitch) * yaw_rate)
+        roll = roll + STEP_S * (p + sin_pitch * yaw_rate)
         pitch = pitch + STEP_S * (cos_roll * q - sin_roll * r)
         x, y, z = self._smooth(imu[:3])
         trusted = np.abs(np.sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < TILT_GATE * GRAVITY_M_S2
-        weight = np.where(trusted, TILT_WEIGHT, 0.0)
-        force_roll = np.arctan(y / z)
-        force_pitch = np.arcsin(np.clip(x / GRAVITY_M_S2, -1.0, 1.0))
-        self.euler_rad = np.stack(
-            [
-                np.where(trusted, (1.0 - weight) * roll + weight * force_roll, roll),
-                np.where(trusted, (1.0 - weight) * pitch + weight * force_pitch, pitch),
-                yaw + STEP_S * yaw_rate,
-            ]
-        )
+        if trusted.any():
+            weight = np.where(trusted, TILT_WEIGHT, 0.0)
+            force_roll = arc_tangent(y / z)
+            force_pitch = arc_sine(np.clip(x / GRAVITY_M_S2, -1.0, 1.0))
+            roll = np.where(trusted, (1.0 - weight) * roll + weight * force_roll, roll)
+            pitch = np.where(trusted, (1.0 - weight) * pitch + weight * force_pitch, pitch)
+        self.euler_rad = np.stack([roll, pitch, yaw + STEP_S * yaw_rate])
+        self.sines, self.cosines = sine_cosine(self.euler_rad)
 
     def _smooth(self, force: FloatArray) -> FloatArray:
         earlier = self._forces or [force] * len(ACCELEROMETER_TAPS)
@@ -201,7 +201,7 @@ class Suite:
         """Return the estimate that the controllers receive at this tick; call it once per tick of 5 ms."""
         readings = self._instruments.read(true)
         self._attitude.update(readings.imu)
-        sines, cosines = np.sin(self._attitude.euler_rad), np.cos(self._attitude.euler_rad)
+        sines, cosines = self._attitude.sines, self._attitude.cosines
         force = to_world(sines, cosines, readings.imu[:3])
         self._altitude.update(readings, force[2] + GRAVITY_M_S2)
         force_x, force_y = readings.imu[:2]

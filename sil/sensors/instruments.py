@@ -13,6 +13,7 @@ import numpy as np
 
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.elementary import exponential, sine_cosine
 from mambo_nmpc.sil.plant.randomness import Draws, Purpose
 from mambo_nmpc.sil.plant.rigid_body import to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
@@ -137,9 +138,9 @@ def _discretize_imu(
     step_s: float,
 ) -> tuple[tuple[tuple[float, float], tuple[float, float]], tuple[float, float]]:
     """Return transition matrix and input gain of y'' = w^2 (u - y) - 2 d w y', state (y, y'), u held."""
-    decay, frequency = IMU_DAMPING * IMU_RAD_S, IMU_RAD_S * math.sqrt(1.0 - IMU_DAMPING**2)
-    envelope = math.exp(-decay * step_s)
-    sine, cosine = envelope * math.sin(frequency * step_s), envelope * math.cos(frequency * step_s)
+    decay, frequency = IMU_DAMPING * IMU_RAD_S, IMU_RAD_S * math.sqrt(1.0 - IMU_DAMPING * IMU_DAMPING)
+    envelope = exponential(-decay * step_s)
+    sine, cosine = (float(envelope * value) for value in sine_cosine(frequency * step_s))
     a00 = cosine + decay / frequency * sine
-    a10 = -(IMU_RAD_S**2) / frequency * sine
+    a10 = -(IMU_RAD_S * IMU_RAD_S) / frequency * sine
     return ((a00, sine / frequency), (a10, cosine - decay / frequency * sine)), (1.0 - a00, -a10)

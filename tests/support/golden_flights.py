@@ -1,0 +1,66 @@
+"""Short flights of every kind and the digests of their traces, which must be the same on every processor.
+
+python -m tests.support.golden_flights           print the digests as JSON
+python -m tests.support.golden_flights --write   write them to the golden file; read the diff
+"""
+
+import json
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Final
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.campaign.file import default, scenario
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.flight.loop import fly
+from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
+
+GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
+PRESET: Final = "mambo"
+
+SCENARIOS: Final = {
+    "figure of eight": Scenario(duration_s=10.0),
+    "circle, turned, in wind, with motor lag": Scenario(
+        trajectory="circle", duration_s=10.0, yaw_rad=0.8, wind_m_s2=(0.5, 0.3), motor_lag_s=0.03
+    ),
+    "Lissajous, turning": Scenario(trajectory="lissajous", duration_s=10.0, yaw_rad=-2.0, yaw_rate_rad_s=1.0),
+    "step": Scenario(trajectory="step", duration_s=10.0),
+    "sensors, gusts and dropped updates": Scenario(
+        duration_s=10.0,
+        seed=1,
+        sensors="mambo",
+        wind_speed_m_s=4.0,
+        wind_direction_rad=2.5,
+        dropped_share=0.1,
+    ),
+    "take-off": Scenario(duration_s=5.0, start="take-off"),
+    "drawn by the default campaign": scenario(
+        default().file.flight.model_dump() | {"duration_s": 10.0}, default().draw(0)
+    ),
+}
+
+
+def digests() -> dict[str, str]:
+    """Fly every scenario with the PD and with the preset; return the digests of the traces."""
+    settings = presets.load(PRESET)
+    batches = defaultdict(list)
+    for name, flown in SCENARIOS.items():
+        batches[tuple(getattr(flown, key) for key in SHARED_KEYS)].append(name)
+    found: dict[str, str] = {}
+    for names in batches.values():
+        flight = flight_of([SCENARIOS[name] for name in names], settings.horizon.update_period_s)
+        traces = {"PD": fly(flight, PdController())}
+        traces[PRESET] = fly(flight, CompiledController(settings, len(names)))
+        for index, name in enumerate(names):
+            found |= {f"{name}: {controller}": trace.digest(index) for controller, trace in traces.items()}
+    return found
+
+
+if __name__ == "__main__":
+    text = json.dumps(digests(), indent=2) + "\n"
+    if sys.argv[1:] == ["--write"]:
+        GOLDEN.write_text(text, "utf-8")
+    else:
+        print(text, end="")
