@@ -49,3 +49,48 @@ unsigned long nmpc_batch_instance_bytes(void)
 {
     return (unsigned long)sizeof(nmpc_t);
 }
+
+#ifdef NMPC_ANGLE_BITS
+/* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */
+static nmpc_real_t quantize(double value, int bits)
+{
+    const double scaled = value * (double)((nmpc_sum_t)1 << bits);
+    nmpc_real_t number = 2147483647;
+
+    if ((scaled > -2147483647.0) && (scaled < 2147483647.0)) {
+        number = (nmpc_real_t)scaled;
+        number += (nmpc_real_t)(2.0 * (scaled - (double)number));
+    }
+    return number;
+}
+#define NUMBER(value, quantity) quantize(value, NMPC_##quantity##_BITS)
+#define ANGLE_RAD(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_ANGLE_BITS))
+#else
+#define NUMBER(value, quantity) ((nmpc_real_t)(value))
+#define ANGLE_RAD(number) ((double)(number))
+#endif
+
+/* One step of one controller in SI units, for the engine of the simulation. */
+long long nmpc_batch_engine_step(void *self, const double *state, const double *target,
+                                 double thrust_acceleration_m_s2, double *command_rad)
+{
+    nmpc_state_t measured;
+    nmpc_target_t wanted;
+    nmpc_command_t command;
+    nmpc_status_t status;
+    int i;
+
+    for (i = 0; i < 2; i++) {
+        measured.position_m[i] = NUMBER(state[i], POSITION);
+        measured.velocity_m_s[i] = NUMBER(state[2 + i], VELOCITY);
+        wanted.position_m[i] = NUMBER(target[i], POSITION);
+        wanted.velocity_m_s[i] = NUMBER(target[2 + i], VELOCITY);
+    }
+    measured.roll_rad = NUMBER(state[4], ANGLE);
+    measured.pitch_rad = NUMBER(state[5], ANGLE);
+    measured.yaw_rad = NUMBER(state[6], YAW);
+    status = nmpc_step((nmpc_t *)self, &measured, &wanted, NUMBER(thrust_acceleration_m_s2, THRUST), &command);
+    command_rad[0] = ANGLE_RAD(command.roll_rad);
+    command_rad[1] = ANGLE_RAD(command.pitch_rad);
+    return (long long)status;
+}

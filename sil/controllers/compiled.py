@@ -102,6 +102,13 @@ class CompiledController:
         self._ffi.buffer(self._controllers)[:] = DIRT * self._ffi.sizeof(self._controllers)
         self._lib.nmpc_batch_init(self._controllers, n)
 
+    @property
+    def native(self) -> tuple[int, int, int]:
+        """Address of `nmpc_batch_engine_step` and of the first controller, and the bytes to the next one."""
+        step = self._ffi.addressof(self._lib, "nmpc_batch_engine_step")
+        addresses = (int(self._ffi.cast("uintptr_t", each)) for each in (step, self._controllers))
+        return (*addresses, int(self._ffi.sizeof("nmpc_t")))
+
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
         return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad, COMMAND)

@@ -72,6 +72,8 @@ nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
 void nmpc_batch_init(nmpc_t *, int);
 void nmpc_batch_step(nmpc_t *, int, const nmpc_state_t *, const nmpc_target_t *, const nmpc_real_t *,
                      const nmpc_outcome_t *);
+unsigned long nmpc_batch_instance_bytes(void);
+long long nmpc_batch_engine_step(void *, const double *, const double *, double, double *);
 """
 _INCLUDES: Final = "".join(
     f'#include "nmpc_{name}.h"\n' for name in ("cost", "math", "predictor", "self_test")

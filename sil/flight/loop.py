@@ -151,18 +151,18 @@ def fly(
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
     times_s, targets = flight.times_s(), flight.targets()
-    open_loop_until_s = times_s[0] + (loops.TAKE_OFF_S if flight.start == "take-off" else 0.0)
+    lifting_until = lifting_updates(flight, times_s)
     seeds = flight.seeds or (0,) * flight.flights
-    vehicle, state = flight.vehicle, _start(flight, targets[0])
+    vehicle, state = flight.vehicle, start_state(flight, targets[0])
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
     suite = None if flight.sensors is None else Suite(flight.sensors, seeds, truth(state))
     wire = Wire(flight.link, flight.flights)
     caller = _Caller(
-        controller, Drops(flight.link, seeds), _allocate_trace(times_s, targets, sensed=suite is not None)
+        controller, Drops(flight.link, seeds), allocate_trace(times_s, targets, sensed=suite is not None)
     )
     for update, time_s in enumerate(times_s):
         state = _mark_lost(state)
-        lifting = time_s < open_loop_until_s - STEP_S / 2.0
+        lifting = update < lifting_until
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
         for tick in range(flight.ticks_per_update):
             with np.errstate(all="ignore"):
@@ -180,7 +180,13 @@ def fly(
     return caller.trace
 
 
-def _start(flight: Flight, first_target: FloatArray) -> VehicleState:
+def lifting_updates(flight: Flight, times_s: FloatArray) -> int:
+    """Return how many of the updates at `times_s` (k,) fall into the open-loop beginning of a take-off."""
+    open_loop_s = loops.TAKE_OFF_S if flight.start == "take-off" else 0.0
+    return int((times_s < times_s[0] + open_loop_s - STEP_S / 2.0).sum())
+
+
+def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     """Return the initial state of n flights, above their first targets (n, 4) or on the ground below."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
@@ -218,7 +224,7 @@ def _mark_lost(state: VehicleState) -> VehicleState:
     )
 
 
-def _allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
+def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
     """Return a trace with times and targets set and its other arrays uninitialized."""
     kind = SensedTrace if sensed else Trace
     shape = targets.shape[:2]

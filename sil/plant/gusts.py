@@ -60,8 +60,57 @@ def low_altitude_scales(height_m: float) -> Scales:
     return Scales(height_ft / (power * power * power) * FOOT_M, 0.1 / power)
 
 
-_A_GAIN: Final = math.sqrt(3.0 / 2.0)
-_B_GAIN: Final = (1.0 - math.sqrt(3.0)) / math.sqrt(2.0)
+ACROSS_GAINS: Final = (math.sqrt(3.0 / 2.0), (1.0 - math.sqrt(3.0)) / math.sqrt(2.0))
+"""Gains of the states a and b in the gust across the wind."""
+
+
+@dataclass(frozen=True, eq=False)
+class GustFilter:
+    """The filters of n flights, sampled at a fixed step; every field is (n,)."""
+
+    mean_m_s: FloatArray
+    sigma_m_s: FloatArray
+    """Standard deviation of the gusts."""
+    heading: tuple[FloatArray, FloatArray]
+    """Cosine and sine of the direction towards which the air moves."""
+    x: FloatArray
+    """Step in the dimensionless time."""
+    decay: FloatArray
+    """exp(-x)."""
+    root_aa: FloatArray
+    root_ab: FloatArray
+    root_bb: FloatArray
+    """Cholesky factor of the covariance of an increment of the states a and b."""
+
+
+def coefficients(
+    speed_20ft_m_s: PerFlight, direction_rad: PerFlight, flights: int, *, height_m: float, step_s: float
+) -> GustFilter:
+    """Return the filters of n flights at one height."""
+    speed_20ft = np.broadcast_to(np.asarray(speed_20ft_m_s, np.float64), flights)
+    sine, cosine = sine_cosine(np.broadcast_to(np.asarray(direction_rad, np.float64), flights))
+    scales = low_altitude_scales(height_m)
+    mean_m_s = mean_speed_m_s(speed_20ft, height_m)
+    x = step_s * np.maximum(np.abs(mean_m_s), MIN_SPEED_M_S) / scales.length_m
+    decay = exponential(-x)
+    # Stationary covariance for w of intensity 2: E aa = 1, E ab = 1/2, E bb = 1/2.
+    # aa, ab, bb: covariance of the increment.
+    decay_squared = decay * decay
+    aa = 1.0 - decay_squared
+    ab = 0.5 - decay_squared * (x + 0.5)
+    bb = 0.5 - decay_squared * (x * x + x + 0.5)
+    root_aa = np.sqrt(aa)
+    root_ab = ab / root_aa
+    return GustFilter(
+        mean_m_s=mean_m_s,
+        sigma_m_s=scales.intensity * speed_20ft,
+        heading=(cosine, sine),
+        x=x,
+        decay=decay,
+        root_aa=root_aa,
+        root_ab=root_ab,
+        root_bb=np.sqrt(np.maximum(bb - root_ab * root_ab, 0.0)),
+    )
 
 
 class Gusts:
@@ -83,24 +132,9 @@ class Gusts:
         height_m: float,
         step_s: float,
     ) -> None:
-        flights = len(seeds)
-        speed_20ft = np.broadcast_to(np.asarray(speed_20ft_m_s, np.float64), flights)
-        heading = np.broadcast_to(np.asarray(direction_rad, np.float64), flights)
-        scales = low_altitude_scales(height_m)
-        self._mean = mean_speed_m_s(speed_20ft, height_m)
-        self._sigma = scales.intensity * speed_20ft
-        self._heading = sine_cosine(heading)
-        x = step_s * np.maximum(np.abs(self._mean), MIN_SPEED_M_S) / scales.length_m
-        self._decay, self._x = exponential(-x), x
-        # Stationary covariance for w of intensity 2: E aa = 1, E ab = 1/2, E bb = 1/2.
-        # aa, ab, bb: covariance of the increment; the roots are its Cholesky factor.
-        decay_squared = self._decay * self._decay
-        aa = 1.0 - decay_squared
-        ab = 0.5 - decay_squared * (x + 0.5)
-        bb = 0.5 - decay_squared * (x * x + x + 0.5)
-        self._root_aa = np.sqrt(aa)
-        self._root_ab = ab / self._root_aa
-        self._root_bb = np.sqrt(np.maximum(bb - self._root_ab * self._root_ab, 0.0))
+        self._filter = coefficients(
+            speed_20ft_m_s, direction_rad, len(seeds), height_m=height_m, step_s=step_s
+        )
         self._draws = Draws(seeds, Purpose.GUSTS, 3)
         first = self._draws.next()
         self._u = first[0].copy()
@@ -109,13 +143,12 @@ class Gusts:
 
     def next(self) -> tuple[FloatArray, FloatArray]:
         """Return the air velocity in m/s along world x (n,) and y (n,); advance the filters by a tick."""
-        along = self._mean + self._sigma * self._u
-        across = self._sigma * (_A_GAIN * self._a + _B_GAIN * self._b)
-        sine, cosine = self._heading
+        f, (gain_a, gain_b) = self._filter, ACROSS_GAINS
+        along = f.mean_m_s + f.sigma_m_s * self._u
+        across = f.sigma_m_s * (gain_a * self._a + gain_b * self._b)
+        cosine, sine = f.heading
         drawn = self._draws.next()
-        self._u = self._decay * self._u + self._root_aa * drawn[0]
-        self._b = self._decay * (self._b + self._x * self._a) + (
-            self._root_ab * drawn[1] + self._root_bb * drawn[2]
-        )
-        self._a = self._decay * self._a + self._root_aa * drawn[1]
+        self._u = f.decay * self._u + f.root_aa * drawn[0]
+        self._b = f.decay * (self._b + f.x * self._a) + (f.root_ab * drawn[1] + f.root_bb * drawn[2])
+        self._a = f.decay * self._a + f.root_aa * drawn[1]
         return cosine * along - sine * across, sine * along + cosine * across

@@ -27,11 +27,16 @@ The rows are orthogonal, so the inverse, which the mixer applies, is a quarter o
 """
 
 
-def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
-    """Return the motor commands (4, n) that produce a wrench (4, n), clipped to the command limits."""
+def wrench_per_command(nominal: Airframe) -> FloatArray:
+    """Return the wrench (4, 1) of four rotors at one unit of command each, if all added to each component."""
     offset = nominal.rotor_offset_m
     lever = np.array([[1.0], [offset], [offset], [nominal.torque_per_thrust_m]])
-    shares = wrench / (4.0 * lever * nominal.thrust_per_command_n)
+    return np.asarray(4.0 * lever * nominal.thrust_per_command_n)
+
+
+def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
+    """Return the motor commands (4, n) that produce a wrench (4, n), clipped to the command limits."""
+    shares = wrench / wrench_per_command(nominal)
     commands = np.add.reduce(WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :], axis=0)
     return np.asarray(np.clip(commands, nominal.command_min, nominal.command_max))
 

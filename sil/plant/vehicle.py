@@ -96,7 +96,7 @@ class Vehicle:
         return RigidBody(self.airframe.mass_kg, self.airframe.inertia_kg_m2, self.drag_1_s, self.wind_m_s2)
 
     @cached_property
-    def _rotor_decay(self) -> FloatArray:
+    def rotor_decay(self) -> FloatArray:
         """Share of a rotor speed error that remains at the nodes and at the end of a step (4, 1, n or 1)."""
         return self.rotors.decay(STEP_S * np.append(NODES, 1.0))
 
@@ -148,7 +148,7 @@ class Vehicle:
     ) -> tuple[FloatArray, FloatArray]:
         """Return rigid-body state (12, n) and rotor speeds (4, n) after a tick of held commands (4, n)."""
         steady = self.rotors.commanded_speed_rad_s(motor_command)
-        speeds = steady + (state.rotor_speed_rad_s - steady) * self._rotor_decay
+        speeds = steady + (state.rotor_speed_rad_s - steady) * self.rotor_decay
         wrenches = self.rotors.wrench(speeds[:3])
         body = self.rigid_body
         if moment is not None:

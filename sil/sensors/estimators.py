@@ -34,6 +34,10 @@ PRESSURE_JUMP_M: Final = 0.8
 SLOW_JUMP_M: Final = 0.4
 """Gate: the same for the low-passed sonar height."""
 
+LOW_PASS_A: Final = (-2.9371707284498907, 2.8762997234793319, -0.939098940325283)
+LOW_PASS_B: Final = 3.7568380197861018e-06
+"""Coefficients of the low-pass of sonar and barometer heights: Butterworth, third order, cut-off 1 Hz."""
+
 VELOCITY_NOISE: Final = (0.09, 5.0)
 """Q, process noise per tick, and R, measurement noise of the optical flow, both in m^2/s^2."""
 ACCELERATION_GAIN: Final = 0.2
@@ -107,19 +111,16 @@ class Attitude:
 class _LowPass:
     """Butterworth low-pass of third order, cut-off 1 Hz, in steady state with its first input."""
 
-    _A: Final = (-2.9371707284498907, 2.8762997234793319, -0.939098940325283)
-    _B: Final = 3.7568380197861018e-06
-
     def __init__(self, start: FloatArray) -> None:
-        self._state = [start / (8.0 * self._B)] * 3
+        self._state = [start / (8.0 * LOW_PASS_B)] * 3
 
     def update(self, value: FloatArray) -> FloatArray:
         """Return the output at this tick for the input at this tick."""
         first, second, third = self._state
-        a1, a2, a3 = self._A
+        a1, a2, a3 = LOW_PASS_A
         now = value - a1 * first - a2 * second - a3 * third
         self._state = [now, first, second]
-        return np.asarray(self._B * (now + 3.0 * first + 3.0 * second + third))
+        return np.asarray(LOW_PASS_B * (now + 3.0 * first + 3.0 * second + third))
 
 
 class Altitude:

@@ -72,17 +72,22 @@ class Readings:
     """Velocity along body x and y from the optical flow (2, n), held between images."""
 
 
+def noise_deviations(sensors: Sensors, flights: int) -> FloatArray:
+    """Return the standard deviations of the noise (8, n), in the order of `NOISE_VARIANCES`."""
+    deviations = np.sqrt(np.array(NOISE_VARIANCES))[:, np.newaxis]
+    return deviations * np.broadcast_to(np.asarray(sensors.noise_scale, np.float64), flights)
+
+
 class Instruments:
     """The instruments of n flights; call `read` once per tick."""
 
     def __init__(self, sensors: Sensors, seeds: Sequence[int], start: Seen) -> None:
         flights = len(seeds)
         self._draws = Draws(seeds, Purpose.SENSORS, len(NOISE_VARIANCES))
-        deviations = np.sqrt(np.array(NOISE_VARIANCES))[:, np.newaxis]
-        self._noise = deviations * np.broadcast_to(np.asarray(sensors.noise_scale, np.float64), flights)
+        self._noise = noise_deviations(sensors, flights)
         biases = (*sensors.accelerometer_bias_m_s2, *sensors.gyro_bias_rad_s)
         self._bias = np.stack([np.broadcast_to(np.asarray(bias, np.float64), flights) for bias in biases])
-        self._transition, self._input_gain = _discretize_imu(STEP_S)
+        self._transition, self._input_gain = discretize_imu(STEP_S)
         self._velocity_m_s = start.velocity_m_s
         self._motion = self._measure_motion(start)
         self._imu = np.stack([self._motion, np.zeros_like(self._motion)])
@@ -107,7 +112,7 @@ class Instruments:
         height_m = -true.position_m[2]
         self._delayed.append(
             Readings(
-                imu=np.clip(imu, -_LIMITS, _LIMITS),
+                imu=np.clip(imu, -IMU_LIMITS, IMU_LIMITS),
                 sonar_m=np.maximum(height_m + noise[6], SONAR_MIN_M),
                 pressure_pa=noise[7] - PA_PER_M * height_m,
                 flow_m_s=self._flow_m_s,
@@ -122,7 +127,8 @@ class Instruments:
         return np.concatenate([to_body(true.euler_rad, force), true.rates_rad_s])
 
 
-_LIMITS: Final = np.array([[ACCELEROMETER_LIMIT_M_S2]] * 3 + [[GYRO_LIMIT_RAD_S]] * 3)
+IMU_LIMITS: Final = np.array([[ACCELEROMETER_LIMIT_M_S2]] * 3 + [[GYRO_LIMIT_RAD_S]] * 3)
+"""Largest magnitudes of specific force and body rates (6, 1)."""
 
 
 def _measure_flow(true: Seen) -> FloatArray:
@@ -134,7 +140,7 @@ def _measure_flow(true: Seen) -> FloatArray:
     return np.asarray(body_m_s + FLOW_COUPLING * z * rotation)
 
 
-def _discretize_imu(
+def discretize_imu(
     step_s: float,
 ) -> tuple[tuple[tuple[float, float], tuple[float, float]], tuple[float, float]]:
     """Return transition matrix and input gain of y'' = w^2 (u - y) - 2 d w y', state (y, y'), u held."""

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * The closed loop in C, with the bits of the NumPy simulation. Each header repeats the Python module of its name;
+ * brackets fix the order of operations. Compile with -ffp-contract=off and without -ffast-math.
+ */
+#ifndef ENGINE_H
+#define ENGINE_H
+
+#include <math.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "records.h"
+
+/* np.clip, np.maximum: NaN stays NaN. */
+static inline double clip(double value, double low, double high)
+{
+    return (value < low) ? low : ((value > high) ? high : value);
+}
+
+static inline double maximum(double a, double b)
+{
+    return ((a > b) || (a != a)) ? a : b;
+}
+
+#endif

@@ -1,0 +1,80 @@
+"""Build the engine with the host's compiler, once per machine, and load it."""
+
+import hashlib
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any, Final
+
+import cffi
+import numpy as np
+
+from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.errors import CacheError
+from mambo_nmpc.sil.files.cache import build_cached
+
+SOURCES: Final = ("loop.c", "pd.c")
+HEADERS: Final = ("elementary.h", "engine.h", "records.h", "rigid_body.h", "sensors.h", "vehicle.h", "world.h")
+FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+
+ffi: Final = cffi.FFI()
+ffi.cdef(resources.files("mambo_nmpc.sil.engine").joinpath("records.h").read_text("utf-8"))
+
+
+def texts() -> dict[str, str]:
+    """Return the engine's C by file name."""
+    folder = resources.files("mambo_nmpc.sil.engine")
+    return {name: folder.joinpath(name).read_text("utf-8") for name in (*SOURCES, *HEADERS)}
+
+
+@lru_cache
+def load(toolchain: Toolchain) -> Any:
+    """Return the engine, built with `toolchain` unless it is cached; raises BuildError, CacheError."""
+    files = texts()
+    contents = (files, FLAGS, toolchain, toolchain.identity())
+    name = f"engine_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
+
+    def build(folder: Path) -> Path:
+        for path, text in files.items():
+            (folder / path).write_text(text, "utf-8")
+        flags = [*FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
+        toolchain.run([*flags, *SOURCES, "-o", "engine.so", "-lm"], folder)
+        if not (folder / "engine.so").is_file():
+            raise BuildError(f"{' '.join(toolchain.command)} wrote no output; set CC to a C compiler")
+        return folder / "engine.so"
+
+    path = build_cached(name, build)
+    try:
+        return ffi.dlopen(str(path))
+    except OSError as error:
+        raise CacheError(
+            f"cannot load {path}: {error}; if its folder is mounted noexec, set XDG_CACHE_HOME elsewhere"
+        ) from error
+
+
+def record_type(name: str) -> np.dtype[Any]:
+    """Return the NumPy type with the members and the layout of a record of records.h."""
+    kinds = {"double": "f8", "int64_t": "i8"}
+    members = ffi.typeof(name).fields
+    formats = []
+    for _, member in members:
+        kind = member.type
+        formats.append(
+            (kinds[kind.item.cname], kind.length) if kind.kind == "array" else kinds[kind.cname]
+        )
+    return np.dtype(
+        {
+            "names": [name for name, _ in members],
+            "formats": formats,
+            "offsets": [member.offset for _, member in members],
+            "itemsize": ffi.sizeof(name),
+        }
+    )
+
+
+def pointer(kind: str, array: np.ndarray[Any, Any] | None) -> Any:
+    """Return a pointer of type `kind` to the contiguous `array`, or NULL; the caller keeps the array alive."""
+    return ffi.NULL if array is None else ffi.cast(kind, ffi.from_buffer(array))
+
+

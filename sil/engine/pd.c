@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * The stock PD position controller: sil/controllers/pd.py.
+ */
+#include "elementary.h"
+#include "engine.h"
+
+int64_t engine_pd_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                       double *command_rad)
+{
+    const engine_pd_t *pd = self;
+    const double error_x = target[0] - state[0];
+    const double error_y = target[1] - state[1];
+    double sine;
+    double cosine;
+    double forward_m;
+    double right_m;
+
+    (void)thrust_acceleration_m_s2;
+    sine_cosine(state[6], &sine, &cosine);
+    forward_m = clip((cosine * error_x) + (sine * error_y), -pd->error_limit_m, pd->error_limit_m);
+    right_m = clip((cosine * error_y) - (sine * error_x), -pd->error_limit_m, pd->error_limit_m);
+    command_rad[0] = (pd->position_p_rad_m * right_m)
+                     - (pd->position_d_rad_s_m * ((cosine * state[3]) - (sine * state[2])));
+    command_rad[1] = (pd->position_d_rad_s_m * ((cosine * state[2]) + (sine * state[3])))
+                     - (pd->position_p_rad_m * forward_m);
+    return 0;
+}

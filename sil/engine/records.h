@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * What Python and the engine exchange. cffi reads this file as the C compiler does. Every member is 8 bytes wide,
+ * so that the records have the same layout in both. Units are in the names; frames and signs are those of the
+ * Python modules that the names of the headers repeat.
+ */
+
+/* What the flights of a simulation have in common. Pairs are in the order roll, pitch. */
+typedef struct {
+    int64_t flights;
+    int64_t updates;          /* of the position controller */
+    int64_t ticks_per_update;
+    int64_t first_tick;       /* on the trajectory's clock: negative for a take-off */
+    int64_t lifting_updates;  /* updates with the constant thrust of a take-off */
+    int64_t disturbed;        /* whether any flight has gusts, payload, push or battery sag */
+    int64_t windy;            /* whether any flight has gusts */
+    int64_t dropping;         /* whether any flight drops updates */
+    int64_t sensed;           /* whether controllers receive estimates */
+    int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
+
+    double step_s;            /* a tick */
+    double gravity_m_s2;
+    double lost_m;
+    double height_reference_m;
+
+    double gust_across[2];    /* gains of the states a and b of the gust across the wind */
+
+    /* Stock loops. */
+    double attitude_p_n_m[2];
+    double attitude_i_n_m_s;
+    double attitude_d_n_m_s[2];
+    double integral_limit_rad_s;
+    double integral_leak_1_s;
+    double yaw_p_n_m;
+    double yaw_d_n_m_s;
+    double altitude_p_n_m;
+    double altitude_d_n_s_m;
+    double weight_n;
+    double thrust_limit_n;
+    double take_off_thrust_n;
+
+    /* Mixer: the wrench that one unit of command of all rotors gives. */
+    double wrench_per_command[4];
+    double nominal_mass_kg;
+    double rotor_offset_m;
+    double speed_squared_per_command_rad2_s2;
+    double command_min;
+    double command_max;
+
+    /* Instruments. */
+    double imu_transition[4]; /* by rows */
+    double imu_input_gain[2];
+    double imu_limits[6];
+    double sonar_min_m;
+    double pa_per_m;
+    double flow_coupling;
+    int64_t flow_images;      /* in flow_ticks ticks */
+    int64_t flow_ticks;
+
+    /* Estimators. */
+    double accelerometer_taps[6];
+    double tilt_weight;
+    double tilt_gate;
+    double altitude_gains[2];
+    double low_pass_a[3];
+    double low_pass_b;
+    double sonar_jump_m;
+    double pressure_jump_m;
+    double slow_jump_m;
+    double velocity_gain;
+    double acceleration_gain;
+    double flow_tilt_rad;
+    double flow_rate_rad_s;
+    double flow_slow_rad_s;
+    double flow_jump_m_s;
+    double flow_min_height_m;
+} engine_simulation_t;
+
+/* One flight. Rows of body_start are those of a state of the rigid body. */
+typedef struct {
+    double body_start[12];
+    double rotor_start_rad_s[4];
+    double yaw_rad;
+    double yaw_rate_rad_s;
+
+    double mass_kg;
+    double inertia_kg_m2[3];
+    double thrust_factor_n_s2;
+    double torque_per_thrust_m;
+    double rotor_decay[4];    /* at the nodes and at the end of a tick */
+    double drag_1_s;
+    double wind_m_s2[2];
+
+    double gust_mean_m_s;
+    double gust_sigma_m_s;
+    double gust_heading[2];   /* cosine and sine */
+    double gust_decay;
+    double gust_x;
+    double gust_roots[3];     /* Cholesky factor: aa, ab, bb */
+
+    double battery_sag_1_s;
+    double payload_kg;
+    int64_t payload_tick;     /* on the trajectory's clock */
+    double push_n_s[3];
+    int64_t push_tick;        /* on the trajectory's clock */
+
+    int64_t delay_ticks;
+    double dropped_share;
+
+    double noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure */
+    double bias[6];           /* accelerometer, gyro */
+} engine_flight_t;
+
+/* Random numbers of one flight, a row for each tick: sensors 8, gusts 3 and a first row for their start. One number
+ * for each update: dropped. NULL where the simulation needs none. */
+typedef struct {
+    const double *sensors;
+    const double *gusts;
+    const double *drops;
+} engine_draws_t;
+
+/* Arrays of a trace, (updates, flights, axes). Without sensors the last three are NULL. */
+typedef struct {
+    double *target;
+    double *position_m;
+    double *velocity_m_s;
+    double *euler_rad;
+    double *command_rad;
+    double *thrust_acceleration_m_s2;
+    int64_t *status;
+    double *seen_position_m;
+    double *seen_velocity_m_s;
+    double *seen_euler_rad;
+} engine_trace_t;
+
+/* A position controller: reads a state of 7 and a target of 4 numbers, writes roll and pitch, returns a status. */
+typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
+                                       double thrust_acceleration_m_s2, double *command_rad);
+
+/* Simulate the flight with index `index` from start to end and write its rows of the trace. */
+void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
+                const double *times_s, const engine_draws_t *draws, engine_controller_t controller, void *self,
+                const engine_trace_t *trace);
+
+/* The stock PD position controller; it has no state. Its constants: see engine_pd_t. */
+typedef struct {
+    double position_p_rad_m;
+    double position_d_rad_s_m;
+    double error_limit_m;
+} engine_pd_t;
+
+int64_t engine_pd_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                       double *command_rad);

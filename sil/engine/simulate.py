@@ -1,0 +1,103 @@
+"""Fly simulations in the engine where controller and machine allow it, else in NumPy: the bits are the same."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.pd import ERROR_LIMIT_M, POSITION_D_RAD_S_M, POSITION_P_RAD_M, PdController
+from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.records import flight_records, simulation_record
+from mambo_nmpc.sil.flight import loop
+from mambo_nmpc.sil.flight.loop import Flight, PositionController, allocate_trace
+from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.plant.randomness import Purpose, generators
+from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES
+
+DELAY_TICKS_MAX: Final = 200
+"""Longest delay of a command that the engine can hold."""
+
+_PD: Final = library.ffi.new("engine_pd_t *", (POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M))
+
+EngineController = CompiledController | PdController
+"""Controllers whose step is a C function."""
+
+Progress = Callable[[float], None]
+
+
+def fly(flight: Flight, controller: PositionController, progress: Progress | None = None) -> Trace:
+    """Simulate the flights and return their trace; call `progress` with the share done.
+
+    Raises FlightError as `loop.fly`, and BuildError, CacheError if the engine cannot be built.
+    """
+    delayed_s = np.max(flight.link.delay_ticks)
+    if isinstance(controller, EngineController) and delayed_s <= DELAY_TICKS_MAX:
+        return fly_in_c(flight, controller, progress)
+    return loop.fly(flight, controller, progress)
+
+
+def fly_in_c(
+    flight: Flight, controller: EngineController, progress: Progress | None = None
+) -> Trace:
+    """Simulate the flights in the engine, one after the other."""
+    engine = library.load(host_toolchain())
+    times_s, targets = flight.times_s(), np.ascontiguousarray(flight.targets())
+    simulation = simulation_record(flight, times_s)
+    flights = flight_records(flight, targets[0])
+    trace = allocate_trace(times_s, targets, sensed=flight.sensors is not None)
+    ticks = len(times_s) * flight.ticks_per_update
+    draws = _Buffers(flight, len(times_s), ticks)
+    step, instances, stride = _native(engine, controller)
+    record = library.ffi.new(
+        "engine_trace_t *",
+        {
+            name: library.pointer("int64_t *" if name == "status" else "double *", getattr(trace, name, None))
+            for name, _ in library.ffi.typeof("engine_trace_t").fields
+        },
+    )
+    for index, seed in enumerate(flight.seeds or (0,) * flight.flights):
+        engine.engine_fly(
+            library.pointer("engine_simulation_t *", simulation),
+            library.pointer("engine_flight_t *", flights[index : index + 1]),
+            index,
+            library.pointer("double *", times_s),
+            draws.draw(seed),
+            step,
+            instances + index * stride,
+            record,
+        )
+        if progress is not None:
+            progress((index + 1) / flight.flights)
+    return trace
+
+
+class _Buffers:
+    """Random numbers of one flight at a time, from the same streams as in NumPy."""
+
+    def __init__(self, flight: Flight, updates: int, ticks: int) -> None:
+        self.sensors = np.empty((ticks, len(NOISE_VARIANCES))) if flight.sensors is not None else None
+        self.gusts = np.empty((ticks + 1, 3)) if flight.disturbances.windy else None
+        self.drops = np.empty(updates) if np.any(flight.link.dropped_share) else None
+        self._record = library.ffi.new(
+            "engine_draws_t *",
+            {name: library.pointer("double *", getattr(self, name)) for name in ("sensors", "gusts", "drops")},
+        )
+
+    def draw(self, seed: int) -> Any:
+        """Return the engine_draws_t of the flight with this seed; it is valid until the next call."""
+        for purpose, buffer in ((Purpose.SENSORS, self.sensors), (Purpose.GUSTS, self.gusts)):
+            if buffer is not None:
+                generators((seed,), purpose)[0].standard_normal(out=buffer)
+        if self.drops is not None:
+            generators((seed,), Purpose.DROPS)[0].random(out=self.drops)
+        return self._record
+
+
+def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
+    """Return the function of a step, the address of the first instance, and the bytes to the next one."""
+    if isinstance(controller, PdController):
+        return engine.engine_pd_step, library.ffi.cast("char *", _PD), 0
+    step, instances, stride = controller.native
+    return library.ffi.cast("engine_controller_t", step), library.ffi.cast("char *", instances), stride
