@@ -13,7 +13,8 @@ from rotorpy.vehicles.multirotor import Multirotor
 
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 
 DURATION_S = 100.0

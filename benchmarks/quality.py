@@ -22,7 +22,8 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.flights import detect_crashes
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import PositionController, fly
+from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace

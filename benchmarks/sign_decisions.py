@@ -23,7 +23,8 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, step_watched
-from mambo_nmpc.sil.flight.loop import Flight, Outcome, fly
+from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.loop import Flight, Outcome
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.trajectories import Trajectories
 from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 
 Inputs = NDArray[np.float32]

@@ -21,6 +21,7 @@ WINGS = [
     "flight",
     "emulation",
     "controllers",
+    "engine",
     "paper",
     "footprint",
     "faults",

@@ -15,9 +15,10 @@ from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.faults.flights import CRASH_TILT_RAD
-from mambo_nmpc.sil.flight.loop import PositionController, fly
+from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace

@@ -19,11 +19,11 @@ from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.emulated import EmulatedController, build_guest
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine.simulate import fly as simulate
 from mambo_nmpc.sil.errors import FlightError, TrajectoryError
 from mambo_nmpc.sil.files.folders import new_results
 from mambo_nmpc.sil.firmware.build import builder
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
-from mambo_nmpc.sil.flight.loop import fly as simulate
 from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, flight_text, judge
 from mambo_nmpc.sil.flight.traces import Trace, write_csv, write_npz
@@ -77,7 +77,7 @@ def fly_once(options: FlyOptions) -> None:
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
         controller = _controller(options, settings) if options.on is None else _on_board(options, settings)
         with progress_bar("flying") as progress:
-            trace = simulate(flight, controller, progress)
+            trace = simulate(flight, controller, progress, engine=options.engine)
         same_bits = (
             None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
         )

@@ -10,7 +10,7 @@ import typer
 
 from mambo_nmpc.codegen.command import AsJson, Scalar, Source, load
 from mambo_nmpc.codegen.settings.toml_file import BOARDS, shipped
-from mambo_nmpc.sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
+from mambo_nmpc.sil.flight.names import CURVE_NAMES, ControllerName, EngineName, SensorsName, Start
 
 if TYPE_CHECKING:
     from mambo_nmpc.codegen.boards import Board
@@ -85,6 +85,10 @@ class FlyOptions:
             help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
         ),
     ] = None
+    engine: Annotated[
+        EngineName,
+        typer.Option(help="Simulate in compiled C, or in NumPy: some hundred times slower, the same bits."),
+    ] = "c"
     as_json: AsJson = False
 
 

@@ -1,7 +1,6 @@
 """The compiled controller: the generated C with the interface of the reference controller."""
 
 from collections.abc import Sequence
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -9,32 +8,18 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Step
-from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.representation import COMMAND, OUTCOME, STATE, TARGET, THRUST, WEIGHTS, Representation
-from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
-from mambo_nmpc.sil.controllers.extension import load_extension
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.library import build_library, ffi
 
 
-def with_default_prefix(settings: Settings) -> Settings:
-    """Return `settings` with the prefix nmpc, which the Python side expects; no computed value changes."""
-    return with_option(settings, "code.prefix", "nmpc")
-
-
-def build_extension(settings: Settings, toolchain: Toolchain) -> ModuleType:
-    """Generate the C of `settings` and build it as a Python extension; raises BuildError, CacheError."""
-    return load_extension(
-        render(with_default_prefix(settings), with_digest=False), settings.code.scalar, toolchain
-    )
-
-
-def digest_compiled(extension: ModuleType, episodes: int) -> int:
+def digest_compiled(library: Any, episodes: int) -> int:
     """Return the self-test digest, computed by the C on this machine."""
-    scratch = extension.ffi.new("nmpc_t *")
+    scratch = ffi.new("char[]", library.nmpc_batch_instance_bytes())
     digest = 0
     for episode in range(episodes):
-        digest = extension.lib.nmpc_self_test_episode(scratch, episode, digest)
+        digest = library.nmpc_self_test_episode(scratch, episode, digest)
     return digest
 
 
@@ -91,49 +76,44 @@ DIRT = b"\xa5"
 class CompiledController:
     """n controllers in generated C, with the interface of `codegen.reference.ReferenceController`."""
 
-    def __init__(self, settings: Settings, n: int = 1, extension: ModuleType | None = None) -> None:
+    def __init__(self, settings: Settings, n: int = 1, library: Any = None) -> None:
         self.settings = settings
         self._numbers = Design(settings).numbers
         self.scalar = self._numbers.scalar
         self._n = n
-        extension = extension or build_extension(settings, host_toolchain())
-        self._ffi, self._lib = extension.ffi, extension.lib
-        self._controllers = self._ffi.new("nmpc_t[]", n)
-        self._ffi.buffer(self._controllers)[:] = DIRT * self._ffi.sizeof(self._controllers)
-        self._lib.nmpc_batch_init(self._controllers, n)
+        self._library = library or build_library(settings, host_toolchain())
+        self._instance_bytes: int = self._library.nmpc_batch_instance_bytes()
+        self._controllers = ffi.new("char[]", DIRT * (n * self._instance_bytes))
+        self._library.nmpc_batch_init(self._controllers, n)
 
     @property
-    def native(self) -> tuple[int, int, int]:
-        """Address of `nmpc_batch_engine_step` and of the first controller, and the bytes to the next one."""
-        step = self._ffi.addressof(self._lib, "nmpc_batch_engine_step")
-        addresses = (int(self._ffi.cast("uintptr_t", each)) for each in (step, self._controllers))
-        return (*addresses, int(self._ffi.sizeof("nmpc_t")))
+    def native(self) -> tuple[Any, Any, int]:
+        """The function `nmpc_host_step`, the address of the first controller, and the bytes to the next."""
+        return ffi.addressof(self._library, "nmpc_host_step"), self._controllers, self._instance_bytes
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
-        return self._set_each(self._lib.nmpc_reset, "nmpc_command_t", command_rad, COMMAND)
+        return self._set_each(self._library.nmpc_host_reset, command_rad, COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
         """Set tracking and effort weight to `weights` (n, 2); returns a status (n,)."""
-        return self._set_each(self._lib.nmpc_set_weights, "nmpc_weights_t", weights, WEIGHTS)
+        return self._set_each(self._library.nmpc_host_set_weights, weights, WEIGHTS)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
         inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
         outcome = empty_outcome(self._numbers, self.settings.horizon.control, self._n, np.intc)
-        addresses = self._ffi.new("nmpc_outcome_t *", [self._address(values) for values in outcome.values()])
-        self._lib.nmpc_batch_step(self._controllers, self._n, *map(self._address, inputs), addresses)
+        addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
+        self._library.nmpc_batch_step(self._controllers, self._n, *map(_address, inputs), addresses)
         return as_step(self._numbers, outcome)
 
-    def _address(self, array: NDArray[Any]) -> Any:
-        return self._ffi.cast("void *", self._ffi.from_buffer(array))
-
-    def _set_each(
-        self, function: Any, kind: str, values: ArrayLike, quantities: Sequence[str]
-    ) -> NDArray[np.int64]:
+    def _set_each(self, function: Any, values: ArrayLike, quantities: Sequence[str]) -> NDArray[np.int64]:
         array = as_array(self._numbers, values, quantities, (self._n, 2))
-        pointer = self._ffi.cast(f"{kind} *", self._address(array))
-        return np.array(
-            [function(self._ffi.addressof(self._controllers, i), pointer + i) for i in range(self._n)],
-            np.int64,
-        )
+        status = np.empty(self._n, np.intc)
+        function(self._controllers, self._n, _address(array), ffi.cast("int *", _address(status)))
+        return status.astype(np.int64)
+
+
+def _address(array: Any) -> Any:
+    """Return a pointer to the numbers of a contiguous array, which the caller keeps alive."""
+    return ffi.from_buffer(array)

@@ -11,11 +11,19 @@ import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.errors import CacheError
+from mambo_nmpc.sil.controllers.library import open_library
 from mambo_nmpc.sil.files.cache import build_cached
 
 SOURCES: Final = ("loop.c", "pd.c")
-HEADERS: Final = ("elementary.h", "engine.h", "records.h", "rigid_body.h", "sensors.h", "vehicle.h", "world.h")
+HEADERS: Final = (
+    "elementary.h",
+    "engine.h",
+    "records.h",
+    "rigid_body.h",
+    "sensors.h",
+    "vehicle.h",
+    "world.h",
+)
 FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 
 ffi: Final = cffi.FFI()
@@ -44,13 +52,7 @@ def load(toolchain: Toolchain) -> Any:
             raise BuildError(f"{' '.join(toolchain.command)} wrote no output; set CC to a C compiler")
         return folder / "engine.so"
 
-    path = build_cached(name, build)
-    try:
-        return ffi.dlopen(str(path))
-    except OSError as error:
-        raise CacheError(
-            f"cannot load {path}: {error}; if its folder is mounted noexec, set XDG_CACHE_HOME elsewhere"
-        ) from error
+    return open_library(build_cached(name, build), ffi)
 
 
 def record_type(name: str) -> np.dtype[Any]:
@@ -60,9 +62,7 @@ def record_type(name: str) -> np.dtype[Any]:
     formats = []
     for _, member in members:
         kind = member.type
-        formats.append(
-            (kinds[kind.item.cname], kind.length) if kind.kind == "array" else kinds[kind.cname]
-        )
+        formats.append((kinds[kind.item.cname], kind.length) if kind.kind == "array" else kinds[kind.cname])
     return np.dtype(
         {
             "names": [name for name, _ in members],
@@ -73,8 +73,6 @@ def record_type(name: str) -> np.dtype[Any]:
     )
 
 
-def pointer(kind: str, array: np.ndarray[Any, Any] | None) -> Any:
-    """Return a pointer of type `kind` to the contiguous `array`, or NULL; the caller keeps the array alive."""
+def pointer(kind: str, array: Any) -> Any:
+    """Return a pointer of type `kind` to a contiguous array, which the caller keeps alive; NULL for None."""
     return ffi.NULL if array is None else ffi.cast(kind, ffi.from_buffer(array))
-
-

@@ -1,18 +1,22 @@
-"""Fly simulations in the engine where controller and machine allow it, else in NumPy: the bits are the same."""
+"""Fly simulations in the engine where controller and flight allow it, else in NumPy, with the same bits."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import ffi
 from mambo_nmpc.sil.controllers.pd import ERROR_LIMIT_M, POSITION_D_RAD_S_M, POSITION_P_RAD_M, PdController
 from mambo_nmpc.sil.engine import library
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, allocate_trace
-from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.flight.names import EngineName
+from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.plant.randomness import Purpose, generators
 from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES
 
@@ -27,22 +31,31 @@ EngineController = CompiledController | PdController
 Progress = Callable[[float], None]
 
 
-def fly(flight: Flight, controller: PositionController, progress: Progress | None = None) -> Trace:
+def fly(
+    flight: Flight,
+    controller: PositionController,
+    progress: Progress | None = None,
+    *,
+    engine: EngineName = "c",
+) -> Trace:
     """Simulate the flights and return their trace; call `progress` with the share done.
 
-    Raises FlightError as `loop.fly`, and BuildError, CacheError if the engine cannot be built.
+    Uses the engine unless `engine` is numpy, or the step of the controller is not a C function. On a machine
+    without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError.
     """
-    delayed_s = np.max(flight.link.delay_ticks)
-    if isinstance(controller, EngineController) and delayed_s <= DELAY_TICKS_MAX:
-        return fly_in_c(flight, controller, progress)
+    delay_ticks = int(np.max(flight.link.delay_ticks))
+    if engine == "c" and isinstance(controller, EngineController) and delay_ticks <= DELAY_TICKS_MAX:
+        try:
+            compiled = library.load(host_toolchain())
+        except BuildError as error:
+            warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=2)
+        else:
+            return _fly(compiled, flight, controller, progress)
     return loop.fly(flight, controller, progress)
 
 
-def fly_in_c(
-    flight: Flight, controller: EngineController, progress: Progress | None = None
-) -> Trace:
+def _fly(engine: Any, flight: Flight, controller: EngineController, progress: Progress | None) -> Trace:
     """Simulate the flights in the engine, one after the other."""
-    engine = library.load(host_toolchain())
     times_s, targets = flight.times_s(), np.ascontiguousarray(flight.targets())
     simulation = simulation_record(flight, times_s)
     flights = flight_records(flight, targets[0])
@@ -82,7 +95,10 @@ class _Buffers:
         self.drops = np.empty(updates) if np.any(flight.link.dropped_share) else None
         self._record = library.ffi.new(
             "engine_draws_t *",
-            {name: library.pointer("double *", getattr(self, name)) for name in ("sensors", "gusts", "drops")},
+            {
+                name: library.pointer("double *", getattr(self, name))
+                for name in ("sensors", "gusts", "drops")
+            },
         )
 
     def draw(self, seed: int) -> Any:
@@ -100,4 +116,9 @@ def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
     if isinstance(controller, PdController):
         return engine.engine_pd_step, library.ffi.cast("char *", _PD), 0
     step, instances, stride = controller.native
-    return library.ffi.cast("engine_controller_t", step), library.ffi.cast("char *", instances), stride
+    return _cast("engine_controller_t", step), _cast("char *", instances), stride
+
+
+def _cast(kind: str, pointer: Any) -> Any:
+    """Return a pointer of another cffi interface as one of the engine's."""
+    return library.ffi.cast(kind, int(ffi.cast("intptr_t", pointer)))

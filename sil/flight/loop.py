@@ -177,6 +177,7 @@ def fly(
                 state = vehicle.step(state, command_rad, thrust_n, heading_rad, seen=seen, moment=moment)
         if progress is not None:
             progress((update + 1) / len(times_s))
+    _unify_nan(caller.trace)
     return caller.trace
 
 
@@ -222,6 +223,14 @@ def _mark_lost(state: VehicleState) -> VehicleState:
     return VehicleState(
         np.where(lost, np.nan, state.body), state.rotor_speed_rad_s, state.attitude_integral_rad_s
     )
+
+
+def _unify_nan(trace: Trace) -> None:
+    """Replace every NaN of a trace by the same one: its sign and payload depend on the processor."""
+    for column in fields(trace):
+        values = getattr(trace, column.name)
+        if column.name not in ("time_s", "target", "status"):
+            values[np.isnan(values)] = np.nan
 
 
 def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:

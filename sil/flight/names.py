@@ -9,6 +9,8 @@ SensorsName = Literal["none", "mambo", "mambo-derotated"]
 """`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
 ControllerName = Literal["nmpc", "pd", "reference"]
 """The generated C, the stock PD, or the reference in Python."""
+EngineName = Literal["c", "numpy"]
+"""What computes a simulation; the bits are the same."""
 
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
 PD: Final = "PD"

@@ -13,9 +13,10 @@ from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import with_default_prefix
 from mambo_nmpc.sil.controllers.emulated import build_guest
+from mambo_nmpc.sil.controllers.library import with_default_prefix
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import EmulatorError
 from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
@@ -24,7 +25,7 @@ from mambo_nmpc.sil.firmware.elf import load
 from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
 from mambo_nmpc.sil.firmware.sizes import Added, measure_added
 from mambo_nmpc.sil.firmware.stack import StackReport, bound_stack
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.footprint.counts import InstructionCounts, count_instructions, draw_inputs, sample_flight

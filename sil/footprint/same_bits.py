@@ -13,8 +13,9 @@ from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.controllers.compiled import build_extension, digest_compiled
+from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.controllers.emulated import build_guest, digest_emulated
+from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.errors import EmulatorError
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, Builder, builder, clang_builder
 
@@ -54,8 +55,8 @@ def count_builds(boards: Sequence[Board]) -> int:
 def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int) -> BuildDigest:
     if shutil.which(compiler) is None:
         return BuildDigest("host", compiler, optimisation, None, f"{compiler} is missing")
-    extension = build_extension(settings, Toolchain((compiler,), optimisation))
-    return BuildDigest("host", compiler, optimisation, _format(digest_compiled(extension, episodes)))
+    library = build_library(settings, Toolchain((compiler,), optimisation))
+    return BuildDigest("host", compiler, optimisation, _format(digest_compiled(library, episodes)))
 
 
 def _on_board(

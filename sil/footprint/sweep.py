@@ -14,8 +14,9 @@ from typing import Any, Final
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.files.summary import Number, Summary
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.paper.table2 import CASES

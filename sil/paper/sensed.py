@@ -9,8 +9,9 @@ import numpy as np
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.files.summary import Number, Summary
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace

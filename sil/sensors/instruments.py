@@ -75,7 +75,7 @@ class Readings:
 def noise_deviations(sensors: Sensors, flights: int) -> FloatArray:
     """Return the standard deviations of the noise (8, n), in the order of `NOISE_VARIANCES`."""
     deviations = np.sqrt(np.array(NOISE_VARIANCES))[:, np.newaxis]
-    return deviations * np.broadcast_to(np.asarray(sensors.noise_scale, np.float64), flights)
+    return np.asarray(deviations * np.broadcast_to(np.asarray(sensors.noise_scale, np.float64), flights))
 
 
 class Instruments:

@@ -9,8 +9,8 @@ import numpy as np
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
-from mambo_nmpc.sil.controllers.extension import load_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import build_library, load_library
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.report import table, write_csv
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, scenarios
@@ -30,18 +30,17 @@ def check(subject: Subject) -> Result:
 def controller(subject: Subject, n: int) -> CompiledController:
     """Compile the C in the subject's bundle, and return n controllers; raises BuildError and CacheError.
 
-    The compiled extension requires the prefix nmpc: for another prefix the C is generated again with nmpc.
+    The library requires the prefix nmpc: for another prefix the C is generated again with nmpc.
     """
     settings = subject.settings
     if settings.code.prefix != "nmpc":
-        return CompiledController(settings, n, build_extension(settings, host_toolchain()))
+        return CompiledController(settings, n, build_library(settings, host_toolchain()))
     files = {
         path.relative_to(subject.bundle).as_posix(): path.read_text("utf-8")
         for part in ("include", "src")
         for path in sorted((subject.bundle / part).glob("*.[ch]"))
     }
-    extension = load_extension(files, settings.code.scalar, host_toolchain())
-    return CompiledController(settings, n, extension)
+    return CompiledController(settings, n, load_library(files, host_toolchain()))
 
 
 def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:

@@ -20,7 +20,8 @@ from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WE
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.verify.calls import ApiFunction, Tape, answers, calls
 from tests.support.cases import settings_case
 from tests.support.strategies import Values, toml, valid_values
@@ -220,7 +221,7 @@ def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
     state = np.zeros((2, 7))
     state[:, 2:7] = [30.0, -20.0, 0.3, -0.2, 1.0]
     state[:, 0] = limit_m, limit_m + 500.0
-    step = CompiledController(MAMBO, 2, build_extension(MAMBO, toolchain("gcc"))).step(
+    step = CompiledController(MAMBO, 2, build_library(MAMBO, toolchain("gcc"))).step(
         state, np.zeros((2, 4)), np.full(2, 9.81)
     )
     for values in (step.command_rad, step.gradient, step.converged, step.cost):

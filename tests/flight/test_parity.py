@@ -7,7 +7,8 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
@@ -32,8 +33,8 @@ def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str
     """All arrays of the trace are equal bit for bit; the closed loop would amplify any difference."""
     settings = with_option(presets.load(preset), "code.scalar", scalar)
     flight = CONDITIONS[condition]
-    extension = build_extension(settings, toolchain("gcc"))
-    ours, theirs = ReferenceController(Design(settings)), CompiledController(settings, extension=extension)
+    library = build_library(settings, toolchain("gcc"))
+    ours, theirs = ReferenceController(Design(settings)), CompiledController(settings, library=library)
     assert fly(flight, ours).same_bits(fly(flight, theirs))
 
 
@@ -45,8 +46,8 @@ def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) ->
     flight = Flight(CASE)
     expected = fly(flight, ReferenceController(Design(settings)))
     for compiler in (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2")):
-        extension = build_extension(settings, toolchain(*compiler))
-        assert fly(flight, CompiledController(settings, extension=extension)).same_bits(expected)
+        library = build_library(settings, toolchain(*compiler))
+        assert fly(flight, CompiledController(settings, library=library)).same_bits(expected)
 
 
 def indices(preset: str, scalar: str, flight: Flight) -> np.ndarray:

@@ -16,7 +16,7 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
-from mambo_nmpc.sil.controllers.extension import batch_source
+from mambo_nmpc.sil.controllers.library import batch_source
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.emulation.unicorn import UnicornMachine
 from mambo_nmpc.sil.firmware.disassembly import disassemble

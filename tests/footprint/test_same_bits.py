@@ -17,7 +17,7 @@ from mambo_nmpc.codegen.settings.controller_toml import read, with_option
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.controllers.emulated import GUEST, digest_emulated
-from mambo_nmpc.sil.controllers.extension import batch_source, load_extension
+from mambo_nmpc.sil.controllers.library import batch_source, load_library
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, builder, clang_builder
 from mambo_nmpc.sil.footprint.same_bits import (
     BOARD_COMPILERS,
@@ -105,8 +105,8 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
 def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:
     """The digests are equal for extreme horizons and narrow ranges too."""
     settings = settings_case(index, scalar)
-    extension = load_extension(render(settings, with_digest=False), scalar, toolchain("gcc"))
-    assert digest_compiled(extension, 5) == self_test_digest(Design(settings), 5)
+    library = load_library(render(settings, with_digest=False), toolchain("gcc"))
+    assert digest_compiled(library, 5) == self_test_digest(Design(settings), 5)
 
 
 def test_self_test_steps_end_in_every_way() -> None:
@@ -172,5 +172,5 @@ def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
     }
     stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
     assert stated
-    extension = load_extension(files, settings.code.scalar, toolchain(host_toolchain().command[0]))
-    assert digest_compiled(extension, episode_count(settings)) == int(stated[1], 16)
+    library = load_library(files, toolchain(host_toolchain().command[0]))
+    assert digest_compiled(library, episode_count(settings)) == int(stated[1], 16)

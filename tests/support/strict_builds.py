@@ -12,7 +12,7 @@ from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
 from mambo_nmpc.codegen.render import render, with_prefix
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.extension import batch_source
+from mambo_nmpc.sil.controllers.library import batch_source
 from tests.support.bundles import place
 from tests.support.tools import require
 

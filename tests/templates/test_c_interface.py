@@ -1,7 +1,6 @@
 """What a caller of the generated C may rely on, whatever it passes in."""
 
 from functools import cache
-from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
@@ -16,8 +15,9 @@ from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
-from mambo_nmpc.sil.controllers.extension import load_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import build_library
+from tests.support.extension import build_extension, load_extension
 from tests.support.parity import Controller
 from tests.support.tools import toolchain
 
@@ -26,9 +26,9 @@ HOVER_STATE, HOVER_TARGET, HOVER_THRUST = np.zeros(7), np.array([0.5, -0.4, 0.0,
 
 
 @cache
-def built(settings: Settings) -> ModuleType:
+def built(settings: Settings) -> Any:
     """Build the C of `settings`, once for all tests."""
-    return build_extension(settings, toolchain("gcc"))
+    return build_library(settings, toolchain("gcc"))
 
 
 def controller(kind: str, n: int = 1) -> Controller:
@@ -139,7 +139,7 @@ def test_weights_change_the_cost_and_bad_ones_nothing(kind: str) -> None:
 
 def test_null_pointers_get_a_status_and_a_safe_command() -> None:
     """Each argument null by itself: a status, and the last good command where there is room for one."""
-    extension = built(MAMBO)
+    extension = build_extension(MAMBO)
     ffi, lib = extension.ffi, extension.lib
     self = ffi.new("nmpc_t *")
     state, target = ffi.new("nmpc_state_t *"), ffi.new("nmpc_target_t *", {"position_m": [0.5, 0.5]})
@@ -200,14 +200,14 @@ def test_the_self_test_passes_and_names_the_first_difference() -> None:
     third = vectors.split("NMPC_OK,\n")[2]
     harmed = vectors.replace(third, third.replace("{ ", "{ 0.001f + ", 1))
     for text, expected in ((vectors, 0), (harmed, 2)):
-        extension = load_extension(files | {"src/nmpc_self_test.c": text}, "float32", toolchain("gcc"))
+        extension = load_extension(files | {"src/nmpc_self_test.c": text}, "float32")
         scratch = extension.ffi.new("nmpc_t *")
         assert extension.lib.nmpc_self_test(scratch) == expected
 
 
 def test_the_version_traces_a_binary_to_its_settings() -> None:
     """The string in the binary names the generator and the digest of the settings."""
-    extension = built(MAMBO)
+    extension = build_extension(MAMBO)
     text = extension.ffi.string(extension.lib.nmpc_version()).decode()
     assert text.startswith("mambo-nmpc ")
     assert text.endswith(f"settings {MAMBO.digest[:16]}")

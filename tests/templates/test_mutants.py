@@ -7,7 +7,7 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.extension import load_extension
+from mambo_nmpc.sil.controllers.library import load_library
 from tests.support.parity import Run, differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 
@@ -56,8 +56,8 @@ def expected() -> Run:
 
 def found(files: dict[str, str]) -> Run:
     """Build the C in `files`, without optimisation to save time, and run it through the same inputs."""
-    extension = load_extension(files, BACKTRACKING.code.scalar, toolchain("gcc", "-O0"))
-    return run(CompiledController(BACKTRACKING, CASES, extension), INPUTS, seed=0)
+    library = load_library(files, toolchain("gcc", "-O0"))
+    return run(CompiledController(BACKTRACKING, CASES, library), INPUTS, seed=0)
 
 
 def test_the_generated_code_passes(expected: Run) -> None:

@@ -1,6 +1,5 @@
 """The generated C computes the bits of the reference: per sub-block, then whole steps."""
 
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,10 @@ from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
-from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import build_library
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
+from tests.support.extension import build_extension
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 
@@ -34,7 +35,7 @@ class SubBlocks:
     """The C of one set of settings, sub-block by sub-block."""
 
     def __init__(self, settings: Settings) -> None:
-        extension: ModuleType = build_extension(settings, toolchain("gcc"))
+        extension = build_extension(settings)
         self.design = Design(settings)
         self.products = arithmetic(self.design)
         self.numbers = self.products.numbers
@@ -157,8 +158,8 @@ def test_steps_equal_the_reference(index: int, scalar: str) -> None:
     n = 250
     inputs = inputs_of_steps(settings, n, steps=4, seed=index)
     expected = run(ReferenceController(Design(settings), n), inputs, index)
-    extension = build_extension(settings, toolchain("gcc"))
-    assert differences(expected, run(CompiledController(settings, n, extension), inputs, index)) == {}
+    library = build_library(settings, toolchain("gcc"))
+    assert differences(expected, run(CompiledController(settings, n, library), inputs, index)) == {}
 
 
 @pytest.mark.long
@@ -168,10 +169,10 @@ def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int,
     """In 100,000 cases of each of 50 settings no bit differs, at every optimisation, with gcc and clang."""
     settings = settings_case(index, scalar)
     chunk = 5000
-    extensions = [build_extension(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
+    libraries = [build_library(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
     for seed in range(5):
         inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
         expected = run(ReferenceController(Design(settings), chunk), inputs, seed)
-        for (compiler, level), extension in zip(BUILDS, extensions, strict=True):
-            found = run(CompiledController(settings, chunk, extension), inputs, seed)
+        for (compiler, level), library in zip(BUILDS, libraries, strict=True):
+            found = run(CompiledController(settings, chunk, library), inputs, seed)
             assert differences(expected, found) == {}, f"{compiler} {level} for {settings!r}"

@@ -12,7 +12,8 @@ import pytest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController, build_extension
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.errors import CacheError
 from mambo_nmpc.sil.files.cache import build_cached, cache_folder
 from tests.support.tools import require
@@ -84,11 +85,11 @@ def test_a_build_happens_once_unless_its_file_is_damaged(empty_cache: Path) -> N
 
 def test_what_cannot_be_loaded_is_refused(empty_cache: Path) -> None:
     """The message names the folder, and what to set if it may hold no programs."""
-    script = 'case "$*" in *extension.so) echo no library > extension.so;; esac'
+    script = 'case "$*" in *nmpc.so) echo no library > nmpc.so;; esac'
     with pytest.raises(
         CacheError, match=rf"cannot load {empty_cache}/.*noexec, set XDG_CACHE_HOME elsewhere"
     ):
-        build_extension(MAMBO, Toolchain(("sh", "-c", script, "cc")))
+        build_library(MAMBO, Toolchain(("sh", "-c", script, "cc")))
 
 
 def test_what_killed_builds_left_is_cleared(empty_cache: Path) -> None:
@@ -177,4 +178,4 @@ def test_a_refusing_compiler_is_quoted() -> None:
     """A flag that the compiler does not know: its own words, and nothing cached."""
     require("gcc", "gcc")
     with pytest.raises(BuildError, match=r"(?s)failed:.*--no-such-flag"):
-        build_extension(MAMBO, Toolchain(("gcc", "--no-such-flag")))
+        build_library(MAMBO, Toolchain(("gcc", "--no-such-flag")))

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * What Python and the engine of the simulation call besides batch.c. Compiled with a bundle, not part of it.
+ */
+#include <stdint.h>
+
+#include "nmpc.h"
+
+/* Python passes arrays of numbers where the C reads structs. */
+typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
+typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == 4 * sizeof(nmpc_real_t)) ? 1 : -1];
+typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
+typedef char assert_weights_are_an_array[(sizeof(nmpc_weights_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
+
+void nmpc_host_reset(nmpc_t *controllers, int n, const nmpc_command_t *command, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_reset(&controllers[i], &command[i]);
+    }
+}
+
+void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *weights, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_set_weights(&controllers[i], &weights[i]);
+    }
+}
+
+#ifdef NMPC_ANGLE_BITS
+/* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */
+static nmpc_real_t quantize(double value, int bits)
+{
+    const double scaled = value * (double)((nmpc_sum_t)1 << bits);
+    nmpc_real_t number = 2147483647;
+
+    if ((scaled > -2147483647.0) && (scaled < 2147483647.0)) {
+        number = (nmpc_real_t)scaled;
+        number += (nmpc_real_t)(2.0 * (scaled - (double)number));
+    }
+    return number;
+}
+#define NUMBER(value, quantity) quantize(value, NMPC_##quantity##_BITS)
+#define ANGLE_RAD(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_ANGLE_BITS))
+#else
+#define NUMBER(value, quantity) ((nmpc_real_t)(value))
+#define ANGLE_RAD(number) ((double)(number))
+#endif
+
+/* One step of one controller in SI units, for the engine of the simulation. */
+int64_t nmpc_host_step(void *self, const double *state, const double *target,
+                       double thrust_acceleration_m_s2, double *command_rad)
+{
+    nmpc_state_t measured;
+    nmpc_target_t wanted;
+    nmpc_command_t command;
+    nmpc_status_t status;
+    int i;
+
+    for (i = 0; i < 2; i++) {
+        measured.position_m[i] = NUMBER(state[i], POSITION);
+        measured.velocity_m_s[i] = NUMBER(state[2 + i], VELOCITY);
+        wanted.position_m[i] = NUMBER(target[i], POSITION);
+        wanted.velocity_m_s[i] = NUMBER(target[2 + i], VELOCITY);
+    }
+    measured.roll_rad = NUMBER(state[4], ANGLE);
+    measured.pitch_rad = NUMBER(state[5], ANGLE);
+    measured.yaw_rad = NUMBER(state[6], YAW);
+    status = nmpc_step((nmpc_t *)self, &measured, &wanted, NUMBER(thrust_acceleration_m_s2, THRUST), &command);
+    command_rad[0] = ANGLE_RAD(command.roll_rad);
+    command_rad[1] = ANGLE_RAD(command.pitch_rad);
+    return (int64_t)status;
+}

@@ -1,0 +1,97 @@
+"""Build a bundle as a Python extension, so that tests reach its sub-blocks and the members of its structs.
+
+In cffi's API mode the C compiler checks the declarations below against the bundle's headers.
+"""
+
+import hashlib
+import importlib.machinery
+import importlib.util
+import re
+import sys
+import sysconfig
+from pathlib import Path
+from types import ModuleType
+from typing import Final
+
+import cffi
+
+from mambo_nmpc.codegen.flags import COMPILE_FLAGS
+from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
+from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.library import with_default_prefix
+from mambo_nmpc.sil.files.cache import build_cached
+from tests.support.bundles import place
+from tests.support.tools import toolchain
+
+_DECLARATIONS: Final = """
+typedef REAL nmpc_real_t;
+typedef SUM nmpc_sum_t;
+typedef int... nmpc_status_t;
+typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
+typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
+typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
+typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
+typedef struct { nmpc_real_t error_m, displacement_m_step, acceleration_m_step2; ...; } nmpc_rollout_t;
+typedef struct {
+    nmpc_real_t gain_x_m_step2_rad[2], gain_y_m_step2_rad[2];
+    nmpc_rollout_t x, y;
+    ...;
+} nmpc_prediction_t;
+typedef struct {
+    nmpc_weights_t weights;
+    nmpc_prediction_t prediction;
+    nmpc_real_t command_rad[2], plan_rad[...];
+    nmpc_sum_t gradient[...];
+    ...;
+} nmpc_t;
+void nmpc_init(nmpc_t *);
+nmpc_status_t nmpc_reset(nmpc_t *, const nmpc_command_t *);
+nmpc_status_t nmpc_set_weights(nmpc_t *, const nmpc_weights_t *);
+nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_command_t *);
+const char *nmpc_version(void);
+int nmpc_self_test(nmpc_t *);
+unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
+
+void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
+void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
+void nmpc_predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
+                                nmpc_rollout_t *);
+void nmpc_predictor_step(nmpc_rollout_t *);
+nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
+"""
+_INCLUDES: Final = "".join(
+    f'#include "nmpc_{name}.h"\n' for name in ("cost", "math", "predictor", "self_test")
+)
+
+
+def build_extension(settings: Settings) -> ModuleType:
+    """Generate the C of `settings`, build it with gcc and return a module with cffi's `ffi` and `lib`."""
+    return load_extension(render(with_default_prefix(settings), with_digest=False), settings.code.scalar)
+
+
+def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
+    """Return the extension of a bundle with prefix nmpc; builds it with gcc unless it is cached."""
+    contents = (files, _INCLUDES, _DECLARATIONS)
+    name = f"_nmpc_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}"
+    if name not in sys.modules:
+
+        def build(folder: Path) -> Path:
+            place(files, folder)
+            ffi = cffi.FFI()
+            ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar]))
+            ffi.set_source(name, _INCLUDES, compiler_verbose=0)
+            ffi.emit_c_code(str(folder / "extension.c"))
+            sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
+            headers = ["-Iinclude", "-Isrc", f"-I{sysconfig.get_paths()['include']}"]
+            flags = [*COMPILE_FLAGS, "-fPIC", "-shared"]
+            toolchain("gcc").run([*flags, *headers, *sources, "extension.c", "-o", "extension.so"], folder)
+            return folder / "extension.so"
+
+        path = build_cached(f"{name}{sysconfig.get_config_var('EXT_SUFFIX')}", build)
+        loader = importlib.machinery.ExtensionFileLoader(name, str(path))
+        spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+        assert spec is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        loader.exec_module(sys.modules[name])
+    return sys.modules[name]
