@@ -13,6 +13,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.library import open_library
 from mambo_nmpc.sil.files.cache import build_cached
+from mambo_nmpc.sil.plant import elementary
 
 SOURCES: Final = ("loop.c", "pd.c")
 HEADERS: Final = (
@@ -24,6 +25,11 @@ HEADERS: Final = (
     "vehicle.h",
     "world.h",
 )
+CONSTANTS: Final = (
+    *("TURNS_PER_RAD", "MOST_TURNS", "TURN_HIGH", "TURN_MIDDLE", "TURN_LOW", "SINE", "COSINE"),
+    *("ARC_EDGES", "ARC_HIGH", "ARC_LOW", "ARC_TANGENT", "HALF_PI_HIGH", "HALF_PI_LOW"),
+)
+"""Names of the constants in sil/plant/elementary.py that the engine uses."""
 FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 
 ffi: Final = cffi.FFI()
@@ -33,7 +39,21 @@ ffi.cdef(resources.files("mambo_nmpc.sil.engine").joinpath("records.h").read_tex
 def texts() -> dict[str, str]:
     """Return the engine's C by file name."""
     folder = resources.files("mambo_nmpc.sil.engine")
-    return {name: folder.joinpath(name).read_text("utf-8") for name in (*SOURCES, *HEADERS)}
+    files = {name: folder.joinpath(name).read_text("utf-8") for name in (*SOURCES, *HEADERS)}
+    return files | {"constants.h": _constants()}
+
+
+def _constants() -> str:
+    """Return the constants of `elementary` as C, in hexadecimal and so to the last bit."""
+    lines = []
+    for name in CONSTANTS:
+        values = np.asarray(getattr(elementary, name), np.float64)
+        if values.ndim == 0:
+            lines.append(f"#define {name} {float(values).hex()}")
+        else:
+            spelled = ", ".join(float(value).hex() for value in values)
+            lines.append(f"static const double {name}[] = {{ {spelled} }};")
+    return "\n".join(lines) + "\n"
 
 
 @lru_cache

@@ -55,13 +55,13 @@ def _arc(quarters: int) -> Decimal:
 
 
 _TURN_BITS: Final = 20
-_MOST_TURNS: Final = np.array(2.0**_TURN_BITS)
+MOST_TURNS: Final = np.array(2.0**_TURN_BITS)
 """Quarter turns that `sine_cosine` can subtract."""
-_TURN_HIGH, _TURN_MIDDLE, _TURN_LOW = _constants(split_quarter_turn("float64", _TURN_BITS))
+TURN_HIGH, TURN_MIDDLE, TURN_LOW = _constants(split_quarter_turn("float64", _TURN_BITS))
 _TURN_SINES, _TURN_COSINES = np.array([0.0, 1.0, 0.0, -1.0]), np.array([1.0, 0.0, -1.0, 0.0])
 _LAST_QUADRANT: Final = np.array(3)
-_TURNS_PER_RAD: Final = np.array(trigonometry("float64").quarter_turns_per_rad)
-_SINE, _COSINE = _constants(trigonometry("float64").sine), _constants(trigonometry("float64").cosine)
+TURNS_PER_RAD: Final = np.array(trigonometry("float64").quarter_turns_per_rad)
+SINE, COSINE = _constants(trigonometry("float64").sine), _constants(trigonometry("float64").cosine)
 _ONE: Final = np.array(1.0)
 
 _LN2_BITS: Final = 32
@@ -77,11 +77,11 @@ with localcontext() as _context:
     _LN2_HIGH = int(_LN2 * 2**_LN2_BITS) / 2**_LN2_BITS
     _LN2_LOW = float(_LN2 - Decimal(_LN2_HIGH))
     _ROOT_HALF_BITS = int(np.float64(Decimal("0.5").sqrt()).view(np.int64))
-    _HALF_PI_HIGH, _HALF_PI_LOW = _pair(2 * _arc(4))
-    _ARC_HIGH, _ARC_LOW = np.array([_pair(_arc(quarters)) for quarters in range(5)]).T
+    HALF_PI_HIGH, HALF_PI_LOW = _pair(2 * _arc(4))
+    ARC_HIGH, ARC_LOW = np.array([_pair(_arc(quarters)) for quarters in range(5)]).T
 
-_ARC_EDGES: Final = np.array([0.1875, 0.375, 0.625, 0.875])
-_ARC_TANGENT: Final = _constants((1 - 2 * (n % 2)) / (2 * n + 1) for n in range(1, 11))
+ARC_EDGES: Final = np.array([0.1875, 0.375, 0.625, 0.875])
+ARC_TANGENT: Final = _constants((1 - 2 * (n % 2)) / (2 * n + 1) for n in range(1, 11))
 _EXPONENTIAL: Final = _constants(1.0 / factorial(n) for n in range(2, 14))
 _LOGARITHM: Final = _constants(2.0 / (2 * n + 1) for n in range(1, 11))
 
@@ -106,13 +106,13 @@ def sine_cosine(angle_rad: ArrayLike) -> tuple[FloatArray, FloatArray]:
     is +0. Sums of products with 0 and +/- 1 select here: NumPy is faster with them than with `where`.
     """
     angle = np.asarray(angle_rad, np.float64)
-    turns = np.rint(angle * _TURNS_PER_RAD)
+    turns = np.rint(angle * TURNS_PER_RAD)
     if not np.count_nonzero(turns):  # then r is the angle
         return _series(angle)
-    inside = np.abs(turns) <= _MOST_TURNS
+    inside = np.abs(turns) <= MOST_TURNS
     if np.count_nonzero(inside) != inside.size:
         angle, turns = np.where(inside, angle, nan), np.where(inside, turns, 0.0)
-    rest = ((angle - (turns * _TURN_HIGH)) - (turns * _TURN_MIDDLE)) - (turns * _TURN_LOW)
+    rest = ((angle - (turns * TURN_HIGH)) - (turns * TURN_MIDDLE)) - (turns * TURN_LOW)
     sine, cosine = _series(rest)
     quadrant = turns.astype(np.int64) & _LAST_QUADRANT
     turn_sine, turn_cosine = _TURN_SINES.take(quadrant), _TURN_COSINES.take(quadrant)
@@ -122,8 +122,8 @@ def sine_cosine(angle_rad: ArrayLike) -> tuple[FloatArray, FloatArray]:
 def _series(rest: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return sine and cosine of angles within +/- pi/4."""
     square = rest * rest
-    sine = rest + (rest * (square * _polynomial(square, _SINE)))
-    return sine, _ONE + (square * _polynomial(square, _COSINE))
+    sine = rest + (rest * (square * _polynomial(square, SINE)))
+    return sine, _ONE + (square * _polynomial(square, COSINE))
 
 
 def arc_tangent(x: ArrayLike) -> FloatArray:
@@ -141,12 +141,12 @@ def arc_tangent(x: ArrayLike) -> FloatArray:
     size = np.abs(number)
     steep = size > 1.0
     b = np.where(steep, 1.0 / np.where(steep, size, 1.0), size)
-    nearest = np.searchsorted(_ARC_EDGES, b, side="right")
+    nearest = np.searchsorted(ARC_EDGES, b, side="right")
     c = 0.25 * nearest
     t = (b - c) / (1.0 + (b * c))
     z = t * t
-    y = _ARC_HIGH[nearest] + (_ARC_LOW[nearest] + (t + (t * (z * _polynomial(z, _ARC_TANGENT)))))
-    value: FloatArray = np.copysign(np.where(steep, _HALF_PI_HIGH - (y - _HALF_PI_LOW), y), number)
+    y = ARC_HIGH[nearest] + (ARC_LOW[nearest] + (t + (t * (z * _polynomial(z, ARC_TANGENT)))))
+    value: FloatArray = np.copysign(np.where(steep, HALF_PI_HIGH - (y - HALF_PI_LOW), y), number)
     return value
 
 
@@ -159,7 +159,7 @@ def arc_sine(x: ArrayLike) -> FloatArray:
 
 def arc_cosine(x: ArrayLike) -> FloatArray:
     """Return the arc cosine (...) of x (...): pi/2 as a float64, minus arcsin x."""
-    return _HALF_PI_HIGH - arc_sine(x)
+    return HALF_PI_HIGH - arc_sine(x)
 
 
 def exponential(x: ArrayLike) -> FloatArray:

@@ -6,10 +6,12 @@ import platform
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from mambo_nmpc.sil.flight.names import EngineName
 from tests.support.golden_flights import GOLDEN
 
 ROOT = Path(__file__).parents[2]
@@ -32,10 +34,11 @@ def run(*command: str, processor: str) -> str:
     ).stdout
 
 
+@pytest.mark.parametrize("engine", get_args(EngineName))
 @pytest.mark.parametrize("processor", PROCESSORS)
-def test_flights_have_the_committed_digests(processor: str) -> None:
+def test_flights_have_the_committed_digests(processor: str, engine: EngineName) -> None:
     """In every bit of their traces; `python -m tests.support.golden_flights --write` writes them anew."""
-    flown = json.loads(run("-m", "tests.support.golden_flights", processor=processor))
+    flown = json.loads(run("-m", "tests.support.golden_flights", engine, processor=processor))
     assert flown == json.loads(GOLDEN.read_text("utf-8"))
 
 

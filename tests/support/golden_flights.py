@@ -1,6 +1,7 @@
 """Short flights of every kind and the digests of their traces, which must be the same on every processor.
 
-python -m tests.support.golden_flights           print the digests as JSON
+python -m tests.support.golden_flights c         print the digests of flights in the engine as JSON
+python -m tests.support.golden_flights numpy     print those of flights in NumPy
 python -m tests.support.golden_flights --write   write them to the golden file; read the diff
 """
 
@@ -14,7 +15,8 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.campaign.file import default, scenario
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.flight.loop import fly
+from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
@@ -42,7 +44,7 @@ SCENARIOS: Final = {
 }
 
 
-def digests() -> dict[str, str]:
+def digests(engine: EngineName) -> dict[str, str]:
     """Fly every scenario with the PD and with the preset; return the digests of the traces."""
     settings = presets.load(PRESET)
     batches = defaultdict(list)
@@ -51,16 +53,15 @@ def digests() -> dict[str, str]:
     found: dict[str, str] = {}
     for names in batches.values():
         flight = flight_of([SCENARIOS[name] for name in names], settings.horizon.update_period_s)
-        traces = {"PD": fly(flight, PdController())}
-        traces[PRESET] = fly(flight, CompiledController(settings, len(names)))
+        traces = {"PD": fly(flight, PdController(), engine=engine)}
+        traces[PRESET] = fly(flight, CompiledController(settings, len(names)), engine=engine)
         for index, name in enumerate(names):
             found |= {f"{name}: {controller}": trace.digest(index) for controller, trace in traces.items()}
     return found
 
 
 if __name__ == "__main__":
-    text = json.dumps(digests(), indent=2) + "\n"
     if sys.argv[1:] == ["--write"]:
-        GOLDEN.write_text(text, "utf-8")
+        GOLDEN.write_text(json.dumps(digests("numpy"), indent=2) + "\n", "utf-8")
     else:
-        print(text, end="")
+        print(json.dumps(digests("c" if sys.argv[1:] == ["c"] else "numpy"), indent=2))
