@@ -1,6 +1,8 @@
 """Build the engine with the host's compiler, once per machine, and load it."""
 
 import hashlib
+import platform
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -30,7 +32,11 @@ CONSTANTS: Final = (
     *("ARC_EDGES", "ARC_HIGH", "ARC_LOW", "ARC_TANGENT", "HALF_PI_HIGH", "HALF_PI_LOW"),
 )
 """Names of the constants in sil/plant/elementary.py that the engine uses."""
-FLAGS: Final = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+FLAGS: Final = (
+    *("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared"),
+    *(("-mno-fma",) if platform.machine() in ("x86_64", "AMD64", "i686") else ()),
+)
+"""gcc 12 fuses operations in spite of -ffp-contract=off if CC has -mfma or -march=native."""
 
 ffi: Final = cffi.FFI()
 ffi.cdef(resources.files("mambo_nmpc.sil.engine").joinpath("records.h").read_text("utf-8"))
@@ -59,7 +65,11 @@ def _constants() -> str:
 @lru_cache
 def load(toolchain: Toolchain) -> Any:
     """Return the engine, built with `toolchain` unless it is cached; raises BuildError, CacheError."""
-    files = texts()
+    return load_texts(texts(), toolchain)
+
+
+def load_texts(files: Mapping[str, str], toolchain: Toolchain) -> Any:
+    """Return the engine of the C in `files`; raises BuildError, CacheError."""
     contents = (files, FLAGS, toolchain, toolchain.identity())
     name = f"engine_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
 

@@ -50,12 +50,14 @@ def fly(
         except BuildError as error:
             warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=2)
         else:
-            return _fly(compiled, flight, controller, progress)
+            return fly_compiled(compiled, flight, controller, progress)
     return loop.fly(flight, controller, progress)
 
 
-def _fly(engine: Any, flight: Flight, controller: EngineController, progress: Progress | None) -> Trace:
-    """Simulate the flights in the engine, one after the other."""
+def fly_compiled(
+    engine: Any, flight: Flight, controller: EngineController, progress: Progress | None = None
+) -> Trace:
+    """Simulate the flights in a library of `library.load`, one after the other."""
     times_s, targets = flight.times_s(), np.ascontiguousarray(flight.targets())
     simulation = simulation_record(flight, times_s)
     flights = flight_records(flight, targets[0])

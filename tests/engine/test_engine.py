@@ -1,0 +1,194 @@
+"""The engine computes the bits of the NumPy simulation, whatever is flown and however it is compiled."""
+
+import re
+import subprocess
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import cffi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
+from mambo_nmpc.sil.flight import loop
+from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.plant import elementary
+from mambo_nmpc.sil.plant.link import Link
+from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH, scenarios
+from tests.support.tools import require, toolchain
+
+MAMBO = presets.load("mambo")
+PERIOD_S = MAMBO.horizon.update_period_s
+SCALARS = ("float32", "float64", "fixed")
+BATCHES = {"truth": TRUTH, "sensed": SENSED, "coupled": COUPLED, "take-off": TAKE_OFF}
+BUILDS = [
+    Toolchain(("gcc",), "-O0"),
+    Toolchain(("gcc",), "-O3"),
+    Toolchain(("gcc", "-mavx2", "-mfma")),
+    Toolchain(("clang",)),
+    Toolchain(("clang", "-mavx2", "-mfma"), "-O3"),
+]
+
+
+def controller(kind: str, n: int) -> CompiledController | PdController:
+    """Make n controllers: the PD, or preset mambo in a scalar type."""
+    if kind == "pd":
+        return PdController()
+    return CompiledController(with_option(MAMBO, "code.scalar", kind, "test"), n)
+
+
+def assert_same_bits(flight: Flight, kind: str) -> None:
+    """Fly in C and in NumPy, and compare every array."""
+    toolchain("gcc")
+    ours = fly(flight, controller(kind, flight.flights))
+    theirs = loop.fly(flight, controller(kind, flight.flights))
+    assert type(ours) is type(theirs)
+    for column in fields(theirs):
+        assert getattr(ours, column.name).tobytes() == getattr(theirs, column.name).tobytes(), column.name
+
+
+@pytest.mark.parametrize("kind", ["pd", *SCALARS])
+@pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)
+def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...], kind: str) -> None:
+    """Every array of the trace: every disturbance, sensor, gate, and flights that are lost."""
+    assert_same_bits(flight_of(batch, PERIOD_S), kind)
+
+
+@settings(max_examples=25)
+@given(data=st.data())
+def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
+    """One or two drawn flights, without sensors or through them."""
+    shared = {
+        "duration_s": 0.5,
+        "sensors": data.draw(st.sampled_from(["none", "mambo", "mambo-derotated"])),
+        "start": "take-off" if data.draw(st.integers(0, 9)) == 0 else "hover",
+    }
+    batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=2))
+    assert_same_bits(flight_of(batch, PERIOD_S), data.draw(st.sampled_from(["pd", *SCALARS])))
+
+
+def digests(engine: Any) -> list[str]:
+    """Fly every batch in `engine`; return the digests of all flights."""
+    found = []
+    for batch in BATCHES.values():
+        trace = fly_compiled(engine, flight_of(batch, PERIOD_S), PdController())
+        found += [trace.digest(index) for index in range(len(batch))]
+    return found
+
+
+@pytest.mark.parametrize(
+    "build", BUILDS, ids=[" ".join((*build.command, build.optimisation or "-O2")) for build in BUILDS]
+)
+def test_every_build_has_the_same_bits(build: Toolchain) -> None:
+    """Compilers, optimisations, and a processor with fused operations."""
+    expected = digests(library.load(toolchain("gcc")))
+    require(build.command[0], build.command[0])
+    assert digests(library.load(build)) == expected
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_no_operation_is_fused(compiler: str, tmp_path: Path) -> None:
+    """Even where the compiler may use them, for they round once instead of twice."""
+    path = require(compiler, compiler)
+    for name, text in library.texts().items():
+        (tmp_path / name).write_text(text, "utf-8")
+    flags = ["-mavx2", "-mfma", *library.FLAGS, *library.SOURCES, "-o", "engine.so", "-lm"]
+    subprocess.run([path, *flags], cwd=tmp_path, check=True)
+    code = subprocess.run(
+        [require("objdump", "binutils"), "-d", "engine.so"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert re.search(r"\bvmulsd\b", code)
+    assert not re.search(r"\bvf(n?m)(add|sub)", code)
+
+
+def test_the_engine_compiles_without_a_warning(tmp_path: Path) -> None:
+    """Of gcc and of clang."""
+    for name, text in library.texts().items():
+        (tmp_path / name).write_text(text, "utf-8")
+    warnings = ["-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Wundef", "-Wmissing-prototypes", "-Werror"]
+    for compiler in ("gcc", "clang"):
+        command = [require(compiler, compiler), "-std=c99", "-O2", *warnings, "-c", *library.SOURCES]
+        subprocess.run(command, cwd=tmp_path, check=True)
+
+
+NUMBERS = np.concatenate(
+    [
+        np.random.default_rng(0).uniform(-10.0, 10.0, 20_000),
+        np.random.default_rng(1).uniform(-2e6, 2e6, 5_000),
+        np.arange(-40, 41) * (np.pi / 4.0),
+        [0.0, -0.0, 1e-310, -1e-310, np.inf, -np.inf, np.nan, 1e300, 0.1875, 0.375, 0.625, 0.875, 1.0],
+    ]
+)
+
+
+def test_elementary_functions_have_the_bits_of_numpy(tmp_path: Path) -> None:
+    """Sine, cosine, arc tangent and arc sine of 25,000 numbers, corners among them."""
+    files = library.texts() | {
+        "loop.c": '#include "elementary.h"\n'
+        "void table(const double *x, double *y, int n)\n{\n    int i;\n    for (i = 0; i < n; i++) {\n"
+        "        sine_cosine(x[i], &y[4 * i], &y[4 * i + 1]);\n        y[4 * i + 2] = arc_tangent(x[i]);\n"
+        "        y[4 * i + 3] = arc_sine(x[i]);\n    }\n}\n"
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    toolchain("gcc").run([*library.FLAGS, "loop.c", "-o", "table.so", "-lm"], tmp_path)
+    interface = cffi.FFI()
+    interface.cdef("void table(const double *x, double *y, int n);")
+    numbers = np.concatenate([NUMBERS, NUMBERS / 10.0])
+    found = np.empty((len(numbers), 4))
+    table: Any = interface.dlopen(str(tmp_path / "table.so"))
+    table.table(*(library.pointer("double *", array) for array in (numbers, found)), len(numbers))
+    with np.errstate(all="ignore"):
+        expected = np.stack(
+            [*elementary.sine_cosine(numbers), elementary.arc_tangent(numbers), elementary.arc_sine(numbers)],
+            axis=-1,
+        )
+    for array in (found, expected):
+        array[np.isnan(array)] = np.nan
+    assert found.tobytes() == expected.tobytes()
+
+
+def test_what_is_no_c_flies_in_numpy() -> None:
+    """A controller in Python, and a delay longer than the engine holds."""
+    flight = Flight(Bernoulli(2.0, 0.5), duration_s=0.2)
+    reference = fly(flight, ReferenceController(Design(MAMBO)))
+    assert reference.same_bits(fly(flight, CompiledController(MAMBO)))
+    late = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, link=Link(delay_ticks=201))
+    assert fly(late, PdController()).same_bits(loop.fly(late, PdController()))
+
+
+def test_without_a_compiler_the_flight_is_the_same_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A warning that names what is missing."""
+    flight = Flight(Bernoulli(2.0, 0.5), duration_s=0.2)
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.warns(UserWarning, match="no C compiler found.*the simulation runs in NumPy"):
+        trace = fly(flight, PdController())
+    assert trace.same_bits(loop.fly(flight, PdController()))
+
+
+def test_progress_reaches_the_end() -> None:
+    """One call for each flight."""
+    shares: list[float] = []
+    toolchain("gcc")
+    fly(flight_of(TRUTH, PERIOD_S), PdController(), shares.append)
+    assert shares == [0.25, 0.5, 0.75, 1.0]

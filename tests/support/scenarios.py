@@ -1,0 +1,101 @@
+"""Scenarios that between them use every line of the simulation."""
+
+from typing import Any, Final
+
+from hypothesis import strategies as st
+
+from mambo_nmpc.sil.flight.names import CURVE_NAMES
+from mambo_nmpc.sil.flight.scenario import Scenario
+
+TRUTH: Final = (
+    Scenario(
+        duration_s=2.0,
+        seed=3,
+        trajectory="circle",
+        size_m=1.0,
+        rate_rad_s=1.5,
+        start_velocity_m_s=(0.2, -0.3, 0.1),
+        start_tilt_rad=(0.1, -0.05),
+        yaw_rad=0.8,
+        yaw_rate_rad_s=1.0,
+        motor_lag_s=0.03,
+        wind_m_s2=(0.5, -0.2),
+        wind_speed_m_s=4.0,
+        wind_direction_rad=2.0,
+        battery_sag_1_s=0.02,
+        payload_kg=0.02,
+        payload_time_s=0.5,
+        push_n_s=(0.02, -0.01, 0.015),
+        push_time_s=1.0,
+        command_delay_ticks=3,
+        dropped_share=0.2,
+    ),
+    Scenario(
+        duration_s=2.0, push_n_s=(0.0, 0.03, 0.0), push_time_s=0.5, yaw_rad=-2.5, start_tilt_rad=(0.0, 0.4)
+    ),
+    Scenario(duration_s=2.0, start_offset_m=(9999.0, 0.0, 0.0), start_velocity_m_s=(5.0, 0.0, 0.0)),
+    Scenario(duration_s=2.0, start_tilt_rad=(1.5, 1.2), start_offset_m=(0.0, 0.0, 1.0)),
+)
+"""Without sensors: every disturbance; a push and a hard turn; a flight that is lost; one upside down."""
+
+SENSED: Final = (
+    Scenario(
+        duration_s=4.0,
+        seed=5,
+        sensors="mambo-derotated",
+        yaw_rad=0.6,
+        wind_speed_m_s=3.0,
+        push_n_s=(0.05, 0.02, -0.06),
+        push_time_s=1.0,
+        accelerometer_bias_m_s2=(0.1, -0.1, 0.05),
+        gyro_bias_rad_s=(0.01, 0.02, -0.01),
+    ),
+    Scenario(
+        duration_s=4.0, seed=6, sensors="mambo-derotated", noise_scale=0.01, start_offset_m=(0.0, 0.0, 0.75)
+    ),
+    Scenario(duration_s=4.0, seed=7, sensors="mambo-derotated", noise_scale=0.0, start_tilt_rad=(0.7, 0.65)),
+    Scenario(duration_s=4.0, seed=8, sensors="mambo-derotated", start_velocity_m_s=(7.0, 1.0, 2.5)),
+)
+"""Through sensors: gusts and a push; low over the ground; tilted beyond the gate of the flow; too fast."""
+
+COUPLED: Final = (Scenario(duration_s=4.0, seed=9, sensors="mambo", dropped_share=0.05),)
+TAKE_OFF: Final = (Scenario(duration_s=1.0, seed=1, sensors="mambo-derotated", start="take-off"),)
+
+
+def _within(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high, allow_nan=False)
+
+
+def scenarios(**fixed: Any) -> st.SearchStrategy[Scenario]:
+    """Draw a scenario of any kind; `fixed` members have these values."""
+    small, tilt = _within(-0.05, 0.05), _within(-1.2, 1.2)
+    members: dict[str, st.SearchStrategy[Any]] = {
+        "seed": st.integers(0, 2**63 - 1),
+        "trajectory": st.sampled_from(CURVE_NAMES),
+        "size_m": _within(-3.0, 3.0),
+        "rate_rad_s": _within(-2.0, 2.0),
+        "start_offset_m": st.tuples(*[_within(-2.0, 2.0)] * 3),
+        "start_velocity_m_s": st.tuples(*[_within(-3.0, 3.0)] * 3),
+        "start_tilt_rad": st.tuples(tilt, tilt),
+        "yaw_rad": st.one_of(_within(-4.0, 4.0), _within(-1000.0, 1000.0)),
+        "yaw_rate_rad_s": _within(-3.0, 3.0),
+        "mass_kg": _within(0.05, 0.09),
+        "motor_lag_s": st.one_of(st.just(0.0), _within(0.001, 0.1)),
+        "drag_1_s": _within(0.0, 0.5),
+        "wind_m_s2": st.tuples(_within(-1.0, 1.0), _within(-1.0, 1.0)),
+        "wind_speed_m_s": st.one_of(st.just(0.0), _within(0.0, 10.0)),
+        "wind_direction_rad": _within(-7.0, 7.0),
+        "battery_sag_1_s": _within(0.0, 0.3),
+        "payload_kg": _within(-0.02, 0.03),
+        "payload_time_s": _within(-1.0, 2.0),
+        "push_n_s": st.one_of(
+            st.just((0.0, 0.0, 0.0)), st.tuples(small, small, small), st.just((40.0, 0.0, 0.0))
+        ),
+        "push_time_s": _within(0.0, 1.0),
+        "command_delay_ticks": st.sampled_from([0, 0, 1, 2, 7, 200]),
+        "dropped_share": st.sampled_from([0.0, 0.0, 0.3, 1.0]),
+        "noise_scale": st.sampled_from([0.0, 1.0, 3.0]),
+        "accelerometer_bias_m_s2": st.tuples(small, small, small),
+        "gyro_bias_rad_s": st.tuples(small, small, small),
+    }
+    return st.builds(Scenario, **(members | {name: st.just(value) for name, value in fixed.items()}))
