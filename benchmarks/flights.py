@@ -1,12 +1,14 @@
-"""Time of a simulated flight: our closed loop against RotorPy's vehicle model without a controller.
+"""Processor time of a simulated flight: the closed loop in C and in NumPy, and RotorPy's vehicle alone.
 
 RotorPy's `Multirotor` takes 10,000 steps of 10 ms at hover speed of its rotors. Ours flies the Table II case
-for the same 100 s: compiled C at 100 Hz, stock loops and integrator at 200 Hz. Both run alternately.
+for the same 100 s: compiled C at 100 Hz, stock loops and integrator at 200 Hz, seeing the truth or through
+sensors. All run in turns.
 """
 
 import statistics
-import timeit
-from functools import partial
+import time
+from collections.abc import Callable
+from typing import Final
 
 from rotorpy.vehicles.crazyflie_params import quad_params
 from rotorpy.vehicles.multirotor import Multirotor
@@ -15,20 +17,34 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.sensors.instruments import Sensors
 
-DURATION_S = 100.0
-ROUNDS = 5
-BATCH = 500
-
-
-def fly_ours(flights: int) -> None:
-    """Fly `flights` Table II cases at once."""
-    flight = Flight(Bernoulli(2.0, 0.5), duration_s=DURATION_S, flights=flights)
-    fly(flight, CompiledController(presets.load("mambo"), flights))
+DURATION_S: Final = 100.0
+ROUNDS: Final = 5
+BATCH: Final = 100
 
 
-def fly_rotorpy() -> None:
+def ours(flights: int, engine: EngineName, *, sensed: bool) -> Callable[[], None]:
+    """Return a function that flies `flights` Table II cases at once."""
+    settings = presets.load("mambo")
+    sensors = Sensors(derotated=True) if sensed else None
+    flight = Flight(
+        Bernoulli(2.0, 0.5),
+        duration_s=DURATION_S,
+        flights=flights,
+        sensors=sensors,
+        seeds=tuple(range(flights)),
+    )
+
+    def run() -> None:
+        fly(flight, CompiledController(settings, flights), engine=engine)
+
+    return run
+
+
+def rotorpy() -> None:
     """Simulate RotorPy's vehicle at hover for the same time."""
     vehicle = Multirotor(quad_params)
     state = vehicle.initial_state
@@ -37,21 +53,36 @@ def fly_rotorpy() -> None:
         state = vehicle.step(state, control, 0.01)
 
 
+CASES: Final[dict[str, tuple[int, Callable[[], None]]]] = {
+    "C, truth": (1, ours(1, "c", sensed=False)),
+    "C, sensors": (1, ours(1, "c", sensed=True)),
+    f"C, truth, {BATCH} flights": (BATCH, ours(BATCH, "c", sensed=False)),
+    f"C, sensors, {BATCH} flights": (BATCH, ours(BATCH, "c", sensed=True)),
+    "NumPy, truth": (1, ours(1, "numpy", sensed=False)),
+    "NumPy, sensors": (1, ours(1, "numpy", sensed=True)),
+    "RotorPy, vehicle alone": (1, rotorpy),
+}
+"""Number of flights and the function that flies them, by name."""
+
+
+def seconds(run: Callable[[], None]) -> float:
+    """Return the processor time of one call."""
+    start = time.process_time()
+    run()
+    return time.process_time() - start
+
+
 def main() -> None:
-    """Run both alternately; print the median times and their ratio."""
-    fly_ours(1)  # builds the C
-    seconds = partial(timeit.timeit, number=1)
-    rounds = [(seconds(lambda: fly_ours(1)), seconds(fly_rotorpy)) for _ in range(ROUNDS)]
-    ours, theirs = (statistics.median(column) for column in zip(*rounds, strict=True))
-    ratio = statistics.median(b / a for a, b in rounds)
-    batch = seconds(lambda: fly_ours(BATCH))
-    print(f"one flight of {DURATION_S:.0f} s, median of {ROUNDS} rounds in turns")
-    print(f"  mambo-nmpc, closed loop with compiled C   {ours:7.2f} s")
-    print(f"  RotorPy, vehicle alone                    {theirs:7.2f} s   {ratio:.2f} times ours")
-    print(f"{BATCH} flights at once                         {batch:7.2f} s")
-    print(
-        f"  {BATCH / batch:.1f} flights a second, {BATCH * DURATION_S / batch:.0f} times real time in total"
-    )
+    """Run all in turns; print the median processor time of a flight, and how many times real time that is."""
+    ours(1, "c", sensed=False)()  # builds the C
+    rounds = [{name: seconds(run) / n for name, (n, run) in CASES.items()} for _ in range(ROUNDS)]
+    print(f"a flight of {DURATION_S:.0f} s, processor time, median of {ROUNDS} rounds in turns")
+    for name in CASES:
+        median = statistics.median(one[name] for one in rounds)
+        ratio = statistics.median(one[name] / one["C, truth"] for one in rounds)
+        print(
+            f"  {name:26} {1e3 * median:9.1f} ms  {DURATION_S / median:9.0f} x real time  {ratio:7.1f} x C, truth"
+        )
 
 
 if __name__ == "__main__":

@@ -17,12 +17,10 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.options import FlyOptions, load, show
 from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.emulated import EmulatedController, build_guest
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine.simulate import fly as simulate
 from mambo_nmpc.sil.errors import FlightError, TrajectoryError
 from mambo_nmpc.sil.files.folders import new_results
-from mambo_nmpc.sil.firmware.build import builder
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, flight_text, judge
@@ -127,8 +125,14 @@ def _controller(options: FlyOptions, settings: Settings) -> PositionController:
             return CompiledController(settings)
 
 
-def _on_board(options: FlyOptions, settings: Settings) -> EmulatedController:
+def _on_board(options: FlyOptions, settings: Settings) -> PositionController:
     """Build the C for a board, and load it into the board's emulated core."""
+    from mambo_nmpc.sil.controllers.emulated import (  # unicorn is slow to import
+        EmulatedController,
+        build_guest,
+    )
+    from mambo_nmpc.sil.firmware.build import builder
+
     board = str(options.on)
     if options.controller != "nmpc":
         raise FlightError(f"--on {echo(board)} runs the C: use it with --controller nmpc only")

@@ -123,7 +123,7 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
 def write_npz(trace: Trace, path: Path) -> None:
     """Write all flights of a trace as NPZ, one array per field."""
     with path.open("wb") as file:
-        np.savez_compressed(file, **{field.name: getattr(trace, field.name) for field in fields(trace)})
+        np.savez(file, **{field.name: getattr(trace, field.name) for field in fields(trace)})
 
 
 def read_npz(path: Path) -> Trace:

@@ -7,6 +7,7 @@ These releases leave the camera's rotation in the optical flow; later ones subtr
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -50,6 +51,7 @@ FLOW_JUMP_M_S: Final = 5.0
 FLOW_MIN_HEIGHT_M: Final = 0.4
 
 
+@lru_cache
 def altitude_gains() -> tuple[float, float]:
     """Return the stationary Kalman gains of position and velocity (1/s); A = [1 Ts; 0 1], C = [1 0]."""
     q, r = ALTITUDE_NOISE
