@@ -80,9 +80,8 @@ def main() -> None:
     for name in CASES:
         median = statistics.median(one[name] for one in rounds)
         ratio = statistics.median(one[name] / one["C, truth"] for one in rounds)
-        print(
-            f"  {name:26} {1e3 * median:9.1f} ms  {DURATION_S / median:9.0f} x real time  {ratio:7.1f} x C, truth"
-        )
+        speed = DURATION_S / median
+        print(f"  {name:26} {1e3 * median:9.1f} ms {speed:9.0f} times real time {ratio:7.1f} times C, truth")
 
 
 if __name__ == "__main__":
