@@ -32,6 +32,8 @@ class Metrics:
     rms_error_m: FloatArray
     """Root of the mean of e^2 over time."""
     max_error_m: FloatArray
+    final_error_m: FloatArray
+    """e at the end of the flight."""
     effort_rad_s: FloatArray
     """Integral of the 1-norm of u."""
     command_variation_rad: FloatArray
@@ -72,6 +74,7 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
         itae_m_s2=_integral(weight_s * error_m, time_s),
         rms_error_m=np.sqrt(ise_m2_s / span_s),
         max_error_m=error_m.max(axis=0),
+        final_error_m=error_m[-1],
         effort_rad_s=_sum(np.diff(time_s)[:, np.newaxis] * effort_rad),
         command_variation_rad=_sum(np.abs(np.diff(command_rad, axis=0)).sum(axis=-1)) / (len(time_s) - 1),
     )

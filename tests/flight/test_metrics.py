@@ -75,6 +75,15 @@ def test_error_is_integrated_by_the_trapezoidal_rule() -> None:
     np.testing.assert_allclose(metrics.max_error_m, 3.0)
 
 
+def test_final_error_is_that_of_the_last_sample() -> None:
+    """The largest error lies before it."""
+    error_m = np.zeros((3, 1, 2))
+    error_m[:, 0, 0] = [1.0, 5.0, -2.0]
+    metrics = measure(trace_of(np.array([0.0, 1.0, 2.0]), error_m, np.zeros((3, 1, 2))))
+    np.testing.assert_array_equal(metrics.final_error_m, 2.0)
+    np.testing.assert_array_equal(metrics.max_error_m, 5.0)
+
+
 def test_take_off_is_left_out() -> None:
     """Samples before t = 0 do not change any metric."""
     late = constant_trace(np.linspace(0.0, 20.0, 2001))
