@@ -34,9 +34,9 @@ def verify(
     """Generate the C of a controller, prove and test it, and keep the evidence."""
     from mambo_nmpc.codegen import bundle
     from mambo_nmpc.codegen.render import render
-    from mambo_nmpc.sil.files.folders import SUMMARY, new_results
+    from mambo_nmpc.sil.files.folders import SUMMARY, digests, new_results
     from mambo_nmpc.sil.verify.check import CheckOutcome
-    from mambo_nmpc.sil.verify.report import PAGE, VerifySummary, closing, digests, page, summarise
+    from mambo_nmpc.sil.verify.report import PAGE, VerifySummary, closing, page, summarise
 
     settings = load(source, scalar)
     chosen = _chosen(only)

@@ -9,6 +9,7 @@ hidden folder, which the next run removes.
 
 import contextlib
 import fcntl
+import hashlib
 import json
 import math
 import os
@@ -68,6 +69,15 @@ def finite(value: Any) -> Any:
             return [finite(item) for item in value]
         case _:
             return value
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Return {path: SHA-256} of every file in `folder`, for the key "files" of a summary."""
+    return {
+        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
 @contextlib.contextmanager

@@ -1,10 +1,8 @@
 """The results of a verification as a record, as text and as an HTML page."""
 
-import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from pydantic import Field
@@ -84,15 +82,6 @@ def summarise(found: Sequence[Verified], source: str, settings: Settings) -> Ver
 def page(summary: VerifySummary) -> str:
     """Render the summary as one HTML page that needs no other file."""
     return render_page("verify.html.j2", {"summary": summary})
-
-
-def digests(folder: Path) -> dict[str, str]:
-    """Return {path: SHA-256} of every file in `folder`."""
-    return {
-        path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def _left_out(found: Sequence[Verified]) -> list[str]:
