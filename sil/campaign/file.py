@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeVar, get_args
 
 from pydantic import (
     BaseModel,
@@ -166,7 +166,7 @@ def read_as(model: type[File], path: Path) -> File:
 
 def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
     """Load the controllers and check that each can be simulated."""
-    entrants = tuple(_entrant(name, folder, source) for name in file.controllers)
+    entrants = tuple(load_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
     names = [entrant.name for entrant in entrants]
     for name in names:
         if names.count(name) > 1:
@@ -198,17 +198,20 @@ def load_settings(named: str, folder: Path, place: str) -> Settings:
         raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
 
 
-def _entrant(named: str, folder: Path, source: str) -> Entrant:
-    """Return the controller that the file `source` in `folder` calls `named`: PD, preset or file."""
+def load_entrant(named: str, folder: Path, place: str) -> Entrant:
+    """Return the controller called `named`: PD, preset or file in `folder`.
+
+    Raises InvalidSettingsError, whose lines begin with `place`.
+    """
     if named == PD:
         return Entrant(PD, "pd", Settings())
-    settings = load_settings(named, folder, f"{source}: controllers")
+    settings = load_settings(named, folder, place)
     name = named if named in presets.names() else Path(named).stem
     if not _NAME.fullmatch(name) or name == PD:
         raise InvalidSettingsError(
             (
-                f"{source}: controllers: {echo(named)} must have a name of at most 40 letters, digits, - and "
-                f"_, other than {PD}: columns of the table begin with it",
+                f"{place}: {echo(named)} must have a name of at most 40 letters, digits, - and "
+                f"_, other than {PD}: results are named after it",
             )
         )
     return Entrant(name, "nmpc", settings)
@@ -222,7 +225,7 @@ def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
     match details["type"]:
         case "extra_forbidden":
             return _explain_unknown(names, dotted, model)
-        case "model_type":
+        case "model_type" | "dict_type":
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
         case "greater_than_equal" | "less_than_equal":
             limits = _section(names, model).model_fields[names[-1]].metadata
@@ -233,10 +236,14 @@ def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
 
 
 def _section(names: Sequence[str], model: type[FileSection]) -> Any:
-    """Return the model of the section to which the key at the path `names` belongs."""
+    """Return the model of the section to which the key at the path `names` belongs.
+
+    The names of sections of one kind, as in dict[str, Section], are free.
+    """
     section: Any = model
     for name in names[:-1]:
-        section = section.model_fields[name].annotation
+        inner = get_args(section)
+        section = inner[1] if inner else section.model_fields[name].annotation
     return section
 
 

@@ -20,7 +20,7 @@ from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.faults.flights import CRASH_TILT_RAD
 from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
-from mambo_nmpc.sil.flight.scenario import flight_of
+from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import sine_cosine
@@ -61,11 +61,19 @@ def fly_batch(
             f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
         )
     scenarios = [scenario(flight, one) for one in drawn]
-    rows: list[Row] = [{} for _ in drawn]
-    for document in entrants:
-        entrant = Entrant.from_document(document)
+    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios)
+
+
+def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) -> list[Row]:
+    """Fly flights together with every controller; return one row per flight, in order.
+
+    Raises BuildError if there is no compiler, FlightError for flights that cannot be simulated together.
+    """
+    rows: list[Row] = [{} for _ in scenarios]
+    for entrant in entrants:
         trace = fly(
-            flight_of(scenarios, entrant.settings.horizon.update_period_s), _controller(entrant, len(drawn))
+            flight_of(scenarios, entrant.settings.horizon.update_period_s),
+            _controller(entrant, len(scenarios)),
         )
         for key, values in _evaluate(trace).items():
             for row, value in zip(rows, values, strict=True):
