@@ -26,6 +26,7 @@ WINGS = [
     "footprint",
     "faults",
     "campaign",
+    "regress",
     "verify",
     "tuning",
     "report",

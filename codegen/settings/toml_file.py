@@ -11,14 +11,14 @@ from mambo_nmpc.codegen.errors import UnreadableFileError, echo
 
 LARGEST_FILE_BYTES = 64_000
 BOARDS, PRESETS = "boards", "presets"
-"""The kinds of TOML files that the package holds."""
+"""The kinds of TOML files that `codegen` holds."""
 
 _PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>line (?P<line>\d+), column \d+)\)", re.DOTALL)
 
 
-def shipped(kind: str) -> dict[str, Traversable]:
-    """Return the TOML files of a kind that the package holds, {name: file}, sorted by name."""
-    folder = resources.files("mambo_nmpc.codegen") / "data" / kind
+def shipped(kind: str, package: str = "mambo_nmpc.codegen") -> dict[str, Traversable]:
+    """Return the TOML files of a kind that a package holds, {name: file}, sorted by name."""
+    folder = resources.files(package) / "data" / kind
     files = {file.name.removesuffix(".toml"): file for file in folder.iterdir()}
     return dict(sorted(files.items()))
 

@@ -14,6 +14,7 @@ from mambo_nmpc.sil.cli.faults import faults
 from mambo_nmpc.sil.cli.fly import fly
 from mambo_nmpc.sil.cli.footprint import footprint
 from mambo_nmpc.sil.cli.options import FlyOptions, command_of
+from mambo_nmpc.sil.cli.regress import regress
 from mambo_nmpc.sil.cli.report import report
 from mambo_nmpc.sil.cli.same_bits import same_bits
 from mambo_nmpc.sil.cli.sweep import sweep
@@ -30,6 +31,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "doctor": doctor,
     "faults": faults,
     "verify": verify,
+    "regress": regress,
     "campaign": campaign,
     "tune": tune,
     "report": report,
@@ -59,6 +61,9 @@ mambo-nmpc verify
 mambo-nmpc verify controller.toml -o evidence
 mambo-nmpc verify controller.toml --only proof,rules --json
 mambo-nmpc verify --scalar fixed
+mambo-nmpc regress
+mambo-nmpc regress my-suite.toml --controller controller.toml -o regress
+mambo-nmpc regress my-suite.toml --controller controller.toml --update
 mambo-nmpc campaign -o campaign
 mambo-nmpc campaign campaign.toml --flights 200 -o campaign
 mambo-nmpc campaign --scheduler tcp://10.0.0.1:8786 -o campaign

@@ -23,6 +23,8 @@ from mambo_nmpc.sil.footprint.sweep import SweepSummary
 from mambo_nmpc.sil.paper.section import sensed_section, table2_section
 from mambo_nmpc.sil.paper.sensed import SensedSummary
 from mambo_nmpc.sil.paper.table2 import Table2Summary
+from mambo_nmpc.sil.regress.report import RegressSummary
+from mambo_nmpc.sil.regress.section import regress_section
 from mambo_nmpc.sil.show.section import Section
 from mambo_nmpc.sil.verify.report import VerifySummary
 from mambo_nmpc.sil.verify.section import verify_section
@@ -36,6 +38,7 @@ _FINISHED: Final[dict[type[Summary], Callable[[Path, Any], Section]]] = {
     SweepSummary: sweep_section,
     FaultsSummary: faults_section,
     VerifySummary: verify_section,
+    RegressSummary: regress_section,
     CampaignSummary: campaign_section,
 }
 _SECTIONS: Final = _FINISHED | {UnfinishedCampaign: campaign_section}

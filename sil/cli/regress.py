@@ -1,0 +1,87 @@
+"""The command `regress`: fly a suite, and compare its metrics with bounds and with recorded ones."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.sil.cli.options import AsJson, Results, show
+
+if TYPE_CHECKING:
+    from mambo_nmpc.sil.campaign.file import Entrant
+    from mambo_nmpc.sil.campaign.flights import Row
+    from mambo_nmpc.sil.regress.file import FlightSuite
+
+
+def regress(
+    suite: Annotated[str, typer.Argument(help="A shipped suite or a TOML file.")] = "envelope",
+    *,
+    controller: Annotated[
+        str, typer.Option(help="A preset, a controller.toml, or pd.", metavar="SOURCE")
+    ] = "mambo",
+    output: Results = Path("regress"),
+    update: Annotated[
+        bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.", metavar="")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline."""
+    from mambo_nmpc.sil.campaign.file import load_entrant
+    from mambo_nmpc.sil.files.folders import SUMMARY, digests, new_results
+    from mambo_nmpc.sil.regress.baseline import (
+        baseline_path,
+        demand_replaceable,
+        read_baseline,
+        record_baseline,
+    )
+    from mambo_nmpc.sil.regress.file import load_suite
+    from mambo_nmpc.sil.regress.junit import junit_xml
+    from mambo_nmpc.sil.regress.plots import draw_regress
+    from mambo_nmpc.sil.regress.report import (
+        JUNIT,
+        PICTURES,
+        RECORDS,
+        RegressSummary,
+        judge,
+        regress_text,
+        write_records,
+    )
+    from mambo_nmpc.sil.regress.run import demand_flyable
+
+    chosen, place = load_suite(suite), f"--controller {echo(controller)}"
+    entrant = load_entrant(controller, Path(), place)
+    demand_flyable(chosen, entrant, place)
+    path = baseline_path(chosen, entrant.name)
+    if update:
+        demand_replaceable(path)
+    baseline = None if update else read_baseline(chosen, entrant.name)
+    with new_results(output, RegressSummary.command, (*PICTURES, JUNIT, f"{RECORDS}/")) as folder:
+        rows = _fly(chosen, entrant)
+        summary = judge(chosen, entrant, rows, baseline, path)
+        write_records(summary, chosen, entrant, rows, folder)
+        (folder / JUNIT).write_bytes(junit_xml(summary))
+        draw_regress(summary, folder / "regress")
+        summary = summary.model_copy(update={"files": digests(folder)})
+        summary.write(folder)
+    show(summary, regress_text(summary, str(output)), as_json=as_json)
+    if update:
+        record_baseline(chosen, entrant, rows)
+        typer.echo(f"{echo(str(path))}: recorded {len(rows)} flights", err=True)
+    typer.echo(f"{echo(str(output))}: {SUMMARY}, {JUNIT}, {', '.join(PICTURES)}, {RECORDS}/", err=True)
+    if summary.failed:
+        raise typer.Exit(1)
+
+
+def _fly(suite: "FlightSuite", entrant: "Entrant") -> "list[Row]":
+    """Fly the suite on all processors; show the progress."""
+    from mambo_nmpc.sil.campaign.executors import processes
+    from mambo_nmpc.sil.cli.progress import counting_bar
+    from mambo_nmpc.sil.regress.run import fly_suite
+
+    with (
+        counting_bar("flying", "flights", len(suite.flights)) as progress,
+        processes(os.cpu_count() or 1) as pool,
+    ):
+        return fly_suite(suite, entrant, pool, progress)

@@ -1,0 +1,68 @@
+"""Pictures of a suite's results: each flight's metrics as shares of their limits."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from mambo_nmpc.sil.regress.report import Check, RegressSummary
+from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PlainLogFormatter, inline, save, style
+
+_SHOWN: Final = (1e-2, 1e2)
+"""Shares that the picture shows; others are drawn at its edges."""
+
+
+def draw_regress(summary: RegressSummary, stem: Path) -> tuple[Path, Path]:
+    """Draw the picture of `limits_figure`; writes stem.png and stem.svg."""
+    with style():
+        return save(_limits_figure(summary), stem)
+
+
+def limits_panel(summary: RegressSummary) -> Markup:
+    """Return the same picture for a page."""
+    with style():
+        return inline(_limits_figure(summary), "Metrics of each flight as shares of their limits")
+
+
+def _limits_figure(summary: RegressSummary) -> Figure:
+    """Return a row per group and metric with a dot per flight, at the metric divided by its limit."""
+    rows: dict[str, list[Check]] = {}
+    for flight in summary.flights:
+        for check in flight.checks:
+            if check.limit > 0.0 or not check.holds:
+                rows.setdefault(f"{flight.group}: {check.metric}", []).append(check)
+    figure = Figure(figsize=(9.0, 1.2 + 0.26 * max(len(rows), 1)), layout="constrained")
+    axes = figure.subplots()
+    for holds, colour, label in ((True, FLOWN, "holds"), (False, COMMAND, "fails")):
+        dots = [
+            (share, row)
+            for row, checks in enumerate(rows.values())
+            for share in _shares([check for check in checks if check.holds is holds])
+        ]
+        axes.plot(
+            [share for share, _ in dots],
+            [row for _, row in dots],
+            linestyle="none",
+            marker="o" if holds else "D",
+            markersize=4.5,
+            alpha=0.6,
+            color=colour,
+            label=f"{label}: {len(dots)}",
+        )
+    axes.axvline(1.0, color="#444444", linewidth=0.8)
+    axes.set(xscale="log", xlim=_SHOWN, xlabel="metric over its limit", yticks=range(len(rows)))
+    axes.xaxis.set_major_formatter(PlainLogFormatter())
+    axes.set_yticklabels(rows, parse_math=False)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
+    return figure
+
+
+def _shares(checks: Sequence[Check]) -> list[float]:
+    """Return value over limit of each check, within the picture; a lost flight is at its right edge."""
+    least, most = _SHOWN
+    shares = (check.now / check.limit if check.limit > 0.0 else most for check in checks)
+    return [min(max(share, least), most) if math.isfinite(share) else most for share in shares]

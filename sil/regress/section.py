@@ -1,0 +1,22 @@
+"""The section of the report on a suite."""
+
+from pathlib import Path
+
+from mambo_nmpc.sil.regress.plots import limits_panel
+from mambo_nmpc.sil.regress.report import MOST_SHOWN, RegressSummary, finding, group_rows, remarks
+from mambo_nmpc.sil.show.section import Section
+
+
+def regress_section(folder: Path, summary: RegressSummary) -> Section:
+    """Return the section of a suite."""
+    content = {
+        "folder": str(folder),
+        "controller": f"{summary.controller}, settings {summary.settings[:16]}",
+        "rows": list(group_rows(summary)),
+        "failed": summary.failed[:MOST_SHOWN],
+        "more": max(len(summary.failed) - MOST_SHOWN, 0),
+        "remarks": remarks(summary),
+        "picture": limits_panel(summary),
+    }
+    title = f"Regression tests, {summary.suite} with {summary.controller}"
+    return Section("regress", title, not summary.failed, finding(summary), content)
