@@ -203,7 +203,7 @@ def _suite(file: SuiteFile, name: str, folder: Path, source: str) -> FlightSuite
         values = {key: getattr(section, key) or getattr(file.flight, key) for key in Scenario.model_fields}
         values = {key: found for key, found in values.items() if found is not None}
         count += math.prod(map(len, values.values()))
-        if not faults and count <= MOST_FLIGHTS:
+        if count <= MOST_FLIGHTS:
             try:
                 flights += _flights(group, values, _bounds(file.flight.bounds, section.bounds))
             except ValueError as error:

@@ -225,12 +225,12 @@ def remarks(summary: RegressSummary) -> list[str]:
 
 def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
-    heads = ("bound", "median", "worst", "worst/recorded")
-    lines = [f"{'group':20}{'metric':22}" + "".join(f"{head:>15}" for head in heads) + f"{'failed':>14}"]
+    heads = ("bound", "median", "worst", "/recorded")
+    lines = [f"{'group':21}{'metric':21}" + "".join(f"{head:>11}" for head in heads) + f"{'failed':>12}"]
     for row in group_rows(summary):
         numbers = (row.bound, row.middle, row.worst, row.over_recorded)
-        cells = "".join(f"{'-' if number is None else digits(number):>15}" for number in numbers)
-        lines.append(f"{row.group:20}{row.metric:22}{cells}{f'{row.failed} of {row.flights}':>14}")
+        cells = "".join(f"{'-' if number is None else digits(number):>11}" for number in numbers)
+        lines.append(f"{row.group:20} {row.metric:21}{cells}{f'{row.failed} of {row.flights}':>12}")
     lines.append("")
     for flight in summary.failed[:MOST_SHOWN]:
         lines.append(f"{flight.name}: {'; '.join(flight.failures)}")

@@ -27,6 +27,7 @@ from mambo_nmpc.sil.footprint.measure import Footprint
 from mambo_nmpc.sil.footprint.sweep import Point, SweepSummary, budgets
 from mambo_nmpc.sil.paper.sensed import SensedRow, SensedSummary
 from mambo_nmpc.sil.paper.table2 import CASES, Claim, Table2Row, Table2Summary
+from mambo_nmpc.sil.regress.report import Check, FlightResult, RegressSummary
 from mambo_nmpc.sil.verify import report as verify_report
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.checks import CHECKS
@@ -197,6 +198,27 @@ def campaign_folder(folder: Path, *, finished: bool = True) -> None:
     ).write(folder)
 
 
+def regress_folder(folder: Path) -> None:
+    """Write a suite of two flights, one of which was lost; the other was recorded."""
+
+    def check(now: float, then: float | None) -> Check:
+        return Check("iae_m_s", now, 5.0, then, 5.0 if then is None else 2.2, now <= 2.2)
+
+    good = FlightResult("eight", "eight/yaw_rad=0", {"iae_m_s": 1.5}, [check(1.5, 2.0)], True, None)
+    lost = FlightResult(
+        "circle", HOSTILE, {"iae_m_s": np.nan}, [check(np.nan, None)], False, f"flights/{HOSTILE}"
+    )
+    RegressSummary(
+        suite=HOSTILE,
+        controller="mambo",
+        settings=Settings().digest,
+        baseline=HOSTILE,
+        settings_then="",
+        better=1,
+        flights=[good, lost],
+    ).write(folder)
+
+
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
     "replay": replay_folder,
@@ -207,5 +229,6 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "faults": faults_folder,
     "verify": verify_folder,
     "campaign": campaign_folder,
+    "regress": regress_folder,
 }
 """A folder of every command."""

@@ -1,0 +1,40 @@
+"""The flight envelope of each preset, with what it is known to fail: a change in either direction fails."""
+
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.campaign.executors import processes
+from mambo_nmpc.sil.campaign.file import load_entrant
+from mambo_nmpc.sil.regress.file import load_suite
+from mambo_nmpc.sil.regress.report import judge
+from mambo_nmpc.sil.regress.run import fly_suite
+
+KNOWN: Final[dict[str, dict[str, list[int]]]] = {
+    "mambo": {},
+    "table1": {},
+    "table1-printed": {},
+}
+"""Failures of each preset: headings by group, as multiples of 11.25 degrees from -16 (south) to 16."""
+
+
+def test_the_envelope_of_every_preset_is_known() -> None:
+    """A new preset is added above."""
+    assert set(KNOWN) == set(presets.names())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("preset", KNOWN)
+def test_a_preset_fails_where_it_is_known_to(preset: str) -> None:
+    """No flight more and none less."""
+    suite, entrant = load_suite("envelope"), load_entrant(preset, Path(), "test")
+    with processes(2) as pool:
+        rows = fly_suite(suite, entrant, pool, lambda _: None)
+    summary = judge(suite, entrant, rows, None, Path())
+    found: dict[str, list[int]] = {}
+    for flight, result in zip(suite.flights, summary.flights, strict=True):
+        if result.failures:
+            found.setdefault(flight.group, []).append(round(flight.scenario.yaw_rad / 3.14159 * 16))
+    assert found == KNOWN[preset]

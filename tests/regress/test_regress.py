@@ -1,0 +1,271 @@
+"""A suite's results: limits from bounds and baselines, baselines as files, and what CI servers read."""
+
+import json
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from mambo_nmpc.codegen.errors import FileExistsRefusedError, InvalidSettingsError
+from mambo_nmpc.sil.campaign.file import Entrant, load_entrant
+from mambo_nmpc.sil.campaign.flights import INDICES, Row
+from mambo_nmpc.sil.flight.scenario import read_record
+from mambo_nmpc.sil.regress.baseline import (
+    baseline_path,
+    demand_replaceable,
+    read_baseline,
+    record_baseline,
+)
+from mambo_nmpc.sil.regress.file import FlightSuite, load_suite
+from mambo_nmpc.sil.regress.junit import junit_xml
+from mambo_nmpc.sil.regress.report import (
+    MOST_SHOWN,
+    RECORDS,
+    RegressSummary,
+    group_rows,
+    judge,
+    regress_text,
+    write_records,
+)
+
+SUITE = """
+[baseline]
+iae_m_s = 0.1
+{baseline}
+[flights.eight]
+yaw_rad = [0.0, 0.5, 1.0]
+bounds = {{ iae_m_s = 3.0 }}
+"""
+
+
+def suite(folder: Path, baseline: str = "", more: str = "") -> FlightSuite:
+    """Write and load a suite of three flights."""
+    path = folder / "mine.toml"
+    path.write_text(SUITE.format(baseline=baseline) + more, "utf-8")
+    return load_suite(str(path))
+
+
+def mambo() -> Entrant:
+    """Return the preset as a controller."""
+    return load_entrant("mambo", Path(), "test")
+
+
+def row(iae_m_s: float, **others: float | str) -> Row:
+    """Return the results of a flight."""
+    plain: Row = {"crashed": 0, "refused_updates": 0, "trace_sha256": "ab"} | dict.fromkeys(INDICES, 1.0)
+    return plain | {"iae_m_s": iae_m_s} | others
+
+
+def judged(found: FlightSuite, rows: list[Row]) -> RegressSummary:
+    """Compare rows with bounds and baseline."""
+    path = baseline_path(found, "mambo")
+    return judge(found, mambo(), rows, read_baseline(found, "mambo"), path)
+
+
+def test_without_a_baseline_only_bounds_hold(tmp_path: Path) -> None:
+    """A value at its bound holds, one above fails with flight, metric, value and bound."""
+    summary = judged(suite(tmp_path), [row(3.0), row(3.001), row(0.0)])
+    assert [flight.failures for flight in summary.flights] == [[], ["iae_m_s = 3.001 (bound 3)"], []]
+    assert [flight.name for flight in summary.failed] == ["eight/yaw_rad=0.5"]
+    assert summary.baseline is None
+    assert "compared with the bounds only" in regress_text(summary, "out")
+
+
+def test_a_recorded_value_limits_with_its_tolerance(tmp_path: Path) -> None:
+    """10 % above the recorded value holds, more fails, whichever limit is the smaller one is named."""
+    found = suite(tmp_path)
+    record_baseline(found, mambo(), [row(2.0), row(2.0), row(2.9)])
+    summary = judged(found, [row(2.19), row(2.21), row(3.1)])
+    assert [flight.failures for flight in summary.flights] == [
+        [],
+        ["iae_m_s = 2.21 (bound 3; recorded 2, so at most 2.2)"],
+        ["iae_m_s = 3.1 (bound 3; recorded 2.9)"],
+    ]
+    assert summary.baseline == str(tmp_path / "mine.mambo.baseline.json")
+    assert "settings have changed" not in regress_text(summary, "out")
+
+
+def test_a_better_flight_passes_and_is_said(tmp_path: Path) -> None:
+    """Only within the tolerance does a better value go without saying."""
+    found = suite(tmp_path)
+    record_baseline(found, mambo(), [row(2.0)] * 3)
+    summary = judged(found, [row(1.81), row(1.79), row(0.0)])
+    assert summary.failed == []
+    assert summary.better == 2
+    assert "2 flights are better than recorded by more than the tolerance; --update" in regress_text(
+        summary, "out"
+    )
+
+
+@pytest.mark.parametrize("tolerated", ["ise_m2_s = 0.0", ""])
+def test_a_metric_without_a_tolerance_is_not_compared(tmp_path: Path, tolerated: str) -> None:
+    """All metrics are recorded, so that a tolerance can be added without flying again."""
+    found = suite(tmp_path)
+    record_baseline(found, mambo(), [row(2.0)] * 3)
+    summary = judged(suite(tmp_path, tolerated), [row(2.0, ise_m2_s=1.5)] * 3)
+    assert len(summary.failed) == (3 if tolerated else 0)
+
+
+def test_same_bits_are_compared_if_asked_for(tmp_path: Path) -> None:
+    """Another digest fails, whatever the metrics say."""
+    found = suite(tmp_path, "same_bits = true")
+    record_baseline(found, mambo(), [row(2.0)] * 3)
+    summary = judged(found, [row(2.0), row(2.0, trace_sha256="cd"), row(2.0)])
+    assert [flight.same_bits for flight in summary.flights] == [True, False, True]
+    assert summary.failed[0].failures == ["the trace differs from the recorded one"]
+
+
+def test_a_crashed_or_lost_flight_fails(tmp_path: Path) -> None:
+    """A metric of a lost flight is NaN, which exceeds every limit."""
+    lost = row(math.nan, crashed=1) | dict.fromkeys(INDICES, math.nan)
+    summary = judged(suite(tmp_path), [row(1.0, crashed=1), lost, row(1.0)])
+    assert [flight.failures for flight in summary.flights] == [
+        ["crashed"],
+        ["crashed", "iae_m_s = nan (bound 3)"],
+        [],
+    ]
+    assert "null" in summary.text()
+    crashed, iae = group_rows(summary)
+    assert (crashed.metric, crashed.failed, iae.metric, iae.failed) == ("crashed", 2, "iae_m_s", 1)
+    assert iae.worst == math.inf
+
+
+def test_a_lost_flight_is_recorded_as_null_and_then_not_compared(tmp_path: Path) -> None:
+    """JSON has no NaN; the bound still holds."""
+    found = suite(tmp_path)
+    record_baseline(found, mambo(), [row(math.nan), row(1.0), row(1.0)])
+    assert '"iae_m_s": null' in baseline_path(found, "mambo").read_text("utf-8")
+    assert [flight.name for flight in judged(found, [row(2.9)] * 3).failed] == [
+        "eight/yaw_rad=0.5",
+        "eight/yaw_rad=1",
+    ]
+
+
+def test_a_baseline_has_one_line_for_each_flight(tmp_path: Path) -> None:
+    """So that a difference of two versions shows which flights changed; digits end where noise begins."""
+    found = suite(tmp_path)
+    path = record_baseline(found, mambo(), [row(1 / 3), row(2.0), row(3.0)])
+    lines = path.read_text("utf-8").splitlines()
+    assert [line.strip().partition(":")[0] for line in lines if "iae_m_s" in line] == [
+        f'"{flight.name}"' for flight in found.flights
+    ]
+    assert '"iae_m_s": 0.333333,' in path.read_text("utf-8")
+    assert "sha256" not in path.read_text("utf-8")
+    before = path.read_bytes()
+    record_baseline(found, mambo(), [row(1 / 3 + 1e-9), row(2.0), row(3.0)])
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("baseline", "more", "message"),
+    [
+        ("", "[flights.new]", "1 new (new); record it anew with --update"),
+        ("", "size_m = 1.0\n", "3 changed (eight/yaw_rad=0)"),
+        ("", "rate_rad_s = [1.0, 2.0]\n", "6 new (eight/rate_rad_s=1,yaw_rad=0), 3 gone (eight/yaw_rad=0)"),
+        ("same_bits = true", "", "3 without a value to compare (eight/yaw_rad=0)"),
+    ],
+)
+def test_a_baseline_of_other_flights_is_refused(
+    tmp_path: Path, baseline: str, more: str, message: str
+) -> None:
+    """New, changed or vanished flights are named; nothing is compared with what it is not."""
+    record_baseline(suite(tmp_path), mambo(), [row(2.0)] * 3)
+    with pytest.raises(InvalidSettingsError) as caught:
+        read_baseline(suite(tmp_path, baseline, more), "mambo")
+    assert "was recorded from other flights" in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_other_settings_than_recorded_are_said(tmp_path: Path) -> None:
+    """A comparison of two settings is legitimate, and visible."""
+    found = suite(tmp_path)
+    table1 = load_entrant("table1", Path(), "test")
+    path = record_baseline(found, Entrant("mambo", "nmpc", table1.settings), [row(2.0)] * 3)
+    assert table1.settings.digest in path.read_text("utf-8")
+    assert "settings have changed" in regress_text(judged(found, [row(2.0)] * 3), "out")
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"generator": "x"}', "<<<<<<< HEAD\n"])
+def test_a_file_that_is_no_baseline_is_refused_and_kept(tmp_path: Path, text: str) -> None:
+    """Neither read nor overwritten."""
+    found = suite(tmp_path)
+    path = baseline_path(found, "mambo")
+    path.write_text(text, "utf-8")
+    with pytest.raises(InvalidSettingsError, match=r"is no baseline of mambo-nmpc: .*--update"):
+        read_baseline(found, "mambo")
+    with pytest.raises(FileExistsRefusedError, match="move it away"):
+        demand_replaceable(path)
+
+
+def test_a_damaged_baseline_may_be_replaced(tmp_path: Path) -> None:
+    """A merge of two versions leaves markers in it."""
+    found = suite(tmp_path)
+    path = record_baseline(found, mambo(), [row(2.0)] * 3)
+    path.write_text(path.read_text("utf-8") + ">>>>>>> theirs\n", "utf-8")
+    with pytest.raises(InvalidSettingsError, match="Invalid JSON"):
+        read_baseline(found, "mambo")
+    demand_replaceable(path)
+
+
+def test_each_controller_has_its_baseline(tmp_path: Path) -> None:
+    """Beside the suite; of a shipped suite in the working directory."""
+    found = suite(tmp_path)
+    record_baseline(found, mambo(), [row(2.0)] * 3)
+    assert read_baseline(found, "table1") is None
+    assert baseline_path(found, "table1") == tmp_path / "mine.table1.baseline.json"
+    assert baseline_path(load_suite("envelope"), "mambo") == Path("envelope.mambo.baseline.json")
+
+
+def test_a_record_is_left_of_each_failed_flight_only(tmp_path: Path) -> None:
+    """With the digest of its trace, for `fly --replay`."""
+    found = suite(tmp_path)
+    rows = [row(1.0), row(4.0, trace_sha256="cd"), row(1.0)]
+    summary = judged(found, rows)
+    write_records(summary, found, mambo(), rows, tmp_path)
+    assert [path.name for path in (tmp_path / RECORDS).iterdir()] == ["0001-eight.json"]
+    record = read_record(tmp_path / RECORDS / "0001-eight.json")
+    assert record.scenario == found.flights[1].scenario
+    assert record.trace_sha256 == "cd"
+    assert record.settings == mambo().settings
+
+
+def test_junit_has_a_case_for_each_flight(tmp_path: Path) -> None:
+    """A failure has the message that the text has; counts are those of the cases."""
+    summary = judged(suite(tmp_path), [row(4.0), row(1.0, crashed=1), row(1.0)])
+    root = ElementTree.fromstring(junit_xml(summary))
+    (found,) = root
+    assert {name: found.get(name) for name in ("name", "tests", "failures", "errors", "skipped")} == {
+        "name": "mine.mambo",
+        "tests": "3",
+        "failures": "2",
+        "errors": "0",
+        "skipped": "0",
+    }
+    assert [case.get("name") for case in found] == [flight.name for flight in summary.flights]
+    assert {case.get("classname") for case in found} == {"mine.mambo.eight"}
+    messages = [case.find("failure") for case in found]
+    assert [None if one is None else one.get("message") for one in messages] == [
+        "iae_m_s = 4 (bound 3)",
+        "crashed",
+        None,
+    ]
+
+
+def test_the_text_lists_some_failed_flights_and_counts_the_rest(tmp_path: Path) -> None:
+    """A hundred failed flights do not hide the table."""
+    path = tmp_path / "many.toml"
+    path.write_text(
+        "[flights.eight]\nseed = { from = 1, to = 30, count = 30 }\nbounds.iae_m_s = 1.0", "utf-8"
+    )
+    found = load_suite(str(path))
+    text = regress_text(judge(found, mambo(), [row(2.0)] * 30, None, path), "out")
+    assert text.count("fly --replay out/flights/") == MOST_SHOWN
+    assert "and 20 more failed flights, all in junit.xml" in text
+    assert "many with mambo: 0 of 30 flights passed, 30 failed" in text
+
+
+def test_the_summary_is_read_back(tmp_path: Path) -> None:
+    """As the record that was written."""
+    summary = judged(suite(tmp_path), [row(4.0), row(1.0), row(1.0)])
+    assert RegressSummary.model_validate(json.loads(summary.text())) == summary
