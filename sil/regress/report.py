@@ -225,7 +225,7 @@ def remarks(summary: RegressSummary) -> list[str]:
 
 def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
-    heads = ("bound", "median", "worst", "/recorded")
+    heads = ("bound", "median", "worst", "ratio")
     lines = [f"{'group':21}{'metric':21}" + "".join(f"{head:>11}" for head in heads) + f"{'failed':>12}"]
     for row in group_rows(summary):
         numbers = (row.bound, row.middle, row.worst, row.over_recorded)
