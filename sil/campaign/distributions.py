@@ -30,11 +30,26 @@ _LEAST_SHARE: Final = Decimal("1e-16")
 
 @dataclass(frozen=True)
 class Domain:
-    """Admissible values of a parameter: `low` to `high`, whole numbers only if `whole`."""
+    """Admissible values of a parameter: `low` to `high`, whole numbers only if `whole`.
+
+    With `names` the values are these names, each represented by its index.
+    """
 
     low: float
     high: float
     whole: bool = False
+    names: tuple[str, ...] = ()
+
+    @classmethod
+    def of_names(cls, names: tuple[str, ...]) -> "Domain":
+        """Return the domain of names."""
+        return cls(0, len(names) - 1, whole=True, names=names)
+
+    def value(self, number: float) -> float | str:
+        """Return the value that `number` represents: a name, a whole number, or itself."""
+        if self.names:
+            return self.names[int(number)]
+        return int(number) if self.whole else number
 
 
 @dataclass(frozen=True)
@@ -83,9 +98,23 @@ class Distribution:
             quantile = _standard_quantile(min(max(inner, _LEAST_SHARE), 1 - _LEAST_SHARE))
         return min(max(mean + deviation * quantile, domain.low), domain.high)
 
-    def document(self) -> float | dict[str, list[float]]:
+    def document(self) -> float | str | dict[str, list[Any]]:
         """Return the distribution as written in campaign.toml."""
-        return self.numbers[0] if self.kind == "constant" else {self.kind: list(self.numbers)}
+        names = self.domain.names
+        numbers: list[Any] = [names[int(one)] for one in self.numbers] if names else list(self.numbers)
+        return numbers[0] if self.kind == "constant" else {self.kind: numbers}
+
+    def text(self) -> str:
+        """Return the distribution in words, as in "1", "1 .. 2" or "circle or step"."""
+        names = self.domain.names
+        words = [names[int(one)] if names else f"{one:g}" for one in self.numbers]
+        match self.kind:
+            case "choice":
+                return " or ".join(words)
+            case "normal":
+                return f"{words[0]} +- {words[1]}"
+            case _:
+                return " .. ".join(words)
 
 
 def _density(z: Decimal) -> Decimal:
@@ -120,6 +149,8 @@ def _standard_quantile(share: Decimal) -> float:
 
 def parse(value: Any, domain: Domain) -> Distribution:
     """Return the distribution written as `value` in campaign.toml; raises ValueError, "must ..."."""
+    if domain.names:
+        return _parse_names(value, domain)
     match value:
         case dict() if len(value) == 1:
             ((kind, numbers),) = value.items()
@@ -135,6 +166,18 @@ def parse(value: Any, domain: Domain) -> Distribution:
     for rule in _broken_rules(kind, numbers, domain):
         raise ValueError(rule)
     return Distribution(kind, tuple(float(number) for number in numbers), domain)
+
+
+def _parse_names(value: Any, domain: Domain) -> Distribution:
+    """Return the distribution over names written as `value`; raises ValueError, "must ..."."""
+    match value:
+        case {"choice": [*chosen]} if len(value) == 1 and 1 <= len(chosen) <= _MOST_CHOICES:
+            kind: Kind = "choice"
+        case _:
+            kind, chosen = "constant", [value]
+    if not all(isinstance(one, str) and one in domain.names for one in chosen):
+        raise ValueError(f"must be one of {', '.join(domain.names)}, or {{ choice = [name, ...] }} of them")
+    return Distribution(kind, tuple(float(domain.names.index(one)) for one in chosen), domain)
 
 
 def _broken_rules(kind: str, numbers: list[float], domain: Domain) -> Iterator[str]:

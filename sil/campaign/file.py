@@ -27,9 +27,9 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
-from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw, draw, scenario_values
+from mambo_nmpc.sil.campaign.parameters import OF_THE_CURVE, PARAMETERS, Draw, draw, scenario_values
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.names import CurveName, SensorsName, Start
+from mambo_nmpc.sil.flight.names import SensorsName, Start
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 
 PD: Final = "pd"
@@ -47,33 +47,43 @@ class FileSection(BaseModel):
 File = TypeVar("File", bound=FileSection)
 
 
-class FlightSection(FileSection):
-    """Keys that all flights share."""
+def _checked(name: str) -> PlainValidator:
+    """Return what checks the distribution of a parameter."""
 
-    trajectory: CurveName = "bernoulli"
-    size_m: float = Field(2.0, ge=-1000, le=1000)
-    rate_rad_s: float = Field(0.5, ge=-100, le=100)
+    def validate(value: Any) -> Distribution:
+        try:
+            return parse(value, PARAMETERS[name].domain)
+        except ValueError as error:
+            raise PydanticCustomError("draw", "{rule}", {"rule": str(error)}) from None
+
+    return PlainValidator(validate)
+
+
+_WRITTEN: Final = PlainSerializer(Distribution.document)
+
+
+class FlightSection(FileSection):
+    """Keys that all flights share, and the distributions of what they follow."""
+
+    trajectory: Annotated[Distribution, _checked("trajectory"), _WRITTEN] = PARAMETERS["trajectory"]
+    size_m: Annotated[Distribution, _checked("size_m"), _WRITTEN] = PARAMETERS["size_m"]
+    rate_rad_s: Annotated[Distribution, _checked("rate_rad_s"), _WRITTEN] = PARAMETERS["rate_rad_s"]
     duration_s: float = Field(100.0, ge=1, le=3600)
     start: Start = "hover"
     sensors: SensorsName = "mambo-derotated"
 
 
-def _draw_field(default: Distribution) -> Any:
-    """Return type and default of the key of a parameter."""
-
-    def validate(value: Any) -> Distribution:
-        try:
-            return parse(value, default.domain)
-        except ValueError as error:
-            raise PydanticCustomError("draw", "{rule}", {"rule": str(error)}) from None
-
-    written = PlainSerializer(lambda distribution: distribution.document())
-    return Annotated[Distribution, PlainValidator(validate), written], default
+_DRAWN: Final[dict[str, Any]] = {
+    name: (Annotated[Distribution, _checked(name), _WRITTEN], default)
+    for name, default in PARAMETERS.items()
+    if name not in OF_THE_CURVE
+}
+Draws: Any = create_model("Draws", __base__=FileSection, **_DRAWN)
 
 
-Draws: Any = create_model(
-    "Draws", __base__=FileSection, **{name: _draw_field(default) for name, default in PARAMETERS.items()}
-)
+def distributions(flight: FlightSection, draws: FileSection) -> dict[str, Distribution]:
+    """Return the distribution of every parameter from the sections [flight] and [draws]."""
+    return dict(draws) | {name: getattr(flight, name) for name in OF_THE_CURVE}
 
 
 class CampaignFile(FileSection):
@@ -122,7 +132,7 @@ class Campaign:
 
     def draw(self, flight: int) -> Draw:
         """Return seed and parameters of flight number `flight`."""
-        return draw(self.file.seed, flight, dict(self.file.draws))
+        return draw(self.file.seed, flight, distributions(self.file.flight, self.file.draws))
 
     def document(self) -> dict[str, Any]:
         """Return everything that determines the result, as plain values."""

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
+from mambo_nmpc.sil.flight.names import CURVE_NAMES
 from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.plant.airframe import MAMBO
 
@@ -55,11 +56,18 @@ PARAMETERS: Final[dict[str, Distribution]] = {
     "payload_time_s": _parameter(0.0, 3600.0, 0.0),
     **_axes("push", "_n_s", "xyz", (-1.0, 1.0), 0.0),
     "push_time_s": _parameter(0.0, 3600.0, 0.0),
+    "trajectory": parse("bernoulli", Domain.of_names(CURVE_NAMES)),
+    "size_m": _parameter(-1000.0, 1000.0, 2.0),
+    "rate_rad_s": _parameter(-100.0, 100.0, 0.5),
 }
 """Domain and default distribution by name, in the order in which they use the
 random stream of a flight: a new parameter must be appended."""
 
-Draw = dict[str, float]
+TRAJECTORY: Final = "trajectory"
+OF_THE_CURVE: Final = (TRAJECTORY, "size_m", "rate_rad_s")
+"""Parameters that are written in the section [flight]; all others are written in [draws]."""
+
+Draw = dict[str, Any]
 """One flight: its parameters by name, and the `seed` of its noise, gusts and dropped updates."""
 
 
@@ -69,8 +77,7 @@ def draw(seed: int, flight: int, distributions: Mapping[str, Distribution]) -> D
     shares = np.random.Generator(np.random.Philox(numbers)).random(len(PARAMETERS))
     drawn: Draw = {"seed": int(noise.generate_state(1, np.uint64)[0] >> np.uint64(1))}
     for name, share in zip(PARAMETERS, shares.tolist(), strict=True):
-        value = distributions[name].quantile(share)
-        drawn[name] = int(value) if PARAMETERS[name].domain.whole else value
+        drawn[name] = PARAMETERS[name].domain.value(distributions[name].quantile(share))
     return drawn
 
 

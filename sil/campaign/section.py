@@ -37,4 +37,4 @@ def campaign_section(folder: Path, summary: CampaignSummary | UnfinishedCampaign
         finding = f"{finished.flights} flights; crashed: {crashes}"
         good = all(one.crashed.count == 0 for name, one in found.items() if name != PD)
     missing = [] if path.is_file() else [TABLE]
-    return Section("campaign", f"Campaign, {drawn.flight.trajectory}", good, finding, content, missing)
+    return Section("campaign", f"Campaign, {drawn.flight.trajectory.text()}", good, finding, content, missing)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
+from mambo_nmpc.sil.campaign.parameters import TRAJECTORY
 from mambo_nmpc.sil.errors import ResultsError
 from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -44,7 +45,7 @@ def read_table(path: Path) -> Table:
         return {
             title: np.array([float(cell) for cell in cells])
             for title, cells in columns
-            if not title.endswith("_sha256")
+            if not title.endswith("_sha256") and title != TRAJECTORY
         }
     except (OSError, ValueError, csv.Error) as error:
         raise ResultsError(

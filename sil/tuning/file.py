@@ -18,6 +18,7 @@ from mambo_nmpc.sil.campaign.file import (
     FileSection,
     FlightSection,
     demand_flyable,
+    distributions,
     format_value,
     load_settings,
     read_as,
@@ -90,8 +91,8 @@ class Tuning:
 
     def draw_flights(self) -> list[Draw]:
         """Return the draws of the flights that every trial flies."""
-        distributions = dict(self.file.draws)
-        return [draw(self.file.seed, flight, distributions) for flight in range(self.file.flights)]
+        found = distributions(self.file.flight, self.file.draws)
+        return [draw(self.file.seed, flight, found) for flight in range(self.file.flights)]
 
     def document(self) -> dict[str, Any]:
         """Return everything that determines the trials, as plain values."""

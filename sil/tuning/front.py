@@ -49,7 +49,7 @@ def controller_text(tuning: Tuning, trials: Sequence[FinishedTrial]) -> str:
     title = (
         f"Found by mambo-nmpc tune: trial {best.number} of {len(trials)} in study {study_name(tuning)}, seed "
         f"{tuning.file.seed}: {RULE}. Over {tuning.file.flights} random flights of {flight.duration_s:g} s "
-        f"on {flight.trajectory}, sensors {flight.sensors}: mean IAE {best.iae_m_s:.4g} m s, command "
+        f"on {flight.trajectory.text()}, sensors {flight.sensors}: mean IAE {best.iae_m_s:.4g} m s, command "
         f"variation {best.command_variation_rad:.4g} rad an update, {best.crashed} crashed."
     )
     return controller_toml.to_toml(tuning.settings(best.values), title)

@@ -83,6 +83,69 @@ def test_a_draw_depends_on_seed_and_flight_only() -> None:
     assert draw(5, 17, fixed) == draw(5, 17, PARAMETERS) | {"mass_kg": 0.07}
 
 
+def test_curves_are_drawn(tmp_path: Path) -> None:
+    """Name, size and rate, each from its number of the stream; heading and all else are drawn as before."""
+    plain = file.default()
+    curves = file.read(
+        written(
+            tmp_path,
+            """
+            [flight]
+            trajectory = { choice = ["circle", "step"] }
+            size_m = { uniform = [1, 2] }
+            rate_rad_s = { log_uniform = [0.5, 1.0] }
+            """,
+        )
+    )
+    drawn = [curves.draw(flight) for flight in range(200)]
+    for flight, one in enumerate(drawn):
+        others = {"trajectory": "bernoulli", "size_m": 2.0, "rate_rad_s": 0.5}
+        assert one | others == plain.draw(flight)
+        flown = file.scenario(curves.file.flight.model_dump(), one)
+        assert (flown.trajectory, flown.size_m, flown.rate_rad_s) == tuple(one[name] for name in others)
+    assert 70 < sum(one["trajectory"] == "circle" for one in drawn) < 130
+    assert 1.0 <= min(one["size_m"] for one in drawn) < 1.1
+    assert 0.9 < max(one["rate_rad_s"] for one in drawn) <= 1.0
+    assert max(one["yaw_rad"] for one in drawn) > 3.0 > -3.0 > min(one["yaw_rad"] for one in drawn)
+    assert curves.document()["flight"]["trajectory"] == {"choice": ["circle", "step"]}
+    assert plain.document()["flight"]["trajectory"] == "bernoulli"
+
+
+def test_draws_are_those_of_earlier_versions() -> None:
+    """New parameters use new numbers: the first flight of the default campaign keeps its draws."""
+    drawn = draw(0, 0, PARAMETERS)
+    shares = np.random.Generator(np.random.Philox(np.random.SeedSequence(0, spawn_key=(0,)).spawn(2)[0]))
+    first, *_, last = shares.random(37)
+    assert drawn["mass_kg"] == 0.063 + first * (0.08 - 0.063)
+    assert list(PARAMETERS)[36] == "push_time_s"
+    pushed = draw(0, 0, PARAMETERS | {"push_time_s": parse({"uniform": [0.0, 1.0]}, WIDE)})
+    assert pushed["push_time_s"] == last
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2.0, "2"),
+        ({"uniform": [1.0, 2.5]}, "1 .. 2.5"),
+        ({"normal": [1.0, 0.1]}, "1 +- 0.1"),
+        ({"choice": [1.0, 2.0]}, "1 or 2"),
+    ],
+)
+def test_a_distribution_is_said_in_words(value: object, text: str) -> None:
+    """For the report, and for the comment of a tuned controller."""
+    assert parse(value, WIDE).text() == text
+
+
+def test_names_are_drawn_and_said() -> None:
+    """A distribution over names is written and said with them."""
+    names = Domain.of_names(("a", "b", "c"))
+    found = parse({"choice": ["c", "a"]}, names)
+    assert [names.value(found.quantile(share)) for share in (0.0, 0.49, 0.5, 0.99)] == ["c", "c", "a", "a"]
+    assert found.document() == {"choice": ["c", "a"]}
+    assert found.text() == "c or a"
+    assert parse("b", names).document() == parse("b", names).text() == "b"
+
+
 def test_seeds_of_flights_differ() -> None:
     """2000 flights have 2000 seeds, and so different noise."""
     assert len({draw(0, flight, PARAMETERS)["seed"] for flight in range(2000)}) == 2000
@@ -168,7 +231,13 @@ BAD = {
     "[draws]\ncommand_delay_ticks = 1.5": "must be whole numbers",
     "[draws]\ncommand_delay_ticks = { uniform = [0, 2] }": "must be a whole number or { choice",
     "[flight]\nduration_s = 0": "flight.duration_s = 0 must lie in 1..3600",
-    '[flight]\ntrajectory = "spiral"': "flight.trajectory = \"spiral\" must be 'bernoulli', 'gerono'",
+    '[flight]\ntrajectory = "spiral"': 'flight.trajectory = "spiral" must be one of bernoulli, gerono',
+    '[flight]\ntrajectory = { choice = ["circle", "spiral"] }': "must be one of bernoulli, gerono, lissajous",
+    "[flight]\ntrajectory = { choice = [] }": "hover, step, or { choice = [name, ...] } of them",
+    "[flight]\ntrajectory = { uniform = [0, 1] }": "or { choice = [name, ...] } of them",
+    "[flight]\ntrajectory = 3": "flight.trajectory = 3 must be one of bernoulli",
+    "[flight]\nsize_m = { uniform = [1, 5000] }": "must lie in -1000..1000",
+    "[draws]\nsize_m = 1": "draws.size_m is not a parameter",
     "controllers = []": "controllers = [] must name 1 to 10 controllers",
     'controllers = ["mamba"]': "controllers: mamba is neither a preset nor a file (did you mean mambo?)",
     'controllers = ["pd", "pd"]': "controllers: two are called pd",
