@@ -14,6 +14,8 @@ from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PlainLogFormatter, inline,
 _SHOWN: Final = (1e-2, 1e2)
 """Shares that the picture shows; others are drawn at its edges."""
 
+_MOST_ROWS: Final = 60
+
 
 def draw_regress(summary: RegressSummary, stem: Path) -> tuple[Path, Path]:
     """Draw the picture of `limits_figure`; writes stem.png and stem.svg."""
@@ -29,11 +31,7 @@ def limits_panel(summary: RegressSummary) -> Markup:
 
 def _limits_figure(summary: RegressSummary) -> Figure:
     """Return a row per group and metric with a dot per flight, at the metric divided by its limit."""
-    rows: dict[str, list[Check]] = {}
-    for flight in summary.flights:
-        for check in flight.checks:
-            if check.limit > 0.0 or not check.holds:
-                rows.setdefault(f"{flight.group}: {check.metric}", []).append(check)
+    rows = _rows(summary)
     figure = Figure(figsize=(9.0, 1.2 + 0.26 * max(len(rows), 1)), layout="constrained")
     axes = figure.subplots()
     for holds, colour, label in ((True, FLOWN, "holds"), (False, COMMAND, "fails")):
@@ -59,6 +57,17 @@ def _limits_figure(summary: RegressSummary) -> Figure:
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
     return figure
+
+
+def _rows(summary: RegressSummary) -> dict[str, list[Check]]:
+    """Return the checks by group and metric; of more than `_MOST_ROWS` those closest to their limits."""
+    rows: dict[str, list[Check]] = {}
+    for flight in summary.flights:
+        for check in flight.checks:
+            if check.limit > 0.0 or not check.holds:
+                rows.setdefault(f"{flight.group}: {check.metric}", []).append(check)
+    closest = sorted(rows, key=lambda row: max(_shares(rows[row])), reverse=True)[:_MOST_ROWS]
+    return {row: checks for row, checks in rows.items() if row in closest}
 
 
 def _shares(checks: Sequence[Check]) -> list[float]:

@@ -237,5 +237,5 @@ def regress_text(summary: RegressSummary, folder: str) -> str:
         lines.append(f"    mambo-nmpc fly --replay {echo(folder)}/{flight.record}")
     if len(summary.failed) > MOST_SHOWN:
         lines.append(f"and {len(summary.failed) - MOST_SHOWN} more failed flights, all in {JUNIT}")
-    lines.append(f"{summary.suite} with {summary.controller}: {finding(summary)}")
+    lines.append(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")
     return "\n".join([*lines, *remarks(summary)])

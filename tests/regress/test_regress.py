@@ -19,6 +19,7 @@ from mambo_nmpc.sil.regress.baseline import (
 )
 from mambo_nmpc.sil.regress.file import FlightSuite, load_suite
 from mambo_nmpc.sil.regress.junit import junit_xml
+from mambo_nmpc.sil.regress.plots import draw_regress
 from mambo_nmpc.sil.regress.report import (
     MOST_SHOWN,
     RECORDS,
@@ -263,6 +264,20 @@ def test_the_text_lists_some_failed_flights_and_counts_the_rest(tmp_path: Path) 
     assert text.count("fly --replay out/flights/") == MOST_SHOWN
     assert "and 20 more failed flights, all in junit.xml" in text
     assert "many with mambo: 0 of 30 flights passed, 30 failed" in text
+
+
+def test_a_picture_of_many_groups_has_the_rows_closest_to_their_limits(tmp_path: Path) -> None:
+    """A suite of 200 groups still has a picture that can be looked at."""
+    path = tmp_path / "many.toml"
+    groups = [f"[flights.group-{number}]\nbounds.iae_m_s = 1.0" for number in range(200)]
+    path.write_text("\n".join(groups), "utf-8")
+    found = load_suite(str(path))
+    rows = [row(number / 100) for number in range(200)]
+    png, svg = draw_regress(judge(found, mambo(), rows, None, path), tmp_path / "many")
+    assert png.read_bytes().startswith(b"\x89PNG")
+    drawn = svg.read_text("utf-8")
+    assert "group-199: iae_m_s" in drawn
+    assert "group-139: iae_m_s" not in drawn
 
 
 def test_the_summary_is_read_back(tmp_path: Path) -> None:
