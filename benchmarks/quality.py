@@ -89,12 +89,11 @@ def entrants(preset: str) -> dict[str, Variant]:
 
 
 def by_weight() -> dict[tuple[str, str], Variant]:
-    """Return `mambo` with each effort weight and `mambo-robust`, each with three searches, by two titles."""
+    """Return `mambo` with each effort weight, each with three searches, by two titles."""
     mambo = presets.load("mambo")
     several = {
         f"mambo, {weight:g}": with_option(mambo, "cost.effort_weight", weight) for weight in EFFORT_WEIGHTS
     }
-    several["mambo-robust"] = presets.load("mambo-robust")
     found = {}
     for title, settings in several.items():
         for k in (settings.optimizer.iterations, 20):

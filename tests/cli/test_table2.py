@@ -19,7 +19,6 @@ def test_table2_judges_the_claims(tmp_path: Path) -> None:
         "the PD of Table II flies Bernoulli 0.25 rad/s": False,
         "the PD of Table II flies Gerono 0.25 rad/s": False,
         "mambo": True,
-        "mambo-robust": True,
         "table1": True,
         "table1-printed": False,
     }
