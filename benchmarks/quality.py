@@ -20,9 +20,9 @@ from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.campaign.flights import detect_crashes
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mambo_nmpc.codegen.settings.model import Settings
 
 EXIT_CODES = (
-    "Exit codes: 0 success; 1 a check failed or a flight was lost; 2 bad input or a system error; "
+    "Exit codes: 0 success; 1 a check failed, or the drone crashed; 2 bad input or a system error; "
     "130 interrupted; 141 the reader of the output closed it."
 )
 

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, Final
 
-import numpy as np
-
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
@@ -17,13 +15,11 @@ from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import WorkerError
-from mambo_nmpc.sil.faults.flights import CRASH_TILT_RAD
+from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
-from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.plant.elementary import sine_cosine
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
@@ -102,14 +98,3 @@ def _evaluate(trace: Trace) -> dict[str, list[Any]]:
         metrics = measure(view)
         found |= {prefix + name: getattr(metrics, name).tolist() for name in names}
     return found | {DIGEST: [trace.digest(flight) for flight in range(trace.flights)]}
-
-
-def detect_crashes(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return which flights (n,) were lost, tilted beyond `CRASH_TILT_RAD` or on the ground after t = 0."""
-    flown = trace.time_s >= 0.0
-    angles_rad: FloatArray = trace.euler_rad[flown]
-    _, (cos_roll, cos_pitch) = sine_cosine(np.moveaxis(angles_rad[..., :2], -1, 0))
-    aloft = ((cos_roll * cos_pitch) > sine_cosine(CRASH_TILT_RAD)[1]) & (
-        trace.position_m[flown][..., 2] < 0.0
-    )
-    return np.asarray(~aloft.all(axis=0))

@@ -38,7 +38,7 @@ FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
 
 
 def fly_once(options: FlyOptions) -> None:
-    """Fly once as `options` say and write the results; exit 1 if the drone is lost or the bits differ.
+    """Fly once as `options` say, write the results; exit 1 if the drone crashes or is lost, or bits differ.
 
     Raises FlightError, TrajectoryError, and the errors of loading settings or boards and of building the C.
     """

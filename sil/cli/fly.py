@@ -4,7 +4,7 @@ from mambo_nmpc.sil.cli.options import FlyOptions
 
 
 def fly(options: FlyOptions) -> None:
-    """Simulate one flight of the Mambo; write trace, metrics and plots."""
+    """Simulate one flight of the Mambo; write trace, metrics and plots; exit 1 if the drone crashes."""
     if options.replay is not None:
         from mambo_nmpc.sil.cli.replay import fly_again
 

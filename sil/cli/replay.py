@@ -20,7 +20,9 @@ ALLOWED = frozenset({"replay", "output", "as_json"})
 
 
 def fly_again(options: FlyOptions, file: Path) -> None:
-    """Repeat the flight recorded in `file`, with the reference instead of the C; exit 1 if a bit differs.
+    """Repeat the flight recorded in `file`, with the reference instead of the C.
+
+    Exits 1 if the drone crashes or is lost, or if a bit differs from the recorded flight.
 
     Raises FlightError and ScenarioError.
     """

@@ -25,6 +25,7 @@ from mambo_nmpc.sil.faults.injection import (
 )
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, FaultScenario, scenarios
 from mambo_nmpc.sil.files.summary import Number, Summary
+from mambo_nmpc.sil.flight.crashes import CRASH_TILT_RAD
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, horizontal_error_m
 from mambo_nmpc.sil.flight.traces import Trace
@@ -33,15 +34,11 @@ from mambo_nmpc.sil.paper.table2 import CASES
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import arc_cosine, sine_cosine
 from mambo_nmpc.sil.plant.link import NOT_CALLED
-from mambo_nmpc.sil.plant.loops import THRUST_LIMIT_N, WEIGHT_N
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 
 DURATION_S: Final = 100.0
 ONSETS_S: Final = (20.0, 23.1, 26.3, 29.4)
 """Times at which a fault begins, one flight each: a quarter of the figure of eight apart."""
-
-CRASH_TILT_RAD: Final = float(arc_cosine(WEIGHT_N / THRUST_LIMIT_N))
-"""Tilt beyond which the altitude loop's thrust limit no longer carries the weight: 59 degrees."""
 
 STRAY_M: Final = 10.0
 """Distance at which the stock code of the Mambo shuts the motors down."""

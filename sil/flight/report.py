@@ -9,6 +9,7 @@ from pydantic import SerializerFunctionWrapHandler, model_serializer
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.files.summary import Number, Summary
+from mambo_nmpc.sil.flight.crashes import Crash, first_crash
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, Metrics, measure
 from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
@@ -25,6 +26,7 @@ class FlightSummary(Summary):
     settings: str
     same_bits_as_host: bool | None
     lost: bool
+    crash: Crash | None = None
     mostly_refused: bool
     """Whether more than half of the updates on the trajectory were refused."""
     statuses: dict[str, int]
@@ -46,7 +48,8 @@ class FlightSummary(Summary):
     @property
     def good(self) -> bool:
         """Whether the drone stayed under control, and an emulated flight has the bits of the host."""
-        return not self.lost and not self.mostly_refused and self.same_bits_as_host is not False
+        controlled = not self.lost and self.crash is None and not self.mostly_refused
+        return controlled and self.same_bits_as_host is not False
 
     @model_serializer(mode="wrap")
     def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -135,6 +138,7 @@ def judge(trace: Trace, settings: Settings) -> dict[str, Any]:
     long = trace.time_s[-2] >= TRANSIENT_S
     return {
         "lost": bool(trace.diverged[0]),
+        "crash": first_crash(trace),
         "mostly_refused": bool(np.mean(refused) > 0.5),
         "statuses": {name: count for name, count in counts.items() if count},
         "refusals": refusals(trace, settings),
@@ -164,6 +168,8 @@ def flight_text(summary: FlightSummary) -> str:
     if isinstance(summary, FlySummary) and summary.same_bits_as_host is not None:
         same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
         lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")
+    if summary.crash is not None:
+        lines.append(f"CRASHED at {summary.crash.time_s:.2f} s: {summary.crash.how}")
     if summary.lost:
         lines.append("LOST: the drone diverged before the end of the flight")
     elif summary.mostly_refused:

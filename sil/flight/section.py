@@ -73,6 +73,8 @@ def _flight(
 ) -> Section:
     """Return the section of a flight; `names` has the names of drone and section, `bad` the faults found."""
     flights, missing = traces(folder, {names[0]: "trace.npz"})
+    if summary.crash is not None:
+        bad = [*bad, f"the drone crashed at {summary.crash.time_s:.2f} s: {summary.crash.how}"]
     if summary.lost:
         bad = [*bad, "the drone was lost before the end of the flight"]
     elif summary.mostly_refused:

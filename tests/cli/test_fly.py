@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import INTERRUPTED
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.flight.loop import fly
+from mambo_nmpc.sil.flight.scenario import Record, Scenario, flight_of, write_record
 from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 from tests.support.command import command, run
 
@@ -133,6 +137,31 @@ def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
     assert "101 steps: thrust out of range, 9.81..9.81 m/s^2, but ranges" in said
     assert "thrust_acceleration_* = 20..50; the drone kept the last command" in said
     assert "NOT CONTROLLED" in said
+
+
+def test_a_crash_is_a_failure_that_says_when_and_how(tmp_path: Path) -> None:
+    """Motors too slow for the stock roll loop: exit 1, the time and the tilt, in the summary too."""
+    options = ["--controller", "reference", "--motor-lag-s", "0.2", "--duration-s", "2"]
+    said, _ = run("fly", *options, code=1)
+    line = next(line for line in said.splitlines() if line.startswith("CRASHED"))
+    crash = json.loads((tmp_path / "flight" / "summary.json").read_text())["crash"]
+    assert line == f"CRASHED at {crash['time_s']:.2f} s: {crash['how']}"
+    assert 0.0 < crash["time_s"] < 2.0
+    assert "the thrust limit no longer carries the weight" in line
+
+
+def test_a_replayed_crash_is_a_failure(tmp_path: Path) -> None:
+    """Exit 1 although the trace is the recorded one; a record that does not crash exits 0."""
+    for name, tilt_rad, code in (("upside.json", 1.2, 1), ("level.json", 0.0, 0)):
+        scenario = Scenario(duration_s=0.1, start_tilt_rad=(tilt_rad, 0.0))
+        flown = fly(flight_of([scenario], 0.01), PdController())
+        record = Record(
+            scenario=scenario, controller="pd", settings=presets.load("mambo"), trace_sha256=flown.digest()
+        )
+        write_record(record, tmp_path / name)
+        said, _ = run("fly", "--replay", name, code=code)
+        assert "replay: the trace equals the recorded one" in said
+        assert ("CRASHED at 0.00 s: tilted 68.8 degrees" in said) == (code == 1)
 
 
 def test_refusals_during_lift_off_are_explained() -> None:
