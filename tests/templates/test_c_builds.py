@@ -274,6 +274,15 @@ def test_make_lists_the_boards_when_it_knows_none_of_that_name(mambo: Path) -> N
     assert not (mambo / "build").exists()
 
 
+@pytest.mark.parametrize(("method", "advice"), [(2, "on x86 build with"), (1, "use code.scalar fixed")])
+def test_another_precision_than_the_type_s_is_refused(method: int, advice: str, mambo: Path) -> None:
+    """The x87 has a precision of its own (2), some s390x compilers use double (1); one is an x86."""
+    flags = ["-U__FLT_EVAL_METHOD__", f"-D__FLT_EVAL_METHOD__={method}", "-Iinclude", "-fsyntax-only"]
+    said = refused(require("gcc", "gcc"), *flags, "src/nmpc_math.c", folder=mambo).stderr
+    assert advice in said
+    assert ("x86" in said) == (method == 2)
+
+
 @pytest.mark.parametrize(
     "flag", ["-ffast-math", "-Ofast", "-ffinite-math-only", "-funsafe-math-optimizations"]
 )

@@ -19,9 +19,14 @@
 #if defined(__ASSOCIATIVE_MATH__)
 #error "build without -fassociative-math: it changes the order of operations"
 #endif
-/* 0: float and double are evaluated with their own precision; 16: and so is _Float16, which is not used here. */
+/* 0: float and double are evaluated with their own precision; 16: and so is _Float16, which is not used here;
+ * 1: float as double; 2: both as long double, as the x87 of an x86 does. */
 #if defined(__FLT_EVAL_METHOD__) && (__FLT_EVAL_METHOD__ != 0) && (__FLT_EVAL_METHOD__ != 16)
-#error "arithmetic must keep the precision of its type: on x86 build with -mfpmath=sse"
+#if (__FLT_EVAL_METHOD__ == 2)
+#error "arithmetic must keep the precision of its type: on x86 build with -msse2 -mfpmath=sse"
+#else
+#error "arithmetic must keep the precision of its type, FLT_EVAL_METHOD 0; or use code.scalar fixed"
+#endif
 #endif
 
 #ifdef __cplusplus
