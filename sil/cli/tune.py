@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import Workers
+from mambo_nmpc.sil.cli.options import Workers, output_option
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -26,7 +26,7 @@ def tune(
     *,
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Folder for the results; a study started there is continued."),
+        output_option("Folder for the results; a study started there is continued."),
     ] = Path("tune"),
     trials: Annotated[int, typer.Option(help="Total number of trials.", min=1, max=100_000)] = 100,
     workers: Workers = None,
@@ -37,17 +37,24 @@ def tune(
 ) -> None:
     """Search for settings that track well with calm commands; continue an interrupted search."""
     from mambo_nmpc.sil.campaign.store import claim, convert_os_errors
-    from mambo_nmpc.sil.files.folders import lock
+    from mambo_nmpc.sil.errors import StudyError
+    from mambo_nmpc.sil.files.folders import create_folder, lock
     from mambo_nmpc.sil.tuning import file
     from mambo_nmpc.sil.tuning.front import RULE, choose, pareto_front
-    from mambo_nmpc.sil.tuning.study import finished_trials, open_study
+    from mambo_nmpc.sil.tuning.study import demand_optuna, finished_trials, open_study
 
     tuning = file.default() if source is None else file.read(source)
-    with convert_os_errors(output):
-        output.mkdir(parents=True, exist_ok=True)
-    with lock(output):
+    demand_optuna()
+    with convert_os_errors(output), create_folder(output), lock(output):
+        new = not any(output.iterdir())
         claim(output, "study", {"command": "tune", **tuning.document()})
-        with open_study(tuning, output, storage) as study:
+        with contextlib.ExitStack() as stack:
+            try:
+                study = stack.enter_context(open_study(tuning, output, storage))
+            except StudyError:
+                for path in output.iterdir() if new else ():
+                    path.unlink()
+                raise
             _search(tuning, study, output, trials, workers or os.cpu_count() or 1)
             found = finished_trials(study)
         _finish(tuning, found, output)

@@ -38,7 +38,7 @@ def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[
     UnwritableError if the file system refuses an access; where possible, before the run.
     """
     try:
-        with _create(folder), lock(folder):
+        with create_folder(folder), lock(folder):
             _refuse_other_work(folder, command, (*names, SUMMARY))
             for left_over in folder.glob(f"{_NEW}*"):
                 shutil.rmtree(left_over)
@@ -81,7 +81,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 @contextlib.contextmanager
-def _create(folder: Path) -> Iterator[None]:
+def create_folder(folder: Path) -> Iterator[None]:
     """Create `folder` and its parents; remove those created here if the block raises."""
     missing = [path for path in (folder, *folder.parents) if not path.exists()]
     try:

@@ -7,7 +7,9 @@ number of workers nor on interruptions.
 import contextlib
 import hashlib
 import json
+import shlex
 import socket
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,11 +63,10 @@ def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["S
     The name of the study is derived from its document, so several studies can share a database. Raises
     StudyError if Optuna is not installed or the database refuses an access.
     """
-    try:
-        import optuna  # noqa: PLC0415 - an optional extra
-        from sqlalchemy.exc import SQLAlchemyError  # noqa: PLC0415 - comes with it
-    except ImportError:
-        raise StudyError('tuning needs Optuna; pip install "mambo-nmpc[tune]" installs it') from None
+    demand_optuna()
+    import optuna  # noqa: PLC0415 - an optional extra
+    from sqlalchemy.exc import SQLAlchemyError  # noqa: PLC0415 - comes with it
+
     optuna.logging.set_verbosity(optuna.logging.CRITICAL)
     where = f"sqlite:///{(folder / DATABASE).resolve()}" if storage is None else storage
     named = echo(str(folder / DATABASE)) if storage is None else "--storage"
@@ -87,6 +88,15 @@ def open_study(tuning: Tuning, folder: Path, storage: str | None) -> Iterator["S
             f"{named}: the database refused an access ({echo(reason)}); its trials are kept. A URL is as in "
             "sqlite:////home/me/study.db or postgresql://host/name, with that database's driver installed"
         ) from error
+
+
+def demand_optuna() -> None:
+    """Raise StudyError, which says how to install Optuna, unless it is installed."""
+    try:
+        import optuna  # noqa: F401, PLC0415 - an optional extra
+    except ImportError:
+        install = shlex.join([sys.executable, "-m", "pip", "install", "optuna"])
+        raise StudyError(f"tuning needs Optuna; install it: {install}") from None
 
 
 def study_name(tuning: Tuning) -> str:

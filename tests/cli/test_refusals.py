@@ -1,0 +1,69 @@
+"""Refused commands: an explained exit 2, and no folder or file left behind."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.command import run
+
+COMMANDS = ["generate", "fly", "table2", "footprint", "sweep", "faults", "verify", "campaign", "tune"]
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, "init"])
+def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
+    """It would be the current folder."""
+    said, talk = run(command, "-o", "", code=2)
+    assert (said, "must not be empty" in talk) == ("", True)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *(f"{command} no.toml -o a/b" for command in COMMANDS if command != "table2"),
+        *(f"{command} --scalar flat -o a/b" for command in COMMANDS if command not in ("campaign", "tune")),
+        "fly --trajectory triangle -o a/b",
+        "fly --on no-board -o a/b",
+        "fly --controller pd --on crazyflie -o a/b",
+        "fly --replay no.json -o a/b",
+        "footprint --board no-board -o a/b",
+        "footprint --optimisation=fast --board crazyflie -o a/b",
+        "sweep --board no-board -o a/b",
+        "sweep --prediction 0 -o a/b",
+        "sweep --prediction 1 --control 2 -o a/b",
+        "verify --only charm -o a/b",
+        "campaign --flights 0 -o a/b",
+        "campaign --workers 2 --scheduler tcp://127.0.0.1:9 -o a/b",
+        "campaign --scheduler tcp://127.0.0.1:9 -o a/b",
+        "tune --trials 0 -o a/b",
+        "tune --storage nowhere -o a/b",
+        "report no-folder -o a/b",
+        "init no-preset -o a/b",
+        "generate --prefix 1x -o a/b",
+    ],
+)
+def test_a_refused_command_leaves_nothing(line: str, tmp_path: Path) -> None:
+    """Exit 2, a message without traceback, and the folder as it was."""
+    said, talk = run(*line.split(), code=2)
+    assert (said, bool(talk), "Traceback" in talk) == ("", True, False), talk
+    assert not list(tmp_path.iterdir())
+
+
+def test_tune_without_optuna_names_what_to_install(tmp_path: Path) -> None:
+    """Before a folder is made; the extra of this package, not a name of a package index."""
+    script = "import sys; sys.modules['optuna'] = None; from mambo_nmpc.sil.cli.app import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", script, "tune"],
+        cwd=tmp_path,
+        env=os.environ,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("tuning needs Optuna; install it: ")
+    assert done.stderr.endswith(" -m pip install optuna\n")
+    assert not list(tmp_path.iterdir())
