@@ -191,7 +191,10 @@ def _parse(text: str, source: str, name: str) -> Board:
         return Board.model_validate({"name": name, **document})
     except ValidationError as error:
         details = error.errors(include_url=False, include_context=False)
-        raise InvalidSettingsError(tuple(f"{source}: {_fault(one)}" for one in details)) from None
+        # Pydantic also says of a list whose items are wrong that it is too short.
+        wrong_items = {one["loc"][:-1] for one in details}
+        faults = [one for one in details if not (one["type"] == "too_short" and one["loc"] in wrong_items)]
+        raise InvalidSettingsError(tuple(f"{source}: {_fault(one)}" for one in faults)) from None
 
 
 def _fault(details: ErrorDetails) -> str:

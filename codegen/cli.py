@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_nmpc.codegen.command import AsJson, Scalar, Source, examples, load
+from mambo_nmpc.codegen.command import AsJson, Scalar, Source, examples, load, output_option
 from mambo_nmpc.codegen.errors import DriftError, FileExistsRefusedError, UnwritableError, echo
 
 if TYPE_CHECKING:
@@ -38,9 +38,10 @@ def init(
     preset: Annotated[
         str, typer.Argument(help="Preset to start from; `mambo-nmpc presets` lists them.")
     ] = "mambo",
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write, - for stdout.")] = Path(
-        "controller.toml"
-    ),
+    output: Annotated[
+        Path,
+        output_option("File to write, - for stdout."),
+    ] = Path("controller.toml"),
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
 ) -> None:
     """Write a controller.toml that holds and explains every setting."""
@@ -87,7 +88,10 @@ def schema() -> None:
 
 
 def generate(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the bundle.")],
+    output: Annotated[
+        Path,
+        output_option("Folder of the bundle."),
+    ],
     source: Source = "mambo",
     *,
     check: Annotated[

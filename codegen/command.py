@@ -8,6 +8,7 @@ import io
 import os
 import sys
 import traceback
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -125,6 +126,18 @@ def _root_options(
     ] = False,
 ) -> None:
     """Generate a static-memory C99 NMPC for a very small drone, and fly it in simulation."""
+
+
+def output_option(about: str) -> Any:
+    """Return the option -o, a path; `about` is its help."""
+    return typer.Option("--output", "-o", help=about, parser=_output_path, metavar="<path>")
+
+
+def _output_path(text: str | Path) -> Path:
+    """Return the path; raises BadParameter for an empty one, which pathlib reads as the current folder."""
+    if text == "":
+        raise typer.BadParameter("must not be empty; the current folder is .")
+    return Path(text)
 
 
 def load(source: str, scalar: str | None) -> "Settings":

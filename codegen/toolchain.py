@@ -1,9 +1,11 @@
 """Find and run C compilers, with readable messages if they are missing or fail."""
 
+import errno
 import os
 import shlex
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -38,7 +40,13 @@ class Toolchain:
             ) from error
         if done.returncode != 0:
             output = _first_lines(done.stderr or done.stdout) or f"exit code {done.returncode}, no output"
-            raise BuildError(f"{shlex.join(line)} failed:\n{output}")
+            full = os.strerror(errno.ENOSPC) in output
+            advice = (
+                f"\nfree some space in {tempfile.gettempdir()}, or set TMPDIR to another folder"
+                if full
+                else ""
+            )
+            raise BuildError(f"{shlex.join(line)} failed:\n{output}{advice}")
 
     def identity(self) -> str:
         """Return the output of --version, which tells builds of different compilers apart."""

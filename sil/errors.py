@@ -31,6 +31,10 @@ class BusyError(MamboNmpcError):
     """Another run is using the result folder."""
 
 
+class ScratchError(MamboNmpcError):
+    """The folder for temporary files cannot be written."""
+
+
 class EmulatorError(MamboNmpcError):
     """A program cannot be emulated: the emulator is missing, or the core's memory is too small."""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mambo_nmpc.codegen.errors import UnreadableFileError, echo
+from mambo_nmpc.codegen.plain_file import read_plain_file
 
 LARGEST_FILE_BYTES = 64_000
 BOARDS, PRESETS = "boards", "presets"
@@ -35,8 +36,7 @@ def read_text(path: Path) -> str:
     """Return the text of the file at `path`; raises UnreadableFileError."""
     name = echo(str(path))
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
+        content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
     except FileNotFoundError:
         raise UnreadableFileError(f"{name}: there is no such file") from None
     except IsADirectoryError:

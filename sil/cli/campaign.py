@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, Workers, show
+from mambo_nmpc.sil.cli.options import AsJson, Workers, output_option, show
 
 if TYPE_CHECKING:
     from mambo_nmpc.sil.campaign.executors import Pool
@@ -23,7 +23,7 @@ def campaign(
     *,
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Folder for the results; a campaign started there is continued."),
+        output_option("Folder for the results; a campaign started there is continued."),
     ] = Path("campaign"),
     flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=100_000)] = 1000,
     workers: Workers = None,

@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine.simulate import fly as simulate
 from mambo_nmpc.sil.errors import FlightError, TrajectoryError
 from mambo_nmpc.sil.files.folders import new_results
+from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, flight_text, judge
@@ -138,8 +138,8 @@ def _on_board(options: FlyOptions, settings: Settings) -> PositionController:
         raise FlightError(f"--on {echo(board)} runs the C: use it with --controller nmpc only")
     chosen = boards.load(board)
     core = chosen.emulated_core.value
-    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
-        return EmulatedController(settings, build_guest(settings, builder(chosen), Path(work)), core)
+    with scratch_folder() as work:
+        return EmulatedController(settings, build_guest(settings, builder(chosen), work), core)
 
 
 def _trajectory(options: FlyOptions) -> Trajectory:

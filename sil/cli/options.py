@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
-from mambo_nmpc.codegen.command import AsJson, Scalar, Source, load
+from mambo_nmpc.codegen.command import AsJson, Scalar, Source, load, output_option
 from mambo_nmpc.codegen.settings.toml_file import BOARDS, shipped
 from mambo_nmpc.sil.flight.names import CURVE_NAMES, ControllerName, EngineName, SensorsName, Start
 
@@ -16,11 +16,9 @@ if TYPE_CHECKING:
     from mambo_nmpc.codegen.boards import Board
     from mambo_nmpc.sil.files.summary import Summary
 
-__all__ = ["AsJson", "Scalar", "Source", "load"]
+__all__ = ["AsJson", "Scalar", "Source", "load", "output_option"]
 
-_OUTPUT: Final = typer.Option(
-    "--output", "-o", help="Folder for the results; earlier results there are overwritten."
-)
+_OUTPUT: Final = output_option("Folder for the results; earlier results there are overwritten.")
 Results = Annotated[Path, _OUTPUT]
 OptionalResults = Annotated[Path | None, _OUTPUT]
 Workers = Annotated[

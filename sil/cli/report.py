@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from mambo_nmpc.codegen.command import output_option
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
 
 MARK = '<meta name="generator" content="mambo-nmpc">'
@@ -17,7 +18,8 @@ def report(
     ],
     *,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="HTML file; an earlier report there is overwritten.")
+        Path,
+        output_option("HTML file; an earlier report there is overwritten."),
     ] = Path("report.html"),
 ) -> None:
     """Collect results on one HTML page that needs no network and no other file."""

@@ -81,12 +81,24 @@ class Builder:
         chosen = sorted(path for path in sources if re.fullmatch(r"(src/)?[^/]*\.c", path))
         core, optimisation = self.board.compiler.flags, self.toolchain.optimisation
         flags = [*COMPILE_FLAGS, *core, *([optimisation] if optimisation else []), *_COMPILE, *self.own_flags]
-        self.toolchain.run([*flags, *define, "-Iinclude", "-c", *chosen], place)
+        self._run(self.toolchain, [*flags, *define, "-Iinclude", "-c", *chosen], place)
         objects = [Path(source).with_suffix(".o").name for source in chosen]
         kept = [f"-Wl,-e,{keep[0]}", *(f"-Wl,-u,{symbol}" for symbol in keep[1:])]
         link = [*core, *objects, *_LINK, *address, *kept, *self.board.compiler.libraries]
-        self.linker.run([*link, "-o", "program.elf"], place)
+        self._run(self.linker, [*link, "-o", "program.elf"], place)
         return place / "program.elf"
+
+    def _run(self, tool: Toolchain, arguments: Sequence[str], place: Path) -> None:
+        """Run compiler or linker; raises BuildError, which says what the board demands of it."""
+        try:
+            tool.run(arguments, place)
+        except BuildError as error:
+            compiler = self.board.compiler
+            raise BuildError(
+                f"{self.board.title}: {tool.command[0]} does not build for it; it must be a C99 compiler for "
+                f"{self.board.core.value} that takes {' '.join(compiler.flags)} (compiler.candidates and "
+                f"compiler.flags of the board; Debian: {' '.join(compiler.packages)})\n{error}"
+            ) from error
 
 
 def builder(board: Board, optimisation: str | None = None) -> Builder:

@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.plain_file import read_plain_file
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.errors import FlightError, ScenarioError
 from mambo_nmpc.sil.flight.loop import Flight, Offset
@@ -164,8 +165,7 @@ def read_record(path: Path) -> Record:
     """Read a record; raises `ScenarioError`, which names file, key and rule."""
     name = echo(str(path))
     try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_FILE_BYTES + 1)
+        content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
     except OSError as error:
         raise ScenarioError(f"{name}: cannot be read: {error.strerror}") from error
     if len(content) > LARGEST_FILE_BYTES:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.plain_file import read_plain_file
 from mambo_nmpc.sil.errors import TrajectoryError
 from mambo_nmpc.sil.flight.names import CurveName
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -152,8 +153,7 @@ class Waypoints:
         """
         name = echo(str(path))
         try:
-            with path.open("rb") as file:
-                content = file.read(LARGEST_FILE_BYTES + 1)
+            content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
             if len(content) > LARGEST_FILE_BYTES:
                 raise TrajectoryError("is larger than 10 MB; some thousand waypoints take less")
             points = _read(content.decode("utf-8-sig"))

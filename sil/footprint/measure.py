@@ -1,6 +1,5 @@
 """Measure the footprint of a controller on a board: flash, RAM, stack, instructions, time."""
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,6 +17,7 @@ from mambo_nmpc.sil.controllers.library import with_default_prefix
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
 from mambo_nmpc.sil.firmware.disassembly import is_readable
@@ -136,8 +136,7 @@ def measure_footprint(
     """
     found = builder(board, optimisation)
     files = render(with_default_prefix(settings), with_digest=False)
-    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
-        folder = Path(work)
+    with scratch_folder() as folder:
         firmware = found.firmware(files, folder)
         image = load(firmware)
         readable = is_readable(image)

@@ -1,10 +1,8 @@
 """Compare the self-test digest of every available build: compilers, optimisations, boards."""
 
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 from mambo_nmpc.codegen.boards import Board
@@ -17,6 +15,7 @@ from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.controllers.emulated import build_guest, digest_emulated
 from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, Builder, builder, clang_builder
 
 HOST_COMPILERS: Final = ("gcc", "clang")
@@ -64,8 +63,8 @@ def _on_board(
 ) -> BuildDigest:
     try:
         found = BOARD_COMPILERS[compiler](board, optimisation)
-        with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
-            elf = build_guest(settings, found, Path(work))
+        with scratch_folder() as work:
+            elf = build_guest(settings, found, work)
             digest = digest_emulated(settings, elf, board.emulated_core.value, episodes)
     except (BuildError, EmulatorError) as error:
         return BuildDigest(board.name, compiler, optimisation, None, str(error))

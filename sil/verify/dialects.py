@@ -1,12 +1,11 @@
 """Check: no compiler warns about the C, in any dialect in which firmware is built."""
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 from mambo_nmpc.codegen.flags import WARNING_FLAGS
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.verify.check import Result, Subject, combine
 from mambo_nmpc.sil.verify.tools import missing, run
 
@@ -51,10 +50,10 @@ def check(subject: Subject) -> Result:
             gaps.append(gap)
             continue
         command = dialect.command(subject.settings)
-        with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as objects:
+        with scratch_folder() as objects:
             done = run(
                 [*command, f"-I{bundle / 'include'}", "-c", *map(str, sources)],
-                Path(objects),
+                objects,
             )
         said = (done.stdout + done.stderr).replace(f"{bundle}/", "")
         log.append(f"{name}: {' '.join(command)}\n{said}exit code {done.returncode}\n")

@@ -177,7 +177,9 @@ def test_bad_file_is_told_key_value_and_rule(old: str, new: str, fault: str, tmp
 def test_a_board_runs_compilers_of_the_path_alone(command: str, tmp_path: Path) -> None:
     """A candidate must be the name of a GCC or clang on the PATH, since the file may be untrusted."""
     text = change('candidates = ["arm-none-eabi-gcc"]', f"candidates = [{json.dumps(command)}]")
-    with pytest.raises(InvalidSettingsError, match=r"candidates\.0 = .* must be the name of a GCC or Clang"):
+    with pytest.raises(
+        InvalidSettingsError, match=r"^[^\n]*candidates\.0 = .* must be the name of a GCC or Clang[^\n]*$"
+    ):
         boards.load(write_board(tmp_path, text))
 
 

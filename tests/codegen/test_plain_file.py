@@ -1,0 +1,52 @@
+"""Files that a user names: a pipe is refused at once, whatever would have read it."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.errors import MamboNmpcError
+from mambo_nmpc.codegen.plain_file import read_plain_file
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.campaign import file as campaign_file
+from mambo_nmpc.sil.flight.scenario import read_record
+from mambo_nmpc.sil.flight.trajectories import Waypoints
+from mambo_nmpc.sil.tuning import file as tuning_file
+
+
+def test_a_plain_file_is_read_up_to_a_limit(tmp_path: Path) -> None:
+    """At most so many bytes, all of a shorter file."""
+    path = tmp_path / "a.toml"
+    path.write_bytes(b"12345")
+    assert [read_plain_file(path, most) for most in (3, 5, 9)] == [b"123", b"12345", b"12345"]
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda path: presets.load(str(path)),
+        lambda path: boards.load(str(path)),
+        campaign_file.read,
+        tuning_file.read,
+        Waypoints.read,
+        read_record,
+    ],
+)
+def test_a_pipe_is_refused_without_waiting_for_its_writer(
+    read: Callable[[Path], object], tmp_path: Path
+) -> None:
+    """Nothing ever writes to this pipe."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(MamboNmpcError, match=r"pipe: cannot be read: it is a pipe or a device; name a plain"):
+        read(path)
+
+
+def test_a_device_and_a_folder_are_refused(tmp_path: Path) -> None:
+    """/dev/zero has no end."""
+    with pytest.raises(OSError, match="pipe or a device"):
+        read_plain_file(Path("/dev/zero"), 10)
+    with pytest.raises(IsADirectoryError):
+        read_plain_file(tmp_path, 10)
