@@ -1,5 +1,6 @@
 """Pictures of a campaign: indices over all flights, and the improvement flight by flight."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -9,6 +10,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from mambo_nmpc.sil.campaign.file import PD
 from mambo_nmpc.sil.campaign.flights import CRASHED
@@ -41,7 +43,8 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
             for colour, name in enumerate(names):
                 _draw_shares(axes, index_values(table, name, index), f"C{colour}", name)
             axes.set(xscale="log", xlabel=label, ylim=(0.0, 1.0))
-        panels[0, 0].legend(loc="lower right", frameon=True)
+            _label_plainly(axes)
+        figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(names))
         for axes, index, label in zip(panels[-1] if rows > 1 else (), COMPARED, _LABELS, strict=False):
             for colour, name in enumerate(names[1:], start=1):
                 theirs, ours = index_values(table, names[0], index), index_values(table, name, index)
@@ -49,9 +52,26 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
                     _draw_shares(axes, theirs / ours, f"C{colour}", name)
             axes.axvline(1.0, color="#444444", linewidth=0.8)
             axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: {names[0]} over {other}")
+            _label_plainly(axes)
         for axes in panels[:, 0]:
             axes.set_ylabel("share of flights")
         return save(figure, stem)
+
+
+def _label_plainly(axes: Axes) -> None:
+    """Put three to five ticks on the logarithmic x axis, labelled as 20 and not as 2 x 10^1."""
+    low, high = axes.get_xlim()
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)))
+    ticks: list[float] = []
+    for digits in ((1,), (1, 3), (1, 2, 5), range(1, 10), range(10, 100)):
+        scale = 0.1 if digits == range(10, 100) else 1.0
+        ticks = [scale * digit * 10.0**decade for decade in decades for digit in digits]
+        ticks = [tick for tick in ticks if low <= tick <= high]
+        if len(ticks) >= 3:
+            break
+    axes.set_xticks(ticks[:: -(-len(ticks) // 5) or 1])
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _draw_shares(axes: Axes, values: FloatArray, colour: str, name: str, whole: float = 1.0) -> None:
@@ -79,6 +99,6 @@ def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup
             axes.set(xlabel=label, ylabel="flights below, %", xscale="log", ylim=(0, 102))
             axes.xaxis.set_major_formatter(PlainLogFormatter())
             axes.xaxis.set_minor_formatter(PlainLogFormatter())
-            axes.legend(loc="lower right")
+            axes.legend(loc="best")
             pictures.append(inline(figure, f"Distribution of {label}, for {', '.join(controllers)}"))
     return pictures

@@ -23,7 +23,7 @@ def sweep(
     iterations: Annotated[str, typer.Option(help="Iterations.", metavar="N,N")] = "3,5,10",
     fit: Annotated[
         bool,
-        typer.Option("--fit", help="Print only the largest horizon within the board's budget.", metavar=""),
+        typer.Option("--fit", help="Print only the closest-tracking one within the budget.", metavar=""),
     ] = False,
     output: Results = Path("sweep"),
     as_json: AsJson = False,
@@ -38,7 +38,7 @@ def sweep(
         Point,
         SweepSummary,
         budgets,
-        largest_fit,
+        closest_fit,
         measure_grid,
         point_text,
         write_points,
@@ -64,14 +64,14 @@ def sweep(
                 progress(len(points) / total)
         write_points(points, folder / "sweep.csv")
         draw_sweep(points, chosen, settings.horizon.update_period_s, folder / "sweep")
-        best = largest_fit(points)
+        best = closest_fit(points)
         summary = SweepSummary(
             source=source,
             settings=settings.digest,
             board=chosen.name,
             budget=budgets(chosen, settings.horizon.update_period_s),
             points=points,
-            largest_fit=best,
+            closest_fit=best,
         )
         summary.write(folder)
     shown = ([] if best is None else [best]) if fit else points

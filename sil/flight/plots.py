@@ -40,7 +40,7 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
     path, error, *angles = column
     path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=4, label="target")
     path.plot(*trace.position_m[:, 0, :2].T, color=FLOWN, label="flown")
-    path.set_title(title, loc="right", parse_math=False)
+    path.set_title(title, loc="left", pad=24, parse_math=False)  # above the legend
     path.set(xlabel="x (north), m", aspect="equal")
     error.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
     error.set_ylim(0, None)

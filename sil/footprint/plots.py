@@ -10,7 +10,6 @@ import matplotlib as mpl
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.sil.footprint.measure import Footprint
@@ -79,17 +78,23 @@ def _draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float
         line = [p for p in points if (p.control, p.iterations) == (control, count)]
         x, y = [p.prediction for p in line], [getattr(p, quantity) for p in line]
         colour, dashes = f"C{row}", ("-", "--", "-.", ":")[column % 4]
-        axes.plot(x, y, color=colour, linestyle=dashes, label=f"{control} moves, {count} iterations")
+        label = f"{control} {'move' if control == 1 else 'moves'}, {count} iterations"
+        axes.plot(x, y, color=colour, linestyle=dashes, label=label)
         fits = [(p.prediction, getattr(p, quantity)) for p in line if p.fits]
         axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour, markersize=3.5)
     if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
         axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
     axes.set(xlabel="prediction horizon", ylabel=_SWEPT[quantity])
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xticks(_ticks(sorted({point.prediction for point in points})))
     if quantity in ("iae_m_s", "time_ms"):
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(PlainLogFormatter())
         axes.yaxis.set_minor_formatter(PlainLogFormatter())
+
+
+def _ticks(horizons: Sequence[int]) -> list[int]:
+    """Return the swept horizons, or every second, third ... of more than ten."""
+    return list(horizons[:: -(-len(horizons) // 10)])
 
 
 def sweep_panels(points: Sequence[Point], budgets: Mapping[str, float]) -> list[Markup]:
@@ -103,7 +108,7 @@ def sweep_panels(points: Sequence[Point], budgets: Mapping[str, float]) -> list[
             axes = figure.subplots()
             _draw_swept(axes, points, quantity, budgets.get(quantity))
             if not pictures:
-                axes.legend(fontsize=7, handlelength=2.6)
+                figure.legend(loc="outside lower center", ncols=2, fontsize=7, handlelength=2.6)
             pictures.append(
                 inline(figure, f"{label} against the prediction horizon; the table has the values")
             )

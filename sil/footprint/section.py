@@ -18,11 +18,11 @@ def footprint_section(_folder: Path, summary: FootprintSummary) -> Section:
 
 def sweep_section(_folder: Path, summary: SweepSummary) -> Section:
     """Return the section of a sweep."""
-    best = summary.largest_fit
+    best = summary.closest_fit
     finding = (
         "nothing fits"
         if best is None
-        else f"largest that fits: prediction {best.prediction}, {best.control} moves, "
+        else f"closest tracking that fits: prediction {best.prediction}, {best.control} moves, "
         f"{best.iterations} iterations"
     )
     pictures = sweep_panels(summary.points, summary.budget) if summary.points else []

@@ -67,7 +67,7 @@ class SweepSummary(Summary):
     board: str
     budget: dict[str, Number]
     points: list[Point]
-    largest_fit: Point | None
+    closest_fit: Point | None
 
 
 def measure_grid(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
@@ -87,10 +87,10 @@ def budgets(board: Board, update_period_s: float) -> dict[str, float]:
     }
 
 
-def largest_fit(points: Sequence[Point]) -> Point | None:
-    """Return the fitting point that is not lost with the longest prediction, then most moves, least IAE."""
+def closest_fit(points: Sequence[Point]) -> Point | None:
+    """Return the fitting point that is not lost with the least IAE, of equal ones the shortest horizons."""
     fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
-    return max(fitting, key=lambda p: (p.prediction, p.control, -p.iae_m_s), default=None)
+    return min(fitting, key=lambda p: (p.iae_m_s, p.prediction, p.control, p.iterations), default=None)
 
 
 def write_points(points: Sequence[Point], path: Path) -> None:

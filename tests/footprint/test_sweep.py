@@ -13,7 +13,7 @@ from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.footprint.plots import draw_sweep
-from mambo_nmpc.sil.footprint.sweep import Grid, Point, largest_fit, measure_grid, write_points
+from mambo_nmpc.sil.footprint.sweep import Grid, Point, closest_fit, measure_grid, write_points
 from tests.support.command import run
 from tests.support.tools import board_builder
 
@@ -52,11 +52,10 @@ def test_a_grid_has_every_combination_that_is_a_controller() -> None:
     ("points", "best"),
     [
         pytest.param(
-            [point(5, 1, 9), point(10, 1, 9), point(20, 1, 1, fits=False)], 1, id="longest that fits"
+            [point(5, 1, 9), point(10, 1, 2), point(20, 1, 1, fits=False)], 1, id="closest that fits"
         ),
-        pytest.param([point(10, 1, 1), point(10, 3, 9), point(10, 2, 2)], 1, id="then most moves"),
-        pytest.param([point(10, 2, 3), point(10, 2, 2), point(10, 2, 4)], 1, id="then best tracking"),
-        pytest.param([point(10, 1, 1), point(9, 9, 0), point(10, 2, 9)], 2, id="in this order"),
+        pytest.param([point(10, 2, 1.9), point(30, 3, 15.5)], 0, id="not the largest"),
+        pytest.param([point(10, 1, 2), point(5, 3, 2), point(5, 2, 2)], 2, id="then the shortest"),
         pytest.param([point(10, 2, math.nan), point(10, 2, 50)], 1, id="not lost"),
         pytest.param([point(10, 2, 50), point(20, 2, math.nan)], 0, id="lost, but longer"),
         pytest.param([], None, id="none"),
@@ -64,9 +63,9 @@ def test_a_grid_has_every_combination_that_is_a_controller() -> None:
         pytest.param([point(5, 1, 1, fits=False)], None, id="over budget"),
     ],
 )
-def test_the_largest_fit_follows_its_rule(points: list[Point], best: int | None) -> None:
+def test_the_closest_fit_follows_its_rule(points: list[Point], best: int | None) -> None:
     """Longest prediction within budget, then most moves, then least IAE; lost flights are excluded."""
-    assert largest_fit(points) is (None if best is None else points[best])
+    assert closest_fit(points) is (None if best is None else points[best])
 
 
 def test_points_read_back(tmp_path: Path) -> None:
@@ -107,7 +106,7 @@ def test_the_command_writes_table_and_pictures_and_answers_with_the_largest(tmp_
     assert {path.name for path in out.iterdir()} == {"sweep.csv", "sweep.png", "sweep.svg", "summary.json"}
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert [one["prediction"] for one in summary["points"]] == [2]
-    assert summary["largest_fit"] == summary["points"][0]
+    assert summary["closest_fit"] == summary["points"][0]
 
 
 @pytest.mark.parametrize(

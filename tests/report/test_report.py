@@ -28,7 +28,7 @@ SEEN = {
     "sensed": ("20 flights, 1 lost", "7.123", "0.77", "drift, m"),
     "table2": ("63.02", "204.2", "7.123", "✓ holds", "✗ does not hold", "2.50", "Play"),
     "footprint": ("3000 B", "is over its budget", "Arduino Mega 2560", "there is no emulator", "incomplete"),
-    "sweep": ("largest that fits: prediction 10", "All 5 controllers", "IAE, m s", "\N{EN DASH}"),
+    "sweep": ("closest tracking that fits: prediction 10", "All 5 controllers", "IAE, m s", "\N{EN DASH}"),
     "faults": ("state NaN to the end", "crashed", "2376.50", "OK, BAD_STATE"),
     "verify": ("incomplete: 1 of 2 checks passed", "cppcheck is missing", "update_period_s"),
     "regress": ("1 of 2 flights passed, 1 failed", "the trace differs", "fly --replay", ">1.5<", "0.750"),

@@ -139,7 +139,7 @@ def sweep_folder(folder: Path) -> None:
         board=HOSTILE,
         budget=budgets(boards.load("crazyflie"), 0.01),
         points=points,
-        largest_fit=points[2],
+        closest_fit=points[2],
     ).write(folder)
 
 
