@@ -1,6 +1,5 @@
 """Pictures of a campaign: indices over all flights, and the improvement flight by flight."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -61,11 +60,10 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
 def _label_plainly(axes: Axes) -> None:
     """Put three to five ticks on the logarithmic x axis, labelled as 20 and not as 2 x 10^1."""
     low, high = axes.get_xlim()
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)))
     ticks: list[float] = []
     for digits in ((1,), (1, 3), (1, 2, 5), range(1, 10), range(10, 100)):
         scale = 0.1 if digits == range(10, 100) else 1.0
-        ticks = [scale * digit * 10.0**decade for decade in decades for digit in digits]
+        ticks = [scale * digit * 10.0**decade for decade in range(-12, 13) for digit in digits]
         ticks = [tick for tick in ticks if low <= tick <= high]
         if len(ticks) >= 3:
             break
