@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_nmpc.codegen.command import AsJson, Scalar, Source, examples, load, output_option
+from mambo_nmpc.codegen.command import AsJson, Scalar, Source, complete_presets, examples, load, output_option
 from mambo_nmpc.codegen.errors import DriftError, FileExistsRefusedError, UnwritableError, echo
 
 if TYPE_CHECKING:
@@ -36,7 +36,10 @@ def register(app: typer.Typer) -> None:
 
 def init(
     preset: Annotated[
-        str, typer.Argument(help="Preset to start from; `mambo-nmpc presets` lists them.")
+        str,
+        typer.Argument(
+            help="Preset to start from; `mambo-nmpc presets` lists them.", autocompletion=complete_presets
+        ),
     ] = "mambo",
     output: Annotated[
         Path,

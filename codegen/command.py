@@ -25,7 +25,17 @@ EXIT_CODES = (
     "130 interrupted; 141 the reader of the output closed it."
 )
 
-Source = Annotated[str, typer.Argument(help="A preset or a controller.toml.")]
+
+def complete_presets(incomplete: str) -> list[str]:
+    """Return the presets that begin with `incomplete`, for the shell; it completes files itself."""
+    from mambo_nmpc.codegen.settings.toml_file import PRESETS, shipped
+
+    return [name for name in shipped(PRESETS) if name.startswith(incomplete)]
+
+
+Source = Annotated[
+    str, typer.Argument(help="A preset or a controller.toml.", autocompletion=complete_presets)
+]
 Scalar = Annotated[
     str | None, typer.Option(help="Scalar type of the C (code.scalar).", metavar="float32|float64|fixed")
 ]
@@ -105,7 +115,6 @@ def root() -> typer.Typer:
         cls=RootGroup,
         callback=_root_options,
         no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
         epilog=examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller")
         + f"\n\n{EXIT_CODES}",

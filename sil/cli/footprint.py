@@ -11,6 +11,7 @@ from mambo_nmpc.sil.cli.options import (
     OptionalResults,
     Scalar,
     Source,
+    complete_boards,
     load,
     load_boards,
     show,
@@ -24,7 +25,10 @@ def footprint(
     *,
     scalar: Scalar = None,
     board: Annotated[
-        str, typer.Option(help=f"{', '.join(BOARD_NAMES)}, all, or a board's TOML file.")
+        str,
+        typer.Option(
+            help=f"{', '.join(BOARD_NAMES)}, all, or a board's TOML file.", autocompletion=complete_boards
+        ),
     ] = "all",
     optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
     output: OptionalResults = None,

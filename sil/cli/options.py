@@ -28,6 +28,12 @@ Workers = Annotated[
 
 BOARD_NAMES: Final = tuple(shipped(BOARDS))
 
+
+def complete_boards(incomplete: str) -> list[str]:
+    """Return the boards that begin with `incomplete`, for the shell."""
+    return [name for name in BOARD_NAMES if name.startswith(incomplete)]
+
+
 Options = TypeVar("Options")
 
 
@@ -74,7 +80,8 @@ class FlyOptions:
     on: Annotated[
         str | None,
         typer.Option(
-            help="Board on whose emulated core the C runs; a flight on this machine must have the same bits."
+            help="Board on whose emulated core the C runs; a flight on this machine must have the same bits.",
+            autocompletion=complete_boards,
         ),
     ] = None
     replay: Annotated[

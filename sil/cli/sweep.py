@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
-from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, Source, load, show
+from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, Source, complete_boards, load, show
 
 FILES = ("sweep.csv", "sweep.png", "sweep.svg")
 
@@ -15,7 +15,9 @@ def sweep(
     source: Source = "mambo",
     *,
     scalar: Scalar = None,
-    board: Annotated[str, typer.Option(help="Board, or its TOML file.")] = "crazyflie",
+    board: Annotated[
+        str, typer.Option(help="Board, or its TOML file.", autocompletion=complete_boards)
+    ] = "crazyflie",
     prediction: Annotated[
         str, typer.Option(help="Prediction horizons.", metavar="FIRST:LAST[:STEP]")
     ] = "5:30:5",

@@ -10,6 +10,7 @@ import matplotlib as mpl
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
 
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.sil.footprint.measure import Footprint
@@ -85,7 +86,7 @@ def _draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float
     if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
         axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
     axes.set(xlabel="prediction horizon", ylabel=_SWEPT[quantity])
-    axes.set_xticks(_ticks(sorted({point.prediction for point in points})))
+    axes.xaxis.set_major_locator(FixedLocator(_ticks(sorted({point.prediction for point in points}))))
     if quantity in ("iae_m_s", "time_ms"):
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(PlainLogFormatter())
