@@ -33,8 +33,8 @@ KNOWN: Final[dict[str, dict[str, list[int]]]] = {
 
 
 def test_the_envelope_of_every_preset_is_known() -> None:
-    """A new preset is added above; that of mambo-robust is not held."""
-    assert set(KNOWN) == set(presets.names()) - {"mambo-robust"}
+    """A new preset is added above."""
+    assert set(KNOWN) == set(presets.names())
 
 
 @pytest.mark.long
