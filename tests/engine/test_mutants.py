@@ -4,6 +4,7 @@ import os
 import resource
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Final
 
 import pytest
@@ -28,29 +29,30 @@ REASONS: Final[Mapping[tuple[str, str, str], str]] = {}
 """Why a mutant computes the same, by file, line and change."""
 
 
-def digests(folder: Path) -> list[str]:
-    """Fly every batch in the engine that `folder` holds; return the digests of all flights."""
-    engine = library.ffi.dlopen(str(folder / "engine.so"))
+def digests(path: Path) -> list[str]:
+    """Fly every batch in the engine at `path`; return the digests of all flights."""
+    engine = library.ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
     traces = [fly_compiled(engine, flight, PdController()) for flight in flights]
     return [trace.digest(index) for trace in traces for index in range(trace.flights)]
 
 
-def build(files: Mapping[str, str], folder: Path) -> None:
-    """Compile the engine in `files`; raises BuildError."""
+def build(files: Mapping[str, str], folder: Path) -> Path:
+    """Compile the engine in `files` in a new folder, since a library is loaded once; raises BuildError."""
+    place = Path(mkdtemp(dir=folder))
     for name, text in files.items():
-        (folder / name).write_text(text, "utf-8")
-    flags = [*library.FLAGS, "-O0", "-w", *library.SOURCES, "-o", "engine.so", "-lm"]
-    toolchain("gcc").run(flags, folder)
+        (place / name).write_text(text, "utf-8")
+    toolchain("gcc").run([*library.FLAGS, "-O0", "-w", *library.SOURCES, "-o", "engine.so", "-lm"], place)
+    return place / "engine.so"
 
 
-def survives(folder: Path, expected: list[str]) -> bool:
-    """Return whether the engine in `folder` flies as expected; it may also crash or hang."""
+def survives(path: Path, expected: list[str]) -> bool:
+    """Return whether the engine at `path` flies as expected; it may also crash or hang."""
     child = os.fork()
     if child == 0:
         resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        os._exit(0 if digests(folder) == expected else 1)
+        os._exit(0 if digests(path) == expected else 1)
     return os.waitpid(child, 0)[1] == 0
 
 
@@ -59,8 +61,7 @@ def survives(folder: Path, expected: list[str]) -> bool:
 def test_every_fault_changes_a_flight(name: str, tmp_path: Path) -> None:
     """Operators, constants, indices, conditions and statements of one file."""
     files = library.texts()
-    build(files, tmp_path)
-    expected = digests(tmp_path)
+    expected = digests(build(files, tmp_path))
     found = mutants(name, files[name])
     assert found
     survivors = [mutant.key for mutant in found if alive(mutant, files, tmp_path, expected)]
@@ -70,7 +71,7 @@ def test_every_fault_changes_a_flight(name: str, tmp_path: Path) -> None:
 def alive(mutant: Mutant, files: dict[str, str], folder: Path, expected: list[str]) -> bool:
     """Return whether a mutant compiles and flies as expected."""
     try:
-        build(files | {mutant.file: mutant.apply(files[mutant.file])}, folder)
+        path = build(files | {mutant.file: mutant.apply(files[mutant.file])}, folder)
     except BuildError:
         return False
-    return survives(folder, expected)
+    return survives(path, expected)
