@@ -19,7 +19,7 @@ SETUP_PEERS = $(PEERS)/.installed
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
 
 # Compilers, emulators and analysers that the tests want: Debian's packages, and the commands that show them.
-TOOL_PACKAGES = gcc g++ clang make cmake binutils \
+TOOL_PACKAGES = gcc g++ clang make cmake binutils python3-dev \
     gcc-arm-linux-gnueabi libc6-dev-armel-cross gcc-arm-none-eabi gcc-riscv64-unknown-elf gcc-avr avr-libc qemu-system-misc \
     frama-c-base cppcheck libclang-rt-14-dev chromium
 TOOL_COMMANDS = gcc g++ clang make cmake nm \

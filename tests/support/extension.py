@@ -22,7 +22,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.library import with_default_prefix
 from mambo_nmpc.sil.files.cache import build_cached
 from tests.support.bundles import place
-from tests.support.tools import toolchain
+from tests.support.tools import require_file, toolchain
 
 _DECLARATIONS: Final = """
 typedef REAL nmpc_real_t;
@@ -83,7 +83,8 @@ def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
             ffi.set_source(name, _INCLUDES, compiler_verbose=0)
             ffi.emit_c_code(str(folder / "extension.c"))
             sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
-            headers = ["-Iinclude", "-Isrc", f"-I{sysconfig.get_paths()['include']}"]
+            python = require_file(Path(sysconfig.get_paths()["include"], "Python.h"), "python3-dev").parent
+            headers = ["-Iinclude", "-Isrc", f"-I{python}"]
             flags = [*COMPILE_FLAGS, "-fPIC", "-shared"]
             toolchain("gcc").run([*flags, *headers, *sources, "extension.c", "-o", "extension.so"], folder)
             return folder / "extension.so"

@@ -31,6 +31,13 @@ def require(tool: str, package: str) -> str:
     return path
 
 
+def require_file(path: Path, package: str) -> Path:
+    """Return `path`; without that file skip the test, or fail it where CI is true."""
+    if not path.is_file():
+        _miss(f"{path} is missing (Debian: {package})")
+    return path
+
+
 def require_module(name: str) -> None:
     """Skip the test, or fail it where CI is true, without the Python package `name`."""
     if importlib.util.find_spec(name) is None:
