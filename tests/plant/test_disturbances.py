@@ -10,16 +10,21 @@ from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Hover
 from mambo_nmpc.sil.plant import loops
-from mambo_nmpc.sil.plant.disturbances import Disturbances
+from mambo_nmpc.sil.plant.disturbances import Disturbances, World
 from mambo_nmpc.sil.plant.gusts import FOOT_M, Gusts, low_altitude_scales, mean_speed_m_s
 from mambo_nmpc.sil.plant.link import NOT_CALLED, Link
 from mambo_nmpc.sil.plant.rigid_body import RigidBody
-from mambo_nmpc.sil.plant.vehicle import STEP_S
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Vehicle, VehicleState
 
 
 def hover(duration_s: float = 1.0, flights: int = 1, **more: object) -> Trace:
     """Hover with the PD."""
     return fly(Flight(Hover(), duration_s, flights, **more), PdController())  # type: ignore[arg-type] # tests
+
+
+def at_rest(flights: int = 1) -> VehicleState:
+    """Return n level drones at rest."""
+    return Vehicle().at_rest(np.zeros((3, flights)), 0.0, 236.5)
 
 
 def test_gust_scales_match_the_specification() -> None:
@@ -105,6 +110,110 @@ def test_push_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
     trace = hover(1.0, 2, yaw_rad=0.8, disturbances=disturbances)
     np.testing.assert_array_equal(trace.velocity_m_s[:50, :, :2], 0.0)
     np.testing.assert_allclose(trace.velocity_m_s[50, :, :2], [[0.1, -0.01], [0.0, -0.01]], atol=1e-12)
+
+
+@pytest.mark.parametrize("part", [(0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01)])
+@pytest.mark.parametrize("loaded", [True, False])
+def test_a_push_meets_the_mass_of_its_instant(part: tuple[float, float, float], loaded: bool) -> None:
+    """A payload counts from its own tick on: due with the push it is carried, one tick later it is not."""
+    disturbances = Disturbances(
+        payload_kg=0.007, payload_time_s=0.01 if loaded else 0.015, push_n_s=part, push_time_s=0.01
+    )
+    world = World(disturbances, Vehicle(), (0,), 1.1)
+    state = at_rest()
+    for tick in range(5):
+        after, moment = world.tick(state, STEP_S * tick)
+        expected = np.array(part) / (0.07 if loaded else 0.063) if tick == 2 else np.zeros(3)
+        np.testing.assert_allclose(after.body[3:6, 0], expected, rtol=1e-12)
+        assert moment is not None
+        assert moment.payload_kg == (0.007 if tick >= (2 if loaded else 3) else 0.0)
+
+
+def test_events_happen_at_the_nearest_tick_of_each_flight() -> None:
+    """12.4 ms is tick 2, 12.6 ms tick 3, for payload and push; each flight has its own times."""
+    times_s = np.array([0.0124, 0.0126])
+    disturbances = Disturbances(
+        payload_kg=0.007, payload_time_s=times_s, push_n_s=(0.0, 0.007, 0.0), push_time_s=times_s
+    )
+    world = World(disturbances, Vehicle(), (0, 0), 1.1)
+    pushed, loaded = np.zeros((5, 2)), np.zeros((5, 2))
+    for tick in range(5):
+        state, moment = world.tick(at_rest(2), STEP_S * tick)
+        assert moment is not None
+        pushed[tick], loaded[tick] = state.body[4], moment.payload_kg
+    np.testing.assert_allclose(pushed, 0.1 * np.eye(5)[:, 2:4], rtol=1e-12)
+    np.testing.assert_array_equal(loaded, 0.007 * np.cumsum(np.eye(5)[:, 2:4], axis=0))
+
+
+def test_the_battery_sags_from_the_start_of_the_flight_to_nothing() -> None:
+    """The share falls by its rate from 1 at the first tick, whatever the trajectory's clock shows."""
+    disturbances = Disturbances(battery_sag_1_s=np.array([0.0, 1.0, 100.0]))
+    world = World(disturbances, Vehicle(), (0, 0, 0), 1.1)
+    for tick in range(4):
+        _, moment = world.tick(at_rest(3), -5.0 + STEP_S * tick)
+        assert moment is not None
+        expected = [1.0, 1.0 - 0.005 * tick, max(1.0 - 0.5 * tick, 0.0)]
+        np.testing.assert_allclose(moment.thrust_share, expected, rtol=1e-12)
+
+
+WINDY = Disturbances(wind_speed_m_s=np.array([0.0, 3.0]), wind_direction_rad=np.array([0.0, 2.0]))
+
+
+def test_each_flight_has_the_gusts_of_its_own_wind_at_the_given_height() -> None:
+    """The air is that of `Gusts`, tick by tick; it is still in a flight without wind beside one with wind."""
+    world = World(WINDY, Vehicle(), (7, 8), 4.0)
+    gusts = Gusts(3.0, 2.0, (8,), height_m=4.0, step_s=STEP_S)
+    for tick in range(5):
+        state, moment = world.tick(at_rest(2), STEP_S * tick)
+        assert moment is not None
+        assert moment.air_m_s is not None
+        np.testing.assert_array_equal([part[0] for part in moment.air_m_s], 0.0)
+        np.testing.assert_array_equal([part[1:] for part in moment.air_m_s], gusts.next())
+        np.testing.assert_array_equal(moment.thrust_share, 1.0)
+        np.testing.assert_array_equal(moment.payload_kg, 0.0)
+        np.testing.assert_array_equal(state.body, at_rest(2).body)
+
+
+@pytest.mark.parametrize(
+    ("disturbances", "share", "payload_kg", "velocity_m_s"),
+    [
+        (Disturbances(battery_sag_1_s=np.array([0.0, 2.0])), [1.0, 0.99], 0.0, 0.0),
+        (Disturbances(payload_kg=np.array([0.0, 0.005])), 1.0, [0.0, 0.005], 0.0),
+        (Disturbances(push_n_s=(0.0, np.array([0.0, 0.0063]), 0.0)), 1.0, 0.0, [0.0, 0.1]),
+    ],
+    ids=["battery", "payload", "push"],
+)
+def test_each_disturbance_acts_alone_and_in_its_flight_only(
+    disturbances: Disturbances, share: object, payload_kg: object, velocity_m_s: object
+) -> None:
+    """By default payload and push are due at t = 0, not before; all others stay off."""
+    world = World(disturbances, Vehicle(), (0, 0), 1.1)
+    state, early = world.tick(at_rest(2), -STEP_S)
+    assert early is not None
+    np.testing.assert_array_equal(early.payload_kg, 0.0)
+    np.testing.assert_array_equal(state.body, 0.0)
+    state, moment = world.tick(state, 0.0)
+    assert moment is not None
+    np.testing.assert_allclose(moment.thrust_share, np.broadcast_to(share, 2), rtol=1e-15)
+    np.testing.assert_array_equal(moment.payload_kg, np.broadcast_to(payload_kg, 2))
+    np.testing.assert_allclose(state.body[4], np.broadcast_to(velocity_m_s, 2), rtol=1e-12)
+    assert moment.air_m_s is None
+
+
+def test_wind_blows_towards_north_by_default() -> None:
+    """Its mean is along world x, and its gusts are small beside it."""
+    gusts = World(Disturbances(wind_speed_m_s=5.0), Vehicle(), (1,), 20.0 * FOOT_M)
+    _, moment = gusts.tick(at_rest(), 0.0)
+    assert moment is not None
+    assert moment.air_m_s is not None
+    x, y = moment.air_m_s
+    np.testing.assert_allclose([x[0], y[0]], [5.0, 0.0], atol=2.0)
+
+
+def test_without_disturbances_nothing_happens() -> None:
+    """The state is the one given, and there is no battery, payload or wind to apply."""
+    state = at_rest()
+    assert World(Disturbances(), Vehicle(), (0,), 1.1).tick(state, 0.0) == (state, None)
 
 
 def test_a_command_delay_postpones_the_response() -> None:
