@@ -130,19 +130,20 @@ def test_a_push_meets_the_mass_of_its_instant(part: tuple[float, float, float], 
 
 
 def test_events_happen_at_the_nearest_tick_of_each_flight() -> None:
-    """12.4 ms is tick 2, 12.6 ms tick 3, for payload and push; each flight has its own times."""
-    times_s = np.array([0.0124, 0.0126])
+    """12.4 ms is tick 2, 12.6 ms tick 3; 35 ms is tick 7, although 0.035 / 0.005 is not exactly 7."""
+    times_s = np.array([0.0124, 0.0126, 0.035])
     disturbances = Disturbances(
         payload_kg=0.007, payload_time_s=times_s, push_n_s=(0.0, 0.007, 0.0), push_time_s=times_s
     )
-    world = World(disturbances, Vehicle(), (0, 0), 1.1)
-    pushed, loaded = np.zeros((5, 2)), np.zeros((5, 2))
-    for tick in range(5):
-        state, moment = world.tick(at_rest(2), STEP_S * tick)
+    world = World(disturbances, Vehicle(), (0, 0, 0), 1.1)
+    pushed, loaded = np.zeros((9, 3)), np.zeros((9, 3))
+    for tick in range(9):
+        state, moment = world.tick(at_rest(3), STEP_S * tick)
         assert moment is not None
         pushed[tick], loaded[tick] = state.body[4], moment.payload_kg
-    np.testing.assert_allclose(pushed, 0.1 * np.eye(5)[:, 2:4], rtol=1e-12)
-    np.testing.assert_array_equal(loaded, 0.007 * np.cumsum(np.eye(5)[:, 2:4], axis=0))
+    due = np.eye(9)[:, [2, 3, 7]]
+    np.testing.assert_allclose(pushed, 0.1 * due, rtol=1e-12)
+    np.testing.assert_array_equal(loaded, 0.007 * np.cumsum(due, axis=0))
 
 
 def test_the_battery_sags_from_the_start_of_the_flight_to_nothing() -> None:

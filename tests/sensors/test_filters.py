@@ -1,0 +1,104 @@
+"""Attitude and velocity filters against kinematics, gravity and geometry, tick by tick."""
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.rigid_body import to_body
+from mambo_nmpc.sil.plant.vehicle import STEP_S
+from mambo_nmpc.sil.sensors.estimators import ACCELEROMETER_TAPS, Attitude, Velocity, velocity_gain
+from mambo_nmpc.sil.sensors.instruments import Readings
+
+GRAVITY = np.array([[0.0], [0.0], [-GRAVITY_M_S2]])
+"""Specific force of a drone at rest, in the world frame."""
+UNTRUSTED = 0.5 * GRAVITY
+"""Specific force whose magnitude is not near g: it does not correct the tilt."""
+NO_RATES = np.zeros((3, 1))
+
+
+def column(*values: float) -> FloatArray:
+    """Return an array (k, 1)."""
+    return np.array(values)[:, np.newaxis]
+
+
+def euler_rates(euler_rad: FloatArray, rates_rad_s: FloatArray) -> FloatArray:
+    """Return the rates (3,) of roll, pitch, yaw from body rates (3,): equations 4 and 5 in matrix form."""
+    roll, pitch, _ = euler_rad
+    matrix = np.array(
+        [
+            [1.0, np.sin(roll) * np.tan(pitch), np.cos(roll) * np.tan(pitch)],
+            [0.0, np.cos(roll), -np.sin(roll)],
+            [0.0, np.sin(roll) / np.cos(pitch), np.cos(roll) / np.cos(pitch)],
+        ]
+    )
+    return np.asarray(matrix @ rates_rad_s)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_attitude_integrates_the_body_rates(seed: int) -> None:
+    """One tick adds the Euler rates of equations 4 and 5 times 5 ms, at any attitude."""
+    rng = np.random.default_rng(seed)
+    euler_rad, rates_rad_s = rng.uniform(-1.0, 1.0, 3), rng.uniform(-3.0, 3.0, 3)
+    attitude = Attitude(euler_rad[:, np.newaxis])
+    attitude.update(np.concatenate([UNTRUSTED, rates_rad_s[:, np.newaxis]]))
+    expected = euler_rad + STEP_S * euler_rates(euler_rad, rates_rad_s)
+    np.testing.assert_allclose(attitude.euler_rad[:, 0], expected, rtol=1e-12)
+
+
+def test_attitude_approaches_the_tilt_that_gravity_shows() -> None:
+    """At rest, each tick corrects roll and pitch by a thousandth of their error; yaw is not observed.
+
+    The coefficients of the low-pass are rounded to a sum of 1 - 5e-6.
+    """
+    true_rad, start_rad = np.array([0.2, -0.3, 0.9]), np.array([0.05, 0.1, 0.4])
+    attitude = Attitude(start_rad[:, np.newaxis])
+    imu = np.concatenate([to_body(true_rad[:, np.newaxis], GRAVITY), NO_RATES])
+    for _ in range(50):
+        attitude.update(imu)
+    expected = true_rad + (start_rad - true_rad) * 0.999**50
+    np.testing.assert_allclose(attitude.euler_rad[:2, 0], expected[:2], rtol=2e-6)
+    assert attitude.euler_rad[2, 0] == 0.4
+
+
+def test_attitude_trusts_the_low_passed_force() -> None:
+    """A spike of 1 % of g counts with the weight of its tap: only the two largest exceed 0.2 % of g."""
+    attitude = Attitude(column(0.1, 0.0, 0.0))
+    rest = np.concatenate([GRAVITY, NO_RATES])
+    attitude.update(rest)
+    trusted = []
+    for tick in range(8):
+        before = attitude.euler_rad[0, 0]
+        attitude.update(np.concatenate([1.01 * GRAVITY, NO_RATES]) if tick == 0 else rest)
+        trusted.append(bool(attitude.euler_rad[0, 0] != before))
+    assert trusted == [0.01 * tap < 0.002 for tap in ACCELEROMETER_TAPS] + [True, True]
+    assert trusted.count(False) == 2
+
+
+def test_attitude_survives_a_force_beyond_g() -> None:
+    """A forward force above g within the gate counts as a pitch of 90 degrees, not as NaN."""
+    attitude = Attitude(np.zeros((3, 1)))
+    attitude.update(np.concatenate([column(1.001 * GRAVITY_M_S2, 0.0, -1e-3), NO_RATES]))
+    np.testing.assert_allclose(attitude.euler_rad[1, 0], 0.001 * np.pi / 2.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("derotated", [True, False])
+def test_flow_is_derotated_by_height_times_gyro_rate(derotated: bool) -> None:
+    """At 2 m, pitching at 0.5 rad/s adds 1 m/s forward; rolling at 0.3 rad/s adds 0.6 m/s to the left."""
+    flow_m_s, rotation_m_s = column(0.7, -0.4), column(1.0, -0.6)
+    readings = Readings(
+        column(0.0, 0.0, -GRAVITY_M_S2, 0.3, 0.5, 0.9), np.full(1, 2.0), np.zeros(1), flow_m_s
+    )
+    velocity = Velocity(np.zeros((2, 1)), derotated=derotated)
+    velocity.update(readings, np.zeros((2, 1)), np.full(1, -2.0), np.zeros((2, 1)))
+    translation_m_s = flow_m_s - rotation_m_s if derotated else flow_m_s
+    np.testing.assert_allclose(velocity.velocity_m_s, velocity_gain() * translation_m_s, rtol=1e-12)
+
+
+def test_velocity_integrates_a_fifth_of_the_acceleration() -> None:
+    """Below 0.4 m no flow is accepted: each axis gains 0.2 times 5 ms times its acceleration a tick."""
+    velocity = Velocity(column(0.1, -0.2), derotated=False)
+    readings = Readings(np.zeros((6, 1)), np.zeros(1), np.zeros(1), np.zeros((2, 1)))
+    for _ in range(11):
+        velocity.update(readings, np.zeros((2, 1)), np.zeros(1), column(3.0, -5.0))
+    np.testing.assert_allclose(velocity.velocity_m_s, column(0.1 + 0.03, -0.2 - 0.05), rtol=1e-12)
