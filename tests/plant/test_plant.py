@@ -279,5 +279,5 @@ def test_attitude_integral_leaks_and_is_limited() -> None:
     np.testing.assert_allclose(loops.attitude_integral(error, none, none), 0.005 * error, rtol=1e-15)
     held = np.array([[1.0], [-1.0]])
     np.testing.assert_allclose(loops.attitude_integral(none, none, held), held * (1.0 - 5e-6), rtol=1e-15)
-    limited = loops.attitude_integral(1e3 * error, none, none)
-    np.testing.assert_array_equal(limited, [[1.0], [-2.0]])
+    limited = loops.attitude_integral(3e3 * error, none, none)
+    np.testing.assert_array_equal(limited, [[2.0], [-2.0]])

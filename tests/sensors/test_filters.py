@@ -6,9 +6,9 @@ import pytest
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.rigid_body import to_body
-from mambo_nmpc.sil.plant.vehicle import STEP_S
-from mambo_nmpc.sil.sensors.estimators import ACCELEROMETER_TAPS, Attitude, Velocity, velocity_gain
-from mambo_nmpc.sil.sensors.instruments import Readings
+from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
+from mambo_nmpc.sil.sensors.estimators import ACCELEROMETER_TAPS, Attitude, Suite, Velocity, velocity_gain
+from mambo_nmpc.sil.sensors.instruments import Readings, Sensors
 
 GRAVITY = np.array([[0.0], [0.0], [-GRAVITY_M_S2]])
 """Specific force of a drone at rest, in the world frame."""
@@ -102,3 +102,25 @@ def test_velocity_integrates_a_fifth_of_the_acceleration() -> None:
     for _ in range(11):
         velocity.update(readings, np.zeros((2, 1)), np.zeros(1), column(3.0, -5.0))
     np.testing.assert_allclose(velocity.velocity_m_s, column(0.1 + 0.03, -0.2 - 0.05), rtol=1e-12)
+
+
+def test_estimates_follow_a_steady_motion_from_the_first_tick() -> None:
+    """Level at any heading and velocity: without noise the errors are those of the delay of one tick.
+
+    The position is the integral of the estimated velocity, one tick behind it.
+    """
+    velocity_m_s = column(1.0, -2.0, -0.5)
+    euler_rad = column(0.0, 0.0, 0.8)
+    position_m = column(3.0, 4.0, -1.5)
+    suite = None
+    seen = []
+    for _ in range(200):
+        true = Seen(position_m, velocity_m_s, euler_rad, NO_RATES)
+        suite = suite or Suite(Sensors(noise_scale=0.0, derotated=True), (0,), true)
+        seen.append(suite.estimate(true))
+        np.testing.assert_allclose(seen[-1].velocity_m_s, velocity_m_s, atol=0.01)
+        np.testing.assert_allclose(seen[-1].position_m, position_m, atol=0.006)
+        np.testing.assert_allclose(seen[-1].euler_rad, euler_rad, atol=1e-9)
+        position_m = position_m + STEP_S * velocity_m_s
+    moved_m = seen[-1].position_m - seen[-2].position_m
+    np.testing.assert_allclose(moved_m[:2], STEP_S * seen[-2].velocity_m_s[:2], atol=1e-14)
