@@ -171,11 +171,12 @@ def test_camera_rotation_adds_to_the_flow() -> None:
 
 
 def test_kalman_gains_solve_the_riccati_equation() -> None:
-    """The altitude gains agree with scipy's solution; the velocity gain is the stock model's, 0.1254656."""
+    """The altitude gains agree with scipy's solution; all gains are those of the stock model."""
     a, c = np.array([[1.0, STEP_S], [0.0, 1.0]]), np.array([[1.0, 0.0]])
     q, r = estimators.ALTITUDE_NOISE
     p = scipy.linalg.solve_discrete_are(a.T, c.T, np.diag([0.0, q]), np.array([[r]]))
     np.testing.assert_allclose(estimators.altitude_gains(), p[:, 0] / (p[0, 0] + r), rtol=1e-6)
+    assert estimators.altitude_gains() == pytest.approx((0.02624, 0.06978), abs=5e-6)
     assert estimators.velocity_gain() == pytest.approx(0.1254656, abs=5e-8)
 
 
