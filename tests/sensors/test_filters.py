@@ -61,25 +61,35 @@ def test_attitude_approaches_the_tilt_that_gravity_shows() -> None:
     assert attitude.euler_rad[2, 0] == 0.4
 
 
-def test_attitude_trusts_the_low_passed_force() -> None:
-    """A spike of 1 % of g counts with the weight of its tap: only the two largest exceed 0.2 % of g."""
-    attitude = Attitude(column(0.1, 0.0, 0.0))
+@pytest.mark.parametrize("delay", range(8))
+def test_attitude_trusts_the_low_passed_force(delay: int) -> None:
+    """A spike counts with the weight of its tap: up to 0.2 % of g after it the tilt is trusted."""
+    tap = [*ACCELEROMETER_TAPS, 0.0, 0.0][delay]
     rest = np.concatenate([GRAVITY, NO_RATES])
-    attitude.update(rest)
-    trusted = []
-    for tick in range(8):
-        before = attitude.euler_rad[0, 0]
-        attitude.update(np.concatenate([1.01 * GRAVITY, NO_RATES]) if tick == 0 else rest)
-        trusted.append(bool(attitude.euler_rad[0, 0] != before))
-    assert trusted == [0.01 * tap < 0.002 for tap in ACCELEROMETER_TAPS] + [True, True]
-    assert trusted.count(False) == 2
+    for weighted, trusted in ((0.99 * 0.002, True), (1.01 * 0.002, tap == 0.0)):
+        attitude = Attitude(column(0.1, 0.0, 0.0))
+        attitude.update(rest)
+        for tick in range(delay + 1):
+            before = attitude.euler_rad[0, 0]
+            spike = 1.0 + weighted / (tap or 1.0) if tick == 0 else 1.0
+            attitude.update(np.concatenate([spike * GRAVITY, NO_RATES]))
+        assert (attitude.euler_rad[0, 0] != before) == trusted
 
 
-def test_attitude_survives_a_force_beyond_g() -> None:
-    """A forward force above g within the gate counts as a pitch of 90 degrees, not as NaN."""
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_attitude_survives_a_force_beyond_g(sign: float) -> None:
+    """A force above g along body x within the gate counts as a pitch of 90 degrees, not as NaN."""
     attitude = Attitude(np.zeros((3, 1)))
-    attitude.update(np.concatenate([column(1.001 * GRAVITY_M_S2, 0.0, -1e-3), NO_RATES]))
-    np.testing.assert_allclose(attitude.euler_rad[1, 0], 0.001 * np.pi / 2.0, rtol=1e-12)
+    attitude.update(np.concatenate([column(sign * 1.001 * GRAVITY_M_S2, 0.0, -1e-3), NO_RATES]))
+    np.testing.assert_allclose(attitude.euler_rad[1, 0], sign * 0.001 * np.pi / 2.0, rtol=1e-12)
+
+
+def test_attitude_keeps_the_integrated_angles_in_free_fall() -> None:
+    """Without specific force no tilt is defined: 0 / 0 does not enter the estimate."""
+    attitude = Attitude(column(0.1, -0.2, 0.3))
+    with np.errstate(invalid="ignore"):
+        attitude.update(np.zeros((6, 1)))
+    np.testing.assert_array_equal(attitude.euler_rad[:, 0], [0.1, -0.2, 0.3])
 
 
 @pytest.mark.parametrize("derotated", [True, False])
