@@ -130,15 +130,59 @@ def test_flow_is_accepted_from_four_tenths_of_a_metre_up(z_m: float, accepted: b
     np.testing.assert_allclose(flow_gain(SLOW, np.zeros(2), np.zeros(2), z_m), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize(("flow_m_s", "accepted"), [(5.5, False), (-4.5, True)])
+@pytest.mark.parametrize(("flow_m_s", "accepted"), [(8.5, False), (-1.5, True), (-2.5, False)])
 def test_flow_is_compared_with_the_last_estimate_not_with_the_prediction(
     flow_m_s: float, accepted: bool
 ) -> None:
-    """The estimate is 0, the prediction 1 m/s: 5.5 m/s is out, -4.5 m/s in."""
-    velocity = Velocity(np.zeros((2, 1)), derotated=False)
+    """The estimate is 3 m/s, the prediction 4 m/s: a flow of 8.5 m/s is out, -1.5 m/s in, -2.5 m/s out."""
+    velocity = Velocity(np.full((2, 1), 3.0), derotated=False)
     level, z_m = np.zeros((2, 1)), np.array([-1.1])
-    velocity.update(heights(1.1, 1.1), level, z_m, np.full((2, 1), 1.0 / (0.2 * STEP_S)))
-    seen = Readings(heights(1.1, 1.1).imu, -z_m, STILL, np.full((2, 1), flow_m_s))
-    velocity.update(seen, level, z_m, np.zeros((2, 1)))
-    corrected = 1.0 + velocity_gain() * (flow_m_s - 1.0)
-    np.testing.assert_allclose(velocity.velocity_m_s, corrected if accepted else 1.0, rtol=1e-12)
+    imu = heights(1.1, 1.1).imu
+    velocity.update(
+        Readings(imu, -z_m, STILL, np.full((2, 1), 3.0)), level, z_m, np.full((2, 1), 1.0 / (0.2 * STEP_S))
+    )
+    np.testing.assert_array_equal(velocity.velocity_m_s, 3.0)
+    velocity.update(Readings(imu, -z_m, STILL, np.full((2, 1), flow_m_s)), level, z_m, np.zeros((2, 1)))
+    corrected = 4.0 + velocity_gain() * (flow_m_s - 4.0)
+    np.testing.assert_allclose(velocity.velocity_m_s, corrected if accepted else 4.0, rtol=1e-12)
+
+
+def test_yaw_rate_does_not_gate_the_flow() -> None:
+    """Turning about the vertical at 9 rad/s the flow is accepted."""
+    imu = np.array([[0.0], [0.0], [-GRAVITY_M_S2], [0.0], [0.0], [9.0]])
+    velocity = Velocity(np.zeros((2, 1)), derotated=False)
+    velocity.update(
+        Readings(imu, np.ones(1), STILL, SLOW[:, np.newaxis]), np.zeros((2, 1)), -np.ones(1), np.zeros((2, 1))
+    )
+    np.testing.assert_allclose(velocity.velocity_m_s[:, 0], velocity_gain() * SLOW, rtol=1e-12)
+
+
+@pytest.mark.parametrize("outlier", ["tilt", "rate", "jump", "height"])
+def test_flow_is_gated_flight_by_flight(outlier: str) -> None:
+    """One flight of three is beyond a gate; the others accept their flow."""
+    imu, tilt_rad, flow_m_s, z_m = np.zeros((6, 3)), np.zeros((2, 3)), np.full((2, 3), 0.1), np.full(3, -1.1)
+    imu[3] = 0.6  # above the slow rate, at which any tilt is accepted
+    match outlier:
+        case "tilt":
+            tilt_rad[0, 1] = 1.0
+        case "rate":
+            imu[4, 1] = 8.0
+        case "jump":
+            flow_m_s[1, 1] = 6.0
+        case _:
+            z_m[1] = -0.3
+    velocity = Velocity(np.zeros((2, 3)), derotated=False)
+    velocity.update(Readings(imu, -z_m, np.zeros(3), flow_m_s), tilt_rad, z_m, np.zeros((2, 3)))
+    expected = velocity_gain() * 0.1 * np.array([1.0, 0.0, 1.0])
+    np.testing.assert_allclose(velocity.velocity_m_s, [expected, expected], rtol=1e-12)
+
+
+def test_an_accepted_sonar_reading_corrects_height_and_velocity() -> None:
+    """A reading 0.1 m higher moves z by 0.02624 and its rate by 0.06978 1/s of that, in its flight only."""
+    altitude = Altitude(np.full(2, -1.1), np.zeros(2))
+    altitude.update(
+        Readings(np.zeros((6, 2)), np.array([1.2, 1.1]), -PA_PER_M * np.full(2, 1.1), np.zeros((2, 2))),
+        np.zeros(2),
+    )
+    np.testing.assert_allclose(altitude.z_m, [-1.1 - 0.1 * 0.02624, -1.1], atol=1e-6)
+    np.testing.assert_allclose(altitude.velocity_m_s, [-0.1 * 0.06978, 0.0], atol=1e-6)
