@@ -134,3 +134,14 @@ def test_estimates_follow_a_steady_motion_from_the_first_tick() -> None:
         position_m = position_m + STEP_S * velocity_m_s
     moved_m = seen[-1].position_m - seen[-2].position_m
     np.testing.assert_allclose(moved_m[:2], STEP_S * seen[-2].velocity_m_s[:2], atol=1e-14)
+
+
+def test_estimates_of_a_leaning_drone_at_rest_stay() -> None:
+    """Gravity, turned by the estimated angles, cancels the specific force on all axes."""
+    true = Seen(column(0.0, 0.0, -1.1), NO_RATES, column(0.2, -0.3, 0.9), NO_RATES)
+    suite = Suite(Sensors(noise_scale=0.0), (0,), true)
+    for _ in range(300):
+        seen = suite.estimate(true)
+    np.testing.assert_allclose(seen.velocity_m_s, 0.0, atol=1e-5)
+    np.testing.assert_allclose(seen.position_m, true.position_m, atol=1e-5)
+    np.testing.assert_allclose(seen.euler_rad, true.euler_rad, atol=1e-6)
