@@ -145,3 +145,28 @@ def test_estimates_of_a_leaning_drone_at_rest_stay() -> None:
     np.testing.assert_allclose(seen.velocity_m_s, 0.0, atol=1e-5)
     np.testing.assert_allclose(seen.position_m, true.position_m, atol=1e-5)
     np.testing.assert_allclose(seen.euler_rad, true.euler_rad, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("euler_rad", "accepted"), [((0.0, 0.0, 2.0), True), ((1.0, 0.0, 0.0), False), ((0.0, 1.0, 0.0), False)]
+)
+def test_roll_and_pitch_gate_the_flow_and_the_heading_does_not(
+    euler_rad: tuple[float, float, float], accepted: bool
+) -> None:
+    """Rolling at 0.6 rad/s, the camera sees a motion that is accepted up to 0.6 rad of tilt, at any yaw."""
+    true = Seen(column(0.0, 0.0, -1.1), NO_RATES, column(*euler_rad), column(0.6, 0.0, 0.0))
+    seen = Suite(Sensors(noise_scale=0.0), (0,), true).estimate(true)
+    assert bool(np.abs(seen.velocity_m_s[:2]).max() > 0.01) == accepted
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_acceleration_drives_the_velocity_of_its_own_axis(axis: int) -> None:
+    """Below 0.4 m, without flow, 1 m/s^2 along one axis for half a second gives a fifth of 0.5 m/s."""
+    velocity_m_s, position_m = np.zeros((3, 1)), column(0.0, 0.0, -0.2)
+    suite = Suite(Sensors(noise_scale=0.0), (0,), Seen(position_m, velocity_m_s, NO_RATES, NO_RATES))
+    for tick in range(100):
+        velocity_m_s = np.zeros((3, 1))
+        velocity_m_s[axis] = STEP_S * (tick + 1)
+        seen = suite.estimate(Seen(position_m, velocity_m_s, NO_RATES, NO_RATES))
+    np.testing.assert_allclose(seen.velocity_m_s[axis], 0.1, rtol=0.05)
+    np.testing.assert_allclose(seen.velocity_m_s[1 - axis], 0.0, atol=1e-9)
