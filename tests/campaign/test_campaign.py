@@ -1,6 +1,7 @@
 """Draws, campaign.toml and statistics of campaigns, without flying."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
@@ -349,3 +350,28 @@ def test_every_parameter_is_documented() -> None:
     text = (ROOT / "docs" / "campaign.md").read_text("utf-8")
     missing = [name for name in PARAMETERS if f"`{name}`" not in text]
     assert missing == []
+
+
+def documented(text: str) -> tuple[str, list[float]]:
+    """Return kind and numbers of a distribution as docs/campaign.md writes it."""
+    numbers = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text.partition(" tick")[0])]
+    match text.partition(" ")[0].rstrip(","):
+        case "uniform":
+            return "uniform", numbers or [-math.pi, math.pi]
+        case "log-uniform":
+            return "log_uniform", numbers
+        case "normal":
+            return "normal", [0.0, *numbers]
+        case _:
+            return ("choice" if len(numbers) > 1 else "constant"), numbers
+
+
+def test_the_documented_defaults_are_those_of_the_default_campaign() -> None:
+    """Each row of the table in docs/campaign.md has kind and numbers of its parameters, in their order."""
+    text = (ROOT / "docs" / "campaign.md").read_text("utf-8")
+    rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]+) \| [^|]*\|$", text, re.MULTILINE)
+    table = {name: documented(words) for names, words in rows for name in re.findall(r"\w+", names)}
+    known = {name: found for name, found in table.items() if name in PARAMETERS}
+    assert list(known) == list(PARAMETERS)
+    for name, (kind, numbers) in known.items():
+        assert (PARAMETERS[name].kind, list(PARAMETERS[name].numbers)) == (kind, numbers), name
