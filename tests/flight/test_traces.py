@@ -80,3 +80,62 @@ def test_file_that_holds_no_trace_is_refused(tmp_path: Path) -> None:
     for name in ("absent.npz", "text.npz", "other.npz", "array.npy"):
         with pytest.raises(TraceError, match=name):
             read_npz(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"status": np.zeros(51)}, r"time_s \(51,\) and status \(51,\) disagree"),
+        ({"status": np.zeros((50, 2))}, r"time_s \(51,\) and status \(50, 2\) disagree"),
+        ({"status": np.zeros((51, 0))}, r"time_s \(51,\) and status \(51, 0\) disagree"),
+        ({"time_s": np.zeros((51, 1))}, r"time_s \(51, 1\) and status \(51, 2\) disagree"),
+        ({"position_m": np.zeros((51, 2, 2))}, r"position_m has the shape \(51, 2, 2\)"),
+        ({"command_rad": np.zeros((51, 1, 2))}, r"command_rad has the shape \(51, 1, 2\)"),
+        ({"target": np.zeros((51, 2, 4), np.complex128)}, "target has the shape"),
+        ({"seen_euler_rad": np.zeros((51, 2, 4))}, r"seen_euler_rad has the shape \(51, 2, 4\)"),
+        ({"target": np.full((51, 2, 4), np.nan)}, "time and target must be finite"),
+        ({"time_s": np.append(np.arange(50.0), np.inf)}, "time and target must be finite"),
+        ({"time_s": np.repeat(np.arange(26.0), 2)[:51]}, "time must rise"),
+    ],
+)
+def test_arrays_that_do_not_fit_together_are_refused(
+    change: dict[str, np.ndarray], message: str, trace: SensedTrace, tmp_path: Path
+) -> None:
+    """The message names the file, the array and what is wrong."""
+    path = tmp_path / "bad.npz"
+    np.savez(path, **{field.name: getattr(trace, field.name) for field in fields(trace)} | change)
+    with pytest.raises(TraceError, match=rf"bad\.npz: is no trace: {message}"):
+        read_npz(path)
+
+
+def test_a_lost_flight_and_integers_are_a_trace(trace: SensedTrace, tmp_path: Path) -> None:
+    """NaN in the motion is a lost flight, and arrays of integers are numbers."""
+    position_m = np.full_like(trace.position_m, np.nan)
+    write_npz(
+        replace(trace, position_m=position_m, target=np.zeros((51, 2, 4), np.int64)), tmp_path / "lost.npz"
+    )
+    read = read_npz(tmp_path / "lost.npz")
+    assert read.diverged.all()
+    assert read.flights == 2
+
+
+def test_a_trace_without_sensors_has_no_estimates(trace: SensedTrace, tmp_path: Path) -> None:
+    """Its NPZ reads back as a plain trace, and its CSV ends with the status."""
+    plain = fly(Flight(Circle(1.0, 0.5), duration_s=0.05), PdController())
+    write_npz(plain, tmp_path / "plain.npz")
+    read = read_npz(tmp_path / "plain.npz")
+    assert read.same_bits(plain)
+    assert not read.same_bits(trace)
+    write_csv(plain, tmp_path / "plain.csv")
+    assert (tmp_path / "plain.csv").read_text().splitlines()[0] == ",".join(CSV_COLUMNS)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(SensedTrace)])
+def test_one_changed_bit_of_an_array_changes_the_digest(name: str, trace: SensedTrace) -> None:
+    """The digest covers times and every array of its flight, and nothing of the other."""
+    values = getattr(trace, name).copy()
+    values.view(np.uint64)[(-1,) * values.ndim] ^= 1
+    changed = replace(trace, **{name: values})
+    assert changed.digest(1) != trace.digest(1)
+    assert (changed.digest(0) == trace.digest(0)) == (name != "time_s")
+    assert not changed.same_bits(trace)

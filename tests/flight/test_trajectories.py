@@ -151,6 +151,32 @@ def test_bad_waypoint_file_is_refused_with_file_line_and_rule(
         Waypoints.read(path)
 
 
+def test_waypoints_at_their_limits_are_accepted_and_beyond_them_refused() -> None:
+    """Times up to 1e6 s, coordinates up to 10 km on either side, legs of 1 us and more."""
+    corner = (1e6, 1e4, -1e4)
+    assert Waypoints((corner,)).points == (corner,)
+    for column in range(3):
+        beyond = tuple(value * (1.0 + 1e-15 * (column == place)) for place, value in enumerate(corner))
+        with pytest.raises(TrajectoryError, match=r"point 1: .* must be a finite number"):
+            Waypoints(((beyond[0], beyond[1], beyond[2]),))
+    assert len(Waypoints(((0.0, 0.0, 0.0), (1e-6, 1.0, 1.0))).points) == 2
+    with pytest.raises(
+        TrajectoryError, match=r"point 2: time_s = 9e-07 must be later than the 0\.0 before it"
+    ):
+        Waypoints(((0.0, 0.0, 0.0), (0.9e-6, 1.0, 1.0)))
+
+
+def test_waypoint_file_of_ten_megabytes_is_read(tmp_path: Path) -> None:
+    """The limit of 10 MB is inclusive."""
+    path = tmp_path / "long.csv"
+    content = b"time_s,x_m,y_m\n0,1,2\n"
+    path.write_bytes(content + b"\n" * (10_000_000 - len(content)))
+    assert Waypoints.read(path).points == ((0.0, 1.0, 2.0),)
+    path.write_bytes(path.read_bytes() + b"\n")
+    with pytest.raises(TrajectoryError, match="larger than 10 MB"):
+        Waypoints.read(path)
+
+
 def test_unreadable_waypoint_file_is_refused(tmp_path: Path) -> None:
     """A file that is missing, not text or above 10 MB raises `TrajectoryError`, which names it once."""
     with pytest.raises(TrajectoryError, match=r"absent\.csv: cannot be read: No such file or directory$"):

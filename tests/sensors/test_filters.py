@@ -1,5 +1,7 @@
 """Attitude and velocity filters against kinematics, gravity and geometry, tick by tick."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.rigid_body import to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
 from mambo_nmpc.sil.sensors.estimators import ACCELEROMETER_TAPS, Attitude, Suite, Velocity, velocity_gain
-from mambo_nmpc.sil.sensors.instruments import Readings, Sensors
+from mambo_nmpc.sil.sensors.instruments import Instruments, Readings, Sensors
 
 GRAVITY = np.array([[0.0], [0.0], [-GRAVITY_M_S2]])
 """Specific force of a drone at rest, in the world frame."""
@@ -170,3 +172,15 @@ def test_acceleration_drives_the_velocity_of_its_own_axis(axis: int) -> None:
         seen = suite.estimate(Seen(position_m, velocity_m_s, NO_RATES, NO_RATES))
     np.testing.assert_allclose(seen.velocity_m_s[axis], 0.1, rtol=0.05)
     np.testing.assert_allclose(seen.velocity_m_s[1 - axis], 0.0, atol=1e-9)
+
+
+def test_accelerometer_shows_acceleration_minus_gravity_in_body_axes() -> None:
+    """After the IMU's transient a leaning drone reads R transposed (a - g), and its own rates."""
+    acceleration_m_s2, euler_rad = column(1.0, -2.0, 0.5), column(0.2, -0.3, 0.9)
+    rates_rad_s = column(0.3, -0.5, 0.7)
+    true = Seen(column(0.0, 0.0, -1.1), np.zeros((3, 1)), euler_rad, rates_rad_s)
+    instruments = Instruments(Sensors(noise_scale=0.0), (0,), true)
+    for tick in range(1, 40):
+        reading = instruments.read(replace(true, velocity_m_s=STEP_S * tick * acceleration_m_s2))
+    expected = to_body(euler_rad, acceleration_m_s2 + GRAVITY)
+    np.testing.assert_allclose(reading.imu, np.concatenate([expected, rates_rad_s]), rtol=1e-6)

@@ -84,10 +84,10 @@ def test_altitude_estimate_follows_a_take_off() -> None:
     assert abs(trace.position_m[-1, 0, 2] + 1.1) < 0.03
 
 
-def noise(scale: float = 1.0) -> FloatArray:
+def noise(sensors: Sensors) -> FloatArray:
     """Return the noise (k, 8): readings of the hovering drone minus those without noise."""
     true = hovering()
-    noisy, quiet = (Instruments(Sensors(noise_scale=s), (5,), true) for s in (scale, 0.0))
+    noisy, quiet = (Instruments(each, (5,), true) for each in (sensors, QUIET))
     rows = []
     for _ in range(6000):
         one, other = noisy.read(true), quiet.read(true)
@@ -97,12 +97,12 @@ def noise(scale: float = 1.0) -> FloatArray:
 
 
 def test_noise_has_the_variances_of_the_source() -> None:
-    """Variances agree within 7 %; noise is white, zero-mean, independent and proportional to its scale."""
-    found = noise()
+    """Variances agree within 7 %; noise is white, zero-mean, independent and proportional to its scale, 1."""
+    found = noise(Sensors())
     np.testing.assert_allclose(found.var(axis=0), VARIANCES, rtol=0.07)
     assert (np.abs(found.mean(axis=0)) < 4.0 * np.sqrt(np.array(VARIANCES) / len(found))).all()
     assert np.abs(np.corrcoef(np.hstack([found[1:], found[:-1]]).T) - np.eye(16)).max() < 0.06
-    np.testing.assert_allclose(noise(0.5), 0.5 * found, atol=1e-6)
+    np.testing.assert_allclose(noise(Sensors(noise_scale=0.5)), 0.5 * found, atol=1e-6)
 
 
 def test_bias_adds_to_the_imu() -> None:
