@@ -115,17 +115,24 @@ def test_bias_adds_to_the_imu() -> None:
 
 
 def test_imu_responds_as_the_second_order_system_of_the_source() -> None:
-    """A step of the rates gives the response that scipy simulates for 190 rad/s and damping 0.707."""
+    """A step of the rates gives the response of scipy's exact discretization: 190 rad/s, damping 0.707."""
     true = hovering()
     imu = Instruments(QUIET, (0,), true)
     turning = replace(true, rates_rad_s=np.full((3, 1), 2.0))
     found = [float(imu.read(turning).imu[3, 0]) for _ in range(40)][1:]
-    times = STEP_S * np.arange(40)
     w, d = 190.0, 0.707
-    fine = np.linspace(0.0, times[-1], 40 * 200 - 199)
-    averaged = np.where(fine <= STEP_S, 1.0, 2.0)  # the input is the mean over a tick: first (0 + 2) / 2
-    _, expected, _ = scipy.signal.lsim(([w * w], [1.0, 2.0 * d * w, w * w]), averaged, fine)
-    np.testing.assert_allclose(found, expected[::200][1:40], atol=0.01)
+    system = (
+        np.array([[0.0, 1.0], [-w * w, -2.0 * d * w]]),
+        np.array([[0.0], [w * w]]),
+        np.eye(2),
+        np.zeros((2, 1)),
+    )
+    transition, gain, *_ = scipy.signal.cont2discrete(system, STEP_S)
+    state, expected = np.zeros(2), []
+    for rate_rad_s in [1.0] + 38 * [2.0]:  # the input is the mean over a tick: first (0 + 2) / 2
+        state = transition @ state + gain[:, 0] * rate_rad_s
+        expected.append(state[0])
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
     assert max(found) > 2.05  # it overshoots
 
 
