@@ -93,11 +93,10 @@ class Attitude:
         x, y, z = self._smooth(imu[:3])
         trusted = np.abs(np.sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < TILT_GATE * GRAVITY_M_S2
         if trusted.any():
-            weight = np.where(trusted, TILT_WEIGHT, 0.0)
             force_roll = arc_tangent(y / z)
             force_pitch = arc_sine(np.clip(x / GRAVITY_M_S2, -1.0, 1.0))
-            roll = np.where(trusted, (1.0 - weight) * roll + weight * force_roll, roll)
-            pitch = np.where(trusted, (1.0 - weight) * pitch + weight * force_pitch, pitch)
+            roll = np.where(trusted, (1.0 - TILT_WEIGHT) * roll + TILT_WEIGHT * force_roll, roll)
+            pitch = np.where(trusted, (1.0 - TILT_WEIGHT) * pitch + TILT_WEIGHT * force_pitch, pitch)
         self.euler_rad = np.stack([roll, pitch, yaw + STEP_S * yaw_rate])
         self.sines, self.cosines = sine_cosine(self.euler_rad)
 

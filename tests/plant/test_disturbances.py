@@ -11,7 +11,7 @@ from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Hover
 from mambo_nmpc.sil.plant import loops
 from mambo_nmpc.sil.plant.disturbances import Disturbances, World
-from mambo_nmpc.sil.plant.gusts import FOOT_M, Gusts, low_altitude_scales, mean_speed_m_s
+from mambo_nmpc.sil.plant.gusts import FOOT_M, LIGHT_M_S, Gusts, low_altitude_scales, mean_speed_m_s
 from mambo_nmpc.sil.plant.link import NOT_CALLED, Link
 from mambo_nmpc.sil.plant.rigid_body import RigidBody
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Vehicle, VehicleState
@@ -29,10 +29,13 @@ def at_rest(flights: int = 1) -> VehicleState:
 
 def test_gust_scales_match_the_specification() -> None:
     """At 100 ft: L = 100 / 0.2593^1.2 ft, sigma = 0.1 W20 / 0.2593^0.4; below 10 ft the scales at 10 ft."""
-    scales = low_altitude_scales(100.0 * FOOT_M)
-    assert scales.length_m / FOOT_M == pytest.approx(100.0 / 0.2593**1.2)
+    scales = low_altitude_scales(100.0 * 0.3048)
+    assert scales.length_m / 0.3048 == pytest.approx(100.0 / 0.2593**1.2)
     assert scales.intensity == pytest.approx(0.1 / 0.2593**0.4)
-    assert low_altitude_scales(1.1) == low_altitude_scales(10.0 * FOOT_M)
+    least = low_altitude_scales(1.1)
+    assert least.length_m / 0.3048 == pytest.approx(10.0 / (0.177 + 0.00823) ** 1.2)
+    assert low_altitude_scales(10.1 * 0.3048).length_m > least.length_m
+    assert pytest.approx(7.7167, abs=1e-4) == LIGHT_M_S  # 15 knots
 
 
 def test_mean_wind_grows_with_the_logarithm_of_the_height() -> None:

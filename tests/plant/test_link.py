@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.plant.link import Drops, Link, Wire
+from mambo_nmpc.codegen.reference import Status
+from mambo_nmpc.sil.plant.link import NOT_CALLED, Drops, Link, Wire
 from mambo_nmpc.sil.plant.randomness import BLOCK, Draws, Purpose, generators
 
 
@@ -34,6 +35,20 @@ def test_every_flight_drops_its_own_share_of_updates() -> None:
     assert not dropped[:, 0].any()
     assert dropped[:, 3].all()
     assert (dropped[:, 1] != dropped[:, 2]).any()
+
+
+def test_dropped_updates_come_from_a_stream_of_their_own() -> None:
+    """An update is dropped where the flight's uniform number of that purpose is below its share."""
+    drops = Drops(Link(dropped_share=0.4), (7,))
+    (generator,) = generators((7,), Purpose.DROPS)
+    dropped = np.array([drops.next() for _ in range(100)])
+    np.testing.assert_array_equal(dropped[:, 0], generator.random(100) < 0.4)
+
+
+def test_a_dropped_update_has_a_status_that_no_controller_returns() -> None:
+    """Traces and their CSV files mark it with -1."""
+    assert NOT_CALLED == -1
+    assert NOT_CALLED not in set(Status)
 
 
 @pytest.mark.parametrize("normal", [True, False])

@@ -116,7 +116,8 @@ def fly_attitude(
 
 
 def test_derived_airframe_constants_match_the_stock_tables() -> None:
-    """Hover speed, motor command, thrust per command and thrust-to-weight ratio match the stock model."""
+    """Inertia, hover speed, motor command, thrust per command and thrust-to-weight ratio are stock."""
+    assert MAMBO.inertia_kg_m2 == (5.82857e-5, 7.16914e-5, 1e-4)
     assert pytest.approx(6.532844e-4, rel=1e-6) == MAMBO.thrust_per_command_n
     assert pytest.approx(0.0441235, rel=1e-5) == MAMBO.rotor_offset_m
     assert pytest.approx(2.41374e-3, rel=1e-5) == MAMBO.torque_per_thrust_m

@@ -87,11 +87,14 @@ def test_attitude_survives_a_force_beyond_g(sign: float) -> None:
 
 
 def test_attitude_keeps_the_integrated_angles_in_free_fall() -> None:
-    """Without specific force no tilt is defined: 0 / 0 does not enter the estimate."""
-    attitude = Attitude(column(0.1, -0.2, 0.3))
+    """Without specific force there is no tilt: 0 / 0 does not enter; the flight beside it is corrected."""
+    attitude = Attitude(np.array([[0.1, 0.1], [-0.2, -0.2], [0.3, 0.3]]))
+    imu = np.zeros((6, 2))
+    imu[2, 0] = -GRAVITY_M_S2
     with np.errstate(invalid="ignore"):
-        attitude.update(np.zeros((6, 1)))
-    np.testing.assert_array_equal(attitude.euler_rad[:, 0], [0.1, -0.2, 0.3])
+        attitude.update(imu)
+    np.testing.assert_array_equal(attitude.euler_rad[:, 1], [0.1, -0.2, 0.3])
+    np.testing.assert_allclose(attitude.euler_rad[:, 0], [0.0999, -0.1998, 0.3], rtol=1e-12)
 
 
 @pytest.mark.parametrize("derotated", [True, False])
