@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 def trace_of(time_s: FloatArray, error_m: FloatArray, command_rad: FloatArray) -> Trace:
     """Return a trace of horizontal errors (k, n, 2) and commands (k, n, 2)."""
     shape = error_m.shape[:2]
-    target = np.full((*shape, 4), 7.0)
+    target = np.broadcast_to([7.0, -3.0, 0.0, 0.0], (*shape, 4)).copy()
     position_m = np.full((*shape, 3), 50.0)
     position_m[..., :2] = target[..., :2] - error_m
     return Trace(
@@ -117,9 +117,13 @@ def test_diverged_flight_has_no_metrics() -> None:
 
 
 def test_flight_shorter_than_the_transient_is_refused() -> None:
-    """A start of the measurement after the end of the flight raises `ValueError`."""
+    """Fewer than two samples after the start of the measurement raise `ValueError`; two are enough."""
     with pytest.raises(ValueError, match="start_s = 10 must lie before the end 8"):
         measure(constant_trace(np.linspace(0.0, 8.0, 801)), TRANSIENT_S)
+    with pytest.raises(ValueError, match="start_s = 10 must lie before the end 10"):
+        measure(constant_trace(np.linspace(0.0, 10.0, 101)), TRANSIENT_S)
+    two = measure(constant_trace(np.array([0.0, 10.0, 10.5])), TRANSIENT_S)
+    np.testing.assert_allclose(two.iae_m_s[0], 2.5, rtol=1e-12)
 
 
 def test_a_flight_among_many_has_the_metrics_of_the_flight_alone() -> None:

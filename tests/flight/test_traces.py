@@ -14,6 +14,7 @@ from mambo_nmpc.sil.flight.traces import (
     CSV_COLUMNS,
     SEEN_COLUMNS,
     SensedTrace,
+    Trace,
     read_npz,
     write_csv,
     write_npz,
@@ -119,6 +120,15 @@ def test_a_lost_flight_and_integers_are_a_trace(trace: SensedTrace, tmp_path: Pa
     assert read.flights == 2
 
 
+def test_a_flight_that_ends_as_nan_is_lost(trace: SensedTrace) -> None:
+    """One axis of the last sample decides, flight by flight."""
+    for axis in range(3):
+        position_m = trace.position_m.copy()
+        position_m[-1, 1, axis] = np.nan
+        assert replace(trace, position_m=position_m).diverged.tolist() == [False, True]
+    assert trace.diverged.tolist() == [False, False]
+
+
 def test_a_trace_without_sensors_has_no_estimates(trace: SensedTrace, tmp_path: Path) -> None:
     """Its NPZ reads back as a plain trace, and its CSV ends with the status."""
     plain = fly(Flight(Circle(1.0, 0.5), duration_s=0.05), PdController())
@@ -126,6 +136,8 @@ def test_a_trace_without_sensors_has_no_estimates(trace: SensedTrace, tmp_path: 
     read = read_npz(tmp_path / "plain.npz")
     assert read.same_bits(plain)
     assert not read.same_bits(trace)
+    arrays = {field.name: getattr(trace, field.name) for field in fields(Trace)}
+    assert not Trace(**arrays).same_bits(trace)
     write_csv(plain, tmp_path / "plain.csv")
     assert (tmp_path / "plain.csv").read_text().splitlines()[0] == ",".join(CSV_COLUMNS)
 
@@ -139,3 +151,4 @@ def test_one_changed_bit_of_an_array_changes_the_digest(name: str, trace: Sensed
     assert changed.digest(1) != trace.digest(1)
     assert (changed.digest(0) == trace.digest(0)) == (name != "time_s")
     assert not changed.same_bits(trace)
+    assert trace.digest() == trace.digest(0)

@@ -171,8 +171,9 @@ def test_each_flight_has_the_gusts_of_its_own_wind_at_the_given_height() -> None
         state, moment = world.tick(at_rest(2), STEP_S * tick)
         assert moment is not None
         assert moment.air_m_s is not None
-        np.testing.assert_array_equal([part[0] for part in moment.air_m_s], 0.0)
-        np.testing.assert_array_equal([part[1:] for part in moment.air_m_s], gusts.next())
+        air_m_s = np.array(moment.air_m_s)
+        np.testing.assert_array_equal(air_m_s[:, 0], 0.0)
+        np.testing.assert_array_equal(air_m_s[:, 1:], gusts.next())
         np.testing.assert_array_equal(moment.thrust_share, 1.0)
         np.testing.assert_array_equal(moment.payload_kg, 0.0)
         np.testing.assert_array_equal(state.body, at_rest(2).body)
@@ -188,7 +189,10 @@ def test_each_flight_has_the_gusts_of_its_own_wind_at_the_given_height() -> None
     ids=["battery", "payload", "push"],
 )
 def test_each_disturbance_acts_alone_and_in_its_flight_only(
-    disturbances: Disturbances, share: object, payload_kg: object, velocity_m_s: object
+    disturbances: Disturbances,
+    share: float | list[float],
+    payload_kg: float | list[float],
+    velocity_m_s: float | list[float],
 ) -> None:
     """By default payload and push are due at t = 0, not before; all others stay off."""
     world = World(disturbances, Vehicle(), (0, 0), 1.1)
@@ -210,8 +214,7 @@ def test_wind_blows_towards_north_by_default() -> None:
     _, moment = gusts.tick(at_rest(), 0.0)
     assert moment is not None
     assert moment.air_m_s is not None
-    x, y = moment.air_m_s
-    np.testing.assert_allclose([x[0], y[0]], [5.0, 0.0], atol=2.0)
+    np.testing.assert_allclose(np.array(moment.air_m_s)[:, 0], [5.0, 0.0], atol=2.0)
 
 
 def test_without_disturbances_nothing_happens() -> None:

@@ -68,10 +68,13 @@ def test_a_default_moment_is_undisturbed() -> None:
 
 def test_a_tired_battery_weakens_thrust_and_torques_alike() -> None:
     """Half the rotor thrust and torque is a drone with half of both rotor factors, in every bit."""
-    factors = {"thrust_factor_n_s2": 0.5 * MAMBO.thrust_factor_n_s2}
-    factors["torque_factor_n_m_s2"] = 0.5 * MAMBO.torque_factor_n_m_s2
+    half = replace(
+        MAMBO,
+        thrust_factor_n_s2=0.5 * MAMBO.thrust_factor_n_s2,
+        torque_factor_n_m_s2=0.5 * MAMBO.torque_factor_n_m_s2,
+    )
     tired = Vehicle(motor_lag_s=0.03).integrate(moving(), TURNING, Moment(thrust_share=0.5))
-    weak = Vehicle(replace(MAMBO, **factors), motor_lag_s=0.03).integrate(moving(), TURNING)
+    weak = Vehicle(half, motor_lag_s=0.03).integrate(moving(), TURNING)
     assert same_bits(tired, weak)
 
 
