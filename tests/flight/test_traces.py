@@ -46,7 +46,8 @@ def test_npz_reads_back_as_it_was_written(trace: SensedTrace, tmp_path: Path) ->
 def test_the_estimated_flight_is_a_trace_of_its_own(trace: SensedTrace) -> None:
     """`as_seen` replaces the true state by the estimates and keeps times and targets."""
     seen = trace.as_seen()
-    np.testing.assert_array_equal(seen.position_m, trace.seen_position_m)
+    for name in ("position_m", "velocity_m_s", "euler_rad"):
+        np.testing.assert_array_equal(getattr(seen, name), getattr(trace, f"seen_{name}"))
     np.testing.assert_array_equal(seen.target, trace.target)
     assert not trace.same_bits(seen)
 
@@ -71,6 +72,9 @@ def test_csv_holds_the_chosen_flight_bit_for_bit(trace: SensedTrace, tmp_path: P
         "seen_yaw_rad": trace.seen_euler_rad[:, 1, 2],
     }.items():
         np.testing.assert_array_equal(columns[name], values, err_msg=name)
+    write_csv(trace, tmp_path / "first.csv")
+    write_csv(trace, tmp_path / "zero.csv", flight=0)
+    assert (tmp_path / "first.csv").read_bytes() == (tmp_path / "zero.csv").read_bytes()
 
 
 def test_file_that_holds_no_trace_is_refused(tmp_path: Path) -> None:
