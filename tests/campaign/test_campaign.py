@@ -367,11 +367,11 @@ def documented(text: str) -> tuple[str, list[float]]:
 
 
 def test_the_documented_defaults_are_those_of_the_default_campaign() -> None:
-    """Each row of the table in docs/campaign.md has kind and numbers of its parameters, in their order."""
+    """Each row of [draws] in docs/campaign.md has kind and numbers of its parameters, in their order."""
     text = (ROOT / "docs" / "campaign.md").read_text("utf-8")
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]+) \| [^|]*\|$", text, re.MULTILINE)
     table = {name: documented(words) for names, words in rows for name in re.findall(r"\w+", names)}
     known = {name: found for name, found in table.items() if name in PARAMETERS}
-    assert list(known) == list(PARAMETERS)
+    assert list(known) == [name for name in PARAMETERS if name not in file.FlightSection.model_fields]
     for name, (kind, numbers) in known.items():
         assert (PARAMETERS[name].kind, list(PARAMETERS[name].numbers)) == (kind, numbers), name
