@@ -36,6 +36,8 @@ HARMS = {
         "src/nmpc_optimizer.c", r"\nvoid nmpc", r"\ntypedef int unused_t;\n\g<0>"
     ),
 }
+BESIDE_A_DEVIATION = Harm("src/nmpc_math.h", r"\* \(nmpc_real_t\)\(step_rad", r"* (step_rad")
+"""Rule 10.7 on a line of fixed point that deviates from rule 10.1 too."""
 
 
 @pytest.fixture(autouse=True)
@@ -66,6 +68,19 @@ def test_an_unlisted_finding_fails(harm: str, tmp_path: Path) -> None:
     assert HARMS[harm].path in result.evidence
 
 
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Path) -> None:
+    """By rule, file and scalar type of preset mambo, as cppcheck finds them."""
+    text = (Path(__file__).parents[2] / "docs" / "c-api.md").read_text("utf-8")
+    rows = re.findall(r"^\| (\d+\.\d+) \| `(\S+)` \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
+    column = {"float32": 2, "fixed": 3}[scalar]
+    documented = {row[:2]: int(row[column]) for row in rows if row[column] != "0"}
+    result = check(subject(with_option(presets.load("mambo"), "code.scalar", scalar, "test"), tmp_path))
+    assert result.outcome is CheckOutcome.PASSED, result.evidence
+    deviations_found = result.figures["deviations"].items()
+    assert documented == {(rule, file): n for rule, files in deviations_found for file, n in files.items()}
+
+
 def test_every_deviation_is_in_the_manual() -> None:
     """The table of docs/c-api.md has the rules and files of the list, no more and no less."""
     text = (Path(__file__).parents[2] / "docs" / "c-api.md").read_text("utf-8")
@@ -83,16 +98,30 @@ def test_every_deviation_is_in_the_manual() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("harm", [None, "15.1 goto"])
-def test_make_rules_comes_to_the_same_verdict(harm: str | None, tmp_path: Path) -> None:
-    """The list of deviations is one that cppcheck reads by itself."""
+@pytest.mark.parametrize(
+    ("scalar", "rule", "harm"),
+    [
+        ("float32", "", None),
+        ("float32", "15.1", HARMS["15.1 goto"]),
+        ("fixed", "", None),
+        ("fixed", "10.7", BESIDE_A_DEVIATION),
+    ],
+)
+def test_make_rules_comes_to_the_same_verdict(
+    scalar: str, rule: str, harm: Harm | None, tmp_path: Path
+) -> None:
+    """Also where a line has a listed deviation and another finding."""
     require("make", "make")
-    its = subject(presets.load("mambo"), tmp_path, *([HARMS[harm]] if harm else []))
+    settings = with_option(presets.load("mambo"), "code.scalar", scalar, "test")
+    its = subject(settings, tmp_path, *([harm] if harm else []))
     done = subprocess.run(
         ["make", "-s", "rules"], cwd=its.bundle, capture_output=True, text=True, check=False
     )
+    result = check(its)
     assert (done.returncode == 0) == (harm is None), done.stderr
-    assert ("misra-c2012-15.1" in done.stderr) == (harm is not None)
+    assert f"misra-c2012-{rule}" in done.stderr or not rule
+    assert (result.outcome is CheckOutcome.PASSED) == (harm is None), result.evidence
+    assert f"rule {rule}" in result.evidence or not rule
 
 
 def test_cppcheck_without_its_addon_is_no_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,7 +152,8 @@ static inline nmpc_real_t nmpc_gain_product(nmpc_real_t gain_m_step2_rad, nmpc_r
 /* The acceleration has room to be shifted left first: then the result is the upper word of the product. */
 static inline nmpc_real_t nmpc_share_product(nmpc_real_t share, nmpc_real_t acceleration_m_step2)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)share * (acceleration_m_step2 * ((nmpc_real_t)1 << (32 - NMPC_SHARE_BITS))))
+    return (nmpc_real_t)(((nmpc_sum_t)share
+                          * (nmpc_real_t)(acceleration_m_step2 * ((nmpc_real_t)1 << (32 - NMPC_SHARE_BITS))))
                          >> 32);
 }
 
@@ -200,7 +201,9 @@ static inline nmpc_sum_t nmpc_effort_gradient(nmpc_real_t weight)
 /* The step size is shifted left first too, and the product is rounded down. */
 static inline nmpc_real_t nmpc_step_product(nmpc_real_t step_rad, nmpc_real_t factor)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)factor * (step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS)))) >> 32);
+    return (nmpc_real_t)(((nmpc_sum_t)factor
+                          * (nmpc_real_t)(step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS))))
+                         >> 32);
 }
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, with absolute errors of at most 2e-09. */

@@ -277,7 +277,10 @@ static unsigned long next_number(unsigned long *stream)
 /* Draw a signed integer of 24 bits, times `scale` / 2^23. */
 static nmpc_real_t draw(unsigned long *stream, nmpc_real_t scale)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)((nmpc_real_t)(next_number(stream) >> 8) - 8388608) * scale, 23);
+    const unsigned long bits = next_number(stream) >> 8;
+    const nmpc_real_t number = (nmpc_real_t)bits - 8388608;
+
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)number * scale, 23);
 }
 
 /* The largest number: outside of every range, so it is refused. */

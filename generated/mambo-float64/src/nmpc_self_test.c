@@ -271,7 +271,8 @@ static unsigned long next_number(unsigned long *stream)
 /* Draw a signed integer of 24 bits, which nmpc_real_t holds exactly, times `scale`: rounded once. */
 static nmpc_real_t draw(unsigned long *stream, nmpc_real_t scale)
 {
-    const long number = (long)(next_number(stream) >> 8) - 8388608L;
+    const unsigned long bits = next_number(stream) >> 8;
+    const long number = (long)bits - 8388608L;
 
     return (nmpc_real_t)number * scale;
 }
