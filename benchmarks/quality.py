@@ -113,7 +113,7 @@ def instructions(variant: Variant) -> str:
     if variant.searching is not None:
         return "-"
     counts = measure_footprint(variant.settings, boards.load(BOARD)).counts
-    return "-" if counts is None else f"{counts.mean:.0f}, {counts.most}"
+    return "-" if counts is None else f"{counts.mean:.0f}, {counts.most_met}"
 
 
 def _digits(value: float) -> str:

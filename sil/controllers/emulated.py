@@ -88,6 +88,14 @@ class EmulatedController:
                 values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
         return as_step(self._numbers, outcome)
 
+    def save(self) -> bytes:
+        """Return the instances as they are now."""
+        return bytes(self._instances)
+
+    def restore(self, instances: bytes) -> None:
+        """Set the instances to what `save` returned."""
+        self._instances[:] = instances
+
     def _empty_outcome(self, n: int) -> dict[str, NDArray[Any]]:
         return empty_outcome(self._numbers, self.settings.horizon.control, n, f"<i{self.machine.word_bytes}")
 

@@ -1,20 +1,24 @@
-"""Exact instruction counts of control steps on an emulated core, and a search for the worst case."""
+"""Exact instruction counts of a flight on an emulated core, and a search for a more expensive step."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.emulated import EmulatedController
+from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.firmware.elf import load
-from mambo_nmpc.sil.flight.traces import Trace
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.vehicle import STEP_S
 
 HARNESS: Final = (
     "nmpc_batch_init",
@@ -27,115 +31,109 @@ HARNESS: Final = (
 """Functions of the test harness, which are not part of a step."""
 
 
-@dataclass(frozen=True)
-class InputSequence:
-    """Inputs of k consecutive steps of one controller: state (k, 7), target (k, 4), thrust (k,), m/s2."""
+FLIGHT: Final = Bernoulli(2.0, 0.5)
+"""The figure of eight of Table II, from rest at its centre: the first ticks have the largest errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class CountedStep:
+    """One step: state (1, 7), target (1, 4), thrust (1,), the instance before it, status and instructions."""
 
     state: FloatArray
     target: FloatArray
     thrust: FloatArray
+    before: bytes
+    accepted: bool
+    by_function: Counter[str]
 
-    def __add__(self, other: "InputSequence") -> "InputSequence":
-        return InputSequence(
-            np.concatenate([self.state, other.state]),
-            np.concatenate([self.target, other.target]),
-            np.concatenate([self.thrust, other.thrust]),
-        )
+    @property
+    def instructions(self) -> int:
+        """All instructions of the step."""
+        return self.by_function.total()
 
 
 @dataclass(frozen=True)
 class InstructionCounts:
-    """Instructions of the accepted steps; `by_function` has the mean of each function, largest first."""
+    """Instructions of consecutive ticks of a flight, and the most of those and of the search's steps.
 
-    steps: int
+    `by_function` has the mean of each function over the ticks, largest first; it is not in a summary.
+    """
+
+    ticks: int
+    searched: int
     least: int
     mean: float
-    most: int
+    most_met: int
     by_function: Annotated[dict[str, float], Field(exclude=True)] = field(default_factory=dict)
-    """Mean of a step, most first; not in a summary."""
 
 
 class CountingController:
-    """One emulated controller that counts the instructions of each step."""
+    """One emulated controller that counts the instructions of each step; `steps` has all of them."""
 
     def __init__(self, settings: Settings, elf: Path, core: str) -> None:
         self._emulated = EmulatedController(settings, elf, core, counting=True)
         image = load(elf)
         self._name_of = lru_cache(None)(image.name_of)
+        self.steps: list[CountedStep] = []
 
-    def step(self, state: FloatArray, target: FloatArray, thrust: float) -> tuple[int, Counter[str]]:
-        """Step once with state (7,), target (4,), thrust; returns the status and the counts by function."""
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Step:
+        """Step once with state (1, 7), target (1, 4) and thrust_acceleration_m_s2 (1,)."""
+        before = self._emulated.save()
         self._emulated.machine.take_counts()
-        outcome = self._emulated.step(state[None], target[None], [thrust])
+        outcome = self._emulated.step(state, target, thrust_acceleration_m_s2)
         by_function: Counter[str] = Counter()
         for address, instructions in self._emulated.machine.take_counts().items():
             name = self._name_of(address).partition("+")[0]
             if name not in HARNESS:
                 by_function[name] += instructions
-        return int(outcome.status[0]), by_function
+        accepted = not outcome.status[0]
+        self.steps.append(CountedStep(state, target, thrust_acceleration_m_s2, before, accepted, by_function))
+        return outcome
 
-
-def sample_flight(trace: Trace, every: int) -> InputSequence:
-    """Return every `every`-th controller input of the first flight of a trace."""
-    chosen = slice(0, None, every)
-    state = np.concatenate(
-        [trace.position_m[chosen, 0, :2], trace.velocity_m_s[chosen, 0, :2], trace.euler_rad[chosen, 0]],
-        axis=1,
-    )
-    return InputSequence(state, trace.target[chosen, 0], trace.thrust_acceleration_m_s2[chosen, 0])
-
-
-def draw_inputs(settings: Settings, count: int) -> InputSequence:
-    """Draw random inputs: errors from millimetres to the input ranges, on a log scale, and any heading."""
-    rng = np.random.default_rng(0)
-    ranges = settings.ranges
-    scale = 10.0 ** rng.uniform(-3, 3, (count, 1))
-    bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2)
-    target = np.clip(rng.normal(0, 1, (count, 4)), -bounds, bounds)
-    state = np.clip(target + scale * rng.normal(0, 1, (count, 4)), -bounds, bounds)
-    attitude = rng.uniform(-1, 1, (count, 3)) * [0.5, 0.5, 1000.0]
-    low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
-    return InputSequence(np.concatenate([state, attitude], axis=1), target, rng.uniform(low, high, count))
+    def retry(self, step: CountedStep, state: FloatArray) -> CountedStep:
+        """Repeat an earlier step from the instance before it, with another state (1, 7)."""
+        self._emulated.restore(step.before)
+        self.step(state, step.target, step.thrust)
+        return self.steps.pop()
 
 
 def count_instructions(
-    settings: Settings, elf: Path, core: str, inputs: InputSequence, search_steps: int
+    settings: Settings, elf: Path, core: str, ticks: int, search_steps: int
 ) -> InstructionCounts:
-    """Count the steps of `inputs`, then search from the most expensive for `search_steps` more.
+    """Fly `ticks` updates of `FLIGHT` from its start, then search from the most expensive of them.
 
-    The search (hill climbing) changes one state component at a time and keeps inputs that cost at least as
-    much. Refused inputs return early and are excluded.
+    A refused tick returns early and does not count; raises FlightError if all are refused.
     """
     controller = CountingController(settings, elf, core)
-    totals: list[int] = []
-    sums: Counter[str] = Counter()
-
-    def cost(state: NDArray[np.float64], target: NDArray[np.float64], thrust: float) -> int:
-        status, by_function = controller.step(state, target, thrust)
-        if status != 0:
-            return 0
-        sums.update(by_function)
-        totals.append(by_function.total())
-        return totals[-1]
-
-    costs = [
-        cost(state, target, float(thrust))
-        for state, target, thrust in zip(inputs.state, inputs.target, inputs.thrust, strict=True)
-    ]
-    rng = np.random.default_rng(0)
-    start = int(np.argmax(costs))
-    state, target, thrust = inputs.state[start], inputs.target[start], float(inputs.thrust[start])
-    best = costs[start]
-    for _ in range(search_steps):
-        tried = state.copy()
-        tried[rng.integers(7)] += rng.normal() * 10.0 ** rng.uniform(-4, 0)
-        found = cost(tried, target, thrust)
-        if found >= best:
-            state, best = tried, found
+    period_s = STEP_S * max(1, round(settings.horizon.update_period_s / STEP_S))
+    fly(Flight(FLIGHT, duration_s=(ticks - 1) * period_s, update_period_s=period_s), controller)
+    flown = [step for step in controller.steps if step.accepted]
+    if not flown:
+        raise FlightError("the controller refuses every tick of the flight, which is beyond its [ranges]")
+    totals = [step.instructions for step in flown]
+    sums = sum((step.by_function for step in flown), Counter[str]())
     return InstructionCounts(
-        steps=len(totals),
+        ticks=len(flown),
+        searched=search_steps,
         least=min(totals),
         mean=float(np.mean(totals)),
-        most=max(totals),
-        by_function={name: total / len(totals) for name, total in sums.most_common()},
+        most_met=_search(controller, flown, search_steps),
+        by_function={name: total / len(flown) for name, total in sums.most_common()},
     )
+
+
+def _search(controller: CountingController, flown: Sequence[CountedStep], search_steps: int) -> int:
+    """Return the most instructions met from the most expensive tick on (hill climbing).
+
+    Each step starts from the controller's instance at that tick, with its plan, and changes one component of
+    the state; a change that costs at least as much is kept.
+    """
+    rng = np.random.default_rng(0)
+    best = max(flown, key=lambda step: step.instructions)
+    for _ in range(search_steps):
+        state = best.state.copy()
+        state[0, rng.integers(7)] += rng.normal() * 10.0 ** rng.uniform(-4, 0)
+        tried = controller.retry(best, state)
+        if tried.accepted and tried.instructions >= best.instructions:
+            best = tried
+    return best.instructions

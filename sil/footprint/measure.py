@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -14,9 +13,7 @@ from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.emulated import build_guest
 from mambo_nmpc.sil.controllers.library import with_default_prefix
-from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.errors import EmulatorError
+from mambo_nmpc.sil.errors import EmulatorError, FlightError
 from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
@@ -25,17 +22,13 @@ from mambo_nmpc.sil.firmware.elf import load
 from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
 from mambo_nmpc.sil.firmware.sizes import Added, measure_added
 from mambo_nmpc.sil.firmware.stack import StackReport, bound_stack
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.footprint.counts import InstructionCounts, count_instructions, draw_inputs, sample_flight
+from mambo_nmpc.sil.footprint.counts import InstructionCounts, count_instructions
 
-COUNTED_STEPS: Final = 300
-"""Steps to count: a sixth from a flight, a third random, half in the search for the most expensive."""
-_FEWEST_STEPS: Final = 6
+COUNTED_TICKS: Final = 300
+"""Consecutive ticks of the flight to count; the search for a more expensive step takes half as many."""
+_FEWEST_TICKS: Final = 4
 _USUAL_WORK: Final = 1000
-"""Prediction steps x moves x iterations above which fewer steps are counted."""
-_FLIGHT_S: Final = 20.0
+"""Prediction steps x moves x iterations above which fewer ticks are counted."""
 
 
 @dataclass(frozen=True)
@@ -88,15 +81,18 @@ class Footprint:
 
     @property
     def cycles(self) -> tuple[float, float] | None:
-        """Estimated clock cycles of the most expensive step, lower and upper end of the band."""
+        """Estimated clock cycles of the most expensive step met, lower and upper end of the band."""
         if self.counts is None:
             return None
-        cycles, error = self.board.cycles.per_instruction * self.counts.most, self.board.cycles.error_share
+        cycles, error = (
+            self.board.cycles.per_instruction * self.counts.most_met,
+            self.board.cycles.error_share,
+        )
         return (1 - error) * cycles, (1 + error) * cycles
 
     @property
     def time_s(self) -> tuple[float, float] | None:
-        """Estimated time of the most expensive step in seconds, lower and upper end of the band."""
+        """Estimated time of the most expensive step met in seconds, lower and upper end of the band."""
         clock_hz = self.board.clock_hz.value
         return None if self.cycles is None else (self.cycles[0] / clock_hz, self.cycles[1] / clock_hz)
 
@@ -128,7 +124,7 @@ class Footprint:
 
 
 def measure_footprint(
-    settings: Settings, board: Board, optimisation: str = "-O2", counted_steps: int = COUNTED_STEPS
+    settings: Settings, board: Board, optimisation: str = "-O2", counted_ticks: int = COUNTED_TICKS
 ) -> Footprint:
     """Build the C of `settings` for `board` and measure it.
 
@@ -141,7 +137,7 @@ def measure_footprint(
         image = load(firmware)
         readable = is_readable(image)
         sizes = measure_added(firmware, found.firmware(files, folder, empty=True), PREFIX)
-        counts, uncounted = _counts(settings, found, folder, counted_steps)
+        counts, uncounted = _counts(settings, found, folder, counted_ticks)
         return Footprint(
             board=board,
             compiler=found.compiler,
@@ -157,27 +153,19 @@ def measure_footprint(
         )
 
 
-@lru_cache(maxsize=1)
-def _flight() -> Trace:
-    """Fly the figure of eight with the PD, whose tracking errors are larger than those of the NMPC."""
-    return fly(Flight(Bernoulli(2.0, 0.5), duration_s=_FLIGHT_S), PdController())
-
-
 def _counts(
-    settings: Settings, found: Builder, folder: Path, steps: int
+    settings: Settings, found: Builder, folder: Path, ticks: int
 ) -> tuple[InstructionCounts | None, str]:
-    """Count steps from a flight, random ones, and those of the search; fewer if one step takes long.
+    """Count the ticks of a flight, fewer if one takes long, and the steps of the search.
 
-    Returns None and the reason if the board cannot be emulated.
+    Returns None and the reason if the board cannot be emulated, or the controller refuses the whole flight.
     """
     work = settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
-    steps = max(_FEWEST_STEPS, min(steps, steps * _USUAL_WORK // work))
-    trace = _flight()
-    inputs = sample_flight(trace, every=len(trace.time_s) * 6 // steps) + draw_inputs(settings, steps // 3)
+    ticks = max(_FEWEST_TICKS, min(ticks, ticks * _USUAL_WORK // work))
     elf = build_guest(settings, found, folder)
     try:
-        return count_instructions(settings, elf, found.board.emulated_core.value, inputs, steps // 2), ""
-    except EmulatorError as error:
+        return count_instructions(settings, elf, found.board.emulated_core.value, ticks, ticks // 2), ""
+    except (EmulatorError, FlightError) as error:
         return None, str(error)
 
 

@@ -13,7 +13,16 @@ from mambo_nmpc.sil.footprint.counts import InstructionCounts
 from mambo_nmpc.sil.footprint.measure import Footprint, Limit
 from mambo_nmpc.sil.show.page import render_page
 
-_HEAD = ("board", "flash B", "RAM B", "stack B", "instructions a step", "time ms", "period", "")
+_HEAD = (
+    "board",
+    "flash B",
+    "RAM B",
+    "stack B",
+    "instructions a step: least / mean / most met",
+    "time ms",
+    "period",
+    "",
+)
 
 
 @dataclass(frozen=True)
@@ -98,7 +107,7 @@ def _row(footprint: Footprint) -> tuple[str, ...]:
         str(footprint.added.flash.total),
         str(footprint.added.ram.total),
         "-" if footprint.stack is None else str(footprint.stack.bytes),
-        "-" if counts is None else f"{counts.least} / {counts.mean:.0f} / {counts.most}",
+        "-" if counts is None else f"{counts.least} / {counts.mean:.0f} / {counts.most_met}",
         "-" if time_s is None else f"{1000 * time_s[0]:.3g}..{1000 * time_s[1]:.3g}",
         "-" if time_s is None else f"{100 * time_s[1] / footprint.update_period_s:.2g} %",
         ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER",

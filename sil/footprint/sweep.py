@@ -21,7 +21,7 @@ from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.paper.table2 import CASES
 
-COUNTED_STEPS: Final = 60
+COUNTED_TICKS: Final = 60
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def _measure_point(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) ->
     document["horizon"] |= {"prediction": prediction, "control": control}
     document["optimizer"] |= {"iterations": iterations}
     chosen = Settings.model_validate(document)
-    footprint = measure_footprint(chosen, board, counted_steps=COUNTED_STEPS)
+    footprint = measure_footprint(chosen, board, counted_ticks=COUNTED_TICKS)
     case = next(iter(CASES.values()))
     flight = Flight(case, update_period_s=chosen.horizon.update_period_s)
     metrics = measure(fly(flight, CompiledController(chosen)))
@@ -119,7 +119,7 @@ def _measure_point(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) ->
         flash_bytes=footprint.added.flash.total,
         ram_bytes=footprint.added.ram.total,
         stack_bytes=math.nan if footprint.stack is None else footprint.stack.bytes,
-        instructions=math.nan if footprint.counts is None else footprint.counts.most,
+        instructions=math.nan if footprint.counts is None else footprint.counts.most_met,
         time_ms=math.nan if footprint.time_s is None else 1000 * footprint.time_s[1],
         iae_m_s=float(metrics.iae_m_s[0]),
         fits=footprint.fits and footprint.complete,

@@ -44,9 +44,9 @@ def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) ->
     assert values["flash"] == sum(board["flash_sections"].values()) == sum(board["flash_bytes"].values())
     assert values["stack"] == sum(frame["bytes"] for frame in board["stack_path"])
     counts = board["instructions"]
-    assert 0 < counts["least"] <= counts["mean"] <= counts["most"]
+    assert 0 < counts["least"] <= counts["mean"] <= counts["most_met"]
     low, high = board["cycles_estimate"]
-    assert low < counts["most"] * boards.load("crazyflie").cycles.per_instruction < high
+    assert low < counts["most_met"] * boards.load("crazyflie").cycles.per_instruction < high
 
     page = (out / "footprint.html").read_text("utf-8")
     assert "<img" not in page
@@ -77,7 +77,7 @@ def test_over_budget_is_exit_1_with_names_and_excess(tmp_path: Path) -> None:
 def test_the_name_of_a_board_is_no_formula(tmp_path: Path) -> None:
     """Nor is it markup: a board's file may have any name."""
     odd = boards.load("crazyflie").model_copy(update={"name": r"$\frac{$ <b>"})
-    measured = measure_footprint(presets.load("table1"), odd, counted_steps=6)
+    measured = measure_footprint(presets.load("table1"), odd, counted_ticks=6)
     draw_footprints([measured], tmp_path / "footprint")
     assert r"$\frac{$ &lt;b&gt;  flash" in (tmp_path / "footprint.svg").read_text("utf-8")
 

@@ -1,9 +1,8 @@
-"""Instruction counts are exact and repeatable; the search never returns less than its initial inputs."""
+"""Instruction counts are exact and of consecutive ticks; the search starts from the plan of its tick."""
 
 import json
 import re
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,27 +10,25 @@ import numpy as np
 import pytest
 import unicorn
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
 from mambo_nmpc.sil.controllers.library import batch_source
-from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.emulation.unicorn import UnicornMachine
+from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.firmware.disassembly import disassemble
 from mambo_nmpc.sil.firmware.elf import Image, load
 from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.footprint.counts import (
+    FLIGHT,
     HARNESS,
     CountingController,
-    InputSequence,
+    InstructionCounts,
     count_instructions,
-    draw_inputs,
-    sample_flight,
 )
-from tests.support.cases import settings_case
 from tests.support.tools import CORES, board_builder
 
 IN_PROCESS = [name for name in CORES if name != "mega"]
@@ -112,11 +109,16 @@ def crazyflie(tmp_path: Path) -> Path:
     return build_guest(MAMBO, board_builder("crazyflie"), tmp_path)
 
 
-def costs(elf: Path, inputs: InputSequence) -> list[int]:
-    """Count consecutive steps of one controller on the Cortex-M4."""
+def fly_counted(elf: Path, ticks: int) -> CountingController:
+    """Fly consecutive ticks of the flight on the Cortex-M4F."""
     controller = CountingController(MAMBO, elf, "cortex-m4")
-    rows = zip(inputs.state, inputs.target, inputs.thrust, strict=True)
-    return [controller.step(state, target, float(thrust))[1].total() for state, target, thrust in rows]
+    fly(Flight(FLIGHT, duration_s=0.01 * (ticks - 1)), controller)
+    return controller
+
+
+def counted(settings: Settings, elf: Path, ticks: int, searched: int) -> InstructionCounts:
+    """Count ticks and steps of the search on the Cortex-M4F."""
+    return count_instructions(settings, elf, "cortex-m4", ticks, searched)
 
 
 @pytest.mark.parametrize("name", CORES)
@@ -139,10 +141,9 @@ def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) 
     )
     controller = CountingController(MAMBO, elf, CORES[name])
     for _ in range(2):
-        assert controller.step(np.zeros(7), np.zeros(4), 9.81) == (
-            0,
-            Counter({"nmpc_known": KNOWN + len(skipped)}),
-        )
+        controller.step(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
+        assert controller.steps[-1].accepted
+        assert controller.steps[-1].by_function == Counter({"nmpc_known": KNOWN + len(skipped)})
 
 
 def it_blocks(image: Image) -> dict[int, list[int]]:
@@ -177,90 +178,70 @@ def test_counting_blocks_agrees_with_counting_instructions(name: str, tmp_path: 
     assert isinstance(single.machine, UnicornMachine)
     single.machine._engine.hook_add(unicorn.UC_HOOK_CODE, see)
     runs = CountingController(MAMBO, elf, core)
-    inputs = draw_inputs(MAMBO, 2)
-    for state, target, thrust in zip(inputs.state, inputs.target, inputs.thrust, strict=True):
+    target, thrust = np.zeros((1, 4)), np.array([9.81])
+    for state in np.random.default_rng(0).uniform(-0.5, 0.5, (2, 1, 7)):
         seen.clear()
-        single.step(state[None], target[None], [thrust])
+        single.step(state, target, thrust)
         for first, others in blocks.items():
             seen.update({address: seen[first] - seen[address] for address in others})
         by_function: Counter[str] = Counter()
         for address, times in seen.items():
             by_function[image.name_of(address).partition("+")[0]] += times
         expected = sum(times for function, times in by_function.items() if function not in HARNESS)
-        status, counted = runs.step(state, target, float(thrust))
-        assert (status, counted.total()) == (0, expected)
-        assert counted.keys() <= by_function.keys() - set(HARNESS)
-        assert counted["nmpc_step"] == by_function["nmpc_step"] > 50
+        runs.step(state, target, thrust)
+        step = runs.steps[-1]
+        assert (step.accepted, step.instructions) == (True, expected)
+        assert step.by_function.keys() <= by_function.keys() - set(HARNESS)
+        assert step.by_function["nmpc_step"] == by_function["nmpc_step"] > 50
 
 
-def test_the_same_inputs_have_the_same_counts(crazyflie: Path) -> None:
-    """Two measurements of the same inputs are equal."""
-    inputs = draw_inputs(MAMBO, 20)
-    first, second = (count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, 20) for _ in range(2))
-    assert first == second
-    assert first.least < first.most
-
-
-def test_the_figures_are_those_of_the_steps(crazyflie: Path) -> None:
-    """Number, least, mean and most are those of the steps; the functions add up to the mean."""
-    inputs = draw_inputs(MAMBO, 20)
-    each = costs(crazyflie, inputs)
-    counts = count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, 0)
-    assert (counts.steps, counts.least, counts.most) == (20, min(each), max(each))
-    assert counts.mean == pytest.approx(sum(each) / 20)
+def test_the_figures_are_those_of_consecutive_ticks(crazyflie: Path) -> None:
+    """Of every tick of the flight from its start, as the same C flies it on this machine."""
+    trace = fly(Flight(FLIGHT, duration_s=0.29), CompiledController(MAMBO))
+    again = CountingController(MAMBO, crazyflie, "cortex-m4")
+    state = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad], axis=-1)
+    for row in zip(state, trace.target, trace.thrust_acceleration_m_s2, strict=True):
+        again.step(*row)
+    each = [step.instructions for step in again.steps]
+    counts = counted(MAMBO, crazyflie, 30, 0)
+    assert (counts.ticks, counts.searched) == (30, 0)
+    assert (counts.least, counts.most_met) == (min(each), max(each))
+    assert counts.mean == pytest.approx(sum(each) / 30)
     assert sum(counts.by_function.values()) == pytest.approx(counts.mean)
     assert list(counts.by_function.values()) == sorted(counts.by_function.values(), reverse=True)
 
 
-def test_the_search_never_returns_less_than_it_was_given(crazyflie: Path) -> None:
-    """A longer search finds at least as much, and more than an initial input at rest."""
-    inputs = draw_inputs(MAMBO, 10)
-    given = max(costs(crazyflie, inputs))
-    found = [count_instructions(MAMBO, crazyflie, "cortex-m4", inputs, steps).most for steps in (0, 10, 40)]
-    assert given == found[0] <= found[1] <= found[2]
-    calm = InputSequence(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
-    before, after = (count_instructions(MAMBO, crazyflie, "cortex-m4", calm, steps).most for steps in (0, 60))
-    assert before < after
+def test_a_tick_can_be_repeated_with_the_plan_that_it_had(crazyflie: Path) -> None:
+    """Whatever was stepped since, the same state costs the same; the instance of the first tick differs."""
+    controller = fly_counted(crazyflie, 20)
+    first, last = controller.steps[0], controller.steps[-1]
+    controller.retry(last, last.state + 0.3)
+    assert controller.retry(last, last.state).by_function == last.by_function
+    assert controller.retry(first, first.state).by_function == first.by_function
+    assert first.before != last.before
+    assert len(controller.steps) == 20
 
 
-def test_refused_inputs_are_not_counted(crazyflie: Path) -> None:
-    """Refused inputs return early and would reduce least and mean."""
-    inputs = draw_inputs(MAMBO, 12)
-    state = inputs.state.copy()
-    state[3::4, 0] = np.nan
-    refused = replace(inputs, state=state)
-    kept = np.isfinite(state[:, 0])
-    good = InputSequence(inputs.state[kept], inputs.target[kept], inputs.thrust[kept])
-    alone, among = (count_instructions(MAMBO, crazyflie, "cortex-m4", i, 10) for i in (good, refused))
-    assert alone == among
-    assert alone.steps < 12 + 10
+def test_the_search_never_returns_less_than_the_flight(crazyflie: Path) -> None:
+    """A longer search finds at least as much; least and mean are those of the flight alone."""
+    found = [counted(MAMBO, crazyflie, 20, steps) for steps in (0, 10, 60)]
+    assert found[0].most_met <= found[1].most_met <= found[2].most_met
+    assert found[0].most_met < found[2].most_met
+    assert len({(one.least, one.mean) for one in found}) == 1
+    assert counted(MAMBO, crazyflie, 20, 60) == found[2]
 
 
-@pytest.mark.parametrize("index", range(8))
-def test_spread_inputs_are_all_accepted(index: int) -> None:
-    """Errors range from millimetres to the input ranges, and no input is refused."""
-    settings = settings_case(index, "float32")
-    inputs = draw_inputs(settings, 200)
-    steps = ReferenceController(Design(settings), 200).step(inputs.state, inputs.target, inputs.thrust)
-    assert not np.any(steps.status)
-    errors = np.abs(inputs.state[:, :4] - inputs.target).max(axis=1)
-    assert errors.min() < 0.02
-    assert errors.max() > settings.ranges.velocity_m_s / 2
-
-
-def test_flight_inputs_are_those_of_the_flight() -> None:
-    """Every seventh input equals what the controller received: state, target, thrust."""
-    given: list[tuple[Any, ...]] = []
-
-    class Spy(PdController):
-        def step(self, *arguments: Any) -> Any:
-            given.append(tuple(np.array(argument[0]) for argument in arguments))
-            return super().step(*arguments)
-
-    trace = fly(Flight(Bernoulli(2.0, 0.5), duration_s=1.0), Spy())
-    inputs = sample_flight(trace, every=7)
-    assert len(inputs.thrust) == len(given[::7]) == 15
-    for row, (state, target, thrust) in enumerate(given[::7]):
-        np.testing.assert_array_equal(inputs.state[row], state)
-        np.testing.assert_array_equal(inputs.target[row], target)
-        assert inputs.thrust[row] == thrust
+def test_refused_ticks_are_not_counted(tmp_path: Path) -> None:
+    """They return early and would reduce least and mean; if all are refused, there is no figure."""
+    counts = []
+    for velocity_m_s in (100.0, 0.6):
+        settings = with_option(MAMBO, "ranges.velocity_m_s", velocity_m_s)
+        elf = build_guest(settings, board_builder("crazyflie"), tmp_path)
+        counts.append(counted(settings, elf, 150, 0))
+    all_ticks, some = counts
+    assert 10 < some.ticks < all_ticks.ticks == 150
+    assert some.least >= all_ticks.least
+    heavy = with_option(MAMBO, "ranges.thrust_acceleration_min_m_s2", 15.0)
+    elf = build_guest(heavy, board_builder("crazyflie"), tmp_path)
+    with pytest.raises(FlightError, match="refuses every tick"):
+        counted(heavy, elf, 10, 5)
