@@ -74,7 +74,7 @@ def _plan_sets(library: Path, sets: dict[str, Inputs]) -> dict[str, Any]:
     return {name: plans(library, sets[name], follows=name == "C") for name in ("W", "C")}
 
 
-def _prepare(program: Program, sets: dict[str, Inputs], work: Path) -> tuple[Row, Libraries, Any]:
+def prepare(program: Program, sets: dict[str, Inputs], work: Path) -> tuple[Row, Libraries, Any]:
     """Generate, build and try a contender; returns its row without times, libraries, and plans by set."""
     row, folder = Row(program), work / program.name
     try:
@@ -123,7 +123,7 @@ def _describe_heap(calls: list[int]) -> str:
     return "set-up only" if calls[0] else "no"
 
 
-def _time_all(
+def time_all(
     timer: Path, libraries: Libraries, sets: dict[str, Inputs], rounds: int
 ) -> tuple[dict[Any, Timing], Timing]:
     """Return the times of every library less those of an empty call, and of the empty call.
@@ -202,8 +202,7 @@ def main() -> None:
         work = Path(place)
         print("generating, building, trying", file=sys.stderr)
         with ProcessPoolExecutor() as pool:
-            prepare = partial(_prepare, sets=sets, work=work)
-            prepared = list(pool.map(prepare, contenders()))
+            prepared = list(pool.map(partial(prepare, sets=sets, work=work), contenders()))
         rows = [row for row, _, _ in prepared]
         libraries = {key: path for _, built, _ in prepared for key, path in built.items()}
         planned = {row.program.name: plans_found for row, _, plans_found in prepared}
@@ -214,7 +213,7 @@ def main() -> None:
         before = os.getloadavg()[0]
         try:
             with ProcessPoolExecutor(1) as pool:
-                timings, empty = pool.submit(_time_all, timer, libraries, sets, rounds).result()
+                timings, empty = pool.submit(time_all, timer, libraries, sets, rounds).result()
         except BrokenProcessPool:
             sys.exit("a contender crashed while it was timed")
         machine = _describe_machine(rounds, (before, os.getloadavg()[0]))

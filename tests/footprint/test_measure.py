@@ -51,9 +51,9 @@ def test_the_crazyflie_keeps_its_promises() -> None:
     assert footprint.fits
 
 
-@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.12), ("table1", 1.10)])
+@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.24), ("table1", 1.12)])
 def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
-    """Most instructions over least, on the Cortex-M4F."""
+    """Most instructions met over least, on the Cortex-M4F; the first step of a flight is the cheapest."""
     counts = measure_once("crazyflie", preset).counts
     assert counts is not None
     assert counts.most_met <= spread * counts.least
