@@ -109,7 +109,7 @@ def fly_world(variant: Variant, world: Sequence[Scenario]) -> Trace:
 
 
 def instructions(variant: Variant) -> str:
-    """Return mean and most instructions of a step on the board, "-" for a search without C."""
+    """Return mean and most met instructions of a step on the board, "-" for a search without C."""
     if variant.searching is not None:
         return "-"
     counts = measure_footprint(variant.settings, boards.load(BOARD)).counts
@@ -169,7 +169,7 @@ def main() -> None:
         count = {one: counting.result() for one, counting in counted.items()}
     for preset, several in searched.items():
         rows = [
-            {"search": title, "instructions: mean, most": count[one]} | truth[one]
+            {"search": title, "instructions: mean, most met": count[one]} | truth[one]
             for title, one in several.items()
         ]
         print(f"`{preset}`, with true states:\n\n{table(rows)}\n")
