@@ -69,7 +69,7 @@ def _cppcheck(bundle: Path) -> subprocess.CompletedProcess[str]:
     """Run cppcheck without the list of deviations; findings are lines of `_TEMPLATE`.
 
     Of equal messages on one line cppcheck prints only the first, and without texts all rules have the same
-    message. So a listed deviation would hide a finding of another rule; here a rule's text is its number.
+    message. So a listed deviation would hide a finding of another rule; here a rule's text has its number.
     """
     numbers = [
         f"{chapter}.{rule}" for chapter in range(1, _CHAPTERS + 1) for rule in range(1, _LARGEST_CHAPTER + 1)
@@ -77,7 +77,8 @@ def _cppcheck(bundle: Path) -> subprocess.CompletedProcess[str]:
     with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
         texts = Path(work, "rule_texts.txt")
         texts.write_text(
-            "Appendix A Summary of guidelines\n" + "".join(f"Rule {n} Required\n{n}\n" for n in numbers),
+            "Appendix A Summary of guidelines\n"
+            + "".join(f"Rule {n} Required\nMISRA rule {n}\n" for n in numbers),
             "utf-8",
         )
         addon = json.dumps({"script": "misra.py", "args": [f'--rule-texts="{texts}"']})
