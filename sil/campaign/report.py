@@ -19,7 +19,8 @@ from mambo_nmpc.sil.campaign.statistics import (
     read_table,
     worst_flights,
 )
-from mambo_nmpc.sil.campaign.store import FLIGHT, TABLE, FlightStore, convert_os_errors
+from mambo_nmpc.sil.campaign.store import TABLE, FlightStore, convert_os_errors
+from mambo_nmpc.sil.campaign.table import FLIGHT
 from mambo_nmpc.sil.files.folders import SUMMARY
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.scenario import Record, write_record

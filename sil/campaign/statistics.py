@@ -4,7 +4,6 @@ Every index of a crashed flight is infinite: leaving such flights out would favo
 in difficult ones. Intervals are 95 % confidence intervals.
 """
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
-from mambo_nmpc.sil.campaign.parameters import TRAJECTORY
+from mambo_nmpc.sil.campaign.table import is_number, read_number
 from mambo_nmpc.sil.errors import ResultsError
 from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -37,20 +36,27 @@ Table = Mapping[str, FloatArray]
 
 def read_table(path: Path) -> Table:
     """Return the numeric columns of a table without a truncated last line; raises ResultsError."""
-    name = echo(str(path))
+    name = f"{echo(str(path))}: is not the table of a campaign"
     try:
         text = path.read_text("utf-8")
-        header, *rows = csv.reader(text[: text.rfind("\n") + 1].splitlines())
-        columns = zip(header, zip(*rows, strict=True), strict=True) if rows else ()
-        return {
-            title: np.array([float(cell) for cell in cells])
-            for title, cells in columns
-            if not title.endswith("_sha256") and title != TRAJECTORY
-        }
-    except (OSError, ValueError, csv.Error) as error:
-        raise ResultsError(
-            f"{name}: is not the table of a campaign: {echo(str(error))}; run campaign again"
-        ) from error
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{name}: {echo(str(error))}; run campaign again") from error
+    titles, *rows = [line.split(",") for line in text.split("\n")[:-1]] or [[]]
+    columns: dict[str, list[float]] = {title: [] for title in titles if rows and is_number(title)}
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(titles):
+            raise ResultsError(
+                f"{name}: line {number} must have {len(titles)} cells, not {len(row)}; run campaign again"
+            )
+        for title, cell in zip(titles, row, strict=True):
+            if title in columns:
+                try:
+                    columns[title].append(read_number(cell))
+                except ValueError as error:
+                    raise ResultsError(
+                        f"{name}: line {number}, {echo(title)}: {error}; run campaign again"
+                    ) from None
+    return {title: np.array(values) for title, values in columns.items()}
 
 
 @dataclass(frozen=True)

@@ -6,34 +6,30 @@ or a full disk truncated. When all flights are finished the lines are sorted by 
 """
 
 import contextlib
-import csv
-import io
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
+from mambo_nmpc.sil.campaign.parameters import Draw
+from mambo_nmpc.sil.campaign.table import FLIGHT, Value, header, line, read_lines
 from mambo_nmpc.sil.files.folders import GENERATOR, lock
 
 TABLE: Final = "flights.csv"
-FLIGHT: Final = "flight"
-
-Value = float | str
 
 
 class FlightStore:
     """The open folder of a campaign; `lines` holds the table's line of each finished flight by number."""
 
-    def __init__(self, folder: Path, columns: Sequence[str]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[str], draw: Callable[[int], Draw]) -> None:
         self.folder = folder
-        self._columns = (FLIGHT, *columns)
-        self._header = _csv_line(self._columns)
+        self._columns = columns
         self._table = folder / TABLE
-        self.lines = self._read()
+        self.lines = self._read(draw)
         self._file = self._table.open("ab", buffering=0)
 
     def close(self) -> None:
@@ -42,8 +38,7 @@ class FlightStore:
 
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
         """Append finished flights and flush them to the disk; raises UnwritableError."""
-        columns = self._columns[1:]
-        lines = {flight: _csv_line([flight, *(row[key] for key in columns)]) for flight, row in rows.items()}
+        lines = {flight: line(flight, self._columns, row) for flight, row in rows.items()}
         with convert_os_errors(
             self._table, "; the finished flights are kept, and the same command continues from there"
         ):
@@ -55,16 +50,16 @@ class FlightStore:
 
     def put_in_order(self) -> None:
         """Sort the table by flight, atomically."""
-        ordered = [self._header, *(self.lines[flight] for flight in sorted(self.lines))]
+        ordered = [header(self._columns), *(self.lines[flight] for flight in sorted(self.lines))]
         with convert_os_errors(self.folder):
             put(self._table, "".join(ordered).encode())
 
     def values(self) -> dict[str, list[str]]:
         """Return the columns of the table by name, in the order of the flights."""
-        rows = csv.reader(self.lines[flight] for flight in sorted(self.lines))
-        return dict(zip(self._columns, map(list, zip(*rows, strict=True)), strict=True))
+        rows = (self.lines[flight].rstrip("\n").split(",")[:-1] for flight in sorted(self.lines))
+        return dict(zip((FLIGHT, *self._columns), map(list, zip(*rows, strict=True)), strict=True))
 
-    def _read(self) -> dict[int, str]:
+    def _read(self, draw: Callable[[int], Draw]) -> dict[int, str]:
         """Return the lines of an earlier run by flight, after removing a truncated last line.
 
         Raises ForeignFilesError for a table that this campaign did not write.
@@ -76,30 +71,19 @@ class FlightStore:
             content = self._table.read_bytes() if self._table.exists() else b""
             whole = content[: content.rfind(b"\n") + 1]
             if not whole:
-                put(self._table, self._header.encode())
+                put(self._table, header(self._columns).encode())
                 return {}
+            lines = read_lines(whole.decode("utf-8", "replace"), self._columns, draw, name)
             if len(whole) < len(content):
                 os.truncate(self._table, len(whole))
-        header, *lines = whole.decode("utf-8", "replace").splitlines(keepends=True)
-        found: dict[int, str] = {}
-        for number, line in enumerate([header, *lines], start=1):
-            cells = next(csv.reader([line]), [])
-            flight = cells[0] if len(cells) == len(self._columns) else ""
-            if number == 1 and line == self._header:
-                continue
-            if number == 1 or not (flight.isascii() and flight.isdigit()) or int(flight) in found:
-                raise ForeignFilesError(
-                    f"{name}: line {number} is not a line of this campaign, the table was edited; "
-                    "restore it, or name another folder with -o",
-                    (str(self._table),),
-                )
-            found[int(flight)] = line
-        return found
+        return lines
 
 
 @contextlib.contextmanager
-def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[FlightStore]:
-    """Open and lock `folder` for a run of `campaign`.
+def open_store(
+    folder: Path, campaign: Mapping[str, Any], columns: Sequence[str], draw: Callable[[int], Draw]
+) -> Iterator[FlightStore]:
+    """Open and lock `folder` for a run of `campaign`, which draws flight n as `draw(n)`.
 
     Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
     locked it, UnwritableError if the file system refuses an access.
@@ -108,7 +92,7 @@ def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]
         folder.mkdir(parents=True, exist_ok=True)
     with lock(folder):
         claim(folder, "campaign", {"command": "campaign", **campaign})
-        with contextlib.closing(FlightStore(folder, columns)) as store:
+        with contextlib.closing(FlightStore(folder, columns, draw)) as store:
             yield store
 
 
@@ -163,9 +147,3 @@ def _difference(where: str, held: Any, asked: Any) -> str | None:
     if held == asked:
         return None
     return f"with {echo(where)} = {echo(json.dumps(held))} instead of {echo(json.dumps(asked))}"
-
-
-def _csv_line(cells: Sequence[Value | int]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerow(cells)
-    return text.getvalue()

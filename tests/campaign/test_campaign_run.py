@@ -79,7 +79,7 @@ def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Pa
     assert names == {"campaign.json", "flights.csv", "summary.json", "campaign.png", "campaign.svg"} | records
     rows = list(csv.DictReader((whole / "flights.csv").read_text().splitlines()))
     assert [int(row["flight"]) for row in rows] == list(range(FLIGHTS))
-    assert tuple(rows[0])[1:] == table_columns(file.read(source))
+    assert tuple(rows[0])[1:-1] == table_columns(file.read(source))
     assert 0.063 <= float(rows[0]["mass_kg"]) <= 0.08
     record = read_record(whole / "flights" / "000002-mambo.json")
     assert record.scenario.mass_kg == float(rows[2]["mass_kg"])
@@ -203,6 +203,38 @@ def test_an_edited_table_is_refused(line: bytes, source: Path, whole: Path, tmp_
     table.write_bytes(b"".join([*lines[:3], line or lines[1]]))
     with pytest.raises(ForeignFilesError, match="line 4 is not a line of this campaign"):
         fly_on_threads(source, folder)
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "rule"),
+    [
+        ("flight", "9" * 5000, "flight: 9999.* must be the number of a flight"),
+        ("flight", "0", "flight: 0 must not be that of an earlier line"),
+        ("mass_kg", "0.07", r"mass_kg: 0\.07 must be 0\.0\d+, the draw of flight 2"),
+        ("seed", "5", r"seed: 5 must be \d+, the draw of flight 2"),
+        ("pd_iae_m_s", "1.0", "line_sha256: .* must be the digest of the line: a result was changed"),
+        ("pd_iae_m_s", "fast", "pd_iae_m_s: fast must be a number"),
+        ("pd_iae_m_s", "", "pd_iae_m_s: an empty cell must be a number"),
+        ("mambo_crashed", "x" * 200_000, r"mambo_crashed: x+\.\.\.x+ must be a number"),
+        ("mambo_trace_sha256", "0" * 64, "line_sha256: .* must be the digest of the line"),
+        ("line_sha256", "", "line_sha256: .* must be the digest of the line"),
+    ],
+)
+def test_an_edited_cell_is_refused(
+    column: str, cell: str, rule: str, *, source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """A number, draw or result that the campaign did not write is named with file, line and column."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    table = folder / "flights.csv"
+    lines = [line.split(",") for line in table.read_text().splitlines()]
+    lines[3][lines[0].index(column)] = cell
+    table.write_text("".join(",".join(line) + "\n" for line in lines))
+    edited = table.read_bytes()
+    message = rf"flights\.csv: line 4 is not a line of this campaign, the table was edited: {rule}.*; restore"
+    with pytest.raises(ForeignFilesError, match=message):
+        fly_on_threads(source, folder)
+    assert table.read_bytes() == edited
 
 
 def test_one_run_at_a_time(source: Path, tmp_path: Path) -> None:

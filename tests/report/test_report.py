@@ -221,6 +221,17 @@ def test_a_table_of_a_campaign_with_a_broken_line_is_refused() -> None:
     assert "flights.csv: is not the table of a campaign" in run("campaign", code=2)
 
 
+@pytest.mark.parametrize("cell", ["fast", "", "x" * 200_000])
+def test_a_cell_that_is_no_number_is_named_with_line_and_column(cell: str) -> None:
+    """Whatever its length."""
+    made("campaign")
+    table = Path("campaign/flights.csv")
+    table.write_text(table.read_text().replace(",61,", f",{cell},"))
+    said = run("campaign", code=2)
+    assert "is not the table of a campaign: line 3, pd_iae_m_s: " in said
+    assert said.endswith(" must be a number; run campaign again\n")
+
+
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
