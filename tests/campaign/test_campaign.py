@@ -3,8 +3,9 @@
 import math
 import re
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
-from statistics import NormalDist
+from statistics import NormalDist, median
 
 import numpy as np
 import pytest
@@ -316,6 +317,17 @@ def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
     assert found.low < 3.0 < found.high
     width = 2.0 * 1.96 * 3.0 * 0.5 * math.sqrt(math.pi / 2.0 / 1000)
     assert found.high - found.low == pytest.approx(width, rel=0.25)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+def test_the_interval_of_the_median_is_that_of_all_resamples(n: int) -> None:
+    """Its ends are quantiles of the medians of all n^n resamples, each equally probable."""
+    ratios = [float(2**k) for k in range(n)]
+    medians = sorted(median(resample) for resample in product(ratios, repeat=n))
+    found = improvement(table(a_iae_m_s=ratios, b_iae_m_s=[1.0] * n), "a", "b", "iae_m_s")
+    assert found is not None
+    ends = [medians[math.ceil(tail * len(medians)) - 1] for tail in (0.025, 0.975)]
+    assert [found.low, found.high] == ends
 
 
 def test_a_crash_is_infinitely_bad() -> None:
