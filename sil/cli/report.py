@@ -7,6 +7,7 @@ import typer
 
 from mambo_nmpc.codegen.command import output_option
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_nmpc.sil.cli.options import AsJson, show
 
 MARK = '<meta name="generator" content="mambo-nmpc">'
 """Marks a page as a report, which may be overwritten."""
@@ -21,10 +22,11 @@ def report(
         Path,
         output_option("HTML file; an earlier report there is overwritten."),
     ] = Path("report.html"),
+    as_json: AsJson = False,
 ) -> None:
     """Collect results on one HTML page that needs no network and no other file."""
     from mambo_nmpc.codegen.atomic import put
-    from mambo_nmpc.sil.report.page import report_page
+    from mambo_nmpc.sil.report.page import ReportSummary, report_page
 
     name = echo(str(output))
     try:
@@ -32,8 +34,10 @@ def report(
             raise FileExistsRefusedError(
                 f"{name}: exists and is no report of mambo-nmpc; name another file with -o"
             )
-        page = report_page(folders).encode("utf-8", "replace")  # a folder's name may be invalid UTF-8
+        text, results = report_page(folders)
+        page = text.encode("utf-8", "replace")  # a folder's name may be invalid UTF-8
         put(output, page)
     except OSError as error:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}") from error
-    typer.echo(f"{name}: {len(page) / 1000:.0f} kB")
+    summary = ReportSummary(page=str(output), bytes=len(page), results=results)
+    show(summary, f"{name}: {len(page) / 1000:.0f} kB", as_json=as_json)

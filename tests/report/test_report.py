@@ -129,6 +129,22 @@ def test_many_folders_make_one_page_with_an_overview() -> None:
     assert page.index("Flight: NMPC") < page.index("Table II of the paper") < page.index("Verification of")
 
 
+def test_json_has_the_overview_of_the_page() -> None:
+    """Name and size of the page, and of each folder command, title, verdict and finding."""
+    folders = [made("verify"), made("campaign")]
+    said = command.run("report", *folders, "--json")[0]
+    summary = json.loads(said, parse_constant=pytest.fail)
+    assert summary["page"] == "report.html"
+    assert summary["bytes"] == Path("report.html").stat().st_size
+    assert [one["folder"] for one in summary["results"]] == folders
+    assert [one["command"] for one in summary["results"]] == folders
+    page = Path("report.html").read_text("utf-8")
+    for one in summary["results"]:
+        assert one["finding"] in page
+        assert one["good"] is False
+        assert one["missing"] == []
+
+
 def test_the_same_folders_give_the_same_page() -> None:
     """No clock, no random ids."""
     folders = [made("sweep"), made("verify")]
