@@ -15,14 +15,22 @@ import typer
 from typer.core import TyperGroup
 
 from mambo_nmpc.codegen import __version__
-from mambo_nmpc.codegen.errors import BAD_INPUT, INTERRUPTED, NO_READER, MamboNmpcError, echo
+from mambo_nmpc.codegen.errors import (
+    BAD_INPUT,
+    INTERRUPTED,
+    NO_READER,
+    TERMINATED,
+    MamboNmpcError,
+    Terminated,
+    echo,
+)
 
 if TYPE_CHECKING:
     from mambo_nmpc.codegen.settings.model import Settings
 
 EXIT_CODES = (
     "Exit codes: 0 success; 1 a check failed, or the drone crashed; 2 bad input or a system error; "
-    "130 interrupted; 141 the reader of the output closed it."
+    "130 interrupted; 141 the reader of the output closed it; 143 terminated."
 )
 
 
@@ -78,6 +86,8 @@ class RootGroup(TyperGroup):
 def _exit_code(error: BaseException) -> int:
     """Print why the command ended in `error`, and return its exit code."""
     match error:
+        case Terminated():
+            return TERMINATED
         case KeyboardInterrupt():
             return INTERRUPTED
         case MemoryError():

@@ -3,8 +3,8 @@
 import json
 from typing import ClassVar
 
-BAD_INPUT, INTERRUPTED, NO_READER = 2, 130, 141
-"""Exit codes beside 0 and 1; the last two are 128 + SIGINT and 128 + SIGPIPE, as in a shell."""
+BAD_INPUT, INTERRUPTED, NO_READER, TERMINATED = 2, 130, 141, 143
+"""Exit codes beside 0 and 1; the last three are 128 + SIGINT, SIGPIPE and SIGTERM, as in a shell."""
 
 LONGEST_ECHO = 60
 """Most characters of a user's text that a message repeats."""
@@ -26,6 +26,10 @@ def echo_value(value: object) -> str:
         return echo(json.dumps(value, ensure_ascii=False, default=str))
     except (ValueError, RecursionError):  # thousands of digits or of nested tables
         return "a value too long to repeat"
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, which ends a command as Ctrl-C does, but for the exit code."""
 
 
 class MamboNmpcError(Exception):

@@ -10,7 +10,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
@@ -23,6 +23,9 @@ from mambo_nmpc.sil.errors import WorkerError
 TIME_LIMIT_S: Final = 5.0
 """Time within which a scheduler must answer."""
 
+_PERIOD_S: Final = 0.25
+"""Time from one look at the running tasks to the next."""
+
 
 @dataclass(frozen=True)
 class Pool:
@@ -32,19 +35,25 @@ class Pool:
     workers: int
     trouble: Callable[[BaseException], str | None]
     """Returns the reason if an exception means that a worker or scheduler failed, else None."""
+    shares: Callable[[], float] = lambda: 0.0
+    """Returns the sum of the finished shares of all running tasks, as far as they are known."""
 
     def run(
-        self, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]
+        self,
+        function: Callable[..., Any],
+        tasks: Sequence[tuple[Any, ...]],
+        running: Callable[[float], None] = lambda _: None,
     ) -> Iterator[tuple[int, Any]]:
         """Yield number and result of each task as it finishes, in any order.
 
-        Raises WorkerError if a worker fails, and passes on a `MamboNmpcError` that a task raises.
+        Meanwhile calls `running` with the sum of the finished shares of all running tasks. Raises
+        WorkerError if a worker fails, and passes on a `MamboNmpcError` that a task raises.
         """
         with _interrupts_blocked():  # worker processes inherit the mask, so Ctrl-C reaches this process only
             asked: dict[Future[Any], int] = {
                 self.executor.submit(function, *task): number for number, task in enumerate(tasks)
             }
-        for future in as_completed(asked):
+        for future in _await(set(asked), lambda: running(self.shares())):
             try:
                 result = future.result()
             except MamboNmpcError:
@@ -59,6 +68,14 @@ class Pool:
             yield asked[future], result
 
 
+def _await(left: set[Future[Any]], look: Callable[[], None]) -> Iterator[Future[Any]]:
+    """Yield futures as they finish; call `look` every `_PERIOD_S`."""
+    while left:
+        finished, left = wait(left, _PERIOD_S, FIRST_COMPLETED)
+        look()
+        yield from finished
+
+
 @contextlib.contextmanager
 def processes(count: int) -> Iterator[Pool]:
     """Start `count` worker processes on this machine; they end when this process ends, even if killed."""
@@ -66,13 +83,35 @@ def processes(count: int) -> Iterator[Pool]:
     def trouble(error: BaseException) -> str | None:
         return "a worker process has died" if isinstance(error, BrokenProcessPool) else None
 
-    with ProcessPoolExecutor(count, get_context("spawn"), initializer=_follow_parent) as executor:
+    spawn = get_context("spawn")
+    shares, started = spawn.Array("d", count), spawn.Value("i", 0)
+    with ProcessPoolExecutor(count, spawn, _start_worker, (shares, started)) as executor:
         try:
-            yield Pool(executor, count, trouble)
+            yield Pool(executor, count, trouble, lambda: sum(shares[:]))
         except BaseException:
             for child in active_children():
                 child.terminate()
             raise  # leaving the `with` cancels the tasks of the broken executor and waits for it
+
+
+def report_share(share: float) -> None:
+    """Tell the finished share of this process's task, 0 to 1, to its pool if it has one."""
+    if _slot is not None:
+        shares, number = _slot
+        shares[number] = share
+
+
+_slot: tuple[Any, int] | None = None
+"""In a worker process of this machine: the shares of all workers, and the number of this one."""
+
+
+def _start_worker(shares: Any, started: Any) -> None:
+    """Take the next place in `shares`, an array in the memory of all workers, and follow the parent."""
+    global _slot  # noqa: PLW0603 - set once in a process
+    with started.get_lock():
+        _slot = shares, started.value
+        started.value += 1
+    _follow_parent()
 
 
 def _follow_parent() -> None:
@@ -110,6 +149,12 @@ def cluster(address: str) -> Iterator[Pool]:
     try:
         asyncio.run(asyncio.wait_for(_knock(address), TIME_LIMIT_S))
         client = Client(address, timeout=TIME_LIMIT_S, set_as_default=False)
+    except (TypeError, ImportError, RuntimeError) as error:
+        raise WorkerError(
+            f"{option}: Dask cannot use this address ({echo(str(error))}); tls:// and wss:// need "
+            "certificates in Dask's configuration (distributed.comm.tls), ucx:// needs the package for it; "
+            "tcp://host:8786 needs neither"
+        ) from None
     except (OSError, ValueError) as error:
         reason = str(error) or f"no answer within {TIME_LIMIT_S:g} s"
         raise WorkerError(
@@ -133,12 +178,15 @@ def cluster(address: str) -> Iterator[Pool]:
         try:
             yield Pool(executor, workers, trouble)
         finally:
-            executor.shutdown(wait=False)
+            with contextlib.suppress(Exception):  # a lost scheduler has nothing left to cancel
+                executor.shutdown(wait=False)
 
 
 async def _knock(address: str) -> None:
     """Connect to a scheduler and disconnect; unlike Client, this gives up if nothing answers."""
-    from distributed.core import connect  # noqa: PLC0415 - an optional extra
+    from distributed import Security  # noqa: PLC0415 - an optional extra
+    from distributed.core import connect  # noqa: PLC0415 - likewise
 
-    connection = await connect(address, timeout=TIME_LIMIT_S)
+    certificates = Security().get_connection_args("client")
+    connection = await connect(address, timeout=TIME_LIMIT_S, **certificates)
     await connection.close()

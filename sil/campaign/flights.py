@@ -6,9 +6,11 @@ Arguments and results are plain values, which can be sent to other processes and
 import threading
 from collections.abc import Sequence
 from dataclasses import fields
+from functools import partial
 from typing import Any, Final
 
 from mambo_nmpc.codegen import __version__
+from mambo_nmpc.sil.campaign.executors import report_share
 from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -49,8 +51,8 @@ def fly_batch(
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
-    `flight` is the section [flight], `version` that of the calling program. Raises WorkerError if the worker
-    has another version, BuildError if it has no compiler.
+    `flight` is the section [flight], `version` that of the calling program. Tells the worker's pool how far
+    it is. Raises WorkerError if the worker has another version, BuildError if it has no compiler.
     """
     if version != __version__:
         raise WorkerError(
@@ -66,15 +68,22 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     Raises BuildError if there is no compiler, FlightError for flights that cannot be simulated together.
     """
     rows: list[Row] = [{} for _ in scenarios]
-    for entrant in entrants:
+    for number, entrant in enumerate(entrants):
         trace = fly(
             flight_of(scenarios, entrant.settings.horizon.update_period_s),
             _controller(entrant, len(scenarios)),
+            partial(_report_part, number, len(entrants)),
         )
         for key, values in _evaluate(trace).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
+    report_share(0.0)
     return rows
+
+
+def _report_part(number: int, parts: int, share: float) -> None:
+    """Report the share of one of several equal parts."""
+    report_share((number + share) / parts)
 
 
 def _controller(entrant: Entrant, n: int) -> PositionController:

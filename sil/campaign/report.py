@@ -1,6 +1,8 @@
 """Results of a campaign: summary, text and records for replay."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from pydantic import BaseModel
@@ -106,31 +108,48 @@ def _record_name(flight: int, name: str) -> str:
 
 
 def write_records(campaign: Campaign, store: FlightStore) -> None:
-    """Write one record per flight and controller for `fly --replay`; raises UnwritableError."""
+    """Write the missing records of all flights for `fly --replay`; raises UnwritableError."""
     values = store.values()
     section = campaign.file.flight.model_dump()
     with convert_os_errors(store.folder):
         (store.folder / RECORDS).mkdir(exist_ok=True)
         for row, flight in enumerate(map(int, values[FLIGHT])):
-            flown = scenario(section, campaign.draw(flight))
             for entrant in campaign.entrants:
-                record = Record(
-                    scenario=flown,
-                    controller=entrant.kind,
-                    settings=entrant.settings,
-                    trace_sha256=values[f"{entrant.name}_{DIGEST}"][row],
-                )
-                write_record(record, store.folder / _record_name(flight, entrant.name))
+                digest = values[f"{entrant.name}_{DIGEST}"][row]
+                path = store.folder / _record_name(flight, entrant.name)
+                if not _is_written(path, digest):
+                    flown = scenario(section, campaign.draw(flight))
+                    record = Record(
+                        scenario=flown,
+                        controller=entrant.kind,
+                        settings=entrant.settings,
+                        trace_sha256=digest,
+                    )
+                    write_record(record, path)
 
 
-def finish(campaign: Campaign, store: FlightStore) -> CampaignSummary:
-    """Sort the table and write records, pictures and, last, the summary; raises UnwritableError."""
-    from mambo_nmpc.sil.campaign.plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
+def _is_written(path: Path, digest: str) -> bool:
+    """Return whether the record at `path` is whole and that of the trace with this digest."""
+    try:
+        return path.read_bytes().endswith(f'"trace_sha256": "{digest}"\n}}\n'.encode())
+    except FileNotFoundError:
+        return False
 
+
+def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None]) -> CampaignSummary:
+    """Sort the table and write records, pictures and, last, the summary; raises UnwritableError.
+
+    Calls `stage` with the name of each step before it.
+    """
+    stage("writing records")
     store.put_in_order()
     write_records(campaign, store)
+    stage("computing statistics")
     table = read_table(store.folder / TABLE)
     summary = summarise(campaign, table)
+    stage("drawing pictures")
+    from mambo_nmpc.sil.campaign.plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
+
     with convert_os_errors(store.folder):
         draw_campaign(table, [entrant.name for entrant in campaign.entrants], store.folder / PICTURE)
         put(store.folder / SUMMARY, summary.text().encode())

@@ -1,13 +1,15 @@
 """The command line `mambo-nmpc` with all its commands."""
 
 import os
+import signal
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Never
 
 import typer
 
 from mambo_nmpc.codegen import cli as generating
 from mambo_nmpc.codegen.command import examples, root
+from mambo_nmpc.codegen.errors import Terminated
 from mambo_nmpc.sil.cli.campaign import campaign
 from mambo_nmpc.sil.cli.doctor import doctor
 from mambo_nmpc.sil.cli.faults import faults
@@ -87,7 +89,13 @@ def app() -> typer.Typer:
     return joined
 
 
+def _terminate(*_: object) -> Never:
+    """End the command on SIGTERM, with all that it does on Ctrl-C."""
+    raise Terminated
+
+
 def main() -> None:
     """Run the command line."""
+    signal.signal(signal.SIGTERM, _terminate)
     os.environ["MPLBACKEND"] = "agg"  # plots go to files; matplotlib fails on a backend it does not know
     app()()

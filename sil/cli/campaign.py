@@ -11,9 +11,8 @@ from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.cli.options import AsJson, Workers, output_option, show
 
 if TYPE_CHECKING:
-    from mambo_nmpc.sil.campaign.executors import Pool
-    from mambo_nmpc.sil.campaign.file import Campaign
-    from mambo_nmpc.sil.campaign.store import FlightStore
+    from mambo_nmpc.sil.campaign.report import CampaignSummary
+    from mambo_nmpc.sil.cli.progress import Bar
 
 
 def campaign(
@@ -36,36 +35,42 @@ def campaign(
     """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
     if workers is not None and scheduler is not None:
         raise typer.BadParameter("it has its own workers: leave out --workers", param_hint="--scheduler")
-    from mambo_nmpc.sil.campaign import file
-    from mambo_nmpc.sil.campaign.executors import cluster, processes
-    from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text, finish
-    from mambo_nmpc.sil.campaign.run import missing_flights, open_campaign
+    from mambo_nmpc.sil.cli.progress import counting_bar
+
+    with counting_bar("starting", "flights", flights) as bar:
+        summary = _run(source, output, flights, bar, workers=workers, scheduler=scheduler)
+    from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text
     from mambo_nmpc.sil.campaign.store import TABLE
     from mambo_nmpc.sil.files.folders import SUMMARY
 
-    chosen = file.default() if source is None else file.read(source)
-    pool = cluster(scheduler) if scheduler is not None else processes(workers or os.cpu_count() or 1)
-    with pool as open_pool, open_campaign(chosen, output) as store:
-        if missing_flights(store, flights):
-            _fly(chosen, store, flights, open_pool)
-        summary = finish(chosen, store)
     show(summary, campaign_text(summary, str(output)), as_json=as_json)
     typer.echo(f"{echo(str(output))}: {TABLE}, {SUMMARY}, {PICTURE}.png, {PICTURE}.svg, {RECORDS}/", err=True)
 
 
-def _fly(chosen: "Campaign", store: "FlightStore", flights: int, pool: "Pool") -> None:
-    """Fly the missing flights; on Ctrl-C print how many are finished."""
-    from mambo_nmpc.sil.campaign.run import fly_missing
-    from mambo_nmpc.sil.cli.progress import counting_bar
+def _run(
+    source: Path | None, output: Path, flights: int, bar: "Bar", *, workers: int | None, scheduler: str | None
+) -> "CampaignSummary":
+    """Fly the missing flights and write the results; if interrupted print how many are finished."""
+    from mambo_nmpc.sil.campaign import file
+    from mambo_nmpc.sil.campaign.executors import cluster, processes
+    from mambo_nmpc.sil.campaign.report import finish
+    from mambo_nmpc.sil.campaign.run import fly_missing, missing_flights, open_campaign
 
-    try:
-        with counting_bar("flying", "flights", flights) as progress:
-            fly_missing(chosen, store, flights, pool, progress)
-    except KeyboardInterrupt:
-        with contextlib.suppress(OSError):
-            typer.echo(
-                f"{echo(str(store.folder))}: stopped with {len(store.lines)} of {flights} flights finished; "
-                "the same command continues from there",
-                err=True,
-            )
-        raise
+    chosen = file.default() if source is None else file.read(source)
+    with open_campaign(chosen, output) as store:
+        bar(len(store.lines))
+        try:
+            if missing_flights(store, flights):
+                pool = processes(workers or os.cpu_count() or 1) if scheduler is None else cluster(scheduler)
+                with pool as open_pool:
+                    bar.stage("flying")
+                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running)
+            return finish(chosen, store, bar.stage)
+        except KeyboardInterrupt:
+            with contextlib.suppress(OSError):
+                typer.echo(
+                    f"{echo(str(output))}: stopped with {len(store.lines)} of {flights} flights finished; "
+                    "the same command continues from there",
+                    err=True,
+                )
+            raise

@@ -22,18 +22,20 @@ def faults(
     from mambo_nmpc.sil.controllers.compiled import CompiledController
     from mambo_nmpc.sil.errors import FlightError
     from mambo_nmpc.sil.faults.flights import End, FaultsSummary, fly_faults
-    from mambo_nmpc.sil.faults.plots import draw_faults
     from mambo_nmpc.sil.faults.report import table, write_csv
     from mambo_nmpc.sil.files.folders import new_results
 
     settings = load(source, scalar)
     with new_results(output, FaultsSummary.command, FILES) as folder:
-        try:
-            with progress_bar("flying with faults") as progress:
-                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), progress)
-        except FlightError as error:
-            raise FlightError(f"{echo(source)}: {error}") from error
-        draw_faults(verdicts, folder / "faults")
+        with progress_bar("flying with faults") as bar:
+            try:
+                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), bar)
+            except FlightError as error:
+                raise FlightError(f"{echo(source)}: {error}") from error
+            bar.stage("drawing pictures")
+            from mambo_nmpc.sil.faults.plots import draw_faults
+
+            draw_faults(verdicts, folder / "faults")
         write_csv(verdicts, folder / "faults.csv")
         summary = FaultsSummary(source=source, settings=settings.digest, flights=list(verdicts))
         summary.write(folder)

@@ -1,5 +1,6 @@
 """The command `sweep`: footprint and tracking error over a grid of horizons and iterations."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -32,12 +33,11 @@ def sweep(
 ) -> None:
     """Measure footprint and tracking error over a grid of horizons and iterations."""
     from mambo_nmpc.codegen import boards
-    from mambo_nmpc.sil.cli.progress import progress_bar
+    from mambo_nmpc.sil.campaign.executors import processes
+    from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.files.folders import new_results
-    from mambo_nmpc.sil.footprint.plots import draw_sweep
     from mambo_nmpc.sil.footprint.sweep import (
         Grid,
-        Point,
         SweepSummary,
         budgets,
         closest_fit,
@@ -58,12 +58,15 @@ def sweep(
         raise InvalidSettingsError(
             (f"--control {echo(control)} must be at most --prediction {echo(prediction)}",)
         )
-    points: list[Point] = []
-    with new_results(output, SweepSummary.command, FILES) as folder:
-        with progress_bar(f"sweeping {total} controllers") as progress:
-            for point in measure_grid(settings, chosen, grid):
-                points.append(point)
-                progress(len(points) / total)
+    with (
+        new_results(output, SweepSummary.command, FILES) as folder,
+        counting_bar("sweeping", "controllers", total) as bar,
+    ):
+        with processes(os.cpu_count() or 1) as pool:
+            points = measure_grid(settings, chosen, grid, pool.run, bar)
+        bar.stage("drawing pictures")
+        from mambo_nmpc.sil.footprint.plots import draw_sweep
+
         write_points(points, folder / "sweep.csv")
         draw_sweep(points, chosen, settings.horizon.update_period_s, folder / "sweep")
         best = closest_fit(points)

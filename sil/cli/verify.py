@@ -69,21 +69,23 @@ def _chosen(only: str | None) -> "Sequence[Entry]":
 
 def _run(chosen: "Sequence[Entry]", settings: "Settings", folder: Path, *, aloud: bool) -> "list[Verified]":
     """Run the checks one after the other, each in its own folder; with `aloud` print each result."""
-    from mambo_nmpc.sil.cli.progress import progress_bar
+    from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.verify.check import Subject
     from mambo_nmpc.sil.verify.report import Verified, line
     from mambo_nmpc.sil.verify.tools import versions
 
     found: list[Verified] = []
-    with progress_bar("verifying") as progress:
+    with counting_bar("verifying", "checks", len(chosen)) as bar:
+        bar(0)
         for entry in chosen:
+            bar.stage(f"verifying: {entry.name}")
             own = folder / REPORTS / entry.name
             own.mkdir(parents=True)
             result = entry.check(Subject(settings, folder / CONTROLLER, own))
             evidence = result.evidence.replace(f"{folder}/", "")
             tools = versions(entry.tools) | dict(result.tools)
             found.append(Verified(entry.name, entry.about, result.outcome, evidence, result.figures, tools))
-            progress(len(found) / len(chosen))
+            bar(len(found))
             if aloud:
                 typer.echo(line(found[-1]))
     return found

@@ -2,12 +2,9 @@
 
 import csv
 import math
-import os
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +12,7 @@ from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
@@ -22,6 +20,9 @@ from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.paper.table2 import CASES
 
 COUNTED_TICKS: Final = 60
+
+Run = Callable[[Callable[..., Any], Sequence[tuple[Any, ...]]], Iterator[tuple[int, Any]]]
+"""Calls a function with the arguments of each task, elsewhere; yields number and result as they come."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +71,23 @@ class SweepSummary(Summary):
     closest_fit: Point | None
 
 
-def measure_grid(settings: Settings, board: Board, grid: Grid) -> Iterator[Point]:
-    """Yield the points of the grid in order, measured on all processors of this machine."""
-    jobs = [(settings.model_dump(), board.model_dump(), *point) for point in grid.points()]
-    with ProcessPoolExecutor(os.cpu_count(), mp_context=get_context("spawn")) as pool:
-        yield from pool.map(_measure_point, jobs)
+def measure_grid(
+    settings: Settings, board: Board, grid: Grid, run: Run, progress: Callable[[int], None]
+) -> list[Point]:
+    """Return the points of the grid in order; `run` measures them, in any order.
+
+    Calls `progress` with the number of measured points. Raises WorkerError if a worker fails.
+    """
+    jobs = [((settings.model_dump(), board.model_dump(), *point),) for point in grid.points()]
+    found: dict[int, Point] = {}
+    progress(0)
+    try:
+        for number, point in run(_measure_point, jobs):
+            found[number] = point
+            progress(len(found))
+    except WorkerError:
+        raise WorkerError("a worker process has died; nothing was written, run the command again") from None
+    return [found[number] for number in sorted(found)]
 
 
 def budgets(board: Board, update_period_s: float) -> dict[str, float]:

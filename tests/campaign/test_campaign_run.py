@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.errors import INTERRUPTED, ForeignFilesError, UnwritableError
+from mambo_nmpc.codegen.errors import INTERRUPTED, TERMINATED, ForeignFilesError, UnwritableError
 from mambo_nmpc.sil.campaign import file
-from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes
+from mambo_nmpc.sil.campaign.executors import Pool, cluster, processes, report_share
 from mambo_nmpc.sil.campaign.flights import fly_batch
 from mambo_nmpc.sil.campaign.run import fly_missing, open_campaign, table_columns
 from mambo_nmpc.sil.errors import BusyError, FlightError, WorkerError
@@ -117,8 +117,12 @@ main()
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("stop", "code"),
-    [("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL), ("os.killpg(0, signal.SIGINT)", INTERRUPTED)],
-    ids=["killed", "Ctrl-C, which also signals the workers"],
+    [
+        ("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL),
+        ("os.killpg(0, signal.SIGINT)", INTERRUPTED),
+        ("os.kill(os.getpid(), signal.SIGTERM)", TERMINATED),
+    ],
+    ids=["killed", "Ctrl-C, which also signals the workers", "terminated"],
 )
 def test_a_stopped_campaign_resumes_to_the_same_bytes(
     stop: str, code: int, source: Path, whole: Path, tmp_path: Path
@@ -127,7 +131,7 @@ def test_a_stopped_campaign_resumes_to_the_same_bytes(
     arguments = ("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
     done = command(*arguments, script=STOPPED.replace("STOP", stop))
     assert (done.returncode, done.stdout) == (code, "")
-    if code == INTERRUPTED:
+    if code != -signal.SIGKILL:
         message = f"stopped with 3 of {FLIGHTS} flights finished; the same command continues from there\n"
         assert done.stderr.endswith(message)
         assert done.stderr.count("\n") == 1
@@ -166,6 +170,59 @@ def test_a_finished_campaign_may_be_extended(source: Path, whole: Path, tmp_path
     assert table == (whole / "flights.csv").read_bytes()
     with pytest.raises(FlightError, match="already has flight 5; --flights must be 6 or more"):
         fly_on_threads(source, tmp_path, 4)
+
+
+def test_a_finished_campaign_needs_no_worker_and_keeps_its_records(
+    source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """With nothing to fly no scheduler is asked, and only a record that is missing or damaged is written."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    (folder / "flights" / "000001-pd.json").unlink()
+    (folder / "flights" / "000002-pd.json").write_text("{")
+    kept = folder / "flights" / "000003-pd.json"
+    kept.write_text("{ " + kept.read_text().removeprefix("{"))
+    edited = kept.read_bytes()
+    done = command(
+        "campaign", source, "--flights", FLIGHTS, "--scheduler", "tcp://127.0.0.1:1", "-o", folder, "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == (folder / "summary.json").read_text()
+    assert kept.read_bytes() == edited
+    kept.write_bytes((whole / "flights" / "000003-pd.json").read_bytes())
+    assert contents(folder) == contents(whole)
+
+
+def test_unfinished_flights_are_counted(source: Path, tmp_path: Path) -> None:
+    """A batch that has flown with one of two controllers amounts to half of its flights."""
+    campaign, amounts = file.read(source), set[float]()
+    with open_campaign(campaign, tmp_path) as store, ThreadPoolExecutor(1) as thread:
+        pool = Pool(thread, 2, lambda _: None, shares=lambda: 0.5)
+        fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, running=amounts.add)
+    batch = FLIGHTS / 2
+    assert amounts == {0.25 * batch, 0.75 * batch}
+
+
+def report_half(fifo: str) -> None:
+    """Report half of a task, and wait until somebody opens `fifo`."""
+    report_share(0.5)
+    Path(fifo).read_text()
+
+
+def test_a_worker_process_reports_its_share(tmp_path: Path) -> None:
+    """The pool sees the share while the task runs."""
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    seen: list[float] = []
+
+    def look(shares: float) -> None:
+        seen.append(shares)
+        if seen.count(0.5) == 1 and shares == 0.5:
+            fifo.write_text("")
+
+    with processes(1) as pool:
+        assert list(pool.run(report_half, [(str(fifo),)], look)) == [(0, None)]
+    assert 0.5 in seen
 
 
 def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
@@ -269,6 +326,17 @@ def test_scheduler_and_workers_exclude_each_other(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("scheme", ["tls", "ucx"])
+def test_an_address_that_needs_more_is_reported(scheme: str) -> None:
+    """Certificates of TLS and the package for UCX are named, with an address that needs neither."""
+    require_module("distributed")
+    message = (
+        rf"^--scheduler {scheme}://127\.0\.0\.1:1: Dask cannot use .*certificates.*tcp://host:8786 needs"
+    )
+    with pytest.raises(WorkerError, match=message), cluster(f"{scheme}://127.0.0.1:1"):
+        pass
+
+
 def test_a_bad_address_is_reported() -> None:
     """The message shows the form of an address."""
     require_module("distributed")
@@ -298,3 +366,20 @@ def test_a_dask_cluster_gives_the_results_of_one_process(source: Path, whole: Pa
             fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, batch=2)
             store.put_in_order()
         assert (tmp_path / "flights.csv").read_bytes() == (whole / "flights.csv").read_bytes()
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")  # Dask itself warns
+def test_a_scheduler_may_die_when_all_has_flown() -> None:
+    """The results are there: the pool is left without an error."""
+    require_module("distributed")
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - an optional extra
+
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local,
+        cluster(local.scheduler_address) as pool,
+    ):
+        assert list(pool.run(pow, [(2, 3)])) == [(0, 8)]
+        local.close()
+        client: Client = pool.executor._client  # type: ignore[attr-defined] # Dask's executor
+        client.close()  # as it does after some seconds without a scheduler

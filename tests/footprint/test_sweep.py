@@ -12,6 +12,8 @@ import pytest
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.campaign.executors import processes
 from mambo_nmpc.sil.footprint.plots import draw_sweep
 from mambo_nmpc.sil.footprint.sweep import Grid, Point, closest_fit, measure_grid, write_points
 from tests.support.command import run
@@ -40,6 +42,15 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def point(prediction: int, control: int, iae_m_s: float, *, fits: bool = True) -> Point:
     """Return a point of a grid."""
     return replace(POINT, prediction=prediction, control=control, iae_m_s=iae_m_s, fits=fits)
+
+
+def measured(settings: Settings, board: Board, grid: Grid) -> list[Point]:
+    """Measure a grid on two processes; demand that progress is counted."""
+    counts: list[int] = []
+    with processes(2) as pool:
+        points = measure_grid(settings, board, grid, pool.run, counts.append)
+    assert counts == list(range(len(points) + 1))
+    return points
 
 
 def test_a_grid_has_every_combination_that_is_a_controller() -> None:
@@ -137,7 +148,7 @@ def test_a_sweep_yields_the_points_in_order() -> None:
     """A longer horizon takes more flash and instructions, and no less RAM."""
     board_builder("crazyflie")
     grid = Grid(prediction=(5, 8), control=(1, 2), iterations=(3,))
-    points = list(measure_grid(presets.load("mambo"), boards.load("crazyflie"), grid))
+    points = measured(presets.load("mambo"), boards.load("crazyflie"), grid)
     assert [(p.prediction, p.control, p.iterations) for p in points] == grid.points()
     assert all(p.fits and math.isfinite(p.iae_m_s) for p in points)
     for less, more in ((0, 1), (0, 2), (1, 3), (2, 3)):
@@ -155,7 +166,7 @@ def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
     document["ram_bytes"]["value"] = 65_536
     document["budget"] |= {"flash_bytes": 131_072, "ram_bytes": 32_768}
     grid = Grid(prediction=(50,), control=(50,), iterations=(1,))
-    (found,) = measure_grid(presets.load("mambo"), Board.model_validate(document), grid)
+    (found,) = measured(presets.load("mambo"), Board.model_validate(document), grid)
     assert found.ram_bytes <= 32_768
     assert found.stack_bytes > 0
     assert math.isnan(found.time_ms)
@@ -167,6 +178,6 @@ def test_a_small_controller_fits_the_mega() -> None:
     """Five predicted steps, one move and three iterations take less than half of the period."""
     board_builder("mega")
     grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
-    (found,) = measure_grid(presets.load("mambo"), boards.load("mega"), grid)
+    (found,) = measured(presets.load("mambo"), boards.load("mega"), grid)
     assert found.time_ms < 5
     assert found.fits
