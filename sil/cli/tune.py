@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import Workers, output_option
+from mambo_nmpc.sil.cli.options import AsJson, Workers, output_option, show
 
 if TYPE_CHECKING:
     from optuna import Study
 
+    from mambo_nmpc.sil.cli.progress import Bar
     from mambo_nmpc.sil.tuning.file import Tuning
-    from mambo_nmpc.sil.tuning.study import FinishedTrial
-
-CONTROLLER, FRONT = "controller.toml", "front"
+    from mambo_nmpc.sil.tuning.report import TuneSummary
 
 
 def tune(
@@ -34,14 +33,31 @@ def tune(
         str | None,
         typer.Option(help="URL of a database that several machines share, instead of a file in the folder."),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Search for settings that track well with calm commands; continue an interrupted search."""
+    from mambo_nmpc.sil.cli.progress import counting_bar
+
+    with counting_bar("starting", "trials", trials) as bar:
+        summary = _run(source, output, trials, bar, workers=workers or os.cpu_count() or 1, storage=storage)
+    from mambo_nmpc.sil.files.folders import SUMMARY
+    from mambo_nmpc.sil.tuning.report import CONTROLLER, FRONT, tune_text
+
+    show(summary, tune_text(summary), as_json=as_json)
+    written = f"{CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg, {SUMMARY}"
+    typer.echo(f"{echo(str(output))}: {written}", err=True)
+
+
+def _run(
+    source: Path | None, output: Path, trials: int, bar: "Bar", *, workers: int, storage: str | None
+) -> "TuneSummary":
+    """Run the missing trials and write the results."""
     from mambo_nmpc.sil.campaign.store import claim, convert_os_errors
     from mambo_nmpc.sil.errors import StudyError
     from mambo_nmpc.sil.files.folders import create_folder, lock
     from mambo_nmpc.sil.tuning import file
-    from mambo_nmpc.sil.tuning.front import RULE, choose, pareto_front
-    from mambo_nmpc.sil.tuning.study import demand_optuna, finished_trials, open_study
+    from mambo_nmpc.sil.tuning.report import finish
+    from mambo_nmpc.sil.tuning.study import demand_optuna, finished_trials, open_study, owner_of
 
     tuning = file.default() if source is None else file.read(source)
     demand_optuna()
@@ -55,31 +71,25 @@ def tune(
                 for path in output.iterdir() if new else ():
                     path.unlink()
                 raise
-            _search(tuning, study, output, trials, workers or os.cpu_count() or 1)
+            bar(len(finished_trials(study)))
+            if len(finished_trials(study)) < trials:
+                _search(tuning, study, owner_of(output, storage), trials, bar, workers=workers, folder=output)
             found = finished_trials(study)
-        _finish(tuning, found, output)
-    best = choose(pareto_front(found))
-    for name, one in (*(("base", one) for one in _base(tuning, found)), ("chosen", best)):
-        typer.echo(
-            f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
-            f"{one.command_variation_rad:9.4g} rad per update   "
-            f"{one.crashed} of {tuning.file.flights} crashed"
-        )
-    typer.echo(f"chosen by the rule: {RULE}")
-    typer.echo(f"{echo(str(output))}: {CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg", err=True)
+        bar.stage("drawing the front")
+        return finish(tuning, found, output)
 
 
-def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers: int) -> None:
-    """Search until `trials` are finished; on Ctrl-C print how many are."""
+def _search(
+    tuning: "Tuning", study: "Study", owner: str, trials: int, bar: "Bar", *, workers: int, folder: Path
+) -> None:
+    """Search until `trials` are finished; if interrupted print how many are."""
     from mambo_nmpc.sil.campaign.executors import processes
-    from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.tuning.study import finished_trials, search
 
-    if len(finished_trials(study)) >= trials:
-        return
+    bar.stage("tuning")
     try:
-        with counting_bar("tuning", "trials", trials) as progress, processes(workers) as pool:
-            search(tuning, study, folder, trials, pool=pool, progress=progress)
+        with processes(workers) as pool:
+            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
     except KeyboardInterrupt:
         with contextlib.suppress(OSError):
             typer.echo(
@@ -88,21 +98,3 @@ def _search(tuning: "Tuning", study: "Study", folder: Path, trials: int, workers
                 err=True,
             )
         raise
-
-
-def _base(tuning: "Tuning", found: "list[FinishedTrial]") -> "list[FinishedTrial]":
-    """Return the trial with the base settings: the first one, unless the run was killed during it."""
-    return [one for one in found if one.values == tuning.start][:1]
-
-
-def _finish(tuning: "Tuning", found: "list[FinishedTrial]", folder: Path) -> None:
-    """Write Pareto front, plot and, last, the chosen controller."""
-    from mambo_nmpc.codegen.atomic import put
-    from mambo_nmpc.sil.campaign.store import convert_os_errors
-    from mambo_nmpc.sil.tuning.front import controller_text, front_csv, pareto_front
-    from mambo_nmpc.sil.tuning.plots import draw_front
-
-    with convert_os_errors(folder):
-        put(folder / f"{FRONT}.csv", front_csv(pareto_front(found)).encode())
-        draw_front(found, _base(tuning, found), folder / FRONT)
-        put(folder / CONTROLLER, controller_text(tuning, found).encode())

@@ -1,7 +1,8 @@
 """The study: Optuna proposes settings, flights of the compiled C evaluate them, a database stores both.
 
-Trials are proposed in rounds of `ROUND`, each with a seed of its own, so the proposals depend neither on the
-number of workers nor on interruptions.
+Trials are proposed in rounds of `ROUND`, each with a seed of its own, from the results of the rounds before.
+A trial is stored with all its values in one transaction. So the proposals depend neither on the number of
+workers nor on interruptions, at whatever moment.
 """
 
 import contextlib
@@ -13,7 +14,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from mambo_nmpc.sil.tuning.file import Tuning
 
 if TYPE_CHECKING:
     from optuna import Study, Trial
+    from optuna.trial import FrozenTrial
 
 ROUND: Final = 8
 """Trials proposed together, before any of them is evaluated."""
@@ -42,6 +44,7 @@ DATABASE: Final = "study.db"
 
 _NAME: Final = "tuned"
 _OWNER: Final = "folder"
+_SEED_BYTES: Final = 8
 
 
 @dataclass(frozen=True)
@@ -105,29 +108,42 @@ def study_name(tuning: Tuning) -> str:
     return f"mambo-nmpc-{hashlib.sha256(json.dumps(document, sort_keys=True).encode()).hexdigest()[:16]}"
 
 
-def search(
-    tuning: Tuning, study: "Study", folder: Path, trials: int, *, pool: Pool, progress: Callable[[int], None]
-) -> None:
-    """Run trials until the study has `trials` finished ones; call `progress` with their number.
+def owner_of(folder: Path, storage: str | None) -> str:
+    """Return the name under which trials of a run in `folder` are stored; empty for a database of its own."""
+    return "" if storage is None else f"{socket.gethostname()}:{folder.resolve()}"
 
-    Trials that an earlier run in `folder` proposed and did not finish are flown first. Raises WorkerError.
+
+def search(
+    tuning: Tuning,
+    study: "Study",
+    owner: str,
+    trials: int,
+    *,
+    pool: Pool,
+    progress: Callable[[int], None],
+    running: Callable[[float], None] = lambda _: None,
+) -> None:
+    """Run trials until the study has `trials` finished ones.
+
+    Calls `progress` with their number, and `running` with what the running ones amount to. Trials that an
+    earlier run of `owner` proposed and did not finish are flown before the next round is proposed. Raises
+    WorkerError.
     """
     drawn = tuning.draw_flights()
     flight = tuning.file.flight.model_dump()
-    owner = f"{socket.gethostname()}:{folder.resolve()}"
-    if not study.get_trials(deepcopy=False):
-        study.enqueue_trial(tuning.start)
     progress(len(finished_trials(study)))
     while (finished := len(finished_trials(study))) < trials:
-        proposed = _find_unfinished(tuning, study, owner)
-        count = min(ROUND - _count_proposed(study) % ROUND, trials - finished - len(proposed))
-        proposed |= dict(_propose(tuning, study, owner) for _ in range(max(count, 0)))
+        waiting, proposed = _find_unfinished(study, owner), len(study.get_trials(deepcopy=False))
+        room = -proposed % ROUND if waiting else ROUND - proposed % ROUND
+        for _ in range(min(room, trials - finished - len(waiting))):
+            study.add_trial(propose(tuning, study, owner))
+        flown = _find_unfinished(study, owner)
         tasks = [
             (__version__, [Entrant(_NAME, "nmpc", tuning.settings(values)).document()], flight, drawn)
-            for values in proposed.values()
+            for values in flown.values()
         ]
-        numbers = list(proposed)
-        for task, rows in pool.run(fly_batch, tasks):
+        numbers = list(flown)
+        for task, rows in pool.run(fly_batch, tasks, running):
             crashed, means = judge(rows, tuning.file.flight.duration_s, tuning.base.limits.tilt_rad)
             study.set_user_attr(f"{CRASHED}_{numbers[task]}", crashed)
             study.tell(numbers[task], means)
@@ -162,43 +178,57 @@ def finished_trials(study: "Study") -> list[FinishedTrial]:
     ]
 
 
-def _count_proposed(study: "Study") -> int:
-    """Return how many trials have been proposed."""
-    return sum(one.state.name != "WAITING" for one in study.get_trials(deepcopy=False))
+def propose(tuning: Tuning, study: "Study", owner: str) -> "FrozenTrial":
+    """Return the next trial of `study` with all its values; the study itself stays as it is.
 
+    The first trial has the base's values. The sampler works on a copy in memory, in which the other trials of
+    this round are still running, as they are in a run without interruption.
+    """
+    import optuna  # noqa: PLC0415 - an optional extra
 
-def _propose(tuning: Tuning, study: "Study", owner: str) -> tuple[int, dict[str, float]]:
-    """Propose a new trial; return its number and values."""
-    from optuna.samplers import TPESampler  # noqa: PLC0415 - an optional extra
-
-    entropy = np.random.SeedSequence(tuning.file.seed, spawn_key=(_count_proposed(study),))
-    seed = int(entropy.generate_state(1)[0])
-    study.sampler = TPESampler(
+    before = study.get_trials(deepcopy=False)
+    number = len(before)
+    shared = int.from_bytes(hashlib.sha256(owner.encode()).digest()[:_SEED_BYTES])
+    key = (number, shared) if owner else (number,)
+    seed = int(np.random.SeedSequence(tuning.file.seed, spawn_key=key).generate_state(1)[0])
+    sampler = optuna.samplers.TPESampler(
         n_startup_trials=DRAWN_AT_RANDOM, multivariate=True, constant_liar=True, seed=seed
     )
-    trial = study.ask()
+    copy = optuna.create_study(sampler=sampler, directions=study.directions)
+    copy.add_trials(_show_as_running(one) if one.number >= number - number % ROUND else one for one in before)
+    if not before:
+        copy.enqueue_trial(tuning.start)
+    trial = copy.ask()
     trial.set_user_attr(_OWNER, owner)
-    return trial.number, {path: _suggest(trial, path, found) for path, found in tuning.search.items()}
+    for path, found in tuning.search.items():
+        _suggest(trial, path, found)
+    return copy.get_trials(deepcopy=False)[number]
 
 
-def _suggest(trial: "Trial", path: str, found: Distribution) -> float:
-    """Return the sampler's proposal for one key."""
+def _show_as_running(trial: "FrozenTrial") -> "FrozenTrial":
+    """Return a trial as it was before it finished."""
+    from optuna.trial import TrialState, create_trial  # noqa: PLC0415 - an optional extra
+
+    return create_trial(
+        state=TrialState.RUNNING,
+        params=trial.params,
+        distributions=trial.distributions,
+        user_attrs=trial.user_attrs,
+        system_attrs=trial.system_attrs,
+    )
+
+
+def _suggest(trial: "Trial", path: str, found: Distribution) -> None:
+    """Have the sampler propose the value of one key."""
     if found.kind == "choice":
-        value: Any = trial.suggest_categorical(path, found.numbers)
-        return float(value)
-    return trial.suggest_float(path, *found.numbers, log=found.kind == "log_uniform")
+        trial.suggest_categorical(path, found.numbers)
+    else:
+        trial.suggest_float(path, *found.numbers, log=found.kind == "log_uniform")
 
 
-def _find_unfinished(tuning: Tuning, study: "Study", owner: str) -> dict[int, dict[str, float]]:
-    """Return the unfinished trials of an earlier run of `owner`; fail those without all values."""
+def _find_unfinished(study: "Study", owner: str) -> dict[int, dict[str, float]]:
+    """Return number and values of the trials that `owner` has proposed and not finished."""
     from optuna.trial import TrialState  # noqa: PLC0415 - an optional extra
 
-    whole = {}
-    for one in study.get_trials(deepcopy=False, states=(TrialState.RUNNING,)):
-        if one.user_attrs.get(_OWNER) != owner:
-            continue
-        if set(one.params) == set(tuning.search):
-            whole[one.number] = dict(one.params)
-        else:
-            study.tell(one.number, state=TrialState.FAIL)
-    return whole
+    running = study.get_trials(deepcopy=False, states=(TrialState.RUNNING,))
+    return {one.number: dict(one.params) for one in running if one.user_attrs.get(_OWNER) == owner}

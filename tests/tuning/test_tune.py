@@ -1,12 +1,15 @@
 """Tuning: tune.toml, objectives, interrupted studies, Pareto front and the controller found."""
 
 import csv
+import json
 import math
 import shutil
+import signal
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -20,10 +23,14 @@ from mambo_nmpc.sil.tuning import file
 from mambo_nmpc.sil.tuning.front import IAE_ALLOWANCE, choose, pareto_front
 from mambo_nmpc.sil.tuning.study import (
     CRASH_ERROR_M,
+    DRAWN_AT_RANDOM,
+    ROUND,
     FinishedTrial,
     finished_trials,
     judge,
     open_study,
+    owner_of,
+    propose,
     search,
 )
 from tests.support.command import command
@@ -70,7 +77,8 @@ def search_on_threads(
     """Run a study on two threads of this process; return the finished trials."""
     tuning = file.read(source)
     with open_study(tuning, folder, storage) as study, ThreadPoolExecutor(2) as threads:
-        search(tuning, study, folder, trials, pool=Pool(threads, 2, lambda _: None), progress=progress)
+        owner, pool = owner_of(folder, storage), Pool(threads, 2, lambda _: None)
+        search(tuning, study, owner, trials, pool=pool, progress=progress)
         return finished_trials(study)
 
 
@@ -156,6 +164,33 @@ def test_a_finished_study_prints_its_result_only(source: Path, whole: Path, tmp_
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["base", "chosen", "chosen"]
     assert done.stderr.count("\n") == 1
     assert (folder / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
+
+
+def test_the_summary_is_what_json_prints(source: Path, whole: Path, tmp_path: Path) -> None:
+    """It has base, chosen trial and front, with the values of controller.toml."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    done = command("tune", source, "--trials", TRIALS, "-o", folder, "--json")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == (folder / "summary.json").read_text()
+    summary = json.loads(done.stdout, parse_constant=pytest.fail)
+    assert (summary["command"], summary["trials"], summary["base"]["number"]) == ("tune", TRIALS, 0)
+    settings = controller_toml.read(folder / "controller.toml")
+    assert summary["chosen"]["values"]["cost.effort_weight"] == settings.cost.effort_weight
+    assert summary["chosen"] in summary["front"]
+
+
+def test_machines_that_share_a_study_propose_different_trials(source: Path, tmp_path: Path) -> None:
+    """Two folders that ask at the same moment get different values, but for the base."""
+    tuning, url = file.read(source), f"sqlite:///{tmp_path / 'shared.db'}"
+    owners = [owner_of(tmp_path / name, url) for name in ("one", "two")]
+    with open_study(tuning, tmp_path, url) as study:
+        first = [propose(tuning, study, owner).params for owner in owners]
+        study.add_trial(propose(tuning, study, owners[0]))
+        second = [propose(tuning, study, owner).params for owner in owners]
+        again = propose(tuning, study, owners[1]).params
+    assert first[0] == first[1] == tuning.start
+    assert second[0] != second[1] == again
 
 
 def test_folders_of_another_study_or_other_files_are_refused(
@@ -279,3 +314,35 @@ def test_a_study_resumes_after_ctrl_c(source: Path, whole: Path, tmp_path: Path)
     assert command(*arguments).returncode == 0
     assert found_in(tmp_path, source) == found_in(whole, source)
     assert (tmp_path / "controller.toml").read_bytes() == (whole / "controller.toml").read_bytes()
+
+
+KILLED = """
+import os, signal, sys
+from sqlalchemy import event
+from sqlalchemy.engine import Engine
+from mambo_nmpc.__main__ import main
+left = int(sys.argv.pop(1))
+@event.listens_for(Engine, "commit")
+def kill_before_commit(connection):
+    global left
+    left -= 1
+    if left == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+main()
+"""
+
+
+@pytest.mark.long
+def test_a_study_killed_again_and_again_equals_an_undisturbed_one(source: Path, tmp_path: Path) -> None:
+    """Killed before any transaction, also after the random trials, it proposes the same trials again."""
+    trials = DRAWN_AT_RANDOM + ROUND
+    whole, folder = tmp_path / "whole", tmp_path / "killed"
+    whole.mkdir()
+    search_on_threads(source, whole, trials)
+    random, kills = Random(0), 0
+    arguments = ("tune", source, "--trials", trials, "--workers", 2, "-o", folder)
+    while (done := command(random.randint(17, 60), *arguments, script=KILLED)).returncode != 0:
+        assert done.returncode == -signal.SIGKILL, done.stderr
+        kills += 1
+    assert kills >= 5
+    assert found_in(folder, source) == found_in(whole, source)
