@@ -25,19 +25,24 @@ with counting_bar("starting", "flights", 8) as bar:
 """
 
 
+def seen(bar: Bar) -> tuple[str, float | None]:
+    """Return text and share of a bar."""
+    return bar.text(), bar.share
+
+
 def test_a_bar_counts_what_is_finished_and_moves_with_what_runs() -> None:
     """Finished things are whole; rate and share include what runs, not what an earlier run finished."""
     bar = Bar("flying", 1000, "flights")
-    assert (bar.text(), bar.share) == ("flying", None)
+    assert seen(bar) == ("flying", None)
     bar(200)
-    assert (bar.text(), bar.share) == ("flying, 200 of 1000 flights", None)
+    assert seen(bar) == ("flying, 200 of 1000 flights", None)
     bar.running(50.5)
-    assert bar.share == 0.2505
+    assert seen(bar)[1] == 0.2505
     assert re.fullmatch(r"flying, 200 of 1000 flights, [\d.]+/s, \d+ s left", bar.text())
     bar.running(0.0)
     bar(1000)
     bar.stage("computing statistics")
-    assert (bar.text(), bar.share) == ("computing statistics, 1000 of 1000 flights", None)
+    assert seen(bar) == ("computing statistics, 1000 of 1000 flights", None)
 
 
 def test_a_bar_of_shares_shows_percent() -> None:
