@@ -9,10 +9,11 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from itertools import islice
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Final
 
@@ -22,6 +23,9 @@ from mambo_nmpc.sil.errors import WorkerError
 
 TIME_LIMIT_S: Final = 5.0
 """Time within which a scheduler must answer."""
+
+_TASKS_PER_WORKER: Final = 4
+"""Tasks that wait or run at a time: enough that no worker waits for the next one."""
 
 _PERIOD_S: Final = 0.25
 """Time from one look at the running tasks to the next."""
@@ -41,39 +45,42 @@ class Pool:
     def run(
         self,
         function: Callable[..., Any],
-        tasks: Sequence[tuple[Any, ...]],
+        tasks: Iterable[tuple[Any, ...]],
         running: Callable[[float], None] = lambda _: None,
     ) -> Iterator[tuple[int, Any]]:
-        """Yield number and result of each task as it finishes, in any order.
+        """Yield number and result of each task as it finishes, in any order; take a task when it is due.
 
         Meanwhile calls `running` with the sum of the finished shares of all running tasks. Raises
         WorkerError if a worker fails, and passes on a `MamboNmpcError` that a task raises.
         """
-        with _interrupts_blocked():  # worker processes inherit the mask, so Ctrl-C reaches this process only
-            asked: dict[Future[Any], int] = {
-                self.executor.submit(function, *task): number for number, task in enumerate(tasks)
-            }
-        for future in _await(set(asked), lambda: running(self.shares())):
-            try:
-                result = future.result()
-            except MamboNmpcError:
+        left, asked = enumerate(tasks), dict[Future[Any], int]()
+        while True:
+            due = list(islice(left, _TASKS_PER_WORKER * self.workers - len(asked)))
+            with self._explained(), _interrupts_blocked():  # worker processes inherit the mask
+                asked |= {self.executor.submit(function, *task): number for number, task in due}
+            if not asked:
+                return
+            finished, _ = wait(asked, _PERIOD_S, FIRST_COMPLETED)
+            running(self.shares())
+            for future in finished:
+                with self._explained():
+                    result = future.result()
+                yield asked.pop(future), result
+
+    @contextlib.contextmanager
+    def _explained(self) -> Iterator[None]:
+        """Raise WorkerError for an exception which means that a worker failed."""
+        try:
+            yield
+        except MamboNmpcError:
+            raise
+        except (CancelledError, Exception) as error:
+            reason = self.trouble(error)
+            if reason is None:
                 raise
-            except (CancelledError, Exception) as error:
-                reason = self.trouble(error)
-                if reason is None:
-                    raise
-                raise WorkerError(
-                    f"{reason}; the finished flights are kept, and the same command continues from there"
-                ) from error
-            yield asked[future], result
-
-
-def _await(left: set[Future[Any]], look: Callable[[], None]) -> Iterator[Future[Any]]:
-    """Yield futures as they finish; call `look` every `_PERIOD_S`."""
-    while left:
-        finished, left = wait(left, _PERIOD_S, FIRST_COMPLETED)
-        look()
-        yield from finished
+            raise WorkerError(
+                f"{reason}; the finished flights are kept, and the same command continues from there"
+            ) from error
 
 
 @contextlib.contextmanager

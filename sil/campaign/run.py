@@ -1,25 +1,20 @@
-"""Run a campaign: fly the flights that are missing in its folder, batch by batch.
+"""Run a campaign: fly the flights that are missing in its folder, batch by batch."""
 
-A task is one batch with one controller, so that several workers share a batch and finish it early.
-"""
-
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from functools import reduce
-from operator import or_
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.sil.campaign.executors import Pool
 from mambo_nmpc.sil.campaign.file import Campaign
-from mambo_nmpc.sil.campaign.flights import Row, columns, fly_batch
-from mambo_nmpc.sil.campaign.parameters import PARAMETERS
+from mambo_nmpc.sil.campaign.flights import columns, fly_batch
+from mambo_nmpc.sil.campaign.parameters import PARAMETERS, Draw
 from mambo_nmpc.sil.campaign.store import FlightStore, open_store
 from mambo_nmpc.sil.errors import FlightError
 
-MOST_IN_A_BATCH: Final = 100
-"""Flights in one simulation: a trace of 100 s takes 2 MB, and larger batches are hardly faster."""
+MOST_IN_A_BATCH: Final = 20
+"""Flights in one task: about a second with two controllers, and larger batches are hardly faster."""
 
 
 def table_columns(campaign: Campaign) -> tuple[str, ...]:
@@ -65,25 +60,17 @@ def fly_missing(
     left = missing_flights(store, flights)
     size = max(1, min(batch, -(-len(left) // pool.workers)))
     batches = [left[first : first + size] for first in range(0, len(left), size)]
-    drawn = {flight: campaign.draw(flight) for flight in left}
-    section, count = campaign.file.flight.model_dump(), len(campaign.entrants)
-    tasks = [
-        (__version__, [entrant.document()], section, [drawn[flight] for flight in numbers])
-        for numbers in batches
-        for entrant in campaign.entrants
-    ]
-    parts: dict[int, list[list[Row]]] = {number: [] for number in range(len(batches))}
+    entrants = [entrant.document() for entrant in campaign.entrants]
+    section = campaign.file.flight.model_dump()
+    drawn: dict[int, list[Draw]] = {}
+
+    def tasks() -> Iterator[tuple[Any, ...]]:
+        for number, flown in enumerate(batches):
+            drawn[number] = [campaign.draw(flight) for flight in flown]
+            yield __version__, entrants, section, drawn[number]
+
     progress(len(store.lines))
-
-    def look(shares: float) -> None:
-        waiting = sum(len(found) for found in parts.values())
-        running((shares + waiting) * size / count)
-
-    for task, rows in pool.run(fly_batch, tasks, look):
-        number = task // count
-        parts[number].append(rows)
-        if len(parts[number]) == count:
-            whole = [reduce(or_, of_one_flight) for of_one_flight in zip(*parts.pop(number), strict=True)]
-            flown = zip(batches[number], whole, strict=True)
-            store.add({flight: drawn[flight] | row for flight, row in flown})
-            progress(len(store.lines))
+    for number, rows in pool.run(fly_batch, tasks(), lambda shares: running(shares * size)):
+        flown = zip(batches[number], drawn.pop(number), rows, strict=True)
+        store.add({flight: draws | row for flight, draws, row in flown})
+        progress(len(store.lines))

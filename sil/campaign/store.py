@@ -6,6 +6,7 @@ or a full disk truncated. When all flights are finished the lines are sorted by 
 """
 
 import contextlib
+import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,8 +26,9 @@ TABLE: Final = "flights.csv"
 class FlightStore:
     """The open folder of a campaign; `lines` holds the table's line of each finished flight by number."""
 
-    def __init__(self, folder: Path, columns: Sequence[str], draw: Callable[[int], Draw]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[str], key: str, draw: Callable[[int], Draw]) -> None:
         self.folder = folder
+        self._key = key
         self._columns = columns
         self._table = folder / TABLE
         self.lines = self._read(draw)
@@ -38,7 +40,7 @@ class FlightStore:
 
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
         """Append finished flights and flush them to the disk; raises UnwritableError."""
-        lines = {flight: line(flight, self._columns, row) for flight, row in rows.items()}
+        lines = {flight: line(flight, self._columns, row, self._key) for flight, row in rows.items()}
         with convert_os_errors(
             self._table, "; the finished flights are kept, and the same command continues from there"
         ):
@@ -73,7 +75,7 @@ class FlightStore:
             if not whole:
                 put(self._table, header(self._columns).encode())
                 return {}
-            lines = read_lines(whole.decode("utf-8", "replace"), self._columns, draw, name)
+            lines = read_lines(whole.decode("utf-8", "replace"), self._columns, self._key, draw, name)
             if len(whole) < len(content):
                 os.truncate(self._table, len(whole))
         return lines
@@ -90,9 +92,10 @@ def open_store(
     """
     with convert_os_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
+    key = hashlib.sha256(json.dumps(campaign, sort_keys=True).encode()).hexdigest()
     with lock(folder):
         claim(folder, "campaign", {"command": "campaign", **campaign})
-        with contextlib.closing(FlightStore(folder, columns, draw)) as store:
+        with contextlib.closing(FlightStore(folder, columns, key, draw)) as store:
             yield store
 
 

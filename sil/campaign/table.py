@@ -1,11 +1,11 @@
 """The table of a campaign as text: one line per flight, which ends in a digest of the line.
 
-A line is number, seed, draws, results and digest, joined by commas; no cell holds a comma or a quote. So the
-draws of a line can be compared with those of the campaign, and an edited result is noticed.
+A line is number, seed, draws, results and digest, joined by commas; no cell holds a comma or a quote. The
+digest covers the campaign, too: a line that was edited, or that another campaign has drawn, is noticed.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Final
 
 from mambo_nmpc.codegen.errors import ForeignFilesError, echo
@@ -13,7 +13,7 @@ from mambo_nmpc.sil.campaign.parameters import TRAJECTORY, Draw
 
 FLIGHT: Final = "flight"
 LINE_DIGEST: Final = "line_sha256"
-"""Title of the last column: the first `_DIGITS` digits of the SHA-256 of the line before it."""
+"""Title of the last column: the first `_DIGITS` digits of a SHA-256 of the campaign and the line."""
 
 _DIGITS: Final = 16
 _MOST_FLIGHT_DIGITS: Final = 9
@@ -33,25 +33,30 @@ def header(columns: Sequence[str]) -> str:
     return ",".join((FLIGHT, *columns, LINE_DIGEST)) + "\n"
 
 
-def line(flight: int, columns: Sequence[str], row: Mapping[str, Value]) -> str:
-    """Return the line of a flight whose cells `row` has by column."""
+def line(flight: int, columns: Sequence[str], row: Mapping[str, Value], key: str) -> str:
+    """Return the line of a flight whose cells `row` has by column; its digest covers `key` as well."""
     start = ",".join([str(flight), *(str(row[title]) for title in columns)])
-    return f"{start},{_digest(start)}\n"
+    return f"{start},{_digest(start, key)}\n"
 
 
-def read_lines(text: str, columns: Sequence[str], draw: Callable[[int], Draw], name: str) -> dict[int, str]:
+def read_lines(
+    text: str, columns: Sequence[str], key: str, draw: Callable[[int], Draw], name: str
+) -> dict[int, str]:
     """Return the lines of the table `text` by flight; `draw` returns what the campaign draws for a flight.
 
-    Raises ForeignFilesError, which begins with `name`, for a line that this campaign did not write.
+    Raises ForeignFilesError, which begins with `name`, for a line that was not written with this `key`.
     """
     titles = (FLIGHT, *columns, LINE_DIGEST)
     found: dict[int, str] = {}
     for number, whole in enumerate(text.split("\n")[:-1], start=1):
+        start, _, digest = whole.rpartition(",")
         cells = whole.split(",")
         if number == 1:
             fault = None if f"{whole}\n" == header(columns) else "must be the header of this campaign's table"
         elif len(cells) != len(titles):
             fault = f"must have {len(titles)} cells, not {len(cells)}"
+        elif digest == _digest(start, key) and int(cells[0]) not in found:
+            fault = None
         else:
             fault = _find_fault(dict(zip(titles, cells, strict=True)), draw, found)
         if fault is not None:
@@ -73,10 +78,8 @@ def read_number(cell: str) -> float:
         raise ValueError(f"{echo(cell) or 'an empty cell'} must be a number") from None
 
 
-def _find_fault(
-    cells: Mapping[str, str], draw: Callable[[int], Draw], before: Mapping[int, str]
-) -> str | None:
-    """Return the first wrong cell of a line and its rule, or None; `before` has the flights above it."""
+def _find_fault(cells: Mapping[str, str], draw: Callable[[int], Draw], before: Container[int]) -> str:
+    """Return the first wrong cell of a wrong line, and its rule; `before` has the flights above it."""
     flight = cells[FLIGHT]
     if not (flight.isascii() and flight.isdigit() and len(flight) <= _MOST_FLIGHT_DIGITS):
         return f"{FLIGHT}: {echo(flight)} must be the number of a flight"
@@ -92,14 +95,9 @@ def _find_fault(
                 read_number(cells[title])
             except ValueError as error:
                 return f"{title}: {error}"
-    start = ",".join(list(cells.values())[:-1])
-    if cells[LINE_DIGEST] != _digest(start):
-        return (
-            f"{LINE_DIGEST}: {echo(cells[LINE_DIGEST])} must be the digest of the line: a result was changed"
-        )
-    return None
+    return f"{LINE_DIGEST}: {echo(cells[LINE_DIGEST])} must be the digest of the line: a result was changed"
 
 
-def _digest(start: str) -> str:
-    """Return the digest of a line's text before its last comma."""
-    return hashlib.sha256(start.encode()).hexdigest()[:_DIGITS]
+def _digest(start: str, key: str) -> str:
+    """Return the digest of `key` and a line's text before its last comma."""
+    return hashlib.sha256(f"{key},{start}".encode()).hexdigest()[:_DIGITS]
