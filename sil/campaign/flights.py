@@ -51,8 +51,8 @@ def fly_batch(
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
-    `flight` is the section [flight], `version` that of the calling program. Tells the worker's pool how far
-    it is. Raises WorkerError if the worker has another version, BuildError if it has no compiler.
+    `flight` is the section [flight], `version` that of the calling program. Raises WorkerError if the worker
+    has another version, BuildError if it has no compiler.
     """
     if version != __version__:
         raise WorkerError(
@@ -65,7 +65,8 @@ def fly_batch(
 def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) -> list[Row]:
     """Fly flights together with every controller; return one row per flight, in order.
 
-    Raises BuildError if there is no compiler, FlightError for flights that cannot be simulated together.
+    Tells the worker's pool how far it is. Raises BuildError if there is no compiler, FlightError for flights
+    that cannot be simulated together.
     """
     rows: list[Row] = [{} for _ in scenarios]
     for number, entrant in enumerate(entrants):
