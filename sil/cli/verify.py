@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mambo_nmpc.codegen.settings.model import Settings
+    from mambo_nmpc.sil.cli.progress import Bar
     from mambo_nmpc.sil.verify.checks import Entry
     from mambo_nmpc.sil.verify.report import Verified
 
@@ -34,16 +35,20 @@ def verify(
     """Generate the C of a controller, prove and test it, and keep the evidence."""
     from mambo_nmpc.codegen import bundle
     from mambo_nmpc.codegen.render import render
+    from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.files.folders import SUMMARY, digests, new_results
     from mambo_nmpc.sil.verify.check import CheckOutcome
     from mambo_nmpc.sil.verify.report import PAGE, VerifySummary, closing, page, summarise
 
     settings = load(source, scalar)
     chosen = _chosen(only)
-    with new_results(output, VerifySummary.command, (CONTROLLER, REPORTS, PAGE)) as place:
+    with (
+        new_results(output, VerifySummary.command, (CONTROLLER, REPORTS, PAGE)) as place,
+        counting_bar("generating the C", "checks", len(chosen)) as bar,
+    ):
         folder = place.resolve()
         bundle.write(render(settings), folder / CONTROLLER)
-        found = _run(chosen, settings, folder, aloud=not as_json)
+        found = _run(chosen, settings, folder, bar, aloud=not as_json)
         summary = summarise(found, source, settings)
         (folder / PAGE).write_text(page(summary), "utf-8")
         summary = summary.model_copy(update={"files": digests(folder)})
@@ -67,25 +72,25 @@ def _chosen(only: str | None) -> "Sequence[Entry]":
     return [entry for entry in CHECKS if entry.name in names]
 
 
-def _run(chosen: "Sequence[Entry]", settings: "Settings", folder: Path, *, aloud: bool) -> "list[Verified]":
+def _run(
+    chosen: "Sequence[Entry]", settings: "Settings", folder: Path, bar: "Bar", *, aloud: bool
+) -> "list[Verified]":
     """Run the checks one after the other, each in its own folder; with `aloud` print each result."""
-    from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.verify.check import Subject
     from mambo_nmpc.sil.verify.report import Verified, line
     from mambo_nmpc.sil.verify.tools import versions
 
     found: list[Verified] = []
-    with counting_bar("verifying", "checks", len(chosen)) as bar:
-        bar(0)
-        for entry in chosen:
-            bar.stage(f"verifying: {entry.name}")
-            own = folder / REPORTS / entry.name
-            own.mkdir(parents=True)
-            result = entry.check(Subject(settings, folder / CONTROLLER, own))
-            evidence = result.evidence.replace(f"{folder}/", "")
-            tools = versions(entry.tools) | dict(result.tools)
-            found.append(Verified(entry.name, entry.about, result.outcome, evidence, result.figures, tools))
-            bar(len(found))
-            if aloud:
-                typer.echo(line(found[-1]))
+    bar(0)
+    for entry in chosen:
+        bar.stage(f"verifying: {entry.name}")
+        own = folder / REPORTS / entry.name
+        own.mkdir(parents=True)
+        result = entry.check(Subject(settings, folder / CONTROLLER, own))
+        evidence = result.evidence.replace(f"{folder}/", "")
+        tools = versions(entry.tools) | dict(result.tools)
+        found.append(Verified(entry.name, entry.about, result.outcome, evidence, result.figures, tools))
+        bar(len(found))
+        if aloud:
+            typer.echo(line(found[-1]))
     return found
