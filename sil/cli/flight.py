@@ -34,7 +34,8 @@ from mambo_nmpc.sil.sensors.instruments import Sensors
 GUSTS = "gusts"
 LONGEST_FLIGHT_S = 3600.0
 LARGEST_SEED = 2**63 - 1
-FLIGHT_FILES = ("trace.csv", "trace.npz", "flight.png", "flight.svg")
+TRACE_FILES = ("trace.csv", "trace.npz")
+FLIGHT_FILES = (*TRACE_FILES, "flight.png", "flight.svg")
 
 
 def fly_once(options: FlyOptions) -> None:
@@ -79,7 +80,9 @@ def fly_once(options: FlyOptions) -> None:
         same_bits = (
             None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
         )
-        write_flight(trace, PD if options.controller == "pd" else f"NMPC, {name}", folder)
+        write_trace(trace, folder)
+        if options.pictures:
+            draw_flight(trace, PD if options.controller == "pd" else f"NMPC, {name}", folder)
         waypoints = Path(options.trajectory) if isinstance(curve, Waypoints) else None
         summary = FlySummary(
             **vars(options)
@@ -95,15 +98,19 @@ def fly_once(options: FlyOptions) -> None:
             }
         )
         summary.write(folder)
-    finish(summary, options, FLIGHT_FILES)
+    finish(summary, options, FLIGHT_FILES if options.pictures else TRACE_FILES)
 
 
-def write_flight(trace: Trace, title: str, folder: Path) -> None:
-    """Write `FLIGHT_FILES`."""
-    from mambo_nmpc.sil.flight.plots import draw_flights  # matplotlib is slow to import
-
+def write_trace(trace: Trace, folder: Path) -> None:
+    """Write `TRACE_FILES`."""
     write_csv(trace, folder / "trace.csv")
     write_npz(trace, folder / "trace.npz")
+
+
+def draw_flight(trace: Trace, title: str, folder: Path) -> None:
+    """Write the pictures of `FLIGHT_FILES`."""
+    from mambo_nmpc.sil.flight.plots import draw_flights  # matplotlib is slow to import
+
     draw_flights({title: trace}, folder / "flight")
 
 

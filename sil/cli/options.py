@@ -94,6 +94,7 @@ class FlyOptions:
         EngineName,
         typer.Option(help="Simulate in compiled C, or in NumPy: some hundred times slower, the same bits."),
     ] = "c"
+    pictures: Annotated[bool, typer.Option(help="Draw the flight, which takes most of the time.")] = True
     as_json: AsJson = False
 
 

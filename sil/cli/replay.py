@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.flight import FLIGHT_FILES, finish, write_flight
+from mambo_nmpc.sil.cli.flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_nmpc.sil.cli.options import FlyOptions
 from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.controllers.inner_steps import WatchedController, write_inner_steps
@@ -15,7 +15,7 @@ from mambo_nmpc.sil.flight.report import ReplaySummary, judge
 from mambo_nmpc.sil.flight.scenario import flight_of, read_record
 
 INNER_STEPS = "inner-steps.npz"
-ALLOWED = frozenset({"replay", "output", "as_json"})
+ALLOWED = frozenset({"replay", "output", "pictures", "as_json"})
 """Options allowed with --replay; the record contains all others."""
 
 
@@ -39,7 +39,9 @@ def fly_again(options: FlyOptions, file: Path) -> None:
     with new_results(options.output, ReplaySummary.command, files) as folder:
         with progress_bar("replaying") as progress:
             trace = simulate(flight, PdController() if watched is None else watched, progress)
-        write_flight(trace, file.name, folder)
+        write_trace(trace, folder)
+        if options.pictures:
+            draw_flight(trace, file.name, folder)
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
@@ -53,4 +55,5 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             **judge(trace, record.settings),
         )
         summary.write(folder)
-    finish(summary, options, files)
+    written = FLIGHT_FILES if options.pictures else TRACE_FILES
+    finish(summary, options, written if watched is None else (*written, INNER_STEPS))

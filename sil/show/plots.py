@@ -68,6 +68,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """Write a figure as PNG and SVG."""
     png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
     figure.savefig(png, dpi=160, metadata={"Software": None})
+    figure.set_layout_engine("none")  # keep the positions instead of computing them again
     figure.savefig(svg, metadata={"Date": None, "Creator": None})
     return png, svg
 

@@ -52,6 +52,18 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     assert "<svg" in (out / "flight.svg").read_text()
 
 
+def test_without_pictures_the_earlier_ones_go(tmp_path: Path) -> None:
+    """What lies in the folder is of one flight; in NumPy its trace is the same."""
+    for options in ([], ["--no-pictures"], ["--no-pictures", "--engine", "numpy"]):
+        run("fly", "--duration-s", "1", *options, "-o", "out")
+        trace = (tmp_path / "out" / "trace.csv").read_text()
+        if options:
+            written = {path.name for path in (tmp_path / "out").iterdir()}
+            assert written == {"trace.csv", "trace.npz", "summary.json"}
+            assert trace == before
+        before = trace
+
+
 def test_reference_and_compiled_flights_print_the_same() -> None:
     """--controller reference flies the very same flight as the C."""
     nmpc, reference = (

@@ -191,4 +191,4 @@ def test_progress_reaches_the_end() -> None:
     shares: list[float] = []
     toolchain("gcc")
     fly(flight_of(TRUTH, PERIOD_S), PdController(), shares.append)
-    assert shares == [0.25, 0.5, 0.75, 1.0]
+    assert shares == [(index + 1) / len(TRUTH) for index in range(len(TRUTH))]

@@ -21,6 +21,7 @@ from tests.support.tools import toolchain
 PERIOD_S: Final = 0.01
 LIMIT_S: Final = 2
 """Processor time of a mutant; the flights take a tenth of a second."""
+_FLAGS: Final = ("-O0", "-w", "-fsanitize=bounds", "-fsanitize-undefined-trap-on-error")
 BATCHES: Final = [TRUTH, SENSED, COUPLED, TAKE_OFF]
 FILES: Final = [
     name for name in (*library.SOURCES, *library.HEADERS) if name not in ("engine.h", "records.h")
@@ -42,7 +43,7 @@ def build(files: Mapping[str, str], folder: Path) -> Path:
     place = Path(mkdtemp(dir=folder))
     for name, text in files.items():
         (place / name).write_text(text, "utf-8")
-    toolchain("gcc").run([*library.FLAGS, "-O0", "-w", *library.SOURCES, "-o", "engine.so", "-lm"], place)
+    toolchain("gcc").run([*library.FLAGS, *_FLAGS, *library.SOURCES, "-o", "engine.so", "-lm"], place)
     return place / "engine.so"
 
 

@@ -33,10 +33,11 @@ TRUTH: Final = (
     Scenario(
         duration_s=2.0, push_n_s=(0.0, 0.03, 0.0), push_time_s=0.5, yaw_rad=-2.5, start_tilt_rad=(0.0, 0.4)
     ),
+    Scenario(duration_s=2.0, yaw_rad=0.3, command_delay_ticks=200),
     Scenario(duration_s=2.0, start_offset_m=(9999.0, 0.0, 0.0), start_velocity_m_s=(5.0, 0.0, 0.0)),
     Scenario(duration_s=2.0, start_tilt_rad=(1.5, 1.2), start_offset_m=(0.0, 0.0, 1.0)),
 )
-"""Without sensors: every disturbance; a push and a hard turn; a flight that is lost; one upside down."""
+"""Without sensors: every disturbance; a push and a hard turn; the longest delay; one lost; one upside down."""
 
 SENSED: Final = (
     Scenario(
