@@ -37,7 +37,7 @@ TRUTH: Final = (
     Scenario(duration_s=2.0, start_offset_m=(9999.0, 0.0, 0.0), start_velocity_m_s=(5.0, 0.0, 0.0)),
     Scenario(duration_s=2.0, start_tilt_rad=(1.5, 1.2), start_offset_m=(0.0, 0.0, 1.0)),
 )
-"""Without sensors: every disturbance; a push and a hard turn; the longest delay; one lost; one upside down."""
+"""Without sensors: all disturbances; a push and a hard turn; the longest delay; one lost; one upside down."""
 
 SENSED: Final = (
     Scenario(
