@@ -66,14 +66,27 @@ def test_a_run_stopped_while_its_files_move_does_not_block_the_next(tmp_path: Pa
     run(tmp_path, "old")
 
     def stop() -> None:
-        with new_results(tmp_path, "fly", ("trace.csv", "missing.csv")) as fresh:
-            (fresh / "trace.csv").write_text("new")
+        with new_results(tmp_path, "fly", ("trace.csv", "in-the-way.csv")) as fresh:
+            for name in ("trace.csv", "in-the-way.csv"):
+                (fresh / name).write_text("new")
             (fresh / SUMMARY).write_text(summary_text("fly", {}))
+            (tmp_path / "in-the-way.csv").mkdir()
 
-    with pytest.raises(UnwritableError, match="cannot be written: No such file"):
+    with pytest.raises(UnwritableError, match="cannot be written: Is a directory"):
         stop()
+    (tmp_path / "in-the-way.csv").rmdir()
     assert not (tmp_path / SUMMARY).exists()
     run(tmp_path)
+    assert files(tmp_path) == {"trace.csv": "new", SUMMARY: summary_text("fly", "new")}
+
+
+def test_a_result_that_this_run_does_not_have_goes(tmp_path: Path) -> None:
+    """Of the files that the command may write, those of an earlier run do not stay beside the new ones."""
+    run(tmp_path, "old")
+    (tmp_path / "flight.png").write_text("old")
+    with new_results(tmp_path, "fly", ("trace.csv", "flight.png")) as fresh:
+        (fresh / "trace.csv").write_text("new")
+        (fresh / SUMMARY).write_text(summary_text("fly", "new"))
     assert files(tmp_path) == {"trace.csv": "new", SUMMARY: summary_text("fly", "new")}
 
 
