@@ -33,9 +33,10 @@ GENERATOR: Final = "mambo-nmpc "
 def new_results(folder: Path, command: str, names: Collection[str]) -> Iterator[Path]:
     """Lock `folder` for one run of `command`; yield a temporary folder for the files `names` and the summary.
 
-    When the block ends they replace the results of an earlier run, also those that this run does not have. If it
-    raises, the earlier results stay. Raises ForeignFilesError if `folder` holds other files, BusyError if another
-    run has locked it, and UnwritableError if the file system refuses an access; where possible, before the run.
+    When the block ends they replace the results of an earlier run, also those that this run does not have.
+    If it raises, the earlier results stay. Raises ForeignFilesError if `folder` holds other files, BusyError
+    if another run has locked it, and UnwritableError if the file system refuses an access; where possible,
+    before the run.
     """
     try:
         with create_folder(folder), lock(folder):
