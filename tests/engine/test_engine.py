@@ -6,7 +6,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import cffi
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -27,6 +26,7 @@ from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant import elementary
 from mambo_nmpc.sil.plant.link import Link
+from tests.support.engines import NUMBERS, build, tabulate
 from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH, scenarios
 from tests.support.tools import require, toolchain
 
@@ -128,38 +128,18 @@ def test_the_engine_compiles_without_a_warning(tmp_path: Path) -> None:
         subprocess.run(command, cwd=tmp_path, check=True)
 
 
-NUMBERS = np.concatenate(
-    [
-        np.random.default_rng(0).uniform(-10.0, 10.0, 20_000),
-        np.random.default_rng(1).uniform(-2e6, 2e6, 5_000),
-        np.arange(-40, 41) * (np.pi / 4.0),
-        [0.0, -0.0, 1e-310, -1e-310, np.inf, -np.inf, np.nan, 1e300, 0.1875, 0.375, 0.625, 0.875, 1.0],
-    ]
-)
-
-
 def test_elementary_functions_have_the_bits_of_numpy(tmp_path: Path) -> None:
-    """Sine, cosine, arc tangent and arc sine of 25,000 numbers, corners among them."""
-    files = library.texts() | {
-        "loop.c": '#include "elementary.h"\n'
-        "void table(const double *x, double *y, int n)\n{\n    int i;\n    for (i = 0; i < n; i++) {\n"
-        "        sine_cosine(x[i], &y[4 * i], &y[4 * i + 1]);\n        y[4 * i + 2] = arc_tangent(x[i]);\n"
-        "        y[4 * i + 3] = arc_sine(x[i]);\n    }\n}\n"
-    }
-    for name, text in files.items():
-        (tmp_path / name).write_text(text, "utf-8")
-    toolchain("gcc").run([*library.FLAGS, "loop.c", "-o", "table.so", "-lm"], tmp_path)
-    interface = cffi.FFI()
-    interface.cdef("void table(const double *x, double *y, int n);")
-    numbers = np.concatenate([NUMBERS, NUMBERS / 10.0])
-    found = np.empty((len(numbers), 4))
-    table: Any = interface.dlopen(str(tmp_path / "table.so"))
-    table.table(*(library.pointer("double *", array) for array in (numbers, found)), len(numbers))
+    """Sine, cosine, arc tangent and arc sine of 50,000 numbers, corners among them."""
     with np.errstate(all="ignore"):
         expected = np.stack(
-            [*elementary.sine_cosine(numbers), elementary.arc_tangent(numbers), elementary.arc_sine(numbers)],
+            [
+                *elementary.sine_cosine(NUMBERS),
+                elementary.arc_tangent(NUMBERS),
+                elementary.arc_sine(NUMBERS),
+            ],
             axis=-1,
         )
+    found = tabulate(build(library.texts(), tmp_path))
     for array in (found, expected):
         array[np.isnan(array)] = np.nan
     assert found.tobytes() == expected.tobytes()

@@ -1,0 +1,42 @@
+"""Why some faults of the engine's C change nothing that a flight shows, by file, line and change."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from tests.support.reasons import Key
+
+_LONGER: Final = "an array one element longer than it must be"
+_BESIDE: Final = "reads or writes beside an array passed as a pointer, which no flight shows"
+
+REASONS: Final[Mapping[Key, str]] = {
+    ("pd.c", "(void)thrust_acceleration_m_s2;", "left out"): "only silences a warning",
+    ("rigid_body.h", "to_world(r, state + VELOCITY, rate + POSITION);", "+ -> - #1"): "POSITION is 0",
+    **{
+        ("vehicle.h", f"double {name}[4];", "4 -> 5"): _LONGER
+        for name in ("share", "command", "thrust_n", "wrench")
+    },
+    ("vehicle.h", "double wrench[4];", "4 -> 3"): _BESIDE,
+    **{
+        ("vehicle.h", "for (i = 0; i < 4; i++) {", change): _BESIDE
+        for change in ("0 -> (-1) #3", "< -> <= #3", "4 -> 5 #3")
+    },
+    **{
+        ("vehicle.h", "for (i = 0; i < STATE_ROWS; i++) {", change): "the derivative does not read position x"
+        for change in ("0 -> 1", "0 -> 1 #1")
+    },
+    ("world.h", "#define DELAY_TICKS_MAX <number>", "one more"): _LONGER,
+    (
+        "world.h",
+        "const gusts_t gusts = { draws[0], draws[1], (<real> * draws[1]) + (<real> * draws[2]) };",
+        "next number #1",
+    ): "one ulp of the first gust, which decays before it changes a rounded state",
+    ("world.h", "double change_m_s[3];", "3 -> 4"): _LONGER,
+    **{
+        ("world.h", line, change): "a push of zero changes nothing but the sign of a zero"
+        for line, change in (
+            ("int pushed = 0;", "0 -> (-1)"),
+            ("int pushed = 0;", "0 -> 1"),
+            ("pushed = pushed || (flight->push_n_s[i] != <real>);", "zero -> one"),
+        )
+    },
+}
