@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import linalg
 
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
@@ -11,8 +12,17 @@ from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Hover
 from mambo_nmpc.sil.plant import loops
 from mambo_nmpc.sil.plant.disturbances import Disturbances, World
-from mambo_nmpc.sil.plant.gusts import FOOT_M, LIGHT_M_S, Gusts, low_altitude_scales, mean_speed_m_s
+from mambo_nmpc.sil.plant.gusts import (
+    ACROSS_GAINS,
+    FOOT_M,
+    LIGHT_M_S,
+    Gusts,
+    coefficients,
+    low_altitude_scales,
+    mean_speed_m_s,
+)
 from mambo_nmpc.sil.plant.link import NOT_CALLED, Link
+from mambo_nmpc.sil.plant.randomness import Purpose, generators
 from mambo_nmpc.sil.plant.rigid_body import RigidBody
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Vehicle, VehicleState
 
@@ -63,6 +73,55 @@ def test_gusts_have_variance_and_correlation_of_the_dryden_spectra() -> None:
         assert along[tick].var() == pytest.approx(1.0, abs=0.07)
         assert across[tick].var() == pytest.approx(1.0, abs=0.07)
     assert abs((along[30] * across[30]).mean()) < 0.07
+
+
+def test_gusts_along_and_across_have_the_documented_transfer_functions() -> None:
+    """In x = t V / L: 1 / (1 + s) and (1 + sqrt(3) s) / (1 + s)^2 over sqrt(2), of w with intensity 2."""
+    rates, drive = np.array([[-1.0, 0.0], [1.0, -1.0]]), np.array([1.0, 0.0])
+    for s in (0.0, 0.5j, 2.0j):
+        states = np.linalg.solve(s * np.eye(2) - rates, drive)
+        across = (1.0 + math.sqrt(3.0) * s) / (1.0 + s) ** 2 / math.sqrt(2.0)
+        np.testing.assert_allclose(np.array(ACROSS_GAINS) @ states, across, rtol=1e-14)
+
+
+@pytest.mark.parametrize("step_s", [0.1, 1.0, 10.0])
+def test_increments_of_the_gusts_have_the_covariance_of_a_stationary_process(step_s: float) -> None:
+    """It is P - F P F', where P solves Lyapunov's equation and F is the matrix exponential of the step."""
+    rates, drive = np.array([[-1.0, 0.0], [1.0, -1.0]]), np.array([[1.0], [0.0]])
+    stationary = linalg.solve_continuous_lyapunov(rates, -2.0 * drive @ drive.T)
+    np.testing.assert_allclose(stationary, [[1.0, 0.5], [0.5, 0.5]], atol=1e-14)
+    gusts = coefficients(8.0, 0.0, 1, height_m=6.0, step_s=step_s)
+    move = linalg.expm(rates * gusts.x[0])
+    np.testing.assert_allclose(move, gusts.decay * np.array([[1.0, 0.0], [gusts.x[0], 1.0]]), rtol=1e-12)
+    root = np.array([[gusts.root_aa[0], 0.0], [gusts.root_ab[0], gusts.root_bb[0]]])
+    np.testing.assert_allclose(root @ root.T, stationary - move @ stationary @ move.T, atol=1e-14)
+
+
+def test_gusts_follow_the_documented_recurrence() -> None:
+    """Three normal numbers a tick drive the states, of which the first three give the stationary start."""
+    speed_m_s, heading_rad, step_s = 7.0, 0.6, 3.0
+    gusts = Gusts(speed_m_s, heading_rad, (11,), height_m=2.0, step_s=step_s)
+    f = coefficients(speed_m_s, heading_rad, 1, height_m=2.0, step_s=step_s)
+    move = math.exp(-f.x[0]) * np.array([[1.0, 0.0], [f.x[0], 1.0]])
+    root = np.array([[f.root_aa[0], 0.0], [f.root_ab[0], f.root_bb[0]]])
+    drawn = generators((11,), Purpose.GUSTS)[0].standard_normal((300, 3))
+    along, across = drawn[0, 0], np.linalg.cholesky([[1.0, 0.5], [0.5, 0.5]]) @ drawn[0, 1:]
+    sigma_m_s = speed_m_s * low_altitude_scales(2.0).intensity
+    turn = np.array(
+        [[math.cos(heading_rad), -math.sin(heading_rad)], [math.sin(heading_rad), math.cos(heading_rad)]]
+    )
+    for numbers in drawn[1:]:
+        air_m_s = [f.mean_m_s[0] + sigma_m_s * along, sigma_m_s * np.dot(ACROSS_GAINS, across)]
+        np.testing.assert_allclose(np.ravel(gusts.next()), turn @ air_m_s, rtol=1e-11, atol=1e-11)
+        along, across = move[0, 0] * along + root[0, 0] * numbers[0], move @ across + root @ numbers[1:]
+
+
+def test_gusts_vary_in_still_air_and_whichever_way_the_wind_blows() -> None:
+    """The step is that of V = 0.1 m/s where the mean wind is slower, and of its magnitude elsewhere."""
+    speeds_m_s = np.array([0.0, 0.05, -0.05, 4.0, -4.0])
+    gusts = coefficients(speeds_m_s, 0.0, 5, height_m=20.0 * FOOT_M, step_s=0.5)
+    length_m = low_altitude_scales(20.0 * FOOT_M).length_m
+    np.testing.assert_allclose(gusts.x, 0.5 * np.array([0.1, 0.1, 0.1, 4.0, 4.0]) / length_m, rtol=1e-14)
 
 
 def test_gusts_rotate_with_the_wind_direction_and_follow_the_seed() -> None:
