@@ -140,7 +140,10 @@ def _standard_quantile(share: Decimal) -> float:
     """Return the quantile of the standard normal distribution, rounded once.
 
     Two steps of Newton's method improve a float64, whatever its last bits, beyond the digits of the result.
+    The upper half mirrors the lower one: a float64 near 1 has too few digits of what it lacks to 1.
     """
+    if share > Decimal("0.5"):
+        return -_standard_quantile(1 - share)
     z = Decimal(NormalDist().inv_cdf(float(share)))
     for _ in range(2):
         z -= (_share_below(z) - share) / _density(z)
