@@ -46,6 +46,26 @@ def test_a_tilt_beyond_what_carries_the_weight_is_a_crash(calm: Trace) -> None:
     assert not detect_crashes(with_sample(calm, "euler_rad", 1, 0.8)).any()
 
 
+@pytest.mark.parametrize(
+    ("name", "axis", "value", "crashed"),
+    [
+        ("euler_rad", 0, CRASH_TILT_RAD - 1e-9, False),
+        ("euler_rad", 0, CRASH_TILT_RAD, True),
+        ("euler_rad", 1, -CRASH_TILT_RAD, True),
+        ("position_m", 2, -1e-9, False),
+        ("position_m", 2, 0.0, True),
+        ("position_m", 2, 1e-9, True),
+    ],
+)
+def test_the_first_crash_is_one_that_is_detected(
+    calm: Trace, *, name: str, axis: int, value: float, crashed: bool
+) -> None:
+    """The limits themselves are crashes to both functions."""
+    changed = with_sample(calm, name, axis, value)
+    assert detect_crashes(changed).tolist() == [False, crashed]
+    assert (first_crash(changed, 1) is not None) == crashed
+
+
 def test_the_ground_is_a_crash(calm: Trace) -> None:
     """Z points down: a height of 0 or less."""
     landed = with_sample(calm, "position_m", 2, 0.0)
