@@ -141,6 +141,7 @@ def test_a_distribution_is_said_in_words(value: object, text: str) -> None:
 def test_names_are_drawn_and_said() -> None:
     """A distribution over names is written and said with them."""
     names = Domain.of_names(("a", "b", "c"))
+    assert (names.low, names.high, names.whole) == (0, 2, True)
     found = parse({"choice": ["c", "a"]}, names)
     assert [names.value(found.quantile(share)) for share in (0.0, 0.49, 0.5, 0.99)] == ["c", "c", "a", "a"]
     assert found.document() == {"choice": ["c", "a"]}
@@ -241,6 +242,7 @@ BAD = {
     '[flight]\ntrajectory = { choice = ["circle", "spiral"] }': "must be one of bernoulli, gerono, lissajous",
     "[flight]\ntrajectory = { choice = [] }": "hover, step, or { choice = [name, ...] } of them",
     "[flight]\ntrajectory = { uniform = [0, 1] }": "or { choice = [name, ...] } of them",
+    '[flight]\ntrajectory = { choice = ["circle"], uniform = [0, 1] }': "or { choice = [name, ...] } of them",
     "[flight]\ntrajectory = 3": "flight.trajectory = 3 must be one of bernoulli",
     "[flight]\nsize_m = { uniform = [1, 5000] }": "must lie in -1000..1000",
     "[draws]\nsize_m = 1": "draws.size_m is not a parameter",
@@ -251,6 +253,26 @@ BAD = {
     'controllers = ["wrong.toml"]': "wrong.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)",
     'controllers = ["a b.toml"]': "controllers: a b.toml must have a name of at most 40 letters",
 }
+
+
+@pytest.mark.parametrize(
+    ("domain", "value"), [(WIDE, 1.0), (Domain.of_names(("a", "b")), "b")], ids=["numbers", "names"]
+)
+def test_a_choice_has_one_to_a_thousand_values(domain: Domain, value: float | str) -> None:
+    """Of numbers and of names; the same value may stand more than once, and is drawn more often."""
+    for count in (1, 1000):
+        assert len(parse({"choice": [value] * count}, domain).numbers) == count
+    for count in (0, 1001):
+        with pytest.raises(ValueError, match="must"):
+            parse({"choice": [value] * count}, domain)
+
+
+def test_limits_belong_to_their_domain() -> None:
+    """A range may be a single value; a mean may lie at a limit, and its deviation may go beyond."""
+    assert parse({"uniform": [-1e3, 1e3]}, WIDE).quantile(0.0) == -1e3
+    assert parse({"uniform": [2.0, 2.0]}, WIDE).quantile(0.9) == 2.0
+    assert parse({"normal": [1e3, 2e3]}, WIDE).quantile(0.9) < 1e3
+    assert parse({"log_uniform": [1e-300, 1e-300]}, WIDE).quantile(0.9) == 1e-300
 
 
 @pytest.mark.parametrize("text", BAD)
@@ -288,6 +310,20 @@ def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
     assert [none.low, none.high] == pytest.approx([0.0, limit])
     assert [every.low, every.high] == pytest.approx([1.0 - limit, 1.0])
     assert proportion(3, 12).share == 0.25
+
+
+@pytest.mark.parametrize(("count", "flights"), [(1, 2), (3, 12), (40, 41), (7, 500)])
+def test_the_limits_of_a_proportion_leave_two_and_a_half_percent_on_each_side(
+    count: int, flights: int
+) -> None:
+    """With the lower limit as probability, `count` or more have that chance; with the upper one, no more."""
+
+    def chance(counts: range, share: float) -> float:
+        return sum(math.comb(flights, k) * share**k * (1.0 - share) ** (flights - k) for k in counts)
+
+    found = proportion(count, flights)
+    assert chance(range(count, flights + 1), found.low) == pytest.approx(0.025, rel=1e-9)
+    assert chance(range(count + 1), found.high) == pytest.approx(0.025, rel=1e-9)
 
 
 def test_quantiles_are_values_of_the_sample() -> None:

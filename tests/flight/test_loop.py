@@ -1,6 +1,6 @@
 """The closed loop: starts, controller interface, trace, lost flights and flights in a batch."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.sil.controllers.pd import PdController, PdOutcome
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep, Trajectories
 from mambo_nmpc.sil.paper.table2 import CASES, PRINTED_PD
@@ -55,6 +55,17 @@ def test_trace_covers_the_flight_at_the_controller_rate() -> None:
     assert trace.status.shape == trace.thrust_acceleration_m_s2.shape == (101, 3)
     assert trace.flights == 3
     np.testing.assert_array_equal(trace.target[:, 2], FIGURE_OF_EIGHT.target(trace.time_s))
+
+
+def test_by_default_a_flight_is_that_of_table_2() -> None:
+    """One nominal drone for 100 s at 100 Hz, above the first point at heading 0, undisturbed, true state."""
+    flight = Flight(FIGURE_OF_EIGHT)
+    times_s = flight.times_s()
+    assert (len(times_s), times_s[0], times_s[-1]) == (10_001, 0.0, 100.0)
+    assert (flight.ticks_per_update, flight.flights, flight.sensors) == (2, 1, None)
+    brief = replace(flight, duration_s=0.2)
+    written = Flight(FIGURE_OF_EIGHT, 0.2, 1, "hover", 0.0, 0.0, seeds=(0,), offset=Offset())
+    assert fly(brief, PdController()).same_bits(fly(written, PdController()))
 
 
 def test_hover_start_is_level_and_at_rest_above_the_first_point() -> None:

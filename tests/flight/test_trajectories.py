@@ -68,9 +68,10 @@ def test_bernoulli_is_the_lemniscate_of_its_half_width() -> None:
 
 
 def test_gerono_is_the_lemniscate_of_its_half_width() -> None:
-    """x^4 = a^2 (x^2 - y^2); the curve reaches x = a after a quarter of its period."""
+    """x^4 = a^2 (x^2 - y^2); the curve turns to +y first, and reaches x = a after a quarter of its period."""
     x, y, _, _ = Gerono(1.5, 0.25).target(TIMES_S).T
     np.testing.assert_allclose(x**4, 1.5**2 * (x**2 - y**2), atol=1e-12)
+    np.testing.assert_allclose(y, x * np.cos(0.25 * TIMES_S), atol=1e-12)
     np.testing.assert_allclose(Gerono(1.5, 0.25).target(2.0 * np.pi)[:2], [1.5, 0.0], atol=1e-12)
 
 

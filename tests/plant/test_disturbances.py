@@ -124,6 +124,13 @@ def test_gusts_vary_in_still_air_and_whichever_way_the_wind_blows() -> None:
     np.testing.assert_allclose(gusts.x, 0.5 * np.array([0.1, 0.1, 0.1, 4.0, 4.0]) / length_m, rtol=1e-14)
 
 
+def test_increments_of_the_gusts_are_finite_however_small_the_step() -> None:
+    """Rounding makes the variance of the second increment negative there; it counts as 0."""
+    gusts = coefficients(np.linspace(0.1, 5.0, 1000), 0.0, 1000, height_m=20.0 * FOOT_M, step_s=1e-5)
+    assert np.isfinite(gusts.root_bb).all()
+    assert (gusts.root_bb == 0.0).any()
+
+
 def test_gusts_rotate_with_the_wind_direction_and_follow_the_seed() -> None:
     """Wind towards east is that towards north, rotated; the same seed repeats it, another one does not."""
     north, east, again, other = (

@@ -135,6 +135,16 @@ def test_the_arc_cosine_is_within_two_and_a_half_ulp_of_1() -> None:
             assert error <= Decimal("2.5") * Decimal(2) ** -52
 
 
+def test_the_hypotenuse_is_within_one_and_a_half_ulp() -> None:
+    """The root halves the relative error of the sum of squares, and is rounded itself."""
+    x, y = spread(3.0), spread(5.0)
+    for one, other, value in zip(x.tolist(), y.tolist(), elementary.hypotenuse(x, y).tolist(), strict=True):
+        with localcontext() as context:
+            context.prec = DIGITS
+            exact = (Decimal(one) ** 2 + Decimal(other) ** 2).sqrt()
+            assert abs(Decimal(value) - exact) <= Decimal("1.5") * Decimal(math.ulp(value))
+
+
 def bits(values: FloatArray | float) -> list[str]:
     """Return the bits of numbers, which tell -0 from 0."""
     return [value.hex() for value in np.atleast_1d(values).tolist()]
