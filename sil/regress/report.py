@@ -120,9 +120,9 @@ def _check(
     metric: str, now: float, bound: float | None, tolerance: float | None, held: float | str | None
 ) -> Check:
     """Compare a metric; one that is NaN, because the flight was lost, exceeds every limit."""
-    then = float(held) if tolerance is not None and held is not None else None
-    limits = [] if bound is None else [bound]
-    if then is not None and tolerance is not None:
+    limits, then = [] if bound is None else [bound], None
+    if tolerance is not None and held is not None:
+        then = float(held)
         limits.append(then * (1.0 + tolerance))
     limit = min(limits)
     return Check(metric, now, bound, then, limit, now <= limit)
@@ -144,7 +144,7 @@ def _explain(check: Check) -> str:
         limits.append(f"bound {digits(check.bound)}")
     if check.then is not None:
         limits.append(f"recorded {digits(check.then)}")
-    if check.then is not None and check.limit != check.bound:
+    if check.limit != check.bound:
         limits[-1] += f", so at most {digits(check.limit)}"
     return f"{check.metric} = {digits(check.now)} ({'; '.join(limits)})"
 
@@ -189,7 +189,7 @@ def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
             if metric == CRASHED and not failed and any(len(flight.checks) > 1 for flight in flights):
                 continue
             values = [math.inf if math.isnan(check.now) else check.now for check in checks]
-            ratios = [check.now / check.then for check in checks if check.then]
+            ratios = [value / check.then for value, check in zip(values, checks, strict=True) if check.then]
             yield GroupRow(
                 group,
                 metric,

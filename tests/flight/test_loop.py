@@ -13,6 +13,7 @@ from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep, Trajectories
 from mambo_nmpc.sil.paper.table2 import CASES, PRINTED_PD
+from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 
 FloatArray = NDArray[np.float64]
@@ -154,6 +155,22 @@ def test_command_accelerates_along_the_heading(
     assert trace.euler_rad[-1, 0, 2] == pytest.approx(yaw_rad, abs=1e-3)
 
 
+def test_the_heading_turns_from_the_start_of_the_clock() -> None:
+    """It rests during take-off, and then follows a reference that turns at the given rate."""
+    flight = Flight(Hover(), 3.0, start="take-off", yaw_rad=0.3, yaw_rate_rad_s=0.5)
+    yaw_rad = fly(flight, PdController()).euler_rad[:, 0, 2]
+    np.testing.assert_array_equal(yaw_rad[:501], 0.3)
+    assert yaw_rad[-1] - yaw_rad[-101] == pytest.approx(0.5, abs=1e-4)
+    assert 0.3 + 0.5 * 2.0 < yaw_rad[-1] < 0.3 + 0.5 * 3.0
+
+
+def test_without_seeds_every_flight_has_seed_0() -> None:
+    """In gusts the flights are alike, and another seed's is not."""
+    flight = Flight(Hover(), 0.2, 2, disturbances=Disturbances(wind_speed_m_s=5.0))
+    plain, seeded = (fly(replace(flight, seeds=seeds), PdController()) for seeds in (None, (0, 1)))
+    assert plain.digest(0) == plain.digest(1) == seeded.digest(0) != seeded.digest(1)
+
+
 def test_pd_reaches_a_step_and_is_off_target_in_wind() -> None:
     """It settles at a point 1.4 m away, and in a wind of 0.5 m/s^2 where Kp times the error balances it."""
     vehicle = Vehicle(wind_m_s2=(0.0, np.array([0.0, 0.5])))
@@ -174,6 +191,16 @@ def test_lost_flight_is_nan_and_does_not_affect_the_others() -> None:
     assert np.isnan(trace.position_m[201:, 1]).all()
     assert np.isnan(trace.euler_rad[201:, 1]).all()
     np.testing.assert_allclose(trace.position_m[:, 0], [[0.0, 0.0, -1.1]] * 301, atol=1e-9)
+
+
+def test_a_lost_flight_has_the_same_nan_everywhere() -> None:
+    """The processor's own NaN, which may be negative, is in no array: digests would tell processors apart."""
+    vehicle = Vehicle(wind_m_s2=(1e308, 0.0))
+    trace = fly(Flight(Hover(), duration_s=0.1, vehicle=vehicle), PdController())
+    for values in (trace.position_m, trace.velocity_m_s, trace.euler_rad, trace.thrust_acceleration_m_s2):
+        lost = values[np.isnan(values)]
+        assert len(lost) > 0
+        assert lost.tobytes() == np.full(len(lost), np.nan).tobytes()
 
 
 def test_overflowing_flight_is_lost_without_a_warning() -> None:

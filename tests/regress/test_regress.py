@@ -94,6 +94,7 @@ def test_a_better_flight_passes_and_is_said(tmp_path: Path) -> None:
     summary = judged(found, [row(1.81), row(1.79), row(0.0)])
     assert summary.failed == []
     assert summary.better == 2
+    assert judged(found, [row(1.8)] * 3).better == 0
     assert "2 flights are better than recorded by more than the tolerance; --update" in regress_text(
         summary, "out"
     )
@@ -114,7 +115,24 @@ def test_same_bits_are_compared_if_asked_for(tmp_path: Path) -> None:
     record_baseline(found, mambo(), [row(2.0)] * 3)
     summary = judged(found, [row(2.0), row(2.0, trace_sha256="cd"), row(2.0)])
     assert [flight.same_bits for flight in summary.flights] == [True, False, True]
-    assert summary.failed[0].failures == ["the trace differs from the recorded one"]
+    differs = ["the trace differs from the recorded one"]
+    assert [flight.failures for flight in summary.flights] == [[], differs, []]
+    assert [flight.record for flight in summary.flights] == [None, "flights/0001-eight.json", None]
+
+
+def test_same_bits_want_a_recorded_digest(tmp_path: Path) -> None:
+    """Before the first recording nothing is compared."""
+    summary = judged(suite(tmp_path, "same_bits = true"), [row(2.0)] * 3)
+    assert [flight.same_bits for flight in summary.flights] == [None] * 3
+    assert summary.failed == []
+
+
+def test_the_record_of_a_failed_flight_names_the_kind_of_controller(tmp_path: Path) -> None:
+    """The stock PD's flight is replayed with it."""
+    found, pd = suite(tmp_path), load_entrant("pd", Path(), "test")
+    rows = [row(4.0), row(1.0), row(1.0)]
+    write_records(judge(found, pd, rows, None, tmp_path), found, pd, rows, tmp_path)
+    assert read_record(tmp_path / RECORDS / "0000-eight.json").controller == "pd"
 
 
 def test_a_crashed_or_lost_flight_fails(tmp_path: Path) -> None:
@@ -130,6 +148,60 @@ def test_a_crashed_or_lost_flight_fails(tmp_path: Path) -> None:
     crashed, iae = group_rows(summary)
     assert (crashed.metric, crashed.failed, iae.metric, iae.failed) == ("crashed", 2, "iae_m_s", 1)
     assert iae.worst == math.inf
+
+
+MIXED = """
+[flights.fall]
+bounds.crashed = true
+seed = [1, 2]
+[flights.calm]
+seed = [1, 2]
+bounds = { ise_m2_s = 2.0, refused_updates = 4 }
+[flights.still]
+"""
+"""Groups that may crash, have other bounds, or none."""
+
+TEXT = """\
+group                metric                     bound     median      worst      ratio      failed
+eight                iae_m_s                        3        2.5        2.9       1.25      1 of 3
+fall                 iae_m_s                        -        inf        inf        inf      1 of 2
+calm                 crashed                        0        0.5          1          -      1 of 2
+calm                 refused_updates                4        2.5          5          -      1 of 2
+calm                 iae_m_s                        -          1          1          1      0 of 1
+calm                 ise_m2_s                       2       1.75        2.5          -      1 of 2
+still                crashed                        0          0          0          -      0 of 1
+
+eight/yaw_rad=0: iae_m_s = 2.5 (bound 3; recorded 2, so at most 2.2)
+    mambo-nmpc fly --replay out/flights/0000-eight.json
+fall/seed=2: iae_m_s = nan (recorded 1, so at most 1.1)
+    mambo-nmpc fly --replay out/flights/0004-fall.json
+calm/seed=1: crashed; ise_m2_s = 2.5 (bound 2)
+    mambo-nmpc fly --replay out/flights/0005-calm.json
+calm/seed=2: refused_updates = 5 (bound 4)
+    mambo-nmpc fly --replay out/flights/0006-calm.json
+mine with mambo: 4 of 8 flights passed, 4 failed
+compared with the bounds and with here.json"""
+
+
+def test_the_text_has_a_row_for_each_group_and_metric_and_then_what_failed(tmp_path: Path) -> None:
+    """Median, worst value, worst ratio; a lost flight is infinite; crashes where nothing else is judged."""
+    found = suite(tmp_path, more=MIXED)
+    path = record_baseline(found, mambo(), [*map(row, (2.0, 1.0, 2.8, 1.0, 1.0, 1.0, math.nan, math.nan))])
+    rows = [row(2.5), row(1.05), row(2.9), row(1.05), row(math.nan, crashed=1)]
+    rows += [row(1.0, ise_m2_s=2.5, crashed=1), row(0.9, refused_updates=5), row(9.0)]
+    assert path == baseline_path(found, "mambo")
+    summary = judge(found, mambo(), rows, read_baseline(found, "mambo"), Path("here.json"))
+    assert regress_text(summary, "out") == TEXT
+
+
+def test_the_text_of_a_suite_that_passed_is_its_table_and_one_line(tmp_path: Path) -> None:
+    """Without what failed or was recorded."""
+    text = regress_text(judged(suite(tmp_path), [row(1.0)] * 3), "out")
+    assert text.splitlines()[2:] == [
+        "",
+        "mine with mambo: 3 of 3 flights passed",
+        "compared with the bounds only: no recorded metrics",
+    ]
 
 
 def test_a_lost_flight_is_recorded_as_null_and_then_not_compared(tmp_path: Path) -> None:
