@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.atomic import put
-from mambo_nmpc.codegen.errors import FileExistsRefusedError, InvalidSettingsError, echo
+from mambo_nmpc.codegen.errors import FileExistsRefusedError, InvalidSettingsError, echo, echo_value
 from mambo_nmpc.sil.campaign.file import Entrant
 from mambo_nmpc.sil.campaign.flights import DIGEST, INDICES, Row
 from mambo_nmpc.sil.campaign.store import convert_os_errors
@@ -43,6 +43,16 @@ class Baseline(BaseModel):
     """Settings digest of the controller."""
     flights: dict[str, Recorded]
 
+    @field_validator("flights")
+    @classmethod
+    def _check_kinds(cls, flights: dict[str, Recorded]) -> dict[str, Recorded]:
+        for name, held in flights.items():
+            for key, value in held.items():
+                if isinstance(value, str) != (key in (SCENARIO, DIGEST)):
+                    rule = "text" if key in (SCENARIO, DIGEST) else "a number or null"
+                    raise ValueError(f"{echo(name)}: {echo(key)} = {echo_value(value)} must be {rule}")
+        return flights
+
 
 def baseline_path(suite: FlightSuite, controller: str) -> Path:
     """Return where the baseline of a suite with a controller is, recorded or not."""
@@ -61,12 +71,19 @@ def read_baseline(suite: FlightSuite, controller: str) -> Baseline | None:
     try:
         found = Baseline.model_validate_json(path.read_bytes())
     except (OSError, ValidationError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error.errors()[0]["msg"]
+        reason = error.strerror if isinstance(error, OSError) else _first_fault(error)
         raise InvalidSettingsError((f"{name}: is no baseline of mambo-nmpc: {reason}; {_UPDATE}",)) from None
     changes = _changes(suite, found)
     if changes:
         raise InvalidSettingsError((f"{name}: was recorded from other flights: {changes}; {_UPDATE}",))
     return found
+
+
+def _first_fault(error: ValidationError) -> str:
+    """Return place and rule of the first fault of a file."""
+    fault = error.errors()[0]
+    place = ".".join(map(str, fault["loc"])) or "file"
+    return f"{echo(place)}: {fault['msg'].removeprefix('Value error, ')}"
 
 
 def _changes(suite: FlightSuite, found: Baseline) -> str:

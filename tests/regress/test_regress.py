@@ -2,6 +2,7 @@
 
 import json
 import math
+from hashlib import sha256
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -269,6 +270,75 @@ def test_a_file_that_is_no_baseline_is_refused_and_kept(tmp_path: Path, text: st
         read_baseline(found, "mambo")
     with pytest.raises(FileExistsRefusedError, match="move it away"):
         demand_replaceable(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        (
+            '"iae_m_s": 2.0',
+            '"iae_m_s": "fast"',
+            r'eight/yaw_rad=0: iae_m_s = "fast" must be a number or null',
+        ),
+        ('"iae_m_s": 2.0', '"iae_m_s": true', "iae_m_s.*: Input should be a valid number"),
+        ('"iae_m_s": 2.0', '"iae_m_s": NaN', "iae_m_s.*: Input should be a finite number"),
+        ('"scenario": "', '"scenario": 3, "x": "', r"scenario = 3\.0 must be text"),
+        ('"suite": "mine"', '"suite": 3', "suite: Input should be a valid string"),
+        ('"flights": {', '"flights": [], "x": {', "flights: Input should be an object"),
+    ],
+)
+def test_a_baseline_with_a_wrong_value_is_refused(tmp_path: Path, *, old: str, new: str, rule: str) -> None:
+    """Before any flight, with the first wrong key and its rule."""
+    found = suite(tmp_path)
+    path = record_baseline(found, mambo(), [row(2.0)] * 3)
+    path.write_text(path.read_text("utf-8").replace(old, new, 1), "utf-8")
+    with pytest.raises(
+        InvalidSettingsError, match=rf"is no baseline of mambo-nmpc: .*{rule}; record it anew"
+    ):
+        read_baseline(found, "mambo")
+
+
+def test_a_baseline_needs_only_the_compared_metrics(tmp_path: Path) -> None:
+    """Others may be left out, and keys of later versions may be there."""
+    found = suite(tmp_path)
+    path = record_baseline(found, mambo(), [row(2.0)] * 3)
+    whole = json.loads(path.read_text("utf-8"))
+    flights = whole["flights"]
+    for name, held in flights.items():
+        flights[name] = {key: held[key] for key in ("scenario", "iae_m_s")}
+    path.write_text(json.dumps(whole | {"comment": "by hand"}), "utf-8")
+    assert len(judged(found, [row(2.3)] * 3).failed) == 3
+    flights["gone"] = {"scenario": "ab"}
+    path.write_text(json.dumps(whole), "utf-8")
+    with pytest.raises(InvalidSettingsError, match=r"other flights: 1 gone \(gone\); record"):
+        read_baseline(found, "mambo")
+
+
+def test_what_is_no_plain_file_is_neither_read_nor_replaced(tmp_path: Path) -> None:
+    """A folder, and a link, even to a baseline; a path where nothing is may be written."""
+    found = suite(tmp_path)
+    path = baseline_path(found, "mambo")
+    demand_replaceable(path)
+    path.mkdir()
+    with pytest.raises(InvalidSettingsError, match="is no baseline of mambo-nmpc: Is a directory; record"):
+        read_baseline(found, "mambo")
+    with pytest.raises(FileExistsRefusedError, match="is not a plain file; move it away"):
+        demand_replaceable(path)
+    path.rmdir()
+    record_baseline(found, mambo(), [row(2.0)] * 3).rename(tmp_path / "elsewhere")
+    for target in ("elsewhere", "nowhere"):
+        path.symlink_to(target)
+        with pytest.raises(FileExistsRefusedError, match="is not a plain file; move it away"):
+            demand_replaceable(path)
+        path.unlink()
+
+
+def test_a_key_that_has_its_default_changes_no_recorded_flight(tmp_path: Path) -> None:
+    """The digest covers the other keys, so that a version with more keys compares with older baselines."""
+    path = record_baseline(suite(tmp_path), mambo(), [row(2.0)] * 3)
+    recorded = json.loads(path.read_text("utf-8"))["flights"]["eight/yaw_rad=0.5"]
+    assert recorded["scenario"] == sha256(b'{"yaw_rad":0.5}').hexdigest()[:16]
+    assert path.read_text("utf-8").endswith("}\n")
 
 
 def test_a_damaged_baseline_may_be_replaced(tmp_path: Path) -> None:
