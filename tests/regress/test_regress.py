@@ -387,6 +387,10 @@ def test_junit_has_a_case_for_each_flight(tmp_path: Path) -> None:
     }
     assert [case.get("name") for case in found] == [flight.name for flight in summary.flights]
     assert {case.get("classname") for case in found} == {"mine.mambo.eight"}
+    text = junit_xml(summary).decode("utf-8")
+    assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<testsuites tests=\"3\"")
+    assert text.endswith("\n</testsuites>\n")
+    assert "replay it: mambo-nmpc fly --replay flights/0001-eight.json, in the result folder" in text
     messages = [case.find("failure") for case in found]
     assert [None if one is None else one.get("message") for one in messages] == [
         "iae_m_s = 4 (bound 3)",

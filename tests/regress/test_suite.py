@@ -59,6 +59,7 @@ def test_names_do_not_depend_on_the_order_of_keys(tmp_path: Path) -> None:
     ("written", "values"),
     [
         ("{ from = 0.0, to = 1.0, count = 3 }", (0.0, 0.5, 1.0)),
+        ("{ from = 1.0, to = 0.0, count = 2 }", (1.0, 0.0)),
         ("{ from = -3.14159, to = 3.14159, count = 3 }", (-3.14159, 0.0, 3.14159)),
         ("{ from = 0, to = 1, count = 4 }", (0.0, 0.333333, 0.666667, 1.0)),
     ],
@@ -126,12 +127,16 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
         ("wind_m_s2 = [1, 2, 3]", "wind_m_s2 = [1, 2, 3] must be a vector of 2 finite numbers, or a list"),
         ("wind_m_s2 = [[1, inf], [1, 2]]", "or a list of such vectors; [1, Infinity] is not"),
         ("yaw_rad = { from = 0, to = 1 }", "must be a value, a list of values, or { from = first, to ="),
+        ("yaw_rad = { from = 0, to = 1, count = 3, step = 1 }", "must be a value, a list of values, or {"),
+        ("yaw_rad = { from = 0, to = 1, count = 1001 }", "must have a count of 2 to 1000"),
         ("yaw_rad = { from = 0, to = nan, count = 3 }", "must be a value, a list of values, or { from ="),
         ("yaw_rad = { from = 0, to = 1, count = 1 }", "must have a count of 2 to 1000"),
         ('sensors = "all"', "sensors = \"all\" must be 'none', 'mambo' or 'mambo-derotated'"),
         ("yaw_rad = 1979-05-27", "must be a valid number"),
         ("bounds = 3", "bounds = 3 must be a section; write [flights.eight.bounds] and its keys below"),
         ("bounds.iae_m_s = -1", "bounds.iae_m_s = -1 must lie in 0..1000000000000"),
+        ("bounds.refused_updates = -1", "bounds.refused_updates = -1 must lie in 0..1000000000"),
+        ("bounds.refused_updates = 0.5", "bounds.refused_updates = 0.5 must be a valid integer"),
         ("bounds.crashed = 0", "bounds.crashed = 0 must be a valid boolean"),
         ("bounds.iae = 1", "bounds.iae is not a key of this file; did you mean iae_m_s?"),
     ],
@@ -171,6 +176,15 @@ def test_the_number_of_flights_is_limited(tmp_path: Path, count: int) -> None:
     group += "\nsize_m = [1, 2, 3, 4]"
     (fault,) = faults(tmp_path, group if count else "[flight]")
     assert fault.startswith(f"flights = {count} must be 1 to 2000; [flights.name] begins a group")
+
+
+def test_the_largest_number_of_flights_is_accepted(tmp_path: Path) -> None:
+    """The limit is inclusive, for the flights of all groups together."""
+    seeds = f"seed = {{ from = 1, to = {MOST_FLIGHTS // 2}, count = {MOST_FLIGHTS // 2} }}"
+    groups = f"[flights.one]\n{seeds}\n[flights.other]\n{seeds}"
+    assert len(suite(tmp_path, groups).flights) == MOST_FLIGHTS
+    (fault,) = faults(tmp_path, f"{groups}\n[flights.more]")
+    assert fault.startswith(f"flights = {MOST_FLIGHTS + 1} must be 1 to {MOST_FLIGHTS};")
 
 
 def test_a_million_million_flights_are_refused_without_making_them(tmp_path: Path) -> None:
