@@ -56,5 +56,5 @@ def _batches(suite: FlightSuite, workers: int) -> Iterator[list[int]]:
         alike.setdefault(shared, []).append(number)
     for numbers in alike.values():
         longest = int(_LONGEST_BATCH_S / suite.flights[numbers[0]].scenario.duration_s)
-        size = max(1, min(MOST_IN_A_BATCH, -(-len(numbers) // workers), longest))
+        size = min(MOST_IN_A_BATCH, -(-len(numbers) // workers), longest)
         yield from (numbers[first : first + size] for first in range(0, len(numbers), size))

@@ -20,7 +20,7 @@ from mambo_nmpc.sil.regress.baseline import (
 )
 from mambo_nmpc.sil.regress.file import FlightSuite, load_suite
 from mambo_nmpc.sil.regress.junit import junit_xml
-from mambo_nmpc.sil.regress.plots import draw_regress
+from mambo_nmpc.sil.regress.plots import _rows, _shares, draw_regress
 from mambo_nmpc.sil.regress.report import (
     MOST_SHOWN,
     RECORDS,
@@ -338,7 +338,7 @@ def test_a_key_that_has_its_default_changes_no_recorded_flight(tmp_path: Path) -
     path = record_baseline(suite(tmp_path), mambo(), [row(2.0)] * 3)
     recorded = json.loads(path.read_text("utf-8"))["flights"]["eight/yaw_rad=0.5"]
     assert recorded["scenario"] == sha256(b'{"yaw_rad":0.5}').hexdigest()[:16]
-    assert path.read_text("utf-8").endswith("}\n")
+    assert path.read_text("utf-8").endswith("}\n  }\n}\n")
 
 
 def test_a_damaged_baseline_may_be_replaced(tmp_path: Path) -> None:
@@ -346,7 +346,7 @@ def test_a_damaged_baseline_may_be_replaced(tmp_path: Path) -> None:
     found = suite(tmp_path)
     path = record_baseline(found, mambo(), [row(2.0)] * 3)
     path.write_text(path.read_text("utf-8") + ">>>>>>> theirs\n", "utf-8")
-    with pytest.raises(InvalidSettingsError, match="Invalid JSON"):
+    with pytest.raises(InvalidSettingsError, match="mambo-nmpc: file: Invalid JSON"):
         read_baseline(found, "mambo")
     demand_replaceable(path)
 
@@ -424,6 +424,19 @@ def test_a_picture_of_many_groups_has_the_rows_closest_to_their_limits(tmp_path:
     drawn = svg.read_text("utf-8")
     assert "group-199: iae_m_s" in drawn
     assert "group-139: iae_m_s" not in drawn
+
+
+def test_the_picture_shows_shares_of_limits_within_its_edges(tmp_path: Path) -> None:
+    """A lost flight, and any excess of a limit of 0, are at the right edge; a count of 0 has no row."""
+    found = suite(
+        tmp_path, more="[flights.calm]\nseed = [1, 2]\nbounds = { refused_updates = 0, ise_m2_s = 4 }"
+    )
+    rows = [row(1.5), row(1e-9), row(math.nan), row(1.0), row(1.0, ise_m2_s=1e9)]
+    shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows)).items()}
+    assert shares == {"eight: iae_m_s": [0.5, 0.01, 100.0], "calm: ise_m2_s": [0.25, 100.0]}
+    rows[3] = row(1.0, refused_updates=1, crashed=1)
+    shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows)).items()}
+    assert shares["calm: refused_updates"] == shares["calm: crashed"] == [100.0]
 
 
 def test_the_summary_is_read_back(tmp_path: Path) -> None:
