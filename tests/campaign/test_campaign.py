@@ -149,6 +149,12 @@ def test_names_are_drawn_and_said() -> None:
     assert parse("b", names).document() == parse("b", names).text() == "b"
 
 
+def test_whole_numbers_are_drawn_as_integers() -> None:
+    """A table shows 2, not 2.0."""
+    assert repr(Domain(0, 9, whole=True).value(2.0)) == "2"
+    assert repr(Domain(0, 9).value(2.0)) == "2.0"
+
+
 def test_seeds_of_flights_differ() -> None:
     """2000 flights have 2000 seeds, and so different noise."""
     assert len({draw(0, flight, PARAMETERS)["seed"] for flight in range(2000)}) == 2000

@@ -164,6 +164,15 @@ def test_the_heading_turns_from_the_start_of_the_clock() -> None:
     assert 0.3 + 0.5 * 2.0 < yaw_rad[-1] < 0.3 + 0.5 * 3.0
 
 
+def test_an_event_between_updates_happens_at_its_own_tick() -> None:
+    """A push at 0.5 s moves the drone 10 ms until the update at 0.51 s, one at 0.505 s half as long; once."""
+    push = Disturbances(push_n_s=(0.0063, 0.0, 0.0), push_time_s=np.array([0.5, 0.505]))
+    trace = fly(Flight(Hover(), 0.6, 2, disturbances=push), PdController())
+    np.testing.assert_allclose(trace.velocity_m_s[50, :, 0], [0.1, 0.0], atol=1e-12)
+    np.testing.assert_allclose(trace.velocity_m_s[51, :, 0], 0.1, atol=2e-4)
+    np.testing.assert_allclose(trace.position_m[51, :, 0], [1e-3, 0.5e-3], atol=1e-6)
+
+
 def test_without_seeds_every_flight_has_seed_0() -> None:
     """In gusts the flights are alike, and another seed's is not."""
     flight = Flight(Hover(), 0.2, 2, disturbances=Disturbances(wind_speed_m_s=5.0))
