@@ -11,10 +11,12 @@ from mambo_nmpc.sil.controllers.pd import PdController, PdOutcome
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.traces import SensedTrace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep, Trajectories
 from mambo_nmpc.sil.paper.table2 import CASES, PRINTED_PD
 from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.sensors.instruments import Sensors
 
 FloatArray = NDArray[np.float64]
 
@@ -203,10 +205,11 @@ def test_lost_flight_is_nan_and_does_not_affect_the_others() -> None:
 
 
 def test_a_lost_flight_has_the_same_nan_everywhere() -> None:
-    """The processor's own NaN, which may be negative, is in no array: digests would tell processors apart."""
+    """NaN of the processor, which may be negative, is in no array: digests would tell processors apart."""
     vehicle = Vehicle(wind_m_s2=(1e308, 0.0))
-    trace = fly(Flight(Hover(), duration_s=0.1, vehicle=vehicle), PdController())
-    for values in (trace.position_m, trace.velocity_m_s, trace.euler_rad, trace.thrust_acceleration_m_s2):
+    trace = fly(Flight(Hover(), duration_s=0.1, vehicle=vehicle, sensors=Sensors()), PdController())
+    assert isinstance(trace, SensedTrace)
+    for values in (trace.position_m, trace.thrust_acceleration_m_s2, trace.seen_velocity_m_s):
         lost = values[np.isnan(values)]
         assert len(lost) > 0
         assert lost.tobytes() == np.full(len(lost), np.nan).tobytes()
