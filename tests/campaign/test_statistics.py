@@ -94,6 +94,16 @@ def test_the_interval_of_the_median_of_two_values_follows_from_the_binomial_dist
     assert judged > n / 2
 
 
+def test_an_index_of_0_is_infinitely_better() -> None:
+    """A ratio to it is no error and no warning."""
+    table = {"a_iae_m_s": np.ones(3), "b_iae_m_s": np.zeros(3)} | {
+        f"{name}_crashed": np.zeros(3) for name in "ab"
+    }
+    found = improvement(table, "a", "b", "iae_m_s")
+    assert found is not None
+    assert (found.median, found.better.count) == (math.inf, 3)
+
+
 def test_a_single_ratio_has_no_interval() -> None:
     """One flight says nothing of the spread; two flights have one."""
     assert all(map(math.isnan, compared([2.0])))

@@ -1,10 +1,13 @@
 """Scenarios and records: files, flights in a batch, replay."""
 
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -15,6 +18,8 @@ from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
 from mambo_nmpc.sil.flight.traces import SEEN_COLUMNS
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.plant.airframe import MAMBO as MAMBO_AIRFRAME
+from mambo_nmpc.sil.plant.vehicle import Vehicle
 from tests.support.command import command
 
 MAMBO = presets.load("mambo")
@@ -95,6 +100,113 @@ def test_file_that_holds_no_record_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(ScenarioError, match=message):
             read_record(tmp_path / name)
+
+
+LIMITS: dict[str, tuple[float, float]] = {
+    "seed": (0, 2**63 - 1),
+    "size_m": (-1000.0, 1000.0),
+    "rate_rad_s": (-100.0, 100.0),
+    "yaw_rad": (-1000.0, 1000.0),
+    "duration_s": (5e-324, 3600.0),
+    "mass_kg": (5e-324, math.inf),
+    "thrust_factor_n_s2": (5e-324, math.inf),
+    "torque_factor_n_m_s2": (5e-324, math.inf),
+    "motor_lag_s": (0.0, 1.0),
+    "drag_1_s": (0.0, math.inf),
+    "wind_speed_m_s": (0.0, 50.0),
+    "battery_sag_1_s": (0.0, 1.0),
+    "command_delay_ticks": (0, 200),
+    "dropped_share": (0.0, 1.0),
+    "noise_scale": (0.0, 1000.0),
+}
+"""Least and largest value of each key that has limits; infinity itself is refused."""
+
+
+@pytest.mark.parametrize("key", LIMITS)
+def test_a_key_has_its_limits(key: str) -> None:
+    """The limits themselves are accepted, the numbers next to them are not."""
+    least, most = LIMITS[key]
+    whole = isinstance(least, int)
+    below, above = (
+        (least - 1, most + 1) if whole else (np.nextafter(least, -np.inf), np.nextafter(most, np.inf))
+    )
+    for value in (least, min(most, 1e308)):
+        assert getattr(Scenario(**{key: value}), key) == value
+    for value in (below, above):
+        with pytest.raises(ValidationError, match=key):
+            Scenario(**{key: value})
+
+
+@pytest.mark.parametrize(
+    ("accepted", "refused", "rule"),
+    [
+        ({"inertia_kg_m2": (1e-9, 1.0, 1.0)}, {"inertia_kg_m2": (1.0, 0.0, 1.0)}, "three positive numbers"),
+        ({"mass_kg": 2.0, "payload_kg": -1.9}, {"mass_kg": 2.0, "payload_kg": -2.0}, "leave a positive mass"),
+    ],
+)
+def test_inertia_and_mass_are_positive(accepted: dict[str, Any], refused: dict[str, Any], rule: str) -> None:
+    """A payload may be lost instead of added, but not all the mass."""
+    Scenario(**accepted)
+    with pytest.raises(ValidationError, match=rule):
+        Scenario(**refused)
+
+
+def test_every_key_reaches_its_field_of_the_simulation() -> None:
+    """Column by column, flight by flight."""
+    scenarios = (HARD, CALM)
+    flight = flight_of(scenarios, 0.02)
+
+    def columns(key: str) -> list[Any]:
+        return np.array([getattr(one, key) for one in scenarios]).T.tolist()
+
+    offset, sensors = flight.offset, flight.sensors
+    assert offset is not None
+    assert sensors is not None
+    for key, found in (
+        ("start_offset_m", offset.position_m),
+        ("start_velocity_m_s", offset.velocity_m_s),
+        ("start_tilt_rad", offset.tilt_rad),
+        ("yaw_rad", flight.yaw_rad),
+        ("yaw_rate_rad_s", flight.yaw_rate_rad_s),
+        ("command_delay_ticks", flight.link.delay_ticks),
+        ("dropped_share", flight.link.dropped_share),
+        ("mass_kg", flight.vehicle.airframe.mass_kg),
+        ("inertia_kg_m2", flight.vehicle.airframe.inertia_kg_m2),
+        ("wind_m_s2", flight.vehicle.wind_m_s2),
+        ("push_n_s", flight.disturbances.push_n_s),
+        ("push_time_s", flight.disturbances.push_time_s),
+        ("noise_scale", sensors.noise_scale),
+        ("gyro_bias_rad_s", sensors.gyro_bias_rad_s),
+    ):
+        assert np.array(found).tolist() == columns(key), key
+    assert (flight.duration_s, flight.start, flight.update_period_s) == (2.0, "hover", 0.02)
+    assert flight.seeds == (HARD.seed, CALM.seed)
+    assert sensors.derotated
+    for name in ("none", "mambo"):
+        other = flight_of([CALM.model_copy(update={"sensors": name})], 0.01).sensors
+        assert (other is None) if name == "none" else (other is not None and not other.derotated)
+
+
+NOTHING = (0, (0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_by_default_nothing_disturbs_a_flight() -> None:
+    """All keys are 0 but those of the curve, the drone, and the scale of noise that is off."""
+    defaults = Scenario().model_dump()
+    assert {key: value for key, value in defaults.items() if value not in NOTHING} == {
+        "trajectory": "bernoulli",
+        "size_m": 2.0,
+        "rate_rad_s": 0.5,
+        "duration_s": 100.0,
+        "start": "hover",
+        "mass_kg": MAMBO_AIRFRAME.mass_kg,
+        "inertia_kg_m2": MAMBO_AIRFRAME.inertia_kg_m2,
+        "thrust_factor_n_s2": MAMBO_AIRFRAME.thrust_factor_n_s2,
+        "torque_factor_n_m_s2": MAMBO_AIRFRAME.torque_factor_n_m_s2,
+        "drag_1_s": Vehicle.drag_1_s,
+        "sensors": "none",
+        "noise_scale": 1.0,
+    }
 
 
 def test_default_scenario_is_the_table_2_case() -> None:
