@@ -93,6 +93,11 @@ def test_file_that_holds_no_record_is_refused(tmp_path: Path) -> None:
     """A file that is missing, not JSON or larger than 1 MB raises `ScenarioError`."""
     (tmp_path / "text").write_text("hello")
     (tmp_path / "large").write_bytes(b" " * 1_000_001)
+    record = Record(scenario=HARD, settings=MAMBO)
+    write_record(record, tmp_path / "full")
+    content = (tmp_path / "full").read_bytes()
+    (tmp_path / "full").write_bytes(content + b" " * (1_000_000 - len(content)))
+    assert read_record(tmp_path / "full") == record
     for name, message in (
         ("none", "cannot be read"),
         ("text", "Invalid JSON"),
@@ -156,7 +161,7 @@ def test_every_key_reaches_its_field_of_the_simulation() -> None:
     scenarios = (HARD, CALM)
     flight = flight_of(scenarios, 0.02)
 
-    def columns(key: str) -> list[Any]:
+    def columns(key: str) -> object:
         return np.array([getattr(one, key) for one in scenarios]).T.tolist()
 
     offset, sensors = flight.offset, flight.sensors

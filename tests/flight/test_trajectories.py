@@ -27,7 +27,10 @@ CURVES: list[Trajectory] = [
     Waypoints(((0.0, 0.0, 0.0), (2.0, 1.0, -1.0), (5.0, 1.0, 3.0), (9.0, -2.0, 0.5))),
 ]
 
-ALL: list[Trajectory] = [*CURVES, Hover(), PositionStep(1.0, -0.5)]
+AWAY = Waypoints(((-10.0, 1.0, -0.5), (30.0, 2.0, -2.0)))
+"""It begins before t = 0, and is away from both axes."""
+
+ALL: list[Trajectory] = [*CURVES, Hover(), PositionStep(1.0, -0.5), AWAY]
 
 TIMES_S = np.arange(0.005, 20.0, 0.0101)
 
