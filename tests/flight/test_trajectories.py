@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.sil.errors import TrajectoryError
+from mambo_nmpc.sil.flight.trajectories import CURVES as CURVES_BY_NAME
 from mambo_nmpc.sil.flight.trajectories import (
     Bernoulli,
     Circle,
@@ -98,6 +99,18 @@ def test_step_jumps_at_one_second() -> None:
     targets = PositionStep(1.0, -0.5).target(np.array([0.0, 0.99, 1.0, 50.0]))
     np.testing.assert_array_equal(targets[:2], 0.0)
     np.testing.assert_array_equal(targets[2:], [[1.0, -0.5, 0.0, 0.0]] * 2)
+
+
+def test_curves_have_names_sizes_and_rates() -> None:
+    """Hovering has neither size nor rate; a step goes along x, whatever the rate."""
+    assert {name: curve(2.0, 0.5) for name, curve in CURVES_BY_NAME.items()} == {
+        "bernoulli": Bernoulli(2.0, 0.5),
+        "gerono": Gerono(2.0, 0.5),
+        "lissajous": Lissajous(2.0, 0.5),
+        "circle": Circle(2.0, 0.5),
+        "hover": Hover(),
+        "step": PositionStep(2.0, 0.0),
+    }
 
 
 def test_hover_stays_at_the_origin() -> None:
