@@ -110,6 +110,7 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
     assert found.flights[0].bounds == {"crashed": 0.0} | dict.fromkeys(INDICES, 0.5)
     assert dict(suite(tmp_path, "[flights.eight]").tolerances) == {"iae_m_s": 0.05}
     assert suite(tmp_path, "[baseline]\nsame_bits = true\n[flights.eight]").same_bits
+    assert not suite(tmp_path, "[baseline]\n[flights.eight]").same_bits
 
 
 @pytest.mark.parametrize(
@@ -128,6 +129,8 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
         ("wind_m_s2 = [[1, inf], [1, 2]]", "or a list of such vectors; [1, Infinity] is not"),
         ("yaw_rad = { from = 0, to = 1 }", "must be a value, a list of values, or { from = first, to ="),
         ("yaw_rad = { from = 0, to = 1, count = 3, step = 1 }", "must be a value, a list of values, or {"),
+        ("yaw_rad = { from = 0, to = 1, count = 3.0 }", "must be a value, a list of values, or { from ="),
+        ('yaw_rad = { from = "a", to = 1, count = 3 }', "must be a value, a list of values, or { from ="),
         ("yaw_rad = { from = 0, to = 1, count = 1001 }", "must have a count of 2 to 1000"),
         ("yaw_rad = { from = 0, to = nan, count = 3 }", "must be a value, a list of values, or { from ="),
         ("yaw_rad = { from = 0, to = 1, count = 1 }", "must have a count of 2 to 1000"),
@@ -206,6 +209,8 @@ def test_what_is_no_suite_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SourceNotFoundError, match=r"nor a file \(did you mean envelope\?\)"):
         load_suite("envelop")
+    with pytest.raises(SourceNotFoundError, match="nor a file; shipped suites are envelope"):
+        load_suite("zzz")
     Path("envelope").write_text("no", "utf-8")
     with pytest.raises(UnreadableFileError, match="envelope: line 1"):
         load_suite("./envelope")
