@@ -9,6 +9,26 @@ _LONGER: Final = "an array one element longer than it must be"
 _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no flight shows"
 
 REASONS: Final[Mapping[Key, str]] = {
+    **{
+        ("elementary.h", "#define COUNT(array) ((int)(sizeof(array) / sizeof((array)[0])))", change): (
+            "every element has the same size"
+        )
+        for change in ("0 -> (-1)", "0 -> 1")
+    },
+    ("elementary.h", "#define ROUNDING <real> /* <real> * 2^52 */", "negative"): "it rounds alike",
+    **{
+        (
+            "elementary.h",
+            f"static const double turn_{name}[4] = {{ <real>, <real>, <real>, <real> }};",
+            "4 -> 5",
+        ): _LONGER
+        for name in ("sines", "cosines")
+    },
+    **{
+        ("elementary.h", "turns = <real>;", change): "the angle is NaN there, and so is every result"
+        for change in ("left out", "zero -> one")
+    },
+    ("elementary.h", "const int steep = size > <real>;", "next number"): "one number, with the same result",
     ("pd.c", "(void)thrust_acceleration_m_s2;", "left out"): "only silences a warning",
     ("rigid_body.h", "to_world(r, state + VELOCITY, rate + POSITION);", "+ -> - #1"): "POSITION is 0",
     **{
