@@ -98,10 +98,12 @@ class Improvement:
 
 def proportion(count: int, flights: int) -> Proportion:
     """Return the share `count` / `flights` with its Clopper-Pearson interval."""
-    from scipy.stats import binomtest  # noqa: PLC0415 - takes a second
+    from scipy.special import betaincinv  # noqa: PLC0415 - takes a quarter of a second
 
-    interval = binomtest(count, flights).proportion_ci(CONFIDENCE, method="exact")
-    return Proportion(count, flights, count / flights, float(interval.low), float(interval.high))
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low = betaincinv(count, flights - count + 1, tail) if count else 0.0
+    high = betaincinv(count + 1, flights - count, 1.0 - tail) if count < flights else 1.0
+    return Proportion(count, flights, count / flights, float(low), float(high))
 
 
 def index_values(table: Table, name: str, index: str) -> FloatArray:

@@ -80,9 +80,11 @@ def extremes(settings: Settings, n: int) -> list[Tape]:
 def test_nothing_overflows_at_the_ends_of_all_ranges(name: str, tmp_path: Path) -> None:
     """Nothing undefined, no step refused, and the bits of the reference, which computes in 64 bits."""
     settings = SETTINGS[name]
+    require("gcc", "gcc")
     tapes = extremes(settings, 200)
-    assert all(np.all(outcome["status"] == Status.OK) for outcome in answers(settings, tapes))
-    assert played_fault(subject(settings, tmp_path), *WATCH, tapes=tapes) is None
+    expected = answers(settings, tapes)
+    assert all(np.all(outcome["status"] == Status.OK) for outcome in expected)
+    assert played_fault(subject(settings, tmp_path), *WATCH, played=(tapes, expected)) is None
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -182,10 +184,10 @@ def test_numbers_mean_what_was_given() -> None:
 
 def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) -> None:
     """nmpc_float.h and the macros of nmpc_config.h: statuses, commands and costs of the nearest numbers."""
+    gcc = require("gcc", "gcc")
     bundle = subject(MAMBO, tmp_path).bundle
     sources = [*(bundle / "src").glob("*.c"), CONVERSIONS]
     flags = [*COMPILE_FLAGS, "-Wall", "-Wextra", "-Werror", f"-I{bundle / 'include'}"]
-    gcc = require("gcc", "gcc")
     subprocess.run([gcc, *flags, *sources, "-o", "convert"], cwd=tmp_path, check=True)
     rng = np.random.default_rng(0)
     rows = rng.normal(0, 1, (500, 12)).astype(np.float32)

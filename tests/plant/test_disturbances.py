@@ -158,8 +158,8 @@ def test_drag_is_proportional_to_the_velocity_relative_to_the_air() -> None:
 
 def test_battery_sag_leaves_an_altitude_error() -> None:
     """The altitude loop has no integral action: Kp times the altitude error makes up for the lost thrust."""
-    trace = hover(20.0, disturbances=Disturbances(battery_sag_1_s=0.002))
-    share = 1.0 - 0.002 * 20.0
+    trace = hover(10.0, disturbances=Disturbances(battery_sag_1_s=0.004))
+    share = 1.0 - 0.004 * 10.0
     assert trace.position_m[-1, 0, 2] + 1.1 == pytest.approx(
         loops.WEIGHT_N * (1.0 / share - 1.0) / loops.ALTITUDE_P_N_M, rel=0.05
     )
@@ -167,8 +167,8 @@ def test_battery_sag_leaves_an_altitude_error() -> None:
 
 def test_payload_is_added_at_its_time() -> None:
     """Before it nothing changes; after it Kp times the altitude error carries the payload's weight."""
-    trace = hover(8.0, 2, disturbances=Disturbances(payload_kg=np.array([0.0, 0.005]), payload_time_s=2.0))
-    np.testing.assert_allclose(trace.position_m[:201, 1, 2], -1.1, atol=1e-9)
+    trace = hover(4.0, 2, disturbances=Disturbances(payload_kg=np.array([0.0, 0.005]), payload_time_s=0.5))
+    np.testing.assert_allclose(trace.position_m[:51, 1, 2], -1.1, atol=1e-9)
     assert trace.position_m[-1, 1, 2] + 1.1 == pytest.approx(0.005 * 9.81 / 0.8, rel=0.02)
     np.testing.assert_allclose(trace.position_m[:, 0, 2], -1.1, atol=1e-9)
 

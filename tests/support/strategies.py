@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from hypothesis import strategies as st
@@ -22,6 +23,7 @@ NUMBERS = [key for key in KEYS.values() if key.low is not None]
 CHOICES = [key for key in KEYS.values() if key.kind == "one of"]
 
 
+@cache
 def numbers(path: str, low: float | None = None, high: float | None = None) -> st.SearchStrategy[float]:
     """Draw a number that the key at `path` admits, within narrower bounds if given; often a bound."""
     least, most = _bounds(KEYS[path])
@@ -71,6 +73,7 @@ def valid_values(draw: st.DrawFn) -> Values:
     return {path: drawn[path] for path in KEYS}
 
 
+@cache
 def prefixes() -> st.SearchStrategy[str]:
     """Draw a prefix, of up to three words and 24 letters."""
     word = st.text("abcdefghijklmnopqrstuvwxyz0123456789", min_size=1, max_size=7)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify import replay
-from mambo_nmpc.sil.verify.calls import Tape, answers
+from mambo_nmpc.sil.verify.calls import Outcomes, Tape
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Subject
 from tests.support.bundles import place
@@ -42,9 +42,11 @@ def subject(
     return Subject(settings, place(files, folder / "controller"), folder / "evidence")
 
 
-def played_fault(its: Subject, *flags: str, tapes: Sequence[Tape] | None = None) -> str | None:
-    """Build the C with gcc, play `tapes` or all cases, and return what differs from the reference."""
-    played, expected = (tapes, answers(its.settings, tapes)) if tapes else cases(its.settings)
-    replay.write_tapes(its.settings, played, its.folder / "tapes.bin")
+def played_fault(
+    its: Subject, *flags: str, played: tuple[Sequence[Tape], Sequence[Outcomes]] | None = None
+) -> str | None:
+    """Build the C with gcc, play tapes, by default all cases, and return what differs from the reference."""
     program = replay.build(its, require("gcc", "gcc"), flags, its.folder)
-    return replay.fault(replay.play(program, its.folder / "tapes.bin", its.settings, played), expected)
+    tapes, expected = played or cases(its.settings)
+    replay.write_tapes(its.settings, tapes, its.folder / "tapes.bin")
+    return replay.fault(replay.play(program, its.folder / "tapes.bin", its.settings, tapes), expected)
