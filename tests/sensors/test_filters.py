@@ -63,9 +63,10 @@ def test_attitude_approaches_the_tilt_that_gravity_shows() -> None:
     assert attitude.euler_rad[2, 0] == 0.4
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("delay", range(8))
-def test_attitude_trusts_the_low_passed_force(delay: int) -> None:
-    """A spike counts with the weight of its tap: up to 0.2 % of g after it the tilt is trusted."""
+def test_attitude_trusts_the_low_passed_force(delay: int, sign: float) -> None:
+    """A spike counts with the weight of its tap: up to 0.2 % of g after it, up or down, it is trusted."""
     tap = [*ACCELEROMETER_TAPS, 0.0, 0.0][delay]
     rest = np.concatenate([GRAVITY, NO_RATES])
     for weighted, trusted in ((0.99 * 0.002, True), (1.01 * 0.002, tap == 0.0)):
@@ -73,7 +74,7 @@ def test_attitude_trusts_the_low_passed_force(delay: int) -> None:
         attitude.update(rest)
         for tick in range(delay + 1):
             before = attitude.euler_rad[0, 0]
-            spike = 1.0 + weighted / (tap or 1.0) if tick == 0 else 1.0
+            spike = 1.0 + sign * weighted / (tap or 1.0) if tick == 0 else 1.0
             attitude.update(np.concatenate([spike * GRAVITY, NO_RATES]))
         assert (attitude.euler_rad[0, 0] != before) == trusted
 

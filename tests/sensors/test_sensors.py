@@ -1,4 +1,4 @@
-"""Sensors and estimators: readings of each instrument, gates of each filter, errors of the estimates."""
+"""Sensors and estimators: readings of each instrument, design of each filter, errors of the estimates."""
 
 from dataclasses import replace
 
@@ -15,8 +15,8 @@ from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
 from mambo_nmpc.sil.sensors import estimators
-from mambo_nmpc.sil.sensors.estimators import Altitude, Attitude, Suite, Velocity
-from mambo_nmpc.sil.sensors.instruments import Instruments, Readings, Sensors
+from mambo_nmpc.sil.sensors.estimators import Suite
+from mambo_nmpc.sil.sensors.instruments import Instruments, Sensors
 
 QUIET = Sensors(noise_scale=0.0)
 VARIANCES = (0.3, 0.3, 0.5, 0.002, 0.002, 0.002, 0.001, 50.0)
@@ -29,13 +29,6 @@ def hovering(n: int = 1, z_m: float = -1.1) -> Seen:
     position_m = rest.copy()
     position_m[2] = z_m
     return Seen(position_m, rest.copy(), rest.copy(), rest.copy())
-
-
-def readings_at(z_m: float = -1.1, flow_m_s: float = 0.0, rate_rad_s: float = 0.0) -> Readings:
-    """Return noise-free readings of one level drone."""
-    imu = np.zeros((6, 1))
-    imu[2], imu[3] = -GRAVITY_M_S2, rate_rad_s
-    return Readings(imu, np.array([-z_m]), np.array([12.01725 * z_m]), np.full((2, 1), flow_m_s))
 
 
 def fly_eight(sensors: Sensors, duration_s: float = 6.0, start: Start = "hover") -> Trace:
@@ -199,73 +192,6 @@ def test_low_pass_filters_have_their_designs() -> None:
     for at in range(3, len(given)):
         expected.append(b @ given[at - 3 : at + 1][::-1] - a[1:] @ expected[at - 3 :][::-1])
     np.testing.assert_allclose(found, expected[3:], atol=1e-6)
-
-
-@pytest.mark.parametrize(("excess", "corrects"), [(0.0015, True), (-0.0015, True), (0.0025, False)])
-def test_accelerometer_corrects_the_tilt_only_near_g(excess: float, corrects: bool) -> None:
-    """Within 0.2 % of g a tilt error decays by a thousandth per tick; outside it stays."""
-    attitude = Attitude(np.array([[0.1], [0.1], [0.0]]))
-    imu = np.zeros((6, 1))
-    imu[2] = -(1.0 + excess) * GRAVITY_M_S2
-    for _ in range(100):
-        attitude.update(imu)
-    kept = 0.999**100 if corrects else 1.0
-    np.testing.assert_allclose(attitude.euler_rad[:2, 0], 0.1 * kept, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("sonar_m", "pressure_m", "accepted"),
-    [(1.35, 1.1, True), (1.45, 1.1, False), (0.44, 1.1, False), (1.35, 3.0, True)],
-)
-def test_sonar_is_accepted_near_the_estimate_and_within_its_range(
-    sonar_m: float,
-    pressure_m: float,
-    accepted: bool,
-) -> None:
-    """A reading off by more than 0.3 m or at the least height is rejected; a pressure jump alone is not."""
-    altitude = Altitude(np.array([-1.1]), np.zeros(1))
-    readings = replace(
-        readings_at(), sonar_m=np.array([sonar_m]), pressure_pa=np.array([-12.01725 * pressure_m])
-    )
-    altitude.update(readings, np.zeros(1))
-    assert (altitude.z_m[0] != -1.1) == accepted
-
-
-def test_sonar_is_rejected_when_low_passed_sonar_and_pressure_contradict_the_estimate() -> None:
-    """Both low-passed heights are 0.9 m off, so a sonar reading near the estimate is an outlier."""
-    altitude = Altitude(np.array([-2.0]), np.zeros(1))
-    altitude.z_m = np.array([-1.1])
-    altitude._predicted = altitude.z_m, np.zeros(1)
-    altitude.update(readings_at(z_m=-1.0), np.zeros(1))
-    assert altitude.z_m[0] == -1.1
-
-
-@pytest.mark.parametrize(
-    ("flow_m_s", "tilt_rad", "rate_rad_s", "z_m", "accepted"),
-    [
-        (0.5, 0.0, 0.0, -1.1, True),
-        (0.5, 0.61, 0.6, -1.1, False),
-        (0.5, 0.61, 0.4, -1.1, True),
-        (0.5, 0.0, 6.9, -1.1, True),
-        (0.5, 0.0, 7.1, -1.1, False),
-        (5.1, 0.0, 0.0, -1.1, False),
-        (0.5, 0.0, 0.0, -0.39, False),
-    ],
-)
-def test_optical_flow_is_gated(
-    flow_m_s: float,
-    tilt_rad: float,
-    rate_rad_s: float,
-    z_m: float,
-    accepted: bool,
-) -> None:
-    """Gates: tilt 0.6 rad and rate 7 rad/s, or rate 0.5 rad/s; jump 5 m/s; height 0.4 m."""
-    velocity = Velocity(np.zeros((2, 1)), derotated=False)
-    tilt = np.array([[tilt_rad], [0.0]])
-    readings = readings_at(flow_m_s=flow_m_s, rate_rad_s=rate_rad_s)
-    velocity.update(readings, tilt, np.array([z_m]), np.zeros((2, 1)))
-    expected = estimators.velocity_gain() * flow_m_s if accepted else 0.0
-    np.testing.assert_allclose(velocity.velocity_m_s, expected)
 
 
 def test_yaw_drifts_as_a_random_walk_and_position_with_it() -> None:
