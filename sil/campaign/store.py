@@ -18,7 +18,8 @@ from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import ForeignFilesError, UnwritableError, echo
 from mambo_nmpc.sil.campaign.parameters import Draw
 from mambo_nmpc.sil.campaign.table import FLIGHT, Value, header, line, read_lines
-from mambo_nmpc.sil.files.folders import GENERATOR, lock
+from mambo_nmpc.sil.errors import WorkerError
+from mambo_nmpc.sil.files.folders import GENERATOR, create_folder, lock
 
 TABLE: Final = "flights.csv"
 
@@ -88,15 +89,24 @@ def open_store(
     """Open and lock `folder` for a run of `campaign`, which draws flight n as `draw(n)`.
 
     Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
-    locked it, UnwritableError if the file system refuses an access.
+    locked it, UnwritableError if the file system refuses an access. A folder that is new, in which no flight
+    finishes because the workers fail, is removed.
     """
-    with convert_os_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
     key = hashlib.sha256(json.dumps(campaign, sort_keys=True).encode()).hexdigest()
-    with lock(folder):
+    with contextlib.ExitStack() as stack:
+        with convert_os_errors(folder):
+            stack.enter_context(create_folder(folder))
+        stack.enter_context(lock(folder))
+        new = not any(folder.iterdir())
         claim(folder, "campaign", {"command": "campaign", **campaign})
-        with contextlib.closing(FlightStore(folder, columns, key, draw)) as store:
+        store = stack.enter_context(contextlib.closing(FlightStore(folder, columns, key, draw)))
+        try:
             yield store
+        except WorkerError:
+            if new and not store.lines:
+                for path in folder.iterdir():
+                    path.unlink()
+            raise
 
 
 @contextlib.contextmanager
