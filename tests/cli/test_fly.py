@@ -151,8 +151,7 @@ def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
 
 def test_a_crash_is_a_failure_that_says_when_and_how(tmp_path: Path) -> None:
     """Motors too slow for the stock roll loop: exit 1, the time and the tilt, in the summary too."""
-    options = ["--controller", "reference", "--motor-lag-s", "0.2", "--duration-s", "2"]
-    said, _ = run("fly", *options, code=1)
+    said, _ = run("fly", "--motor-lag-s", "0.2", "--duration-s", "2", code=1)
     line = next(line for line in said.splitlines() if line.startswith("CRASHED"))
     crash = json.loads((tmp_path / "flight" / "summary.json").read_text())["crash"]
     assert line == f"CRASHED at {crash['time_s']:.2f} s: {crash['how']}"
@@ -176,7 +175,7 @@ def test_a_replayed_crash_is_a_failure(tmp_path: Path) -> None:
 
 def test_refusals_during_lift_off_are_explained() -> None:
     """They belong to every start from the ground, which does well."""
-    options = ["--controller", "reference", "--start", "take-off", "--duration-s", "0.1"]
+    options = ["--start", "take-off", "--duration-s", "0.1"]
     assert "77 steps during lift-off: thrust out of range" in run("fly", *options)[0]
 
 

@@ -1,6 +1,7 @@
 """The command `regress`, used as a person would."""
 
 import json
+import shutil
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -27,6 +28,18 @@ start_offset_m = [0.5, 0.0, 0.0]
 FILES = {"summary.json", "junit.xml", "regress.png", "regress.svg", "flights"}
 
 
+@pytest.fixture(scope="module", name="passed")
+def _passed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run the suite with --json, whose text is in stdout.json; return the folder of its results."""
+    folder = tmp_path_factory.mktemp("passed")
+    (folder / "mine.toml").write_text(SUITE, "utf-8")
+    done = command("regress", "mine.toml", "--json", "-o", "out", folder=folder)
+    assert done.returncode == 0, done.stderr
+    assert {path.name for path in folder.iterdir()} == {"mine.toml", "out"}
+    (folder / "stdout.json").write_text(done.stdout, "utf-8")
+    return folder
+
+
 @pytest.fixture(autouse=True)
 def _suite(_in_an_empty_folder: None) -> None:
     Path("mine.toml").write_text(SUITE, "utf-8")
@@ -37,17 +50,16 @@ def break_suite() -> None:
     Path("mine.toml").write_text(SUITE.replace("iae_m_s = 0.5", "iae_m_s = 1e-6"), "utf-8")
 
 
-def test_a_suite_passes_and_leaves_its_results() -> None:
+def test_a_suite_passes_and_leaves_its_results(passed: Path) -> None:
     """Summary, which --json prints, JUnit XML and pictures; no record, because no flight failed."""
-    said, _ = run("regress", "mine.toml", "--json", "-o", "out")
-    assert {path.name for path in Path("out").iterdir()} == FILES
-    assert not list(Path("out/flights").iterdir())
-    assert said == Path("out/summary.json").read_text("utf-8")
+    out, said = passed / "out", (passed / "stdout.json").read_text("utf-8")
+    assert {path.name for path in out.iterdir()} == FILES
+    assert not list((out / "flights").iterdir())
+    assert said == (out / "summary.json").read_text("utf-8")
     summary = json.loads(said, parse_constant=pytest.fail)
     assert [flight["checks"][0]["holds"] for flight in summary["flights"]] == [True] * 5
-    assert ElementTree.parse("out/junit.xml").getroot().get("tests") == "5"
-    assert Path("out/regress.png").read_bytes().startswith(b"\x89PNG")
-    assert not Path("mine.mambo.baseline.json").exists()
+    assert ElementTree.parse(out / "junit.xml").getroot().get("tests") == "5"
+    assert (out / "regress.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_broken_bound_fails_and_its_flight_replays_bit_for_bit() -> None:
@@ -127,12 +139,12 @@ main()
 """
 
 
-def test_a_stopped_run_leaves_nothing_half_written() -> None:
+def test_a_stopped_run_leaves_nothing_half_written(passed: Path) -> None:
     """Ctrl-C: neither folder nor baseline, and earlier results stay as they are."""
     done = command("regress", "mine.toml", "-o", "out", "--update", script=STOPPED)
     assert (done.returncode, done.stdout, done.stderr) == (INTERRUPTED, "", "")
     assert {path.name for path in Path().iterdir()} == {"mine.toml"}
-    run("regress", "mine.toml", "-o", "out")
+    shutil.copytree(passed / "out", "out")
     before = {path: path.read_bytes() for path in Path("out").iterdir() if path.is_file()}
     command("regress", "mine.toml", "-o", "out", "--update", script=STOPPED)
     assert {path: path.read_bytes() for path in Path("out").iterdir() if path.is_file()} == before

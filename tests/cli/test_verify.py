@@ -27,7 +27,7 @@ def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
     """Settings, C, reports, page and summary; stdout repeats the summary, and a hostile name is text."""
     require("cppcheck", "cppcheck")
     (tmp_path / HOSTILE).write_text('[code]\nprefix = "drone"\n')
-    said, _ = run("verify", HOSTILE, "--scalar", "fixed", "--only", "rules", "--json", "-o", "evidence")
+    said, _ = run("verify", HOSTILE, "--scalar", "float64", "--only", "rules", "--json", "-o", "evidence")
     evidence = tmp_path / "evidence"
     assert said == (evidence / "summary.json").read_text("utf-8")
     summary = json.loads(said, parse_constant=pytest.fail)
@@ -43,7 +43,7 @@ def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
         assert sha256((evidence / path).read_bytes()).hexdigest() == digest
     for path in ("controller/controller.toml", "controller/src/drone.c", "checks/rules/cppcheck.txt"):
         assert path in files
-    assert 'scalar = "fixed"' in (evidence / "controller" / "controller.toml").read_text("utf-8")
+    assert 'scalar = "float64"' in (evidence / "controller" / "controller.toml").read_text("utf-8")
 
     page = (evidence / "verify.html").read_text("utf-8")
     assert "<img" not in page

@@ -68,7 +68,7 @@ def test_an_unlisted_finding_fails(harm: str, tmp_path: Path) -> None:
     assert HARMS[harm].path in result.evidence
 
 
-@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+@pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
 def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Path) -> None:
     """By rule, file and scalar type of preset mambo, as cppcheck finds them."""
     text = (Path(__file__).parents[2] / "docs" / "c-api.md").read_text("utf-8")
