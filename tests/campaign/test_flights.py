@@ -12,8 +12,9 @@ from mambo_nmpc.sil.campaign.file import Entrant, FlightSection, scenario
 from mambo_nmpc.sil.campaign.flights import _evaluate, columns, fly_batch
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.crashes import detect_crashes
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace

@@ -19,6 +19,7 @@ from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.faults.flights import End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.injection import (
     Applied,
@@ -40,7 +41,7 @@ from mambo_nmpc.sil.faults.injection import (
 )
 from mambo_nmpc.sil.faults.report import table
 from mambo_nmpc.sil.faults.scenarios import FaultScenario, scenarios
-from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly
+from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
 from mambo_nmpc.sil.paper.table2 import CASES

@@ -7,7 +7,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import parse
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import fly
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 

@@ -14,10 +14,11 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.report import CampaignSummary, Drawn, WorstFlight
 from mambo_nmpc.sil.campaign.statistics import Distributions, Improvement, Proportion
 from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.faults.flights import End, FaultsSummary, Verdict
 from mambo_nmpc.sil.firmware.sizes import Added, Parts, SectionBytes
 from mambo_nmpc.sil.flight import report
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.names import PD
 from mambo_nmpc.sil.flight.report import FlySummary, ReplaySummary
 from mambo_nmpc.sil.flight.scenario import Scenario
