@@ -24,9 +24,7 @@ from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.errors import CacheError
 from mambo_nmpc.sil.files.cache import build_cached
 
-ffi: Final = cffi.FFI()
-ffi.cdef(
-    """
+DECLARATIONS: Final = """
     void nmpc_batch_init(void *controllers, int n);
     void nmpc_batch_step(void *controllers, int n, const void *state, const void *target, const void *thrust,
                          const void *outcome);
@@ -36,8 +34,11 @@ ffi.cdef(
     int64_t nmpc_host_step(void *controller, const double *state, const double *target,
                            double thrust_acceleration_m_s2, double *command_rad);
     unsigned long nmpc_self_test_episode(void *scratch, int episode, unsigned long digest);
-    """
-)
+"""
+"""The functions that Python calls in a library: those of the glue, and one step of the self-test."""
+
+ffi: Final = cffi.FFI()
+ffi.cdef(DECLARATIONS)
 
 _LINK_FLAGS: Final = ("-fPIC", "-shared", "-Iinclude", "-Isrc")
 _LOADED: Final[dict[str, Any]] = {}
@@ -51,6 +52,11 @@ def with_default_prefix(settings: Settings) -> Settings:
 def batch_source() -> str:
     """Return the C that loops over n controllers, to compile with a bundle."""
     return _text("batch.c")
+
+
+def glue() -> dict[str, str]:
+    """Return the C that is compiled with a bundle for this machine, by file name."""
+    return {name: _text(name) for name in ("batch.c", "host.c")}
 
 
 def build_library(settings: Settings, toolchain: Toolchain) -> Any:
@@ -72,19 +78,19 @@ def load_library(files: dict[str, str], toolchain: Toolchain) -> Any:
 
 
 def _load(key: object, generate: Any, toolchain: Toolchain) -> Any:
-    glue = {name: _text(name) for name in ("batch.c", "host.c")}
-    contents = (key, glue, COMPILE_FLAGS, _LINK_FLAGS, toolchain, toolchain.identity())
+    beside = glue()
+    contents = (key, beside, COMPILE_FLAGS, _LINK_FLAGS, toolchain, toolchain.identity())
     name = f"nmpc_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
     if name not in _LOADED:
 
         def build(folder: Path) -> Path:
-            files = generate() | glue
+            files = generate() | beside
             for path, text in files.items():
                 (folder / path).parent.mkdir(parents=True, exist_ok=True)
                 (folder / path).write_text(text, "utf-8")
             sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
             flags = [*COMPILE_FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
-            toolchain.run([*flags, *_LINK_FLAGS, *sources, *glue, "-o", "nmpc.so"], folder)
+            toolchain.run([*flags, *_LINK_FLAGS, *sources, *beside, "-o", "nmpc.so"], folder)
             if not (folder / "nmpc.so").is_file():
                 raise BuildError(f"{shlex.join(toolchain.command)} wrote no output; set CC to a C compiler")
             return folder / "nmpc.so"

@@ -12,6 +12,7 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.controllers.library import ffi
 from tests.support import command
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run
@@ -30,13 +31,13 @@ USUAL_WORK = 10_000
 def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> None:
     """Generate, compile without a word, run the self-test, and compare some hundred steps bit for bit."""
     with tempfile.TemporaryDirectory() as folder:
-        extension = built(drawn, Path(folder), compiler, amalgamate=amalgamate)
-    assert extension.lib.nmpc_self_test(extension.ffi.new("nmpc_t *")) == 0
+        library = built(drawn, Path(folder), compiler, amalgamate=amalgamate)
+    assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
     work = drawn.horizon.prediction * drawn.horizon.control * drawn.optimizer.iterations
     n = 100 if work <= USUAL_WORK else 25
     inputs = inputs_of_steps(drawn, n, STEPS, work)
     expected = run(ReferenceController(Design(drawn), n), inputs, work)
-    found = run(CompiledController(drawn, n, extension), inputs, work)
+    found = run(CompiledController(drawn, n, library), inputs, work)
     assert differences(expected, found) == {}
 
 
