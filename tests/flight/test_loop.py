@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mambo_nmpc.sil.controllers.pd import PdController, PdOutcome
+from mambo_nmpc.sil.engine import simulate
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.metrics import measure
@@ -42,7 +43,7 @@ class Lean:
 def test_pd_reproduces_its_row_of_table_2_at_half_a_radian_per_second() -> None:
     """The four indices are within 2 % of the printed ones; the printed rate gives less than half the IAE."""
     flight = Flight(Trajectories(tuple(CASES.values())), flights=len(CASES))
-    measured = measure(fly(flight, PdController()))
+    measured = measure(simulate.fly(flight, PdController()))
     np.testing.assert_allclose(measured.table2[:, 0], PRINTED_PD, rtol=0.02)
     np.testing.assert_allclose(measured.iae_m_s[1:], [21.7, 24.1], rtol=0.01)
     assert (measured.iae_m_s[1:] < PRINTED_PD[0] / 2.0).all()
@@ -186,7 +187,7 @@ def test_pd_reaches_a_step_and_is_off_target_in_wind() -> None:
     """It settles at a point 1.4 m away, and in a wind of 0.5 m/s^2 where Kp times the error balances it."""
     vehicle = Vehicle(wind_m_s2=(0.0, np.array([0.0, 0.5])))
     flight = Flight(Trajectories((PositionStep(1.0, -1.0), Hover())), 30.0, 2, vehicle=vehicle)
-    last = fly(flight, PdController()).position_m[-1]
+    last = simulate.fly(flight, PdController()).position_m[-1]
     np.testing.assert_allclose(last[0], [1.0, -1.0, -1.1], atol=0.02)
     np.testing.assert_allclose(last[1, 1], 0.5 / 9.81 / 0.24, rtol=0.05)
     assert abs(last[1, 0]) < 1e-6
