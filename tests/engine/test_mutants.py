@@ -15,6 +15,8 @@ from typing import Final
 import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine import library
 from mambo_nmpc.sil.engine.simulate import fly_compiled
@@ -29,7 +31,11 @@ STRIDE: Final = 8
 """The test tries one fault in so many; all of them take ten minutes."""
 LIMIT_S: Final = 2
 """Processor time of a mutant; the flights take a tenth of a second."""
-FLAGS: Final = ("-O0", "-w", "-fsanitize=bounds", "-fsanitize-undefined-trap-on-error")
+FLAGS: Final = (
+    *("-O0", "-w", "-ftrivial-auto-var-init=pattern"),
+    *("-fsanitize=bounds", "-fsanitize-undefined-trap-on-error"),
+)
+"""A variable without a value is not 0, and a read beside an array is a crash."""
 BATCHES: Final = (TRUTH, SENSED, COUPLED, TAKE_OFF)
 FILES: Final = sorted({*library.SOURCES, *library.HEADERS} - {"engine.h", "records.h"})
 
@@ -39,6 +45,10 @@ def digests(path: Path) -> list[str]:
     engine = library.ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
     traces = [fly_compiled(engine, flight, PdController()) for flight in flights]
+    settings = presets.load("mambo")
+    traces += [
+        fly_compiled(engine, flight, CompiledController(settings, flight.flights)) for flight in flights[:2]
+    ]
     found = [trace.digest(index) for trace in traces for index in range(trace.flights)]
     return [*found, hashlib.sha256(tabulate(path).tobytes()).hexdigest()]
 

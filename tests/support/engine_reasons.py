@@ -29,6 +29,35 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("left out", "zero -> one")
     },
     ("elementary.h", "const int steep = size > <real>;", "next number"): "one number, with the same result",
+    ("loop.c", "return (value == value) ? value : NAN;", "left out"): "the value is in the register anyway",
+    **{
+        (
+            "loop.c",
+            "lost = lost || !isfinite(state->body[i]) "
+            "|| ((i < VELOCITY) && !(fabs(state->body[i]) < simulation->lost_m));",
+            change,
+        ): "a position of exactly 10 km, or a speed of as many metres per second"
+        for change in ("< -> <=", "< -> <= #1")
+    },
+    (
+        "loop.c",
+        "const int dropped = simulation->dropping && (draws->drops[update] < flight->dropped_share);",
+        "< -> <=",
+    ): "a random number that equals the share",
+    **{
+        ("loop.c", "gusts_t gusts = { <real>, <real>, <real> };", change): "read only in wind, which sets it"
+        for change in ("zero -> one", "zero -> one #1", "zero -> one #2")
+    },
+    **{
+        ("loop.c", "wire_t wire = { { { <real>, <real> } } };", change): "the first command replaces it"
+        for change in ("zero -> one", "zero -> one #1")
+    },
+    **{
+        ("loop.c", "surroundings_t around = { flight->mass_kg, { <real>, <real> } };", change): (
+            "read only in wind, which sets it"
+        )
+        for change in ("zero -> one", "zero -> one #1")
+    },
     ("pd.c", "(void)thrust_acceleration_m_s2;", "left out"): "only silences a warning",
     ("rigid_body.h", "to_world(r, state + VELOCITY, rate + POSITION);", "+ -> - #1"): "POSITION is 0",
     **{
