@@ -80,11 +80,12 @@ class Problems:
 
 
 class CostModel:
-    """Eqs 8-11 for given settings; supports `position_update = "exact"` only."""
+    """Eqs 8-11 for given settings; supports `position_update = "exact"` and no target acceleration only."""
 
     def __init__(self, settings: Settings) -> None:
         horizon, model = settings.horizon, settings.model
         assert model.position_update == "exact"
+        assert settings.target.acceleration == "none"
         self._settings = settings
         self._yaw_sign = 1.0 if model.yaw_convention == "printed" else -1.0
         self._times_s = horizon.prediction_step_s * np.arange(1, horizon.prediction + 1)

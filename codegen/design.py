@@ -12,6 +12,7 @@ from mambo_nmpc.codegen.fixed_point import formats
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
 from mambo_nmpc.codegen.representation import InputLimits, Representation
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.tracker import TrackerConstants, tracker_constants
 from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
 
 
@@ -25,6 +26,11 @@ class Design:
     def tables(self) -> HorizonTables:
         """The constants of the prediction, in float64."""
         return horizon_tables(self.settings)
+
+    @cached_property
+    def tracker(self) -> TrackerConstants | None:
+        """The constants of the target tracker, in float64; None without `target.acceleration = "tracked"`."""
+        return tracker_constants(self.settings)
 
     @cached_property
     def numbers(self) -> Representation:

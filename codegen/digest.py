@@ -60,10 +60,13 @@ class InputScales:
     yaw_rad: float
     thrust_acceleration_m_s2: float
     hover_m_s2: float
+    target_change_m_s: float
+    """Of the change of the target's velocity from step to step; 0 without a tracker."""
 
 
-def input_scales(settings: Settings) -> InputScales:
-    """Return the factors that give inputs as in a flight, within the ranges of `settings`."""
+def input_scales(design: Design) -> InputScales:
+    """Return the factors that give inputs as in a flight, within the ranges of the settings."""
+    settings = design.settings
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
     near = 0.25, 0.025, 0.0025
@@ -71,6 +74,7 @@ def input_scales(settings: Settings) -> InputScales:
     hover_m_s2 = min(HOVER_M_S2, most_m_s2) if fixed else HOVER_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
     unit = 1 if fixed else _UNIT
+    tested_m_s = design.tracker.tested_change_m_s if design.tracker else 0.0
     return InputScales(
         target_position_m=position_m / unit,
         target_velocity_m_s=velocity_m_s / unit,
@@ -84,6 +88,7 @@ def input_scales(settings: Settings) -> InputScales:
         yaw_rad=100.0 / unit,
         thrust_acceleration_m_s2=thrust_m_s2 / unit,
         hover_m_s2=hover_m_s2,
+        target_change_m_s=min(tested_m_s, half_m_s / 4) / unit,
     )
 
 
@@ -107,11 +112,16 @@ def self_test_digest(design: Design, count: int) -> int:
 
 def episode_inputs(design: Design, episodes: Words) -> Iterator[StepInputs]:
     """Yield the inputs of each of TICKS steps; `episodes` (n,) are the indices of the episodes."""
-    generator, scales = _Generator(episodes), input_scales(design.settings)
+    numbers, generator, scales = design.numbers, _Generator(episodes), input_scales(design)
     for _ in range(TICKS // TICKS_PER_INPUT):
-        inputs = _next_inputs(design, scales, generator)
+        state, target, thrust, change = _next_inputs(design, scales, generator)
         for _ in range(TICKS_PER_INPUT):
-            yield inputs
+            yield (
+                numbers.to_si(state, *STATE),
+                numbers.to_si(target, *TARGET),
+                numbers.to_si(thrust, "thrust"),
+            )
+            target = target + change
 
 
 class _Generator:
@@ -136,8 +146,11 @@ class _Generator:
         return drawn
 
 
-def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> StepInputs:
-    """Draw states, targets and thrusts; five steps in 64 have an input out of range."""
+def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> tuple[Real, Real, Real, Real]:
+    """Draw states, targets, thrusts and changes of the targets (n, 4) from step to step, in numbers of the C.
+
+    Five in 64 have an input out of range. Without a tracker targets do not change.
+    """
     numbers, limits = design.numbers, design.limits
     choice = generator.next()
     size = choice & 3
@@ -156,19 +169,18 @@ def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> 
     state += [draw(scales.yaw_rad, "yaw")]
     thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_acceleration_m_s2, "thrust")
     thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+    change = [np.zeros_like(thrust)] * 4
+    if design.tracker:
+        change[2:] = [draw(scales.target_change_m_s, "velocity") for _ in range(2)]
 
     fault = (choice >> 8) & 63
     position, pitch, yaw, velocity = _out_of_range(numbers, limits)
     state[0] = np.where(fault == 0, position, state[0])
     state[5] = np.where(fault == 1, pitch, state[5])
     state[6] = np.where(fault == 2, yaw, state[6])
-    target[3] = np.where(fault == 3, velocity, target[3])
+    target[3], change[3] = np.where(fault == 3, velocity, target[3]), np.where(fault == 3, 0, change[3])
     thrust = np.where(fault == 4, numbers.computed(0), thrust)
-    return (
-        numbers.to_si(np.stack(state, axis=1), *STATE),
-        numbers.to_si(np.stack(target, axis=1), *TARGET),
-        numbers.to_si(thrust, "thrust"),
-    )
+    return np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1)
 
 
 def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, Any, Any, Any]:

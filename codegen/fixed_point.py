@@ -23,6 +23,7 @@ import numpy as np
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.sections import Sections
+from mambo_nmpc.codegen.tracker import TrackerConstants, tracker_constants
 
 WORD_BITS: Final = 31
 """Bits of a number without its sign."""
@@ -74,6 +75,7 @@ class Formats:
     distance_gradient:  gradient of the distance, m/rad.
     tracking, effort:   lambda_1 and lambda_2, 1/m and 1/rad.
     factor:             eta+ and eta-.
+    tracker:            tau^2 over the update period, s; 0 without a tracker.
     cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
     error_limit:        limit to which the initial error is clamped, an integer of the format of positions.
     tracking_limit, effort_limit: largest weights, integers of their formats.
@@ -95,6 +97,7 @@ class Formats:
     tracking: int
     effort: int
     factor: int
+    tracker: int
     cost: int
     gradient: int
     error_limit: int
@@ -134,7 +137,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     """Choose the formats of `settings`; `refusals` says whether they are fine enough."""
     ranges, optimizer, tilt = settings.ranges, settings.optimizer, settings.limits.tilt_rad
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
-    bounds = _bounds(settings, tables)
+    bounds, tracker = _bounds(settings, tables), tracker_constants(settings)
 
     factor = _fractional_bits(optimizer.increase)
     angle = _fractional_bits(
@@ -195,6 +198,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         tracking=tracking,
         effort=effort,
         factor=factor,
+        tracker=_fractional_bits(tracker.step_squared_per_update_s) if tracker else 0,
         cost=tracking + error,
         gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),
@@ -332,7 +336,8 @@ def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
     tilt_rad, steps = settings.limits.tilt_rad, settings.horizon.prediction
     measured_rad = ATTITUDE_LIMIT_RAD if tables.has_lag else 0.0
     gain = _largest_gain(settings, tables)
-    acceleration = shared = 2 * gain * measured_rad
+    target = _tracker_bound(tracker_constants(settings))
+    acceleration = shared = 2 * gain * measured_rad + target
     displacement = (
         2 * settings.ranges.velocity_m_s * settings.horizon.prediction_step_s
         + tables.displacement_share * acceleration
@@ -362,6 +367,16 @@ def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
         error_sum=error_sum,
         response=float(steps * np.abs(tables.response_sum).max()),
     )
+
+
+def _tracker_bound(tracker: TrackerConstants | None) -> float:
+    """Return a bound of the target's acceleration and of every sum in the tracker, m/step^2.
+
+    The largest is the difference of the measured acceleration and the predicted one.
+    """
+    if tracker is None:
+        return 0.0
+    return 2 * tracker.acceleration_limit_m_step2 + tracker.jerk_limit_m_step2_update
 
 
 def _fractional_bits(*sizes: float) -> int:

@@ -15,6 +15,8 @@ _FORMS: Final = {
     "gain_product": "{} * {}",
     "share_product": "{} * {}",
     "step_product": "{} * {}",
+    "change_product": "{} * {}",
+    "tracker_product": "{} * {}",
     "initial_error": "{}",
     "error_change": "{}",
     "distance_gradient": "({} * {}) + ({} * {})",

@@ -30,8 +30,8 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
-SUB_BLOCKS: Final = ("nmpc_math", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
-SOURCES: Final = (*(f"{block}.c" for block in SUB_BLOCKS), "nmpc.c", "nmpc_self_test.c")
+SUB_BLOCKS: Final = ("nmpc_math", "nmpc_tracker", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
+"""Sources with a header each; a bundle has nmpc_tracker only if its settings have a tracker."""
 PROJECT: Final = {
     "README.md": "README.md",
     "Makefile": "Makefile",
@@ -63,11 +63,12 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     design = Design(settings)
     environment = _environment()
     public: tuple[str, ...] = PUBLIC_HEADERS
-    code: tuple[str, ...] = SOURCES
+    blocks = tuple(block for block in SUB_BLOCKS if design.tracker or block != "nmpc_tracker")
+    code: tuple[str, ...] = (*(f"{block}.c" for block in blocks), "nmpc.c", "nmpc_self_test.c")
     if design.numbers.formats is not None:
         public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
     headers = {name: environment.get_template(f"include/{name}.j2") for name in public}
-    privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in SUB_BLOCKS}
+    privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in blocks}
     sources = {name: environment.get_template(f"src/{name}.j2") for name in code}
     others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
@@ -81,7 +82,7 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
         text = {name: infix(content) for name, content in text.items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
-        library = _join(text, public, code)
+        library = _join([text[name] for name in public], [text[name] for name in (*privates, *code)])
     else:
         layout = {
             "header_folder": "include/",
@@ -141,7 +142,7 @@ def _context(design: Design) -> dict[str, object]:
         "spelling": literals.Spelling(scalar, numbers.bits),
         "parameters": [
             (f"{section}.{key}", value)
-            for section, values in settings.model_dump().items()
+            for section, values in settings.in_use.items()
             for key, value in values.items()
             if key != "prefix"  # every public name shows it
         ],
@@ -157,10 +158,11 @@ def _context(design: Design) -> dict[str, object]:
         "shell": "nmpc_float_" if numbers.formats else "nmpc_",
         "sum_type": literals.SUM_TYPES[scalar],
         "scalar_bytes": _BYTES[scalar][0],
-        "instance_bytes": _instance_bytes(settings, has_lag=design.tables.has_lag),
+        "instance_bytes": _instance_bytes(design),
         "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
         "tables": design.tables,
+        "tracker": design.tracker,
         "trigonometry": design.trigonometry,
         "sine_error": SINE_ERRORS[scalar],
         "tracking_limit": numbers.tracking_limit,
@@ -172,7 +174,7 @@ def _context(design: Design) -> dict[str, object]:
         "ticks": TICKS,
         "held": TICKS_PER_INPUT,
         "self_test_steps": TICKS * episode_count(settings),
-        "spread": input_scales(settings),
+        "spread": input_scales(design),
         "boards": [
             {
                 "name": board.name,
@@ -218,21 +220,20 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     }
 
 
-def _instance_bytes(settings: Settings, *, has_lag: bool) -> int:
+def _instance_bytes(design: Design) -> int:
     """Return the size of nmpc_t: its numbers, sums and single bytes, with padding."""
+    settings = design.settings
     moves = 2 * settings.horizon.control
-    weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if has_lag else 3), 2
-    flags = 2
-    numbers, sums = weights + gains + tilt + rollouts + command + moves, moves + 1
+    weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if design.tables.has_lag else 3), 2
+    tracker, flags = (6, 3) if design.tracker else (0, 2)
+    numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
     number_bytes, sum_bytes = _BYTES[settings.code.scalar]
     before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
     return -(-(before_flags + flags) // sum_bytes) * sum_bytes
 
 
-def _join(text: dict[str, str], public: Sequence[str], code: Sequence[str]) -> dict[str, str]:
-    """Join the library into one header and one source, in order, without its own includes."""
-    header = [text[name] for name in public]
-    source = [text[f"{block}.h"] for block in SUB_BLOCKS] + [text[name] for name in code]
+def _join(header: Sequence[str], source: Sequence[str]) -> dict[str, str]:
+    """Join the texts of the library into one header and one source, in order, without its own includes."""
     return {
         "nmpc.h": _OWN_INCLUDE.sub("", "\n".join(header)),
         "nmpc.c": '#include "nmpc.h"\n\n' + _OWN_INCLUDE.sub("", "\n".join(source)),

@@ -33,7 +33,8 @@ def self_test(design: Design) -> list[SelfTestStep]:
 
     The first input has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails. Every seventh input is out of range: first a state, then a target, then a thrust.
-    The values are a Weyl sequence; a library's random numbers may change with its version.
+    For a tracker the target's velocity changes little from step to step. The values are a Weyl sequence; a
+    library's random numbers may change with its version.
     """
     settings = design.settings
     controller = ReferenceController(design)
@@ -43,8 +44,14 @@ def self_test(design: Design) -> list[SelfTestStep]:
     scalar = settings.code.scalar
     tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
     steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, hover_thrust(settings))]
+    velocity_m_s, change_m_s = [0.0, 0.0], speed_m_s
+    if design.tracker:
+        change_m_s = min(design.tracker.tested_change_m_s, speed_m_s / 8)
     for index in range(1, STEPS):
-        target = [_next(spread, scale) for scale in (position_m, position_m, speed_m_s, speed_m_s)]
+        target = [_next(spread, scale) for scale in (position_m, position_m, change_m_s, change_m_s)]
+        if design.tracker:
+            velocity_m_s = [v + change for v, change in zip(velocity_m_s, target[2:], strict=True)]
+            target[2:] = velocity_m_s
         error = [_next(spread, scale) for scale in (*[0.15 * position_m] * 2, *[0.5 * speed_m_s] * 2)]
         tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
         state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]

@@ -6,6 +6,6 @@ additions. `paper.py` is the exception: eqs 8-12 and RPROP as a lecture would wr
 rounding.
 """
 
-from mambo_nmpc.codegen.reference.controller import Memory, ReferenceController, Status, Step
+from mambo_nmpc.codegen.reference.controller import Memory, ReferenceController, Status, Step, choose
 
-__all__ = ["Memory", "ReferenceController", "Status", "Step"]
+__all__ = ["Memory", "ReferenceController", "Status", "Step", "choose"]

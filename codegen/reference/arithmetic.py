@@ -68,6 +68,12 @@ class Arithmetic(Protocol):
     def step_product(self, step_rad: Real, factor: Any) -> Real:
         """Return step size * eta."""
 
+    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
+        """Return factor * change of a velocity, m/step^2."""
+
+    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
+        """Return gain * acceleration, m/step^2."""
+
 
 class FloatArithmetic:
     """Products in float32 or float64."""
@@ -120,6 +126,12 @@ class FloatArithmetic:
 
     def step_product(self, step_rad: Real, factor: Any) -> Real:
         return step_rad * factor
+
+    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
+        return factor_s * change_m_s
+
+    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
+        return gain * acceleration_m_step2
 
 
 class FixedArithmetic:
@@ -182,6 +194,13 @@ class FixedArithmetic:
 
     def step_product(self, step_rad: Real, factor: Any) -> Real:
         return (step_rad * factor) >> self._formats.factor
+
+    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
+        f = self._formats
+        return rounded(factor_s * change_m_s, f.tracker + f.velocity - f.acceleration)
+
+    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
+        return rounded(gain * acceleration_m_step2, SINE_BITS)
 
 
 def arithmetic(design: Design) -> Arithmetic:

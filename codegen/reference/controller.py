@@ -1,9 +1,9 @@
 """Controller: checks the inputs of a step, predicts, optimizes the plan and applies its first move."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,10 @@ from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.math import Real
 from mambo_nmpc.codegen.reference.optimizer import Minimize, Rprop, Search
 from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.reference.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
+
+Record = TypeVar("Record", "Memory", TargetMotion)
 
 
 class Status(IntEnum):
@@ -34,7 +37,7 @@ class Memory:
     """State of n controllers between two steps.
 
     command_rad is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost (n,), gradient (n, control, 2),
-    iterations (n,), converged (n,).
+    iterations (n,), converged (n,). Without a tracker `target` stays unknown.
     """
 
     command_rad: Real
@@ -44,6 +47,19 @@ class Memory:
     gradient: Real
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
+    target: TargetMotion
+
+
+def choose(chosen: NDArray[np.bool_], new: Record, old: Record) -> Record:
+    """Return a record of arrays (n, ...) with the rows of `new` where `chosen` (n,), else those of `old`."""
+
+    def rows(name: str) -> Any:
+        ours, theirs = getattr(new, name), getattr(old, name)
+        if isinstance(ours, TargetMotion):
+            return choose(chosen, ours, theirs)
+        return np.where(chosen.reshape(-1, *[1] * (ours.ndim - 1)), ours, theirs)
+
+    return replace(new, **{field.name: rows(field.name) for field in fields(new)})
 
 
 @dataclass(frozen=True)
@@ -81,6 +97,7 @@ class ReferenceController:
         self.settings = settings
         self._numbers, self._limits = design.numbers, design.limits
         self._predictor = Predictor(design, products)
+        self._tracker = Tracker(design.tracker, products) if design.tracker else None
         self._rprop = Rprop(settings, products)
         self._minimize = minimize
         self.scalar = self._numbers.scalar
@@ -94,10 +111,11 @@ class ReferenceController:
             gradient=np.zeros((n, control, 2), computed),
             iterations=np.zeros(n, np.int64),
             converged=np.zeros(n, np.bool_),
+            target=unknown_motion(np.zeros((n, 2), computed)),
         )
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Set last command and plan to `command_rad` (n, 2), clamped to the tilt limit.
+        """Set last command and plan to `command_rad` (n, 2), clamped to the tilt limit; forget the target.
 
         Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
         nothing.
@@ -105,15 +123,10 @@ class ReferenceController:
         given = self._quantize(command_rad, COMMAND)
         good = _within(given, self._limits.attitude)
         limit = self._limits.tilt
-        command = np.where(
-            good[:, None], np.minimum(np.maximum(given, -limit), limit), self.memory.command_rad
-        )
+        command = np.minimum(np.maximum(given, -limit), limit)
         plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
-        self.memory = replace(
-            self.memory,
-            command_rad=command,
-            plan_rad=np.where(good[:, None, None], plan, self.memory.plan_rad),
-        )
+        new = replace(self.memory, command_rad=command, plan_rad=plan, target=unknown_motion(command))
+        self.memory = choose(good, new, self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
@@ -136,22 +149,23 @@ class ReferenceController:
         thrusts = self._quantize(np.asarray(thrust_acceleration_m_s2)[:, None], THRUST)[:, 0]
         status = self._check(states, targets, thrusts)
         good = status == Status.OK
+        zero = self._numbers.computed(0)
+        states, targets = (np.where(good[:, None], given, zero) for given in (states, targets))
+        motion = self._track(targets)
         searched = self._search(
-            np.where(good[:, None], states, self._numbers.computed(0)),
-            np.where(good[:, None], targets, self._numbers.computed(0)),
-            np.where(good, thrusts, self._limits.thrust_least),
+            states, targets, np.where(good, thrusts, self._limits.thrust_least), motion.acceleration_m_step2
         )
-        old = self.memory
-        self.memory = replace(
-            old,
-            command_rad=np.where(good[:, None], searched.moves_rad[:, 0], old.command_rad),
-            plan_rad=np.where(good[:, None, None], searched.moves_rad, old.plan_rad),
-            cost=np.where(good, searched.cost, old.cost),
-            gradient=np.where(good[:, None, None], searched.gradient, old.gradient),
-            iterations=np.where(good, searched.iterations, old.iterations),
-            converged=np.where(good, searched.converged, old.converged),
+        new = replace(
+            self.memory,
+            command_rad=searched.moves_rad[:, 0],
+            plan_rad=searched.moves_rad,
+            cost=searched.cost,
+            gradient=searched.gradient,
+            iterations=searched.iterations,
+            converged=searched.converged,
+            target=motion,
         )
-        new = self.memory
+        new = self.memory = choose(good, new, self.memory)
         to_si = self._numbers.to_si
         return Step(
             status=status,
@@ -166,9 +180,15 @@ class ReferenceController:
     def _quantize(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
         return self._numbers.quantize(values, quantities).astype(self._numbers.computed)
 
-    def _search(self, state: Real, target: Real, thrust: Real) -> Search:
+    def _track(self, target: Real) -> TargetMotion:
+        if self._tracker is None:
+            return self.memory.target
+        return self._tracker.update(self.memory.target, target[:, 2:4])
+
+    def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
         memory = self.memory
-        prediction = self._predictor.prepare(state, target, thrust)
+        acceleration = None if self._tracker is None else target_acceleration
+        prediction = self._predictor.prepare(state, target, thrust, acceleration)
 
         def evaluate(moves_rad: Real) -> tuple[Real, Real]:
             return cost.evaluate(self._predictor, prediction, memory.weights, moves_rad, memory.command_rad)

@@ -29,8 +29,9 @@ class Solution:
 class Paper:
     """The controller of `settings`.
 
-    R is the state x, y, vx, vy, phi, theta, psi; T the target x, y, vx, vy; u_1_m the thrust over the mass; U
-    the moves (N_c, 2), phi and theta; u_last the last command.
+    R is the state x, y, vx, vy, phi, theta, psi; T the target x, y, vx, vy, and its acceleration ax, ay, 0 in
+    the paper (24); u_1_m the thrust over the mass; U the moves (N_c, 2), phi and theta; u_last the last
+    command.
     """
 
     settings: Settings
@@ -46,7 +47,7 @@ class Paper:
         lag = np.array([model.roll_lag_s, model.pitch_lag_s])  # (5)
         decay = np.where(lag > 0, np.exp(-tau / np.where(lag > 0, lag, 1.0)), 0.0)
         tau_2_half = tau**2 / 2 if model.position_update == "exact" else tau / 2  # (1)
-        r, v, angle, Tp, Tv = R[0:2], R[2:4], R[4:6], T[0:2], T[2:4]
+        r, v, angle, Tp, Tv, Ta = R[0:2], R[2:4], R[4:6], T[0:2], T[2:4], T[4:6]
         matrix = self.eq_8(R[6], u_1_m)
         errors = []
         for i in range(self.settings.horizon.prediction):
@@ -57,9 +58,23 @@ class Paper:
             r = r + tau * v + matrix @ (tau_2_half * u + twice)  # eq 9
             v = v + matrix @ (tau * u + once)  # (2)
             angle = u + decay * rest
-            Tp = Tp + tau * Tv  # eq 11
+            Tp = Tp + tau * Tv + tau_2_half * Ta  # eq 11
+            Tv = Tv + tau * Ta
             errors.append(r - Tp)
         return np.array(errors)
+
+    def track(self, Ta: Array, Tj: Array, Tv: Array, Tv_last: Array) -> tuple[Array, Array]:
+        """Return acceleration and jerk of the target, estimated from its present and last velocity (24)."""
+        settings, T_s = self.settings, self.settings.horizon.update_period_s
+        limit = min(1.5 * 9.81 * settings.limits.tilt_rad, 2 * settings.ranges.velocity_m_s / T_s)
+        alpha = 0.3
+        beta = alpha**2 / (2 - alpha)
+        measured = (Tv - Tv_last) / T_s
+        jump = np.abs(measured) > limit
+        rest = measured - (Ta + T_s * Tj)
+        acceleration = np.clip(Ta + T_s * Tj + alpha * rest, -limit, limit)
+        jerk = np.clip(Tj + beta / T_s * rest, -0.1 * limit / T_s, 0.1 * limit / T_s)
+        return np.where(jump, Ta, acceleration), np.where(jump, 0.0, jerk)
 
     def responses(self, R: Array, T: Array, u_1_m: float) -> Array:
         """Return the derivatives (N_p, 2, N_c, 2) of the errors by U, in which they are affine."""

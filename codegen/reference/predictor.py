@@ -17,7 +17,7 @@ class Prediction:
     tilt_rad:             (n, 2) roll, pitch before the first move: measured, or zero without lag.
     error_m:              (n, 2) position less target along x, y.
     displacement_m_step:  (n, 2) change of the error over the first step at constant tilt.
-    acceleration_m_step2: (n, 2) tau^2 times eq 8 at that tilt.
+    acceleration_m_step2: (n, 2) tau^2 times eq 8 at that tilt, less the target's acceleration.
     """
 
     gain_m_step2_rad: Real
@@ -46,10 +46,17 @@ class Predictor:
             [[numbers.constant(value, "response") for value in row] for row in tables.response_sum]
         )
 
-    def prepare(self, state: Real, target: Real, thrust_acceleration_m_s2: Real) -> Prediction:
+    def prepare(
+        self,
+        state: Real,
+        target: Real,
+        thrust_acceleration_m_s2: Real,
+        target_acceleration_m_step2: Real | None = None,
+    ) -> Prediction:
         """Evaluate eq 8 at the present yaw and thrust, and start the roll-out along each axis of the world.
 
-        state is (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
+        state is (n, 7), target (n, 4), thrust_acceleration_m_s2 (n,), and target_acceleration_m_step2 (n, 2)
+        or None for a target of constant velocity.
         """
         arithmetic = self.arithmetic
         thrust = arithmetic.thrust_product(thrust_acceleration_m_s2)
@@ -65,6 +72,10 @@ class Predictor:
             by_angle = arithmetic.gain_product(gain, tilt[:, None])
             acceleration = by_angle[:, :, 0] + by_angle[:, :, 1]
             displacement = displacement + arithmetic.share_product(self._displacement_share, acceleration)
+        if target_acceleration_m_step2 is not None:
+            by_target = target_acceleration_m_step2
+            acceleration = acceleration - by_target if self._has_lag else -by_target
+            displacement = displacement - arithmetic.share_product(self._displacement_share, by_target)
         error = arithmetic.initial_error(state[:, 0:2] - target[:, 0:2])
         return Prediction(gain, tilt, error, displacement, acceleration)
 

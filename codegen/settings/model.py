@@ -8,7 +8,7 @@ from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_nmpc.codegen.fixed_point import refusals
-from mambo_nmpc.codegen.settings.sections import Sections
+from mambo_nmpc.codegen.settings.sections import Sections, Target
 
 
 class Settings(Sections):
@@ -32,9 +32,18 @@ class Settings(Sections):
         return self
 
     @property
+    def in_use(self) -> dict[str, dict[str, Any]]:
+        """The values by section, without [target] at its default, with which the C has nothing of it."""
+        return {
+            section: values
+            for section, values in self.model_dump().items()
+            if section != "target" or self.target != Target()
+        }
+
+    @property
     def digest(self) -> str:
-        """The SHA-256 of the values, in hexadecimal; equal settings have equal digests."""
-        canonical = json.dumps(self.model_dump(), sort_keys=True, separators=(",", ":"))
+        """The SHA-256 of the values in use, in hexadecimal; equal settings have equal digests."""
+        canonical = json.dumps(self.in_use, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()
 
     @classmethod

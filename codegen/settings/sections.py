@@ -138,6 +138,18 @@ class Model(_Section):
         return lag
 
 
+class Target(_Section):
+    """What the controller knows of the target's motion beyond its position and velocity."""
+
+    acceleration: Literal["none", "tracked"] = Field(
+        "none",
+        description='Acceleration of the target in the prediction: "none" predicts a target of constant '
+        'velocity, as the paper does (eq 11); "tracked" estimates the acceleration from the velocities of '
+        "successive steps and holds it over the horizon, which removes most of the tracking error on curved "
+        "paths. The target's velocity must then be that of its motion, without noise.",
+    )
+
+
 class Cost(_Section):
     """The weights of the cost: distance from the target, and changes of the attitude command."""
 
@@ -318,6 +330,10 @@ class Sections(_Section):
 
     horizon: Horizon = Field(Horizon(), description="How far the controller predicts, and how often it runs.")
     model: Model = Field(Model(), description="The prediction model of the drone.")
+    target: Target = Field(
+        Target(),
+        description="What the controller knows of the target's motion beyond its position and velocity.",
+    )
     cost: Cost = Field(Cost(), description="The weights of the cost: distance and effort.")
     optimizer: Optimizer = Field(Optimizer(), description="The RPROP search for the moves.")
     limits: Limits = Field(Limits(), description="The limits of the commands.")

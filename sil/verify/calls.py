@@ -5,7 +5,6 @@ decodes. A tape is a sequence of calls of one controller, which is initialised b
 """
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
 from enum import IntEnum
 from typing import Any, Final
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import Memory, ReferenceController, Status
+from mambo_nmpc.codegen.reference import ReferenceController, Status, choose
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_nmpc.codegen.settings.model import Settings
 
@@ -154,10 +153,4 @@ class _Runs:
         return outcome
 
     def _initialise(self, chosen: NDArray[np.bool_]) -> None:
-        def renewed(name: str) -> NDArray[Any]:
-            old, new = getattr(self._controller.memory, name), getattr(self._fresh, name)
-            mixed: NDArray[Any] = np.where(chosen.reshape(-1, *[1] * (old.ndim - 1)), new, old)
-            return mixed
-
-        names = [field.name for field in fields(Memory)]
-        self._controller.memory = replace(self._controller.memory, **{name: renewed(name) for name in names})
+        self._controller.memory = choose(chosen, self._fresh, self._controller.memory)

@@ -26,7 +26,7 @@ from mambo_nmpc.sil.verify.calls import (
     answers,
     calls,
 )
-from mambo_nmpc.sil.verify.inputs import StepInputs, random_inputs
+from mambo_nmpc.sil.verify.inputs import StepInputs, random_steps
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]
@@ -46,6 +46,7 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
         *_convergence(settings),
         *_zero_errors(settings),
         *_largest_inputs(settings, rng),
+        *_target_motion(settings),
     )
     return tapes, tuple(answers(settings, tapes))
 
@@ -57,7 +58,7 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     that the last bits of the prediction constants matter.
     """
     rng = np.random.default_rng(0)
-    draws = [_rows(random_inputs(settings, n, rng)) for _ in range(8)]
+    draws = [_rows(inputs) for inputs in random_steps(settings, n, 8, rng)]
     with np.errstate(invalid="ignore"):
         for drawn in draws:
             drawn[::5, 0:4] = drawn[::5, 7:11] + (1e-3 * (drawn[::5, 0:4] - drawn[::5, 7:11]))
@@ -235,6 +236,33 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
         calls(settings, ApiFunction.STEP, pulled),
     )
     yield from np.stack(columns, axis=1)
+
+
+def _target_motion(settings: Settings) -> Iterator[Tape]:
+    """For a tracker change the target's velocity by its limit and the numbers next to it, either way.
+
+    Then accelerate it to and fro along both axes, so that acceleration and jerk reach their limits, with a
+    reset on the way.
+    """
+    tracker, ranges = Design(settings).tracker, settings.ranges
+    if tracker is None:
+        return
+
+    def steps(velocity_m_s: Array) -> Tape:
+        rows = np.zeros((len(velocity_m_s), 12))
+        rows[:, 2:4] = rows[:, 9:11] = np.clip(velocity_m_s, -ranges.velocity_m_s, ranges.velocity_m_s)
+        rows[:, 0], rows[:, 11] = 1e-3, hover_thrust(settings)
+        return calls(settings, ApiFunction.STEP, rows)
+
+    limit_m_s = tracker.change_limit_m_s
+    for change_m_s in _around(settings, "velocity", -limit_m_s, limit_m_s):
+        if np.isfinite(change_m_s):
+            for columns in ([1, 0], [0, 1]):
+                yield steps(np.outer([0.0, change_m_s, change_m_s, 0.0], columns))
+    changes_m_s = limit_m_s * np.repeat([0.5, 0.9, -0.9, 0.99, -0.99, 0.2], 8)
+    velocity_m_s = np.cumsum(changes_m_s)[:, None] * [1.0, -0.7]
+    again = calls(settings, ApiFunction.RESET, np.zeros((1, 2)))
+    yield np.concatenate([steps(velocity_m_s), again, steps(velocity_m_s[::-1])])
 
 
 def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:

@@ -1,10 +1,12 @@
 """Inputs of steps: random values from a seed, and special cases that random values miss."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -46,6 +48,25 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
     return StepInputs(state, target, thrust)
+
+
+def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generator) -> list[StepInputs]:
+    """Draw the inputs of consecutive steps of n controllers, independent of each other.
+
+    For a tracker two targets in three change their velocity little from step to step; one in five of these
+    changes is a jump.
+    """
+    drawn = [random_inputs(settings, n, rng) for _ in range(steps)]
+    tracker = Design(settings).tracker
+    if tracker is None:
+        return drawn
+    limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_change_m_s
+    with np.errstate(invalid="ignore"):
+        for before, now in itertools.pairwise(drawn):
+            moved = before.target[:, 2:] + rng.uniform(-change_m_s, change_m_s, (n, 2))
+            near = (rng.random((n, 1)) < 2 / 3) & np.isfinite(moved) & np.isfinite(now.target[:, 2:])
+            now.target[:, 2:] = np.where(near, np.clip(moved, -limit_m_s, limit_m_s), now.target[:, 2:])
+    return drawn
 
 
 def _make_special(

@@ -8,6 +8,8 @@ from mambo_nmpc.codegen.reference import ReferenceController, cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.paper import Array, Paper
 from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.reference.tracker import Tracker, unknown_motion
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.cases import settings_case
 
@@ -19,7 +21,9 @@ class Situation:
 
     def __init__(self, settings: Settings, rng: np.random.Generator, scale: float = 1.0) -> None:
         self.state = scale * rng.normal(0, 1, 7) * [1, 1, 1, 1, 0.3, 0.3, 3]
-        self.target = scale * rng.normal(0, 1, 4)
+        self.target = scale * rng.normal(0, 1, 6)
+        if settings.target.acceleration == "none":
+            self.target[4:] = 0
         self.thrust = rng.uniform(5, 15)
         self.last = rng.uniform(-0.3, 0.3, 2)
         self.plan = rng.uniform(-0.3, 0.3, (settings.horizon.control, 2))
@@ -42,7 +46,10 @@ def test_errors_cost_and_gradient_are_those_of_the_paper(index: int) -> None:
     design = Design(settings)
     predictor = Predictor(design, arithmetic(design))
     weights = np.array([[settings.cost.tracking_weight, settings.cost.effort_weight]])
-    prediction = predictor.prepare(case.state[None], case.target[None], np.array([case.thrust]))
+    acceleration = case.target[None, 4:] * settings.horizon.prediction_step_s**2 if design.tracker else None
+    prediction = predictor.prepare(
+        case.state[None], case.target[None, :4], np.array([case.thrust]), acceleration
+    )
     errors = predictor.errors(prediction, case.plan[None])[:, 0]
     costs, gradients = cost.evaluate(predictor, prediction, weights, case.plan[None], case.last[None])
 
@@ -76,13 +83,44 @@ def test_the_search_is_that_of_the_paper(index: int) -> None:
     settings, rng = settings_case(index, "float64"), np.random.default_rng(index)
     controller, paper = ReferenceController(Design(settings)), Paper(settings)
     plan, last = np.zeros((settings.horizon.control, 2)), np.zeros(2)
-    for _ in range(5):
+    acceleration, jerk, velocity = np.zeros(2), np.zeros(2), np.zeros(2)
+    for index_of_step in range(5):
         case = Situation(settings, rng, scale=0.2)
+        if settings.target.acceleration == "tracked":
+            before, velocity = velocity, velocity + settings.horizon.update_period_s * rng.normal(0, 1, 2)
+            if index_of_step > 0:
+                acceleration, jerk = paper.track(acceleration, jerk, velocity, before)
+            case.target[2:] = *velocity, *acceleration
         guess = plan if settings.optimizer.warm_start == "plan" else np.tile(last, (len(plan), 1))
         expected = paper.rprop(*case.inputs(), guess, u_last=last)
-        step = controller.step(case.state[None], case.target[None], [case.thrust])
+        step = controller.step(case.state[None], case.target[None, :4], [case.thrust])
         assert step.status[0] == 0
         np.testing.assert_allclose(step.plan_rad[0], expected.U, rtol=0, atol=1e-12)
         assert step.cost[0] == pytest.approx(expected.J, rel=1e-9)
         assert (step.iterations[0], step.converged[0]) == (expected.updates, expected.converged)
         plan, last = expected.U, expected.U[0]
+
+
+@pytest.mark.parametrize("index", range(6))
+def test_the_tracker_is_that_of_the_paper(index: int) -> None:
+    """A target's acceleration and jerk over 200 steps, with jumps and at their limits."""
+    settings = with_option(settings_case(index, "float64"), "target.acceleration", "tracked")
+    design, paper, rng = Design(settings), Paper(settings), np.random.default_rng(index)
+    constants = design.tracker
+    assert constants is not None
+    tracker = Tracker(constants, arithmetic(design))
+    motion = tracker.update(unknown_motion(np.zeros((1, 2))), np.zeros((1, 2)))
+    acceleration, jerk, velocity = np.zeros(2), np.zeros(2), np.zeros(2)
+    step_squared_s2, update_s = settings.horizon.prediction_step_s**2, settings.horizon.update_period_s
+    for step in range(200):
+        if step % 5 == 0:
+            change = constants.tested_change_m_s * rng.uniform(-1, 1, 2)
+        acceleration, jerk = paper.track(acceleration, jerk, velocity + change, velocity)
+        velocity = velocity + change
+        motion = tracker.update(motion, velocity[None])
+        most = constants.acceleration_limit_m_step2
+        for found, expected in (
+            (motion.acceleration_m_step2[0], step_squared_s2 * acceleration),
+            (motion.jerk_m_step2_update[0], step_squared_s2 * update_s * jerk),
+        ):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * most)

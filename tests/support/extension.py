@@ -32,6 +32,7 @@ typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
 typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
+TRACKER_TYPE
 typedef struct { nmpc_real_t error_m, displacement_m_step, acceleration_m_step2; ...; } nmpc_rollout_t;
 typedef struct {
     nmpc_real_t gain_x_m_step2_rad[2], gain_y_m_step2_rad[2];
@@ -41,6 +42,7 @@ typedef struct {
 typedef struct {
     nmpc_weights_t weights;
     nmpc_prediction_t prediction;
+    TRACKER_MEMBERS
     nmpc_real_t command_rad[2], plan_rad[...];
     nmpc_sum_t gradient[...];
     ...;
@@ -54,15 +56,24 @@ int nmpc_self_test(nmpc_t *);
 unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
 
 void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
-void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_prediction_t *);
+void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, TRACKER_ARGUMENT nmpc_real_t,
+                            nmpc_prediction_t *);
 void nmpc_predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
                                 nmpc_rollout_t *);
 void nmpc_predictor_step(nmpc_rollout_t *);
 nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
+TRACKER_FUNCTIONS
 """
-_INCLUDES: Final = "".join(
-    f'#include "nmpc_{name}.h"\n' for name in ("cost", "math", "predictor", "self_test")
-)
+_TRACKER: Final = {
+    "TRACKER_TYPE": "typedef struct { nmpc_real_t velocity_m_s[2], acceleration_m_step2[2], "
+    "jerk_m_step2_update[2]; } nmpc_tracker_t;",
+    "TRACKER_MEMBERS": "nmpc_tracker_t tracker; unsigned char has_target;",
+    "TRACKER_ARGUMENT": "const nmpc_real_t *,",
+    "TRACKER_FUNCTIONS": "void nmpc_tracker_clear(nmpc_t *);\n"
+    "void nmpc_tracker_update(nmpc_t *, const nmpc_real_t *);",
+}
+"""What the declarations of a bundle with a tracker have besides."""
+_HEADERS: Final = ("cost", "math", "predictor", "self_test")
 
 
 def build_extension(settings: Settings) -> ModuleType:
@@ -72,21 +83,27 @@ def build_extension(settings: Settings) -> ModuleType:
 
 def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     """Return the extension of a bundle with prefix nmpc; builds it with gcc unless it is cached."""
-    contents = (files, _INCLUDES, _DECLARATIONS)
+    tracked = "src/nmpc_tracker.h" in files
+    headers = (*_HEADERS, "tracker") if tracked else _HEADERS
+    includes = "".join(f'#include "nmpc_{name}.h"\n' for name in headers)
+    declarations = _DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
+    for place_holder, text in _TRACKER.items():
+        declarations = declarations.replace(place_holder, text if tracked else "")
+    contents = (files, includes, declarations)
     name = f"_nmpc_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}"
     if name not in sys.modules:
 
         def build(folder: Path) -> Path:
             place(files, folder)
             ffi = cffi.FFI()
-            ffi.cdef(_DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar]))
-            ffi.set_source(name, _INCLUDES, compiler_verbose=0)
+            ffi.cdef(declarations)
+            ffi.set_source(name, includes, compiler_verbose=0)
             ffi.emit_c_code(str(folder / "extension.c"))
             sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
             python = require_file(Path(sysconfig.get_paths()["include"], "Python.h"), "python3-dev").parent
-            headers = ["-Iinclude", "-Isrc", f"-I{python}"]
+            folders = ["-Iinclude", "-Isrc", f"-I{python}"]
             flags = [*COMPILE_FLAGS, "-fPIC", "-shared"]
-            toolchain("gcc").run([*flags, *headers, *sources, "extension.c", "-o", "extension.so"], folder)
+            toolchain("gcc").run([*flags, *folders, *sources, "extension.c", "-o", "extension.so"], folder)
             return folder / "extension.so"
 
         path = build_cached(f"{name}{sysconfig.get_config_var('EXT_SUFFIX')}", build)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.inputs import StepInputs, random_inputs
+from mambo_nmpc.sil.verify.inputs import StepInputs, random_steps
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
 
@@ -27,8 +27,7 @@ class Controller(Protocol):
 
 def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[StepInputs]:
     """Draw the inputs of consecutive steps of n controllers."""
-    rng = np.random.default_rng(seed)
-    return [random_inputs(settings, n, rng) for _ in range(steps)]
+    return random_steps(settings, n, steps, np.random.default_rng(seed))
 
 
 class Run(NamedTuple):

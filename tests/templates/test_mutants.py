@@ -24,11 +24,13 @@ BACKTRACKING = Settings.model_validate(
             "step_max_rad": 0.03,
         },
         "limits": {"tilt_rad": 0.25},
+        "target": {"acceleration": "tracked"},
     }
 )
 CASES = 400
-INPUTS = inputs_of_steps(BACKTRACKING, CASES, steps=4, seed=0)
+INPUTS = inputs_of_steps(BACKTRACKING, CASES, steps=12, seed=0)
 PREDICTOR, PREDICTOR_H, COST = "src/nmpc_predictor.c", "src/nmpc_predictor.h", "src/nmpc_cost.c"
+TRACKER, TRACKER_H = "src/nmpc_tracker.c", "src/nmpc_tracker.h"
 OPTIMIZER, STEP, HELPERS = "src/nmpc_optimizer.c", "src/nmpc.c", "src/nmpc_math.h"
 FAULTS = {
     "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
@@ -43,6 +45,16 @@ FAULTS = {
     "no lower clamp of a move": (OPTIMIZER, "nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD)", "move_rad - rprop->step_rad"),
     "no backtracking": (OPTIMIZER, "        next_rad = rprop->previous_rad;\n", ""),
     "no first command": (STEP, "        self->command_rad[k] = (nmpc_real_t)0;\n", ""),
+    "the target accelerates the other way": (PREDICTOR, "rollout->acceleration_m_step2 - target_acceleration_m_step2", "rollout->acceleration_m_step2 + target_acceleration_m_step2"),
+    "x takes the target's acceleration along y": (PREDICTOR, "&prediction->x, target_acceleration_m_step2[0]", "&prediction->x, target_acceleration_m_step2[1]"),
+    "the acceleration does not displace the target": (PREDICTOR, "        - (NMPC_DISPLACEMENT_SHARE * target_acceleration_m_step2);", "        - (nmpc_real_t)0;"),
+    "the first velocity is an acceleration": (TRACKER, "(self->has_target != 0U) && ", ""),
+    "a jump is an acceleration": (TRACKER, "&& (limited_m_s == change_m_s)", ""),
+    "a jump keeps the jerk": (TRACKER, "tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;\n        }", "}"),
+    "the jerk is not predicted": (TRACKER, "tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis]", "tracker->acceleration_m_step2[axis]"),
+    "the gains change places": (TRACKER, "(NMPC_TRACKER_JERK_GAIN * ", "(NMPC_TRACKER_GAIN * "),
+    "another gain": (TRACKER_H, "NMPC_TRACKER_GAIN 0.3f", "NMPC_TRACKER_GAIN 0.30000004f"),
+    "a reset remembers the target": (STEP, "    set_plan(self);\n    nmpc_tracker_clear(self);", "    set_plan(self);"),
     "bad input gets a level command": (STEP, "    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
 }  # fmt: skip
 """The one place in a file that reads so, and what it reads instead."""

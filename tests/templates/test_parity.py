@@ -10,7 +10,9 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController, cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.predictor import Predictor
+from mambo_nmpc.codegen.reference.tracker import Tracker, unknown_motion
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
@@ -107,14 +109,19 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
         last = quantize(rng.uniform(-reach, reach, (1, 2)), COMMAND)
         moves = quantize(rng.uniform(-reach, reach, (1, moves_count // 2, 2)), COMMAND)
         moves[0, 0, int(rng.integers(2))] = last[0, 0]
+        acceleration = quantize_acceleration(blocks, rng)
         weights = (
             rng.uniform(0, 0.5, (1, 2)) * np.minimum(limits.weights, limits.weights.dtype.type(2**30))
         ).astype(blocks.scalar)
 
-        expected = predictor.prepare(*map(computed, (state, target, thrust)))
+        given = [computed(values) for values in (state, target, thrust)]
+        expected = predictor.prepare(
+            given[0], given[1], given[2], None if acceleration is None else computed(acceleration)
+        )
         lib.nmpc_predictor_prepare(
             blocks.pointer("nmpc_state_t", state),
             blocks.pointer("nmpc_target_t", target),
+            *([] if acceleration is None else [blocks.pointer("nmpc_real_t", acceleration)]),
             thrust[0],
             prediction,
         )
@@ -148,6 +155,48 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
         assert bits(np.array(ffi.unpack(controller.gradient, moves_count), blocks.numbers.wide)) == bits(
             expected_gradient
         )
+
+
+def quantize_acceleration(blocks: SubBlocks, rng: np.random.Generator) -> NDArray[Any] | None:
+    """Draw a target's acceleration (1, 2) within the tracker's limit; None without a tracker."""
+    tracker = blocks.design.tracker
+    if tracker is None:
+        return None
+    drawn = rng.uniform(-1, 1, (1, 2)) * tracker.acceleration_limit_m_step2
+    return blocks.numbers.quantize(drawn, ("acceleration",) * 2)
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_tracker_equals_the_reference(index: int, scalar: str) -> None:
+    """Velocity, acceleration and jerk have the same bits, in ramps, at both limits and over jumps."""
+    tracked = with_option(settings_case(index, scalar), "target.acceleration", "tracked")
+    blocks = SubBlocks(with_option(tracked, "horizon.update_period_s", 0.01))
+    controller, constants = blocks.ffi.new("nmpc_t *"), blocks.design.tracker
+    assert constants is not None
+    tracker, rng = Tracker(constants, blocks.products), np.random.default_rng(index)
+    motion = unknown_motion(blocks.computed(np.zeros((1, 2))))
+    blocks.lib.nmpc_tracker_clear(controller)
+    limits = {
+        "acceleration_m_step2": constants.acceleration_limit_m_step2,
+        "jerk_m_step2_update": constants.jerk_limit_m_step2_update,
+    }
+    limits_reached = set()
+    velocity = np.zeros((1, 2))
+    for step in range(400):
+        if step % 10 == 0:  # the same change for ten steps, to and fro; one in ten is a jump
+            change = constants.change_limit_m_s * rng.uniform(0.55, 1.05, (1, 2)) * (-1) ** (step // 10)
+        velocity = velocity + change
+        given = blocks.numbers.quantize(velocity, TARGET[2:])
+        motion = tracker.update(motion, blocks.computed(given))
+        blocks.lib.nmpc_tracker_update(controller, blocks.pointer("nmpc_real_t", given))
+        for name in ("velocity_m_s", *limits):
+            found = blocks.unpack(getattr(controller.tracker, name))
+            assert bits(found) == bits(getattr(motion, name)[0].astype(blocks.scalar)), (step, name)
+        for name, limit in limits.items():
+            size = np.abs(getattr(motion, name)).max()
+            limits_reached |= {name} if size == blocks.numbers.constant(limit, "acceleration") else set()
+    assert limits_reached == set(limits)
 
 
 @pytest.mark.parametrize("scalar", SCALARS)
