@@ -19,6 +19,7 @@ def test_table2_judges_the_claims(tmp_path: Path) -> None:
         "the PD of Table II flies Bernoulli 0.25 rad/s": False,
         "the PD of Table II flies Gerono 0.25 rad/s": False,
         "mambo": True,
+        "mambo-1norm": True,
         "table1": True,
         "table1-printed": False,
     }

@@ -35,6 +35,16 @@ def departures(settings: Settings) -> dict[str, Any]:
             },
         ),
         (
+            "mambo-1norm",
+            {
+                "horizon.prediction_step_s": 0.055,
+                "model.roll_lag_s": 0.27,
+                "model.pitch_lag_s": 0.15,
+                "target.acceleration": "tracked",
+                "optimizer.warm_start": "plan",
+            },
+        ),
+        (
             "table1-printed",
             {
                 "horizon.prediction_step_s": 0.01,
@@ -51,7 +61,7 @@ def test_preset_departs_from_table_1_where_it_says(name: str, expected: dict[str
 
 def test_every_preset_is_described_in_one_line() -> None:
     """The list of presets has a sentence for each."""
-    assert presets.names() == ("mambo", "table1", "table1-printed")
+    assert presets.names() == ("mambo", "mambo-1norm", "table1", "table1-printed")
     for name in presets.names():
         description = presets.description(name)
         assert description.endswith(".")
@@ -74,7 +84,7 @@ def test_unknown_source_lists_presets_and_suggests_init(name: str) -> None:
     with pytest.raises(SourceNotFoundError) as caught:
         presets.load(name)
     message = str(caught.value)
-    assert "presets are mambo, table1, table1-printed, and `mambo-nmpc init` writes" in message
+    assert "presets are mambo, mambo-1norm, table1, table1-printed, and `mambo-nmpc init` writes" in message
     assert ("mamba is neither a preset nor a file (did you mean mambo?)" in message) == (name == "mamba")
     assert message.isprintable()
     assert len(message) < 300

@@ -26,6 +26,10 @@ KNOWN: Final[dict[str, dict[str, list[int]]]] = {
     "table1": {
         "fast-circle-sensors": [one for one in EVERY if not (-9 <= one <= -5 or 7 <= one <= 11)],
     },
+    # likewise, and on fewer headings through sensors
+    "mambo-1norm": {
+        "fast-circle-sensors": [-16, -15, -14, -13, -12, -11, -4, -2, *range(-1, 6), 12, 14, 15, 16],
+    },
     # does not fly
     "table1-printed": {course + view: EVERY for view in ("", "-sensors") for course in COURSES},
 }

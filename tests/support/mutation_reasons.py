@@ -89,6 +89,10 @@ _FAINT: Final = (
     "not the same, but without effect: a gradient is a single number, 4e-9 or less, only if products of "
     "weights and slopes a million times as large cancel to that"
 )
+_FINER: Final = (
+    "not the same, but without effect: it changes the product by at most a thousandth of a number of the "
+    "acceleration, 3e-11 m, of which 64 are one of an error"
+)
 _ROUNDED: Final = "rounds to the same steps on every path that the iterations there are can take"
 
 _ABSOLUTE: Final = "return (value < (nmpc_sum_t)0) ? -value : value;"
@@ -178,6 +182,15 @@ REASONS: Final[tuple[Reason, ...]] = (
         "a wider table, whose further columns nobody reads",
         "/ -> *",
         holds=_axes_alike,
+    ),
+    *reasons("src/nmpc_tracker.c", "self->has_target = 1U;", "only 0 means none", "1U -> 2U"),
+    *(
+        Reason("src/nmpc_tracker.h", f"#define NMPC_{line}", "one less", _FINER, _is_fixed)
+        for line in (
+            "STEP_SQUARED_PER_UPDATE_S <number> /* tau^2/T_s */",
+            "TRACKER_GAIN <number> /* alpha */",
+            "TRACKER_JERK_GAIN <number> /* beta */",
+        )
     ),
     *reasons("src/nmpc_math.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32),
 )

@@ -162,6 +162,84 @@ def test_null_pointers_get_a_status_and_a_safe_command() -> None:
     assert lib.nmpc_set_weights(ffi.NULL, ffi.new("nmpc_weights_t *")) == Status.NULL_POINTER
 
 
+TRACKED = presets.load("mambo-1norm")
+HELD_ACCELERATION = np.array([0.0, 0.0, 0.01, -0.004])
+"""What the target's velocity changes by in every step, within the limit of a jump."""
+
+
+def tracking(kind: str, n: int = 1) -> Controller:
+    """Make a controller of preset mambo-1norm."""
+    if kind == "reference":
+        return ReferenceController(Design(TRACKED), n)
+    return CompiledController(TRACKED, n, built(TRACKED))
+
+
+def followed(used: Controller, first: int, last: int, target: NDArray[Any] = HOVER_TARGET) -> NDArray[Any]:
+    """Step with a target that accelerates, in steps `first` to `last` - 1, and return the last cost."""
+    for step in range(first, last):
+        outcome = used.step([HOVER_STATE], [target + step * HELD_ACCELERATION], [HOVER_THRUST])
+        assert outcome.status[0] == Status.OK
+    return outcome.cost
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_a_refused_input_leaves_the_target_as_it_was(kind: str) -> None:
+    """Bad state, target or thrust between two good steps: the next command is as without them."""
+    used, undisturbed = tracking(kind), tracking(kind)
+    for each in (used, undisturbed):
+        followed(each, 0, 20)
+    bad = np.full(7, np.nan), np.array([0.0, 0.0, 1e9, 0.0]), 0.0
+    for state, target, thrust in (
+        (bad[0], HOVER_TARGET, HOVER_THRUST),
+        (HOVER_STATE, bad[1], HOVER_THRUST),
+        (HOVER_STATE, HOVER_TARGET, bad[2]),
+    ):
+        assert used.step([state], [target], [thrust]).status[0] != Status.OK
+    assert followed(used, 20, 21) == followed(undisturbed, 20, 21)
+
+
+@pytest.mark.parametrize("kind", ["reference", "compiled"])
+def test_a_reset_forgets_the_target(kind: str) -> None:
+    """After it the cost of a step is that of a fresh controller; a refused one forgets nothing."""
+    used, fresh = tracking(kind), tracking(kind)
+    followed(used, 0, 20)
+    remembered = followed(used, 20, 21)
+    for each in (used, fresh):
+        assert each.reset([[0.0, 0.0]])[0] == Status.OK
+    assert followed(used, 20, 21) == followed(fresh, 20, 21) != remembered
+
+    used, undisturbed = tracking(kind), tracking(kind)
+    for each in (used, undisturbed):
+        followed(each, 0, 20)
+    assert used.reset([[np.nan, 0.0]])[0] == Status.BAD_COMMAND
+    assert followed(used, 20, 21) == followed(undisturbed, 20, 21)
+
+
+def test_the_acceleration_is_found_kept_over_a_jump_and_never_beyond_its_limit() -> None:
+    """A constant acceleration is estimated to 1 %; a jump keeps it; one of the limit is the limit."""
+    lib, ffi = (extension := build_extension(TRACKED)).lib, extension.ffi
+    constants, horizon = Design(TRACKED).tracker, TRACKED.horizon
+    assert constants is not None
+    self, change_m_s, velocity_m_s = ffi.new("nmpc_t *"), 0.02, 0.0
+    lib.nmpc_init(self)
+    for _ in range(60):
+        lib.nmpc_tracker_update(self, [velocity_m_s, -0.5 * velocity_m_s])
+        velocity_m_s += change_m_s
+    found = np.array(list(self.tracker.acceleration_m_step2)) / horizon.prediction_step_s**2
+    truth = change_m_s / horizon.update_period_s * np.array([1.0, -0.5])
+    assert found == pytest.approx(truth, rel=0.01)
+    lib.nmpc_tracker_update(self, [velocity_m_s + 3.0, 3.0])
+    kept = np.array(list(self.tracker.acceleration_m_step2)) / horizon.prediction_step_s**2
+    assert np.array_equal(kept, found)
+    assert list(self.tracker.jerk_m_step2_update) == [0.0, 0.0]
+    for step in range(200):
+        fast = 0.999 * constants.change_limit_m_s * (abs(step % 60 - 30) - 15)
+        lib.nmpc_tracker_update(self, [fast, -fast])
+        assert max(map(abs, self.tracker.acceleration_m_step2)) <= np.float32(
+            constants.acceleration_limit_m_step2
+        )
+
+
 WIDTHS: dict[str, Literal[32, 64]] = {"float32": 32, "float64": 64}
 
 

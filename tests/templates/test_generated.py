@@ -14,6 +14,7 @@ BUNDLES = {
     "mambo": ("mambo", "float32"),
     "mambo-float64": ("mambo", "float64"),
     "mambo-fixed": ("mambo", "fixed"),
+    "mambo-1norm": ("mambo-1norm", "float32"),
     "table1": ("table1", "float32"),
 }
 

@@ -15,7 +15,9 @@ from tests.support.reasons import is_explained
 from tests.support.subjects import subject
 from tests.support.tools import require
 
-MAMBO = presets.load("mambo")
+MAMBO, TRACKED = presets.load("mambo"), presets.load("mambo-1norm")
+TRACKED_FILES = ("src/nmpc_tracker.h", "src/nmpc_tracker.c", "src/nmpc_predictor.c", "src/nmpc.c")
+"""The files that the tracker changes."""
 
 
 def in_scalar(settings: Settings, scalar: str) -> Settings:
@@ -115,8 +117,8 @@ def test_mutants_meet_their_fate(tmp_path: Path) -> None:
 
 def test_every_reason_is_of_a_mutant_that_there_is() -> None:
     """A row whose line is gone is removed."""
-    floats = (MAMBO, presets.load("table1"), in_scalar(MAMBO, "float64"))
-    chosen = (*floats, *(in_scalar(settings, "fixed") for settings in floats[:2]))
+    floats = (MAMBO, TRACKED, presets.load("table1"), in_scalar(MAMBO, "float64"))
+    chosen = (*floats, *(in_scalar(settings, "fixed") for settings in floats[:3]))
     keys = {
         mutant.key
         for files in (render(settings, with_digest=False) for settings in chosen)
@@ -127,12 +129,21 @@ def test_every_reason_is_of_a_mutant_that_there_is() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("path", FILES)
+@pytest.mark.parametrize(
+    ("settings", "path"),
+    [
+        *((MAMBO, path) for path in FILES if "tracker" not in path),
+        *((TRACKED, path) for path in TRACKED_FILES),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.target.acceleration,
+)
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
-def test_every_fault_is_noticed_or_explained(tmp_path: Path, scalar: str, path: str) -> None:
-    """All mutants of preset mambo; the message has the keys of those that survive."""
+def test_every_fault_is_noticed_or_explained(
+    tmp_path: Path, scalar: str, settings: Settings, path: str
+) -> None:
+    """All mutants of preset mambo, and of mambo-1norm where it differs; the message has the survivors."""
     require("gcc", "gcc")
-    bench = Bench(subject(in_scalar(MAMBO, scalar), tmp_path))
+    bench = Bench(subject(in_scalar(settings, scalar), tmp_path))
     assert bench.difference(("-O1",)) is None
     survivors = [mutant.key for mutant in bench.mutants_of(path) if bench.fate(mutant) is Fate.SURVIVED]
     assert [key for key in survivors if not is_explained(key, REASONS, bench.settings)] == []
