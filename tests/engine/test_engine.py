@@ -6,7 +6,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,9 +23,7 @@ from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.plant import elementary
 from mambo_nmpc.sil.plant.link import Link
-from tests.support.engines import NUMBERS, build, tabulate
 from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH, scenarios
 from tests.support.tools import require, toolchain
 
@@ -126,23 +123,6 @@ def test_the_engine_compiles_without_a_warning(tmp_path: Path) -> None:
     for compiler in ("gcc", "clang"):
         command = [require(compiler, compiler), "-std=c99", "-O2", *warnings, "-c", *library.SOURCES]
         subprocess.run(command, cwd=tmp_path, check=True)
-
-
-def test_elementary_functions_have_the_bits_of_numpy(tmp_path: Path) -> None:
-    """Sine, cosine, arc tangent and arc sine of 50,000 numbers, corners among them."""
-    with np.errstate(all="ignore"):
-        expected = np.stack(
-            [
-                *elementary.sine_cosine(NUMBERS),
-                elementary.arc_tangent(NUMBERS),
-                elementary.arc_sine(NUMBERS),
-            ],
-            axis=-1,
-        )
-    found = tabulate(build(library.texts(), tmp_path))
-    for array in (found, expected):
-        array[np.isnan(array)] = np.nan
-    assert found.tobytes() == expected.tobytes()
 
 
 def test_what_is_no_c_flies_in_numpy() -> None:

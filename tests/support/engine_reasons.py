@@ -1,11 +1,17 @@
 """Why some faults of the engine's C change nothing that a flight shows, by file, line and change."""
 
+import re
 from collections.abc import Mapping
 from typing import Final
 
 from tests.support.reasons import Key
 
 _LONGER: Final = "an array one element longer than it must be"
+_FIRST_IMAGE: Final = "start and first reading take the same image"
+_LOW_PASS: Final = (
+    "const double output = simulation->low_pass_b "
+    "* (((now + (<real> * state[0])) + (<real> * state[1])) + state[2]);"
+)
 _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no flight shows"
 
 REASONS: Final[Mapping[Key, str]] = {
@@ -16,14 +22,6 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("0 -> (-1)", "0 -> 1")
     },
     ("elementary.h", "#define ROUNDING <real> /* <real> * 2^52 */", "negative"): "it rounds alike",
-    **{
-        (
-            "elementary.h",
-            f"static const double turn_{name}[4] = {{ <real>, <real>, <real>, <real> }};",
-            "4 -> 5",
-        ): _LONGER
-        for name in ("sines", "cosines")
-    },
     **{
         ("elementary.h", "turns = <real>;", change): "the angle is NaN there, and so is every result"
         for change in ("left out", "zero -> one")
@@ -58,13 +56,12 @@ REASONS: Final[Mapping[Key, str]] = {
         )
         for change in ("zero -> one", "zero -> one #1")
     },
+    **{
+        ("loop.c", "double thrust_share = <real>;", change): "read only with disturbances, which set it"
+        for change in ("negative", "next number")
+    },
     ("pd.c", "(void)thrust_acceleration_m_s2;", "left out"): "only silences a warning",
     ("rigid_body.h", "to_world(r, state + VELOCITY, rate + POSITION);", "+ -> - #1"): "POSITION is 0",
-    **{
-        ("vehicle.h", f"double {name}[4];", "4 -> 5"): _LONGER
-        for name in ("share", "command", "thrust_n", "wrench")
-    },
-    ("vehicle.h", "double wrench[4];", "4 -> 3"): _BESIDE,
     **{
         ("vehicle.h", "for (i = 0; i < 4; i++) {", change): _BESIDE
         for change in ("0 -> (-1) #3", "< -> <= #3", "4 -> 5 #3")
@@ -73,13 +70,36 @@ REASONS: Final[Mapping[Key, str]] = {
         ("vehicle.h", "for (i = 0; i < STATE_ROWS; i++) {", change): "the derivative does not read position x"
         for change in ("0 -> 1", "0 -> 1 #1")
     },
+    ("sensors.h", "measure_flow(simulation, start, r, suite->flow_m_s);", "left out"): _FIRST_IMAGE,
+    ("sensors.h", "if ((suite->tick == 0)", "0 -> (-1)"): _FIRST_IMAGE,
+    **{
+        ("sensors.h", line, change): "moves a gate by an ulp"
+        for line, change in (
+            ("suite->low_pass[i][k] = suite->z_m / (<real> * simulation->low_pass_b);", "next number"),
+            (_LOW_PASS, "next number"),
+            (_LOW_PASS, "next number #1"),
+        )
+    },
+    **{
+        (
+            "sensors.h",
+            "+ (simulation->tilt_weight * "
+            "arc_sine(clip(smooth[0] / simulation->gravity_m_s2, <real>, <real>)));",
+            change,
+        ): "one number just beyond the limit"
+        for change in ("next number", "next number #1")
+    },
+    (
+        "sensors.h",
+        "|| (fabs(slow_sonar - suite->z_m) < simulation->slow_jump_m));",
+        "- -> +",
+    ): "the wider gate of the pressure accepts first",
     ("world.h", "#define DELAY_TICKS_MAX <number>", "one more"): _LONGER,
     (
         "world.h",
         "const gusts_t gusts = { draws[0], draws[1], (<real> * draws[1]) + (<real> * draws[2]) };",
         "next number #1",
     ): "one ulp of the first gust, which decays before it changes a rounded state",
-    ("world.h", "double change_m_s[3];", "3 -> 4"): _LONGER,
     **{
         ("world.h", line, change): "a push of zero changes nothing but the sign of a zero"
         for line, change in (
@@ -89,3 +109,14 @@ REASONS: Final[Mapping[Key, str]] = {
         )
     },
 }
+
+
+def reason(key: Key) -> str | None:
+    """Return why the fault `key` changes nothing, or None if no reason is known."""
+    name, line, change = key
+    length = re.fullmatch(r"(\d+) -> (\d+)( #\d+)?", change)
+    if length and re.search(rf"\bdouble \w+\[{length[1]}\](;| = )", line):
+        return _LONGER if int(length[2]) > int(length[1]) else _BESIDE
+    if name == "sensors.h" and not line.startswith("for") and re.fullmatch(r"<=? -> <=?( #\d+)?", change):
+        return "two numbers that are equal"
+    return REASONS.get(key)

@@ -1,19 +1,61 @@
-"""Build engines from changed C, with a function that tabulates the elementary functions."""
+"""Build engines from changed C, with functions that run their blocks on any numbers."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import cffi
 import numpy as np
 
 from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.records import flight_records, simulation_record
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from tests.support.tools import toolchain
 
-_TABLE: Final = """\
-#include "elementary.h"
+_BLOCKS: Final = """\
+#include "sensors.h"
+
+/* Each block is a static function of a header. */
+static seen_t seen_of(const double *row)
+{
+    seen_t seen;
+    int i;
+
+    for (i = 0; i < 3; i++) {
+        seen.position_m[i] = row[i];
+        seen.velocity_m_s[i] = row[3 + i];
+        seen.euler_rad[i] = row[6 + i];
+        seen.rates_rad_s[i] = row[9 + i];
+    }
+    return seen;
+}
+
+void run_suite(const engine_simulation_t *simulation, const engine_flight_t *flight, const double *truths,
+               const double *draws, double *found, int n)
+{
+    seen_t truth_now = seen_of(truths);
+    rotation_t r = rotation(truth_now.euler_rad);
+    suite_t suite;
+    int i;
+    int k;
+
+    suite_start(simulation, &truth_now, &r, &suite);
+    for (i = 0; i < n; i++) {
+        seen_t seen;
+
+        truth_now = seen_of(&truths[12 * i]);
+        r = rotation(truth_now.euler_rad);
+        seen = estimate(simulation, flight, &truth_now, &r, &draws[8 * i], &suite);
+        for (k = 0; k < 3; k++) {
+            found[(12 * i) + k] = seen.position_m[k];
+            found[(12 * i) + 3 + k] = seen.velocity_m_s[k];
+            found[(12 * i) + 6 + k] = seen.euler_rad[k];
+            found[(12 * i) + 9 + k] = seen.rates_rad_s[k];
+        }
+    }
+}
 
 void tabulate(const double *x, double *y, int n)
 {
@@ -27,7 +69,11 @@ void tabulate(const double *x, double *y, int n)
 }
 """
 _INTERFACE: Final = cffi.FFI()
-_INTERFACE.cdef("void tabulate(const double *x, double *y, int n);")
+_INTERFACE.cdef("""
+    void tabulate(const double *x, double *y, int n);
+    void run_suite(const void *simulation, const void *flight, const double *truths, const double *draws,
+                   double *found, int n);
+""")
 
 _DRAWN: Final = np.concatenate(
     [
@@ -46,17 +92,52 @@ NUMBERS: Final[FloatArray] = np.concatenate([_DRAWN, _DRAWN / 10.0, _CORNERS, -_
 """Arguments of the elementary functions."""
 
 
+TICKS: Final = 3000
+
+
+def truths(kind: Literal["gates", "wild"]) -> FloatArray:
+    """Return true states (TICKS, 12) that wander through all gates, or jump and end with infinity and NaN.
+
+    The columns are position, velocity, angles and rates.
+    """
+    rng = np.random.default_rng(7)
+    walk = np.cumsum(rng.normal(0.0, np.repeat([0.02, 0.2, 0.03, 0.4], 3), (TICKS, 12)), axis=0)
+    walk = np.repeat([2.0, 8.0, 1.2, 9.0], 3) * np.sin(walk)
+    walk[:, 2] = -1.0 + 0.5 * walk[:, 2]
+    if kind == "wild":
+        walk[rng.random(walk.shape) < 0.001] *= 1e3
+        walk[-300:][rng.random((300, 12)) < 0.002] = np.inf
+        walk[-100:][rng.random((100, 12)) < 0.002] = np.nan
+    return walk
+
+
 def build(files: Mapping[str, str], folder: Path, *flags: str) -> Path:
     """Compile the engine in `files` with gcc in a new folder, since a library is loaded once.
 
     Raises BuildError.
     """
     place = Path(mkdtemp(dir=folder))
-    for name, text in (dict(files) | {"table.c": _TABLE}).items():
+    for name, text in (dict(files) | {"blocks.c": _BLOCKS}).items():
         (place / name).write_text(text, "utf-8")
-    sources = [*library.SOURCES, "table.c"]
+    sources = [*library.SOURCES, "blocks.c"]
     toolchain("gcc").run([*library.FLAGS, *flags, *sources, "-o", "engine.so", "-lm"], place)
     return place / "engine.so"
+
+
+def estimates(path: Path, flight: Flight, truths: FloatArray, draws: FloatArray) -> FloatArray:
+    """Return what the sensors of a flight make of true states (k, 12) with random numbers (k, 8), as (k, 12).
+
+    The columns are position, velocity, angles and rates, as in `Seen`.
+    """
+    found = np.empty_like(truths)
+    records = simulation_record(flight, flight.times_s()), flight_records(flight, np.zeros((1, 4)))
+    engine: Any = _INTERFACE.dlopen(str(path))
+    engine.run_suite(
+        *(library.pointer("void *", record) for record in records),
+        *(library.pointer("double *", array) for array in (truths, draws, found)),
+        len(truths),
+    )
+    return found
 
 
 def tabulate(path: Path) -> FloatArray:

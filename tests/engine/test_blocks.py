@@ -1,0 +1,56 @@
+"""Blocks of the engine have the bits of NumPy on any numbers, also on those that no flight brings."""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.trajectories import Hover
+from mambo_nmpc.sil.plant import elementary
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.randomness import Purpose, generators
+from mambo_nmpc.sil.plant.vehicle import Seen
+from mambo_nmpc.sil.sensors.estimators import Suite
+from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Sensors
+from tests.support.engines import NUMBERS, TICKS, build, estimates, tabulate, truths
+
+
+@pytest.fixture(scope="module")
+def engine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the engine with access to its blocks."""
+    return build(library.texts(), tmp_path_factory.mktemp("engine"))
+
+
+def unified(values: FloatArray) -> bytes:
+    """Return the bits of an array in which every NaN is the same."""
+    return np.where(np.isnan(values), np.nan, values).tobytes()
+
+
+def test_elementary_functions(engine: Path) -> None:
+    """Sine, cosine, arc tangent and arc sine of 50,000 numbers, corners among them."""
+    with np.errstate(all="ignore"):
+        arcs = [elementary.arc_tangent(NUMBERS), elementary.arc_sine(NUMBERS)]
+        expected = np.stack([*elementary.sine_cosine(NUMBERS), *arcs], axis=-1)
+    assert unified(tabulate(engine)) == unified(expected)
+
+
+@pytest.mark.parametrize("derotated", [False, True])
+@pytest.mark.parametrize("noise_scale", [0.0, 1.0])
+@pytest.mark.parametrize("kind", ["gates", "wild"])
+def test_sensors_and_estimators(
+    engine: Path, kind: Literal["gates", "wild"], noise_scale: float, derotated: bool
+) -> None:
+    """True states that jump, spin and fall as no flight does."""
+    sensors = Sensors(noise_scale, (0.1, -0.2, 0.3), (0.01, -0.02, 0.03), derotated)
+    given = truths(kind)
+    rows = given.reshape(TICKS, 4, 3, 1)
+    with np.errstate(all="ignore"):
+        suite = Suite(sensors, (5,), Seen(*rows[0]))
+        seen = [suite.estimate(Seen(*row)) for row in rows]
+    expected = np.array([[one.position_m, one.velocity_m_s, one.euler_rad, one.rates_rad_s] for one in seen])
+    draws = generators((5,), Purpose.SENSORS)[0].standard_normal((TICKS, len(NOISE_VARIANCES)))
+    found = estimates(engine, Flight(Hover(), duration_s=1.0, sensors=sensors), given, draws)
+    assert unified(found) == unified(expected.reshape(TICKS, 12))
