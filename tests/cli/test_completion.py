@@ -13,7 +13,7 @@ import pytest
     [
         ("mambo-nmpc footp", ["footprint"]),
         ("mambo-nmpc fly tab", ["table1", "table1-printed"]),
-        ("mambo-nmpc init mam", ["mambo"]),
+        ("mambo-nmpc init mam", ["mambo", "mambo-1norm"]),
         ("mambo-nmpc footprint --board cra", ["crazyflie"]),
         ("mambo-nmpc sweep --board al", []),
         ("mambo-nmpc fly --on rp", ["rp2040"]),
