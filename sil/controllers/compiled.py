@@ -11,7 +11,7 @@ from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.representation import COMMAND, OUTCOME, STATE, TARGET, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.library import build_library, ffi
+from mambo_nmpc.sil.controllers.build import build_library, ffi
 
 
 def digest_compiled(library: Any, episodes: int) -> int:

@@ -12,8 +12,8 @@ from mambo_nmpc.codegen.digest import TICKS
 from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import batch_source, with_default_prefix
 from mambo_nmpc.sil.controllers.compiled import DIRT, as_arrays, as_step, empty_outcome
-from mambo_nmpc.sil.controllers.library import batch_source, with_default_prefix
 from mambo_nmpc.sil.emulation.avr import Long
 from mambo_nmpc.sil.emulation.machine import TIME_LIMIT_S, start
 from mambo_nmpc.sil.errors import EmulatorError

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.sil.engine.library import record_type
+from mambo_nmpc.sil.engine.build import record_type
 from mambo_nmpc.sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
 from mambo_nmpc.sil.plant import gusts, loops
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO

@@ -8,10 +8,10 @@ import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.build import ffi as controller_ffi
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import ffi
 from mambo_nmpc.sil.controllers.pd import ERROR_LIMIT_M, POSITION_D_RAD_S_M, POSITION_P_RAD_M, PdController
-from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.build import ffi, load, pointer
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, allocate_trace
@@ -23,7 +23,7 @@ from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES
 DELAY_TICKS_MAX: Final = 200
 """Longest delay of a command that the engine can hold."""
 
-_PD: Final = library.ffi.new("engine_pd_t *", (POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M))
+_PD: Final = ffi.new("engine_pd_t *", (POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M))
 
 EngineController = CompiledController | PdController
 """Controllers whose step is a C function."""
@@ -46,7 +46,7 @@ def fly(
     delay_ticks = int(np.max(flight.link.delay_ticks))
     if engine == "c" and isinstance(controller, EngineController) and delay_ticks <= DELAY_TICKS_MAX:
         try:
-            compiled = library.load(host_toolchain())
+            compiled = load(host_toolchain())
         except BuildError as error:
             warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=2)
         else:
@@ -57,7 +57,7 @@ def fly(
 def fly_compiled(
     engine: Any, flight: Flight, controller: EngineController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate the flights in a library of `library.load`, one after the other."""
+    """Simulate the flights in a library of `build.load`, one after the other."""
     times_s, targets = flight.times_s(), np.ascontiguousarray(flight.targets())
     simulation = simulation_record(flight, times_s)
     flights = flight_records(flight, targets[0])
@@ -65,19 +65,19 @@ def fly_compiled(
     ticks = len(times_s) * flight.ticks_per_update
     draws = _Buffers(flight, len(times_s), ticks)
     step, instances, stride = _native(engine, controller)
-    record = library.ffi.new(
+    record = ffi.new(
         "engine_trace_t *",
         {
-            name: library.pointer("int64_t *" if name == "status" else "double *", getattr(trace, name, None))
-            for name, _ in library.ffi.typeof("engine_trace_t").fields
+            name: pointer("int64_t *" if name == "status" else "double *", getattr(trace, name, None))
+            for name, _ in ffi.typeof("engine_trace_t").fields
         },
     )
     for index, seed in enumerate(flight.seeds or (0,) * flight.flights):
         engine.engine_fly(
-            library.pointer("engine_simulation_t *", simulation),
-            library.pointer("engine_flight_t *", flights[index : index + 1]),
+            pointer("engine_simulation_t *", simulation),
+            pointer("engine_flight_t *", flights[index : index + 1]),
             index,
-            library.pointer("double *", times_s),
+            pointer("double *", times_s),
             draws.draw(seed),
             step,
             instances + index * stride,
@@ -95,12 +95,9 @@ class _Buffers:
         self.sensors = np.empty((ticks, len(NOISE_VARIANCES))) if flight.sensors is not None else None
         self.gusts = np.empty((ticks + 1, 3)) if flight.disturbances.windy else None
         self.drops = np.empty(updates) if np.any(flight.link.dropped_share) else None
-        self._record = library.ffi.new(
+        self._record = ffi.new(
             "engine_draws_t *",
-            {
-                name: library.pointer("double *", getattr(self, name))
-                for name in ("sensors", "gusts", "drops")
-            },
+            {name: pointer("double *", getattr(self, name)) for name in ("sensors", "gusts", "drops")},
         )
 
     def draw(self, seed: int) -> Any:
@@ -116,11 +113,11 @@ class _Buffers:
 def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
     """Return the function of a step, the address of the first instance, and the bytes to the next one."""
     if isinstance(controller, PdController):
-        return engine.engine_pd_step, library.ffi.cast("char *", _PD), 0
+        return engine.engine_pd_step, ffi.cast("char *", _PD), 0
     step, instances, stride = controller.native
     return _cast("engine_controller_t", step), _cast("char *", instances), stride
 
 
-def _cast(kind: str, pointer: Any) -> Any:
+def _cast(kind: str, address: Any) -> Any:
     """Return a pointer of another cffi interface as one of the engine's."""
-    return library.ffi.cast(kind, int(ffi.cast("intptr_t", pointer)))
+    return ffi.cast(kind, int(controller_ffi.cast("intptr_t", address)))

@@ -11,8 +11,8 @@ from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import with_default_prefix
 from mambo_nmpc.sil.controllers.emulated import build_guest
-from mambo_nmpc.sil.controllers.library import with_default_prefix
 from mambo_nmpc.sil.errors import EmulatorError, FlightError
 from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.files.summary import Number

@@ -11,9 +11,9 @@ from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.controllers.emulated import build_guest, digest_emulated
-from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.errors import EmulatorError
 from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, Builder, builder, clang_builder

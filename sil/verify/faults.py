@@ -9,8 +9,8 @@ import numpy as np
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.build import build_library, load_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import build_library, load_library
 from mambo_nmpc.sil.faults.flights import STRAY_M, End, Verdict, fly_faults
 from mambo_nmpc.sil.faults.report import table, write_csv
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, scenarios

@@ -20,8 +20,8 @@ from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WE
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.verify.calls import ApiFunction, Tape, answers, calls
 from tests.support.cases import settings_case
 from tests.support.strategies import Values, toml, valid_values

@@ -11,9 +11,9 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import batch_source
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
-from mambo_nmpc.sil.controllers.library import batch_source
 from mambo_nmpc.sil.emulation.machine import CORES as EMULATED_CORES
 from mambo_nmpc.sil.emulation.machine import Machine, start
 from mambo_nmpc.sil.errors import EmulationError

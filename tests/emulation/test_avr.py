@@ -15,8 +15,8 @@ from mambo_nmpc.codegen.digest import self_test_digest
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.controllers.build import batch_source
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest, digest_emulated
-from mambo_nmpc.sil.controllers.library import batch_source
 from mambo_nmpc.sil.emulation.avr import AvrMachine, Long
 from mambo_nmpc.sil.emulation.machine import start
 from mambo_nmpc.sil.errors import EmulationError, EmulatorError

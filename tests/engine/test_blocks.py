@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.build import texts
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.trajectories import Hover
 from mambo_nmpc.sil.plant import elementary
@@ -21,7 +21,7 @@ from tests.support.engines import NUMBERS, TICKS, build, estimates, tabulate, tr
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the engine with access to its blocks."""
-    return build(library.texts(), tmp_path_factory.mktemp("engine"))
+    return build(texts(), tmp_path_factory.mktemp("engine"))
 
 
 def unified(values: FloatArray) -> bytes:

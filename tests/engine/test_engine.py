@@ -17,7 +17,7 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.build import FLAGS, SOURCES, load, texts
 from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight
@@ -91,18 +91,18 @@ def digests(engine: Any) -> list[str]:
 )
 def test_every_build_has_the_same_bits(build: Toolchain) -> None:
     """Compilers, optimisations, and a processor with fused operations."""
-    expected = digests(library.load(toolchain("gcc")))
+    expected = digests(load(toolchain("gcc")))
     require(build.command[0], build.command[0])
-    assert digests(library.load(build)) == expected
+    assert digests(load(build)) == expected
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_no_operation_is_fused(compiler: str, tmp_path: Path) -> None:
     """Even where the compiler may use them, for they round once instead of twice."""
     path = require(compiler, compiler)
-    for name, text in library.texts().items():
+    for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
-    flags = ["-mavx2", "-mfma", *library.FLAGS, *library.SOURCES, "-o", "engine.so", "-lm"]
+    flags = ["-mavx2", "-mfma", *FLAGS, *SOURCES, "-o", "engine.so", "-lm"]
     subprocess.run([path, *flags], cwd=tmp_path, check=True)
     code = subprocess.run(
         [require("objdump", "binutils"), "-d", "engine.so"],
@@ -117,11 +117,11 @@ def test_no_operation_is_fused(compiler: str, tmp_path: Path) -> None:
 
 def test_the_engine_compiles_without_a_warning(tmp_path: Path) -> None:
     """Of gcc and of clang."""
-    for name, text in library.texts().items():
+    for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
     warnings = ["-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Wundef", "-Wmissing-prototypes", "-Werror"]
     for compiler in ("gcc", "clang"):
-        command = [require(compiler, compiler), "-std=c99", "-O2", *warnings, "-c", *library.SOURCES]
+        command = [require(compiler, compiler), "-std=c99", "-O2", *warnings, "-c", *SOURCES]
         subprocess.run(command, cwd=tmp_path, check=True)
 
 

@@ -20,7 +20,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.build import HEADERS, SOURCES, ffi, texts
 from mambo_nmpc.sil.engine.simulate import fly_compiled
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.scenario import flight_of
@@ -42,12 +42,12 @@ FLAGS: Final = (
 )
 """A variable without a value is not 0, and a read beside an array is a crash."""
 BATCHES: Final = (TRUTH, SENSED, COUPLED, TAKE_OFF)
-FILES: Final = sorted({*library.SOURCES, *library.HEADERS} - {"engine.h", "records.h"})
+FILES: Final = sorted({*SOURCES, *HEADERS} - {"engine.h", "records.h"})
 
 
 def digests(path: Path) -> list[str]:
     """Return the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
-    engine = library.ffi.dlopen(str(path))
+    engine = ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
     traces = [fly_compiled(engine, flight, PdController()) for flight in flights]
     settings = presets.load("mambo")
@@ -87,7 +87,7 @@ def alive(mutant: Mutant, files: Mapping[str, str], expected: list[str]) -> bool
 
 def unnoticed(name: str, stride: int) -> list[Mutant]:
     """Return which of the faults of one file, one in `stride`, change nothing."""
-    files = library.texts()
+    files = texts()
     with TemporaryDirectory() as folder:
         expected = digests(build(files, Path(folder), *FLAGS))
     found = mutants(name, files[name])[::stride]

@@ -7,8 +7,8 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure

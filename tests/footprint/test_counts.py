@@ -14,9 +14,9 @@ from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import batch_source
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build_guest
-from mambo_nmpc.sil.controllers.library import batch_source
 from mambo_nmpc.sil.emulation.unicorn import UnicornMachine
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.firmware.disassembly import disassemble

@@ -15,9 +15,9 @@ from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import read, with_option
 from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.build import batch_source, load_library
 from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.controllers.emulated import GUEST, digest_emulated
-from mambo_nmpc.sil.controllers.library import batch_source, load_library
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, builder, clang_builder
 from mambo_nmpc.sil.footprint.same_bits import (
     BOARD_COMPILERS,

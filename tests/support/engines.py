@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 import cffi
 import numpy as np
 
-from mambo_nmpc.sil.engine import library
+from mambo_nmpc.sil.engine.build import FLAGS, SOURCES, pointer
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -119,8 +119,8 @@ def build(files: Mapping[str, str], folder: Path, *flags: str) -> Path:
     place = Path(mkdtemp(dir=folder))
     for name, text in (dict(files) | {"blocks.c": _BLOCKS}).items():
         (place / name).write_text(text, "utf-8")
-    sources = [*library.SOURCES, "blocks.c"]
-    toolchain("gcc").run([*library.FLAGS, *flags, *sources, "-o", "engine.so", "-lm"], place)
+    sources = [*SOURCES, "blocks.c"]
+    toolchain("gcc").run([*FLAGS, *flags, *sources, "-o", "engine.so", "-lm"], place)
     return place / "engine.so"
 
 
@@ -133,8 +133,8 @@ def estimates(path: Path, flight: Flight, truths: FloatArray, draws: FloatArray)
     records = simulation_record(flight, flight.times_s()), flight_records(flight, np.zeros((1, 4)))
     engine: Any = _INTERFACE.dlopen(str(path))
     engine.run_suite(
-        *(library.pointer("void *", record) for record in records),
-        *(library.pointer("double *", array) for array in (truths, draws, found)),
+        *(pointer("void *", record) for record in records),
+        *(pointer("double *", array) for array in (truths, draws, found)),
         len(truths),
     )
     return found
@@ -144,5 +144,5 @@ def tabulate(path: Path) -> FloatArray:
     """Return sine, cosine, arc tangent and arc sine (n, 4) of `NUMBERS` in the engine at `path`."""
     found = np.empty((len(NUMBERS), 4))
     engine: Any = _INTERFACE.dlopen(str(path))
-    engine.tabulate(*(library.pointer("double *", array) for array in (NUMBERS, found)), len(NUMBERS))
+    engine.tabulate(*(pointer("double *", array) for array in (NUMBERS, found)), len(NUMBERS))
     return found

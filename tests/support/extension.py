@@ -19,7 +19,7 @@ from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.literals import C_TYPES, SUM_TYPES
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.library import with_default_prefix
+from mambo_nmpc.sil.controllers.build import with_default_prefix
 from mambo_nmpc.sil.files.cache import build_cached
 from tests.support.bundles import place
 from tests.support.tools import require_file, toolchain

@@ -11,7 +11,7 @@ import cffi
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.render import render, with_prefix
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.library import DECLARATIONS, glue
+from mambo_nmpc.sil.controllers.build import DECLARATIONS, glue
 from tests.support.bundles import place
 from tests.support.tools import require
 

@@ -15,8 +15,8 @@ from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import build_library
 from tests.support.extension import build_extension, load_extension
 from tests.support.parity import Controller
 from tests.support.tools import toolchain

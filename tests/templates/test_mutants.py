@@ -6,8 +6,8 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import load_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import load_library
 from tests.support.parity import Run, differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 

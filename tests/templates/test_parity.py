@@ -16,8 +16,8 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import build_library
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.extension import build_extension
 from tests.support.parity import differences, inputs_of_steps, run

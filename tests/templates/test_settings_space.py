@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import ffi
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import ffi
 from tests.support import command
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run

@@ -13,7 +13,7 @@ import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.controllers.library import open_library
+from mambo_nmpc.sil.controllers.build import open_library
 from mambo_nmpc.sil.files.cache import build_cached
 from mambo_nmpc.sil.plant import elementary
 

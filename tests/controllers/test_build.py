@@ -12,8 +12,8 @@ import pytest
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.toolchain import Toolchain, host_toolchain
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.library import build_library
 from mambo_nmpc.sil.errors import CacheError
 from mambo_nmpc.sil.files.cache import build_cached, cache_folder
 from tests.support.tools import require
