@@ -1,28 +1,24 @@
-"""Build a bundle as a shared library with the host's compiler, cache it, and load it.
+"""Load a bundle as a shared library, built with the host's compiler.
 
 The glue passes arrays and instances of unknown layout only, so nothing here can disagree with the bundle's
 headers; its assertions check that the structs are the arrays that Python fills.
 """
 
 import hashlib
-import re
-import shlex
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from importlib import resources
 from importlib.resources.abc import Traversable
-from pathlib import Path
 from typing import Any, Final
 
 import cffi
 
-from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.errors import CacheError
-from mambo_nmpc.sil.files.cache import build_cached
+from mambo_nmpc.sil.files.shared_library import LibrarySource, load_shared_library
 
 DECLARATIONS: Final = """
     void nmpc_batch_init(void *controllers, int n);
@@ -40,8 +36,7 @@ DECLARATIONS: Final = """
 ffi: Final = cffi.FFI()
 ffi.cdef(DECLARATIONS)
 
-_LINK_FLAGS: Final = ("-fPIC", "-shared", "-Iinclude", "-Isrc")
-_LOADED: Final[dict[str, Any]] = {}
+_FLAGS: Final = (*COMPILE_FLAGS, "-Iinclude", "-Isrc")
 
 
 def with_default_prefix(settings: Settings) -> Settings:
@@ -77,37 +72,14 @@ def load_library(files: dict[str, str], toolchain: Toolchain) -> Any:
     return _load(("files", files), lambda: files, toolchain)
 
 
-def _load(key: object, generate: Any, toolchain: Toolchain) -> Any:
-    beside = glue()
-    contents = (key, beside, COMPILE_FLAGS, _LINK_FLAGS, toolchain, toolchain.identity())
-    name = f"nmpc_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
-    if name not in _LOADED:
+def _load(key: object, generate: Callable[[], Mapping[str, str]], toolchain: Toolchain) -> Any:
+    """Return the library of the C that `generate` returns, with the glue; `key` determines that C."""
 
-        def build(folder: Path) -> Path:
-            files = generate() | beside
-            for path, text in files.items():
-                (folder / path).parent.mkdir(parents=True, exist_ok=True)
-                (folder / path).write_text(text, "utf-8")
-            sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
-            flags = [*COMPILE_FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
-            toolchain.run([*flags, *_LINK_FLAGS, *sources, *beside, "-o", "nmpc.so"], folder)
-            if not (folder / "nmpc.so").is_file():
-                raise BuildError(f"{shlex.join(toolchain.command)} wrote no output; set CC to a C compiler")
-            return folder / "nmpc.so"
+    def files() -> dict[str, str]:
+        library = {path: text for path, text in generate().items() if path.startswith(("include/", "src/"))}
+        return library | glue()
 
-        _LOADED[name] = open_library(build_cached(name, build), ffi)
-    return _LOADED[name]
-
-
-def open_library(path: Path, declarations: cffi.FFI) -> Any:
-    """Load the shared library at `path`; raises CacheError if that fails."""
-    try:
-        return declarations.dlopen(str(path))
-    except OSError as error:
-        reason = str(error).removeprefix(f"cannot load library '{path}': ").removeprefix(f"{path}: ")
-        raise CacheError(
-            f"cannot load {path}: {reason}; if its folder is mounted noexec, set XDG_CACHE_HOME elsewhere"
-        ) from error
+    return load_shared_library(LibrarySource("nmpc", (key, glue()), files, _FLAGS, ffi), toolchain)
 
 
 @lru_cache

@@ -1,20 +1,15 @@
 """Build the engine with the host's compiler, once per machine, and load it."""
 
-import hashlib
 import platform
-from collections.abc import Mapping
 from functools import lru_cache
 from importlib import resources
-from pathlib import Path
 from typing import Any, Final
 
 import cffi
 import numpy as np
 
-from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.controllers.build import open_library
-from mambo_nmpc.sil.files.cache import build_cached
+from mambo_nmpc.sil.files.shared_library import LibrarySource, load_shared_library
 from mambo_nmpc.sil.plant import elementary
 
 SOURCES: Final = ("loop.c", "pd.c")
@@ -33,10 +28,11 @@ CONSTANTS: Final = (
 )
 """Names of the constants in sil/plant/elementary.py that the engine uses."""
 FLAGS: Final = (
-    *("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared"),
+    *("-std=c99", "-O2", "-ffp-contract=off"),
     *(("-mno-fma",) if platform.machine() in ("x86_64", "AMD64", "i686") else ()),
 )
 """gcc 12 fuses operations in spite of -ffp-contract=off if CC has -mfma or -march=native."""
+LIBRARIES: Final = ("-lm",)
 
 ffi: Final = cffi.FFI()
 ffi.cdef(resources.files("mambo_nmpc.sil.engine").joinpath("records.h").read_text("utf-8"))
@@ -65,24 +61,10 @@ def _constants() -> str:
 @lru_cache
 def load(toolchain: Toolchain) -> Any:
     """Return the engine, built with `toolchain` unless it is cached; raises BuildError, CacheError."""
-    return load_texts(texts(), toolchain)
-
-
-def load_texts(files: Mapping[str, str], toolchain: Toolchain) -> Any:
-    """Return the engine of the C in `files`; raises BuildError, CacheError."""
-    contents = (files, FLAGS, toolchain, toolchain.identity())
-    name = f"engine_{hashlib.sha256(repr(contents).encode()).hexdigest()[:32]}.so"
-
-    def build(folder: Path) -> Path:
-        for path, text in files.items():
-            (folder / path).write_text(text, "utf-8")
-        flags = [*FLAGS, *([toolchain.optimisation] if toolchain.optimisation else [])]
-        toolchain.run([*flags, *SOURCES, "-o", "engine.so", "-lm"], folder)
-        if not (folder / "engine.so").is_file():
-            raise BuildError(f"{' '.join(toolchain.command)} wrote no output; set CC to a C compiler")
-        return folder / "engine.so"
-
-    return open_library(build_cached(name, build), ffi)
+    files = texts()
+    return load_shared_library(
+        LibrarySource("engine", files, lambda: files, FLAGS, ffi, LIBRARIES), toolchain
+    )
 
 
 def record_type(name: str) -> np.dtype[Any]:

@@ -1,1 +1,1 @@
-"""Result folders and the compile cache."""
+"""Result folders, the compile cache, and the shared libraries in it."""

@@ -17,8 +17,9 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine.build import FLAGS, SOURCES, load, texts
+from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, load, texts
 from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
+from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
@@ -102,7 +103,7 @@ def test_no_operation_is_fused(compiler: str, tmp_path: Path) -> None:
     path = require(compiler, compiler)
     for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
-    flags = ["-mavx2", "-mfma", *FLAGS, *SOURCES, "-o", "engine.so", "-lm"]
+    flags = ["-mavx2", "-mfma", *FLAGS, *LIBRARY_FLAGS, *SOURCES, "-o", "engine.so", *LIBRARIES]
     subprocess.run([path, *flags], cwd=tmp_path, check=True)
     code = subprocess.run(
         [require("objdump", "binutils"), "-d", "engine.so"],

@@ -8,8 +8,9 @@ from typing import Any, Final, Literal
 import cffi
 import numpy as np
 
-from mambo_nmpc.sil.engine.build import FLAGS, SOURCES, pointer
+from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, pointer
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
+from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from tests.support.tools import toolchain
@@ -120,7 +121,7 @@ def build(files: Mapping[str, str], folder: Path, *flags: str) -> Path:
     for name, text in (dict(files) | {"blocks.c": _BLOCKS}).items():
         (place / name).write_text(text, "utf-8")
     sources = [*SOURCES, "blocks.c"]
-    toolchain("gcc").run([*FLAGS, *flags, *sources, "-o", "engine.so", "-lm"], place)
+    toolchain("gcc").run([*FLAGS, *LIBRARY_FLAGS, *flags, *sources, "-o", "engine.so", *LIBRARIES], place)
     return place / "engine.so"
 
 
