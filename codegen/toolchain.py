@@ -5,13 +5,15 @@ import os
 import shlex
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Final
 
-from mambo_nmpc.codegen.errors import BuildError, echo
+from mambo_nmpc.codegen.errors import BuildError, UnwritableError, echo
+
+_LACK_OF_SPACE: Final = (errno.ENOSPC, errno.EDQUOT)
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,17 @@ class Toolchain:
     optimisation: str | None = None
 
     def run(self, arguments: Sequence[str], folder: Path) -> None:
-        """Compile or link in `folder`; raises BuildError with the first lines of the compiler's output."""
+        """Compile or link in `folder`.
+
+        Raises BuildError with the first lines of the compiler's output, and UnwritableError if it had no
+        space for its files.
+        """
         line = [*self.command, *arguments]
         try:
             done = subprocess.run(
                 line,
                 cwd=folder,
+                env=os.environ | {"LC_ALL": "C.UTF-8"},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 text=True,
@@ -39,14 +46,9 @@ class Toolchain:
                 f"cannot run the C compiler {shlex.join(self.command)}: {error.strerror}"
             ) from error
         if done.returncode != 0:
+            refuse_lack_of_space(self.command[0], done.stderr, folder)
             output = _first_lines(done.stderr or done.stdout) or f"exit code {done.returncode}, no output"
-            full = os.strerror(errno.ENOSPC) in output
-            advice = (
-                f"\nfree some space in {tempfile.gettempdir()}, or set TMPDIR to another folder"
-                if full
-                else ""
-            )
-            raise BuildError(f"{shlex.join(line)} failed:\n{output}{advice}")
+            raise BuildError(f"{shlex.join(line)} failed:\n{output}")
 
     def identity(self) -> str:
         """Return the output of --version, which tells builds of different compilers apart."""
@@ -71,6 +73,20 @@ def host_toolchain(optimisation: str | None = None) -> Toolchain:
         if shutil.which(name):
             return Toolchain((name,), optimisation)
     raise BuildError("no C compiler found (cc, gcc, clang); install one (Debian: gcc), or set CC")
+
+
+def refuse_lack_of_space(tool: str, output: str, folder: Path) -> None:
+    """Raise UnwritableError if a tool that failed in `folder` says that it could not write for lack of space.
+
+    `output` is in English. If it names no temporary file, `folder` may be full as well.
+    """
+    for line in output.splitlines():
+        if any(os.strerror(number) in line for number in _LACK_OF_SPACE):
+            temporary = os.environ.get("TMPDIR") or "/tmp"
+            advice = f"free some space in {temporary}, or set TMPDIR to another folder"
+            if temporary not in line:
+                advice += f"; or free some in {folder}"
+            raise UnwritableError(f"{tool} cannot write its files: {line.strip()}; {advice}")
 
 
 @lru_cache

@@ -37,11 +37,13 @@ def verify(
     from mambo_nmpc.codegen.render import render
     from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.files.folders import SUMMARY, digests, new_results
+    from mambo_nmpc.sil.files.scratch import check_tmpdir
     from mambo_nmpc.sil.verify.check import CheckOutcome
     from mambo_nmpc.sil.verify.report import PAGE, VerifySummary, closing, page, summarise
 
     settings = load(source, scalar)
     chosen = _chosen(only)
+    check_tmpdir()
     with (
         new_results(output, VerifySummary.command, (CONTROLLER, REPORTS, PAGE)) as place,
         counting_bar("generating the C", "checks", len(chosen)) as bar,

@@ -41,7 +41,8 @@ def fly(
     """Simulate the flights and return their trace; call `progress` with the share done.
 
     Uses the engine unless `engine` is numpy, or the step of the controller is not a C function. On a machine
-    without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError.
+    without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
+    UnwritableError if the engine cannot be built for want of a folder or space.
     """
     delay_ticks = int(np.max(flight.link.delay_ticks))
     if engine == "c" and isinstance(controller, EngineController) and delay_ticks <= DELAY_TICKS_MAX:

@@ -43,7 +43,8 @@ class LibrarySource:
 def load_shared_library(source: LibrarySource, toolchain: Toolchain) -> Any:
     """Return the library of `source`, built with `toolchain` unless it is cached.
 
-    Raises BuildError, and CacheError if the cache cannot be used or the library cannot be loaded.
+    Raises BuildError, UnwritableError if the compiler had no space for its files, and CacheError if the cache
+    cannot be used or the library cannot be loaded.
     """
     flags = (*source.flags, *((toolchain.optimisation,) if toolchain.optimisation else ()), *LIBRARY_FLAGS)
     contents = (source.key, flags, source.libraries, toolchain.command, toolchain.identity())

@@ -47,7 +47,7 @@ class Result:
 
 
 Check = Callable[[Subject], Result]
-"""A check raises only errors that the user must correct before it can start; faults of the C are results."""
+"""A check raises only errors that the user must correct, such as a full disk; faults of the C are results."""
 
 
 def passed(evidence: str, figures: Mapping[str, Any]) -> Result:

@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-import tempfile
 from collections import Counter
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Final
 
 from mambo_nmpc.codegen.flags import RULE_FLAGS
 from mambo_nmpc.codegen.render import DEVIATIONS
+from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.verify.check import Result, Subject, failed, incomplete, passed
 from mambo_nmpc.sil.verify.tools import TIME_LIMIT_S, missing, run
 
@@ -74,8 +74,8 @@ def _cppcheck(bundle: Path) -> subprocess.CompletedProcess[str]:
     numbers = [
         f"{chapter}.{rule}" for chapter in range(1, _CHAPTERS + 1) for rule in range(1, _LARGEST_CHAPTER + 1)
     ]
-    with tempfile.TemporaryDirectory(prefix="mambo-nmpc-") as work:
-        texts = Path(work, "rule_texts.txt")
+    with scratch_folder() as work:
+        texts = work / "rule_texts.txt"
         texts.write_text(
             "Appendix A Summary of guidelines\n"
             + "".join(f"Rule {n} Required\nMISRA rule {n}\n" for n in numbers),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from mambo_nmpc.codegen.toolchain import refuse_lack_of_space
 from mambo_nmpc.sil.firmware.doctor import command_version
 
 TIME_LIMIT_S: Final = 3600.0
@@ -25,8 +26,11 @@ def versions(tools: Sequence[str]) -> dict[str, str]:
 
 
 def run(command: Sequence[str], folder: Path) -> "subprocess.CompletedProcess[str]":
-    """Run `command` in `folder`, with English messages; raises TimeoutExpired after TIME_LIMIT_S."""
-    return subprocess.run(
+    """Run `command` in `folder`, with English messages.
+
+    Raises TimeoutExpired after TIME_LIMIT_S, and UnwritableError if the tool had no space for its files.
+    """
+    done = subprocess.run(
         command,
         cwd=folder,
         env=os.environ
@@ -38,6 +42,9 @@ def run(command: Sequence[str], folder: Path) -> "subprocess.CompletedProcess[st
         timeout=TIME_LIMIT_S,
         check=False,
     )
+    if done.returncode != 0:
+        refuse_lack_of_space(command[0], done.stderr + done.stdout, folder)
+    return done
 
 
 def number(log: str, pattern: str) -> int:
