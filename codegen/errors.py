@@ -33,7 +33,10 @@ class Terminated(KeyboardInterrupt):
 
 
 class MamboNmpcError(Exception):
-    """An error that the user can correct; its text is the whole message, without a traceback."""
+    """An error that the user can correct; its text is the whole message, without a traceback.
+
+    It passes between processes: its `args` are the arguments of its class.
+    """
 
     exit_code: ClassVar[int] = BAD_INPUT
 
@@ -50,8 +53,11 @@ class InvalidSettingsError(MamboNmpcError):
     """Settings break a rule; `faults` holds one line per broken rule, all of them."""
 
     def __init__(self, faults: tuple[str, ...]) -> None:
-        super().__init__("\n".join(faults))
+        super().__init__(faults)
         self.faults = faults
+
+    def __str__(self) -> str:
+        return "\n".join(self.faults)
 
 
 class FileExistsRefusedError(MamboNmpcError):
@@ -66,8 +72,12 @@ class ForeignFilesError(MamboNmpcError):
     """A bundle would overwrite foreign or edited files; `paths` names them."""
 
     def __init__(self, message: str, paths: tuple[str, ...]) -> None:
-        super().__init__(message)
+        super().__init__(message, paths)
+        self.message = message
         self.paths = paths
+
+    def __str__(self) -> str:
+        return self.message
 
 
 class BuildError(MamboNmpcError):
