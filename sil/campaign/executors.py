@@ -7,7 +7,9 @@ import asyncio
 import contextlib
 import logging
 import os
+import shlex
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
@@ -149,7 +151,8 @@ def cluster(address: str) -> Iterator[Pool]:
     try:
         from distributed import Client  # noqa: PLC0415 - an optional extra
     except ImportError:
-        raise WorkerError('--scheduler needs Dask; pip install "mambo-nmpc[dask]" installs it') from None
+        install = shlex.join([sys.executable, "-m", "pip", "install", "distributed"])
+        raise WorkerError(f"--scheduler needs Dask; install it: {install}") from None
     option = f"--scheduler {echo(address)}"
     for name in ("distributed", "distributed.client"):  # errors arrive as exceptions
         logging.getLogger(name).setLevel(logging.CRITICAL)

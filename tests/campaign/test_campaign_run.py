@@ -4,8 +4,10 @@ import csv
 import json
 import os
 import resource
+import shlex
 import shutil
 import signal
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -323,6 +325,16 @@ def test_scheduler_and_workers_exclude_each_other(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "leave out --workers" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_missing_dask_is_named(tmp_path: Path) -> None:
+    """The message says how to install it for the Python that runs; no folder is made."""
+    script = "import sys; sys.modules['distributed'] = None; from mambo_nmpc.sil.cli.app import main; main()"
+    done = command("campaign", "--scheduler", "tcp://127.0.0.1:1", folder=tmp_path, script=script)
+    assert (done.returncode, done.stdout) == (2, "")
+    install = shlex.join([sys.executable, "-m", "pip", "install", "distributed"])
+    assert done.stderr == f"--scheduler needs Dask; install it: {install}\n"
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("scheme", ["tls", "ucx"])
