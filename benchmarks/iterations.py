@@ -66,7 +66,7 @@ class RecordingController:
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
         """Compute the next command from state (1, 7), target (1, 4) and thrust_acceleration_m_s2 (1,)."""
-        step = self._compiled.step(state, target, thrust_acceleration_m_s2)
+        step: Step = self._compiled.step(state, target, thrust_acceleration_m_s2)
         given = [np.array(each, np.float64)[0] for each in (state, target, thrust_acceleration_m_s2)]
         self._rows.append((*given, self._last_rad, np.array(step.plan_rad[0], np.float64)))
         self._last_rad = np.array(step.command_rad[0], np.float64)

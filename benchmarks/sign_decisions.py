@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.markdown import table
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
@@ -193,7 +193,7 @@ class _RecordingController:
         """Record, and step."""
         moments = Moments(state, target, thrust_acceleration_m_s2, self._command, self._plan)
         self.moments.append(moments.exact(self._settings))
-        step = self._controller.step(state, target, thrust_acceleration_m_s2)
+        step: Step = self._controller.step(state, target, thrust_acceleration_m_s2)
         self._command, self._plan = step.command_rad, step.plan_rad
         return step
 

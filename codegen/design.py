@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from mambo_nmpc.codegen.attitude import AttitudeConstants, attitude_constants
 from mambo_nmpc.codegen.fixed_point import formats
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
+from mambo_nmpc.codegen.observer import ObserverConstants, observer_constants
+from mambo_nmpc.codegen.quadratic import QuadraticConstants, quadratic_constants
 from mambo_nmpc.codegen.representation import InputLimits, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.tracker import TrackerConstants, tracker_constants
@@ -31,6 +34,43 @@ class Design:
     def tracker(self) -> TrackerConstants | None:
         """The constants of the target tracker, in float64; None without `target.acceleration = "tracked"`."""
         return tracker_constants(self.settings)
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether the cost is quadratic; else it is the paper's 1-norm."""
+        return self.settings.cost.norm == "quadratic"
+
+    @cached_property
+    def attitude(self) -> AttitudeConstants:
+        """The constants of the attitude model, in float64; for a quadratic cost."""
+        return attitude_constants(self.settings)
+
+    @cached_property
+    def observer(self) -> ObserverConstants:
+        """The constants of the observer, in float64; for a quadratic cost."""
+        return observer_constants(self.settings)
+
+    @cached_property
+    def law(self) -> QuadraticConstants:
+        """The constants of the quadratic cost's minimum, in float64; for a quadratic cost."""
+        return quadratic_constants(self.settings)
+
+    @cached_property
+    def feedback_steps(self) -> tuple[float, float] | None:
+        """Commands of roll and pitch per change of the angle in an update period; None without feedback."""
+        damping, period_s = self.settings.damping, self.settings.horizon.update_period_s
+        if damping.roll_rate_feedback_s == damping.pitch_rate_feedback_s == 0:
+            return None
+        return damping.roll_rate_feedback_s / period_s, damping.pitch_rate_feedback_s / period_s
+
+    @property
+    def stored(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_t, in their order; for a quadratic cost."""
+        observer = [*["estimate"] * 2, *["speed"] * 2, *["acceleration"] * 2]
+        attitude = [*["acceleration"] * 8, *["sine"] * 2]
+        tracker = [*["velocity"] * 2, *["acceleration"] * 4] if self.tracker else []
+        tilt = ["angle"] * 2 if self.feedback_steps else []
+        return (*observer, *attitude, *tracker, *tilt, "angle", "angle")
 
     @cached_property
     def numbers(self) -> Representation:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.fixed_point import LARGEST
-from mambo_nmpc.codegen.reference import ReferenceController, Step
+from mambo_nmpc.codegen.reference import ExactStep, Step, reference_controller
 from mambo_nmpc.codegen.reference.math import Real, rounded
 from mambo_nmpc.codegen.representation import OUTCOME, STATE, TARGET, InputLimits, Representation
 from mambo_nmpc.codegen.settings.model import Settings
@@ -95,6 +95,8 @@ def input_scales(design: Design) -> InputScales:
 def episode_count(settings: Settings) -> int:
     """Return how many episodes the digest covers: fewer for long horizons, which keeps the run time equal."""
     horizon = settings.horizon
+    if settings.cost.norm == "quadratic":
+        return _MOST_EPISODES
     work = max(horizon.prediction * horizon.control, _LEAST_WORK) * settings.optimizer.iterations
     return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
 
@@ -193,20 +195,26 @@ def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, An
 
 def _episode_digests(design: Design, episodes: Words) -> Words:
     """Run n episodes, and return the digest of each (n,)."""
-    controller = ReferenceController(design, len(episodes))
+    controller = reference_controller(design, len(episodes))
     digests = np.zeros_like(episodes)
     for inputs in episode_inputs(design, episodes):
-        for word in _words(design.numbers, controller.step(*inputs)):
+        for word in _words(design, controller.step(*inputs)):
             digests = _fold(digests, word)
     return digests
 
 
-def _words(numbers: Representation, step: Step) -> Iterator[Words]:
+def _words(design: Design, step: Step | ExactStep) -> Iterator[Words]:
     """Yield the outcome of a step as 32-bit words (n,); a 64-bit number gives its upper word first."""
-    for count in (step.status, step.iterations, step.converged):
+    numbers = design.numbers
+    if isinstance(step, ExactStep):
+        counts: tuple[NDArray[Any], ...] = (step.status, step.missed, step.saturated)
+        outcome = [numbers.stored_from_si(step.stored, design.stored)]
+    else:
+        counts = (step.status, step.iterations, step.converged)
+        outcome = [numbers.from_si(getattr(step, name), name) for name in OUTCOME]
+    for count in counts:
         yield count.astype(np.uint32)
-    for name in OUTCOME:
-        values = numbers.from_si(getattr(step, name), name)
+    for values in outcome:
         rows = np.ascontiguousarray(values.reshape(len(values), -1))
         yield from rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T
 

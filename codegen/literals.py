@@ -34,9 +34,14 @@ class Spelling:
             return real(value, self._scalar)
         return fixed(value, self._bits[quantity]) if quantity else real(value, "float32")
 
-    def rows(self, values: Iterable[Sequence[float]], quantity: str = "") -> str:
-        """Spell a two-dimensional table, each row in braces."""
-        return ",\n".join(_row([self.real(value, quantity) for value in row]) for row in values)
+    def rows(self, values: Iterable[Sequence[float]], quantity: str | Sequence[str] = "") -> str:
+        """Spell a two-dimensional table, each row in braces; `quantity` is that of all, or of each column."""
+
+        def words(row: Sequence[float]) -> list[str]:
+            names = [quantity] * len(row) if isinstance(quantity, str) else quantity
+            return [self.real(value, name) for value, name in zip(row, names, strict=True)]
+
+        return ",\n".join(_row(words(row)) for row in values)
 
     def row(self, values: Sequence[float], quantity: str = "", indent: int = _INDENT) -> str:
         """Spell a one-dimensional table without its braces."""

@@ -22,7 +22,7 @@ from mambo_nmpc.codegen.flags import (
     proofs,
 )
 from mambo_nmpc.codegen.infix import infix
-from mambo_nmpc.codegen.representation import STATE, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.representation import ROW, STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.self_test import hover_thrust, self_test
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
@@ -30,8 +30,16 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
-SUB_BLOCKS: Final = ("nmpc_math", "nmpc_tracker", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer")
-"""Sources with a header each; a bundle has nmpc_tracker only if its settings have a tracker."""
+SUB_BLOCKS: Final = {
+    "1-norm": ("nmpc_math", "nmpc_tracker", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer"),
+    "quadratic": ("nmpc_math", "nmpc_tracker", "nmpc_attitude", "nmpc_observer", "nmpc_optimizer"),
+}
+"""Sources with a header each, by norm; a bundle has nmpc_tracker only if its settings have a tracker."""
+_QUADRATIC: Final = frozenset(
+    {"nmpc_config.h", "nmpc.h", "nmpc.c"}
+    | {f"{block}.{kind}" for block in SUB_BLOCKS["quadratic"][2:] for kind in "hc"}
+)
+"""Files of a bundle whose templates are in quadratic/ if the cost is."""
 PROJECT: Final = {
     "README.md": "README.md",
     "Makefile": "Makefile",
@@ -63,13 +71,19 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     design = Design(settings)
     environment = _environment()
     public: tuple[str, ...] = PUBLIC_HEADERS
-    blocks = tuple(block for block in SUB_BLOCKS if design.tracker or block != "nmpc_tracker")
+    norm = settings.cost.norm
+    blocks = tuple(block for block in SUB_BLOCKS[norm] if design.tracker or block != "nmpc_tracker")
     code: tuple[str, ...] = (*(f"{block}.c" for block in blocks), "nmpc.c", "nmpc_self_test.c")
     if design.numbers.formats is not None:
         public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
-    headers = {name: environment.get_template(f"include/{name}.j2") for name in public}
-    privates = {f"{block}.h": environment.get_template(f"src/{block}.h.j2") for block in blocks}
-    sources = {name: environment.get_template(f"src/{name}.j2") for name in code}
+
+    def template(folder: str, name: str) -> jinja2.Template:
+        own = design.is_quadratic and name in _QUADRATIC
+        return environment.get_template(f"{'quadratic' if own else folder}/{name}.j2")
+
+    headers = {name: template("include", name) for name in public}
+    privates = {f"{block}.h": template("src", f"{block}.h") for block in blocks}
+    sources = {name: template("src", name) for name in code}
     others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
 
@@ -137,61 +151,91 @@ def _context(design: Design) -> dict[str, object]:
     """Return all values that the templates insert."""
     settings, numbers = design.settings, design.numbers
     scalar = settings.code.scalar
+    own = _quadratic_context(design) if design.is_quadratic else _one_norm_context(design)
+    return (
+        own
+        | {
+            "settings": settings,
+            "spelling": literals.Spelling(scalar, numbers.bits),
+            "parameters": [
+                (f"{section}.{key}", value)
+                for section, values in settings.in_use.items()
+                for key, value in values.items()
+                if key != "prefix"  # every public name shows it
+            ],
+            "version": __version__,
+            "digest": settings.digest[:16],
+            "settings_id": _settings_id(settings),
+            "fixed": numbers.formats is not None,
+            "formats": numbers.formats,
+            "sine_bits": SINE_BITS,
+            "scales": _powers(numbers, 1),
+            "units": _powers(numbers, -1),
+            "c_type": literals.C_TYPES[scalar],
+            "shell": "nmpc_float_" if numbers.formats else "nmpc_",
+            "sum_type": literals.SUM_TYPES[scalar],
+            "scalar_bytes": _BYTES[scalar][0],
+            "instance_bytes": _instance_bytes(design),
+            "tracker": design.tracker,
+            "trigonometry": design.trigonometry,
+            "sine_error": SINE_ERRORS[scalar],
+            "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
+            "yaw_limit_rad": YAW_LIMIT_RAD,
+            "vectors": self_test(design),
+            "episodes": episode_count(settings),
+            "ticks": TICKS,
+            "held": TICKS_PER_INPUT,
+            "self_test_steps": TICKS * episode_count(settings),
+            "spread": input_scales(design),
+            "boards": [
+                {
+                    "name": board.name,
+                    "compiler": board.compiler.common,
+                    "flags": " ".join(board.compiler.flags),
+                }
+                for board in map(boards.load, boards.names())
+            ],
+            "hover_thrust_m_s2": hover_thrust(settings),
+            "example_position_m": min(1.0, settings.ranges.position_m / 2),
+            "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
+            "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
+            "compile_flags": " ".join(COMPILE_FLAGS),
+            "warning_flags": " ".join(WARNING_FLAGS),
+            "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
+            "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in proofs(scalar).items()},
+            "rule_flags": " ".join(RULE_FLAGS),
+        }
+    )
+
+
+def _one_norm_context(design: Design) -> dict[str, object]:
+    settings, numbers = design.settings, design.numbers
     return {
-        "settings": settings,
-        "spelling": literals.Spelling(scalar, numbers.bits),
-        "parameters": [
-            (f"{section}.{key}", value)
-            for section, values in settings.in_use.items()
-            for key, value in values.items()
-            if key != "prefix"  # every public name shows it
-        ],
-        "version": __version__,
-        "digest": settings.digest[:16],
-        "settings_id": _settings_id(settings),
-        "fixed": numbers.formats is not None,
-        "formats": numbers.formats,
-        "sine_bits": SINE_BITS,
-        "scales": _powers(numbers, 1),
-        "units": _powers(numbers, -1),
-        "c_type": literals.C_TYPES[scalar],
-        "shell": "nmpc_float_" if numbers.formats else "nmpc_",
-        "sum_type": literals.SUM_TYPES[scalar],
-        "scalar_bytes": _BYTES[scalar][0],
-        "instance_bytes": _instance_bytes(design),
+        "quadratic": False,
         "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
         "tables": design.tables,
-        "tracker": design.tracker,
-        "trigonometry": design.trigonometry,
-        "sine_error": SINE_ERRORS[scalar],
         "tracking_limit": numbers.tracking_limit,
         "effort_limit": numbers.effort_limit,
-        "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
-        "yaw_limit_rad": YAW_LIMIT_RAD,
-        "vectors": self_test(design),
-        "episodes": episode_count(settings),
-        "ticks": TICKS,
-        "held": TICKS_PER_INPUT,
-        "self_test_steps": TICKS * episode_count(settings),
-        "spread": input_scales(design),
-        "boards": [
-            {
-                "name": board.name,
-                "compiler": board.compiler.common,
-                "flags": " ".join(board.compiler.flags),
-            }
-            for board in map(boards.load, boards.names())
-        ],
-        "hover_thrust_m_s2": hover_thrust(settings),
-        "example_position_m": min(1.0, settings.ranges.position_m / 2),
-        "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
-        "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
-        "compile_flags": " ".join(COMPILE_FLAGS),
-        "warning_flags": " ".join(WARNING_FLAGS),
-        "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
-        "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in proofs(scalar).items()},
-        "rule_flags": " ".join(RULE_FLAGS),
+    }
+
+
+def _quadratic_context(design: Design) -> dict[str, object]:
+    period_s, model = design.settings.horizon.update_period_s, design.settings.model
+    return {
+        "quadratic": True,
+        "attitude": design.attitude,
+        "observer": design.observer,
+        "law": design.law,
+        "feedback": design.feedback_steps is not None,
+        "feedback_steps": design.feedback_steps,
+        "stored_numbers": len(design.stored),
+        "stored_quantities": design.stored,
+        "row_quantities": ROW,
+        "attitude_shares": [period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)],
+        "steps_per_s": 1 / period_s,
+        "steps2_per_s2": 1 / period_s**2,
+        "wide": "(nmpc_sum_t)" if design.numbers.formats else "",
     }
 
 
@@ -223,11 +267,14 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
 def _instance_bytes(design: Design) -> int:
     """Return the size of nmpc_t: its numbers, sums and single bytes, with padding."""
     settings = design.settings
+    number_bytes, sum_bytes = _BYTES[settings.code.scalar]
+    if design.is_quadratic:
+        flags = 3 if design.tracker else 2
+        return (len(design.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
     moves = 2 * settings.horizon.control
     weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if design.tables.has_lag else 3), 2
     tracker, flags = (6, 3) if design.tracker else (0, 2)
     numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
-    number_bytes, sum_bytes = _BYTES[settings.code.scalar]
     before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
     return -(-(before_flags + flags) // sum_bytes) * sum_bytes
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, raw
 from mambo_nmpc.codegen.literals import SCALARS
+from mambo_nmpc.codegen.quadratic import STATES
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.sections import Sections
 
@@ -22,6 +23,7 @@ TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
 THRUST: Final = ("thrust",)
 COMMAND: Final = ("angle", "angle")
 WEIGHTS: Final = ("tracking", "effort")
+ROW: Final = tuple(f"row_{state}" for state in STATES)
 """The quantity of each column of an input."""
 
 OUTCOME: Final = {"command_rad": "angle", "cost": "cost", "gradient": "gradient", "plan_rad": "angle"}
@@ -68,6 +70,15 @@ class Representation:
     def constant(self, value: float, quantity: str) -> Any:
         """Round `value` in SI units to a number of the C, in the type that the reference computes with."""
         return self.scalar(value) if self.bits is None else np.int64(raw(value, self.bits[quantity]))
+
+    def row_constants(self, rows: NDArray[np.float64]) -> NDArray[Any]:
+        """Round the rows of the exact optimizer (2, moves, 8), each column in its quantity."""
+        return np.array(
+            [
+                [[self.constant(value, name) for value, name in zip(row, ROW, strict=True)] for row in axis]
+                for axis in rows
+            ]
+        )
 
     def limits(self, settings: Sections) -> InputLimits:
         """Return the limits of inputs and commands that `settings` give."""
@@ -117,4 +128,11 @@ class Representation:
             return values
         kind = self.wide if name in ("cost", "gradient") else self.scalar
         numbers: NDArray[Any] = np.ldexp(values, self.bits[OUTCOME[name]]).astype(kind)
+        return numbers
+
+    def stored_from_si(self, values: NDArray[Any], quantities: Sequence[str]) -> NDArray[Any]:
+        """Convert the stored numbers of a step (n, k) from SI units back to numbers of the C."""
+        if self.bits is None:
+            return values
+        numbers: NDArray[Any] = np.ldexp(values, [self.bits[name] for name in quantities]).astype(self.scalar)
         return numbers

@@ -8,7 +8,14 @@ import numpy as np
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import SCALARS
-from mambo_nmpc.codegen.reference import ReferenceController, Status
+from mambo_nmpc.codegen.reference import (
+    ExactReferenceController,
+    ExactStep,
+    ReferenceController,
+    Status,
+    Step,
+    reference_controller,
+)
 from mambo_nmpc.codegen.settings.model import Settings
 
 STEPS: Final = 24
@@ -17,15 +24,17 @@ _GOLDEN_RATIO: Final = 0.6180339887498949
 
 @dataclass(frozen=True)
 class SelfTestStep:
-    """One step: inputs state (7,), target (4,), thrust; results status, command (2,), cost, gradient (2,)."""
+    """One step: inputs state (7,), target (4,), thrust; results status, command (2,) and other numbers.
+
+    Those are cost and gradient (2,) of the 1-norm; (k,) all stored numbers with a quadratic cost.
+    """
 
     state: tuple[float, ...]
     target: tuple[float, ...]
     thrust_acceleration_m_s2: float
     status: Status
     command_rad: tuple[float, float]
-    cost: float
-    gradient: tuple[float, float]
+    others: tuple[float, ...]
 
 
 def self_test(design: Design) -> list[SelfTestStep]:
@@ -37,7 +46,7 @@ def self_test(design: Design) -> list[SelfTestStep]:
     library's random numbers may change with its version.
     """
     settings = design.settings
-    controller = ReferenceController(design)
+    controller = reference_controller(design)
     ranges = settings.ranges
     position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
     spread = _weyl_sequence()
@@ -76,20 +85,27 @@ def hover_thrust(settings: Settings, offset_m_s2: float = 0.0) -> float:
 
 
 def _step(
-    controller: ReferenceController, state: list[float], target: list[float], thrust: float
+    controller: ReferenceController | ExactReferenceController,
+    state: list[float],
+    target: list[float],
+    thrust: float,
 ) -> SelfTestStep:
     step = controller.step([state], [target], [thrust])
     roll_rad, pitch_rad = step.command_rad[0].tolist()
-    by_roll, by_pitch = step.gradient[0, 0].tolist()
     return SelfTestStep(
         state=tuple(state),
         target=tuple(target),
         thrust_acceleration_m_s2=thrust,
         status=Status(int(step.status[0])),
         command_rad=(roll_rad, pitch_rad),
-        cost=float(step.cost[0]),
-        gradient=(by_roll, by_pitch),
+        others=_others(step),
     )
+
+
+def _others(step: Step | ExactStep) -> tuple[float, ...]:
+    if isinstance(step, ExactStep):
+        return tuple(step.stored[0].tolist())
+    return (float(step.cost[0]), *step.gradient[0, 0].tolist())
 
 
 def _weyl_sequence() -> Iterator[float]:

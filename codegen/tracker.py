@@ -8,9 +8,6 @@ from typing import Final
 
 from mambo_nmpc.codegen.settings.sections import Sections
 
-GAIN: Final = 0.3
-"""alpha: share of the difference between measured and predicted acceleration that the estimate takes."""
-
 JUMP_MARGIN: Final = 1.5
 """A target that accelerates by this factor more than the drone can at its tilt limit has jumped."""
 
@@ -46,10 +43,14 @@ class TrackerConstants:
 
 
 def tracker_constants(settings: Sections) -> TrackerConstants | None:
-    """Derive the constants of the tracker; None if `settings` have none."""
+    """Derive the constants of the tracker; None if `settings` have none.
+
+    With a quadratic cost tau is the update period.
+    """
     if settings.target.acceleration == "none":
         return None
-    update_s, step_s = settings.horizon.update_period_s, settings.horizon.prediction_step_s
+    update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain
+    step_s = update_s if settings.cost.norm == "quadratic" else settings.horizon.prediction_step_s
     acceleration_m_s2 = JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad
     change_m_s = min(acceleration_m_s2 * update_s, 2 * settings.ranges.velocity_m_s)
     step_squared_per_update_s = (step_s * step_s) / update_s
@@ -59,6 +60,6 @@ def tracker_constants(settings: Sections) -> TrackerConstants | None:
         step_squared_per_update_s=step_squared_per_update_s,
         acceleration_limit_m_step2=acceleration_m_step2,
         jerk_limit_m_step2_update=JERK_SHARE * acceleration_m_step2,
-        gain=GAIN,
-        jerk_gain=GAIN * GAIN / (2 - GAIN),
+        gain=gain,
+        jerk_gain=gain * gain / (2 - gain),
     )

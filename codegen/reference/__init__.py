@@ -6,6 +6,23 @@ additions. `paper.py` is the exception: eqs 8-12 and RPROP as a lecture would wr
 rounding.
 """
 
-from mambo_nmpc.codegen.reference.controller import Memory, ReferenceController, Status, Step, choose
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.reference.controller import Memory, ReferenceController, Step
+from mambo_nmpc.codegen.reference.exact_controller import ExactReferenceController, ExactStep
+from mambo_nmpc.codegen.reference.inputs import Status, choose
 
-__all__ = ["Memory", "ReferenceController", "Status", "Step", "choose"]
+__all__ = [
+    "ExactReferenceController",
+    "ExactStep",
+    "Memory",
+    "ReferenceController",
+    "Status",
+    "Step",
+    "choose",
+    "reference_controller",
+]
+
+
+def reference_controller(design: Design, n: int = 1) -> ReferenceController | ExactReferenceController:
+    """Return n controllers in NumPy that compute the bits of the C of `design`."""
+    return ExactReferenceController(design, n) if design.is_quadratic else ReferenceController(design, n)

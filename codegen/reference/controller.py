@@ -1,9 +1,6 @@
 """Controller: checks the inputs of a step, predicts, optimizes the plan and applies its first move."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from enum import IntEnum
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,25 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
+from mambo_nmpc.codegen.reference.inputs import Inputs, Status, choose
 from mambo_nmpc.codegen.reference.math import Real
 from mambo_nmpc.codegen.reference.optimizer import Minimize, Rprop, Search
 from mambo_nmpc.codegen.reference.predictor import Predictor
 from mambo_nmpc.codegen.reference.tracker import TargetMotion, Tracker, unknown_motion
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
-
-Record = TypeVar("Record", "Memory", TargetMotion)
-
-
-class Status(IntEnum):
-    """What `nmpc_step` and its siblings return."""
-
-    OK = 0
-    NULL_POINTER = 1
-    BAD_STATE = 2
-    BAD_TARGET = 3
-    BAD_THRUST = 4
-    BAD_WEIGHT = 5
-    BAD_COMMAND = 6
+from mambo_nmpc.codegen.representation import WEIGHTS
 
 
 @dataclass(frozen=True)
@@ -48,18 +32,6 @@ class Memory:
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
     target: TargetMotion
-
-
-def choose(chosen: NDArray[np.bool_], new: Record, old: Record) -> Record:
-    """Return a record of arrays (n, ...) with the rows of `new` where `chosen` (n,), else those of `old`."""
-
-    def rows(name: str) -> Any:
-        ours, theirs = getattr(new, name), getattr(old, name)
-        if isinstance(ours, TargetMotion):
-            return choose(chosen, ours, theirs)
-        return np.where(chosen.reshape(-1, *[1] * (ours.ndim - 1)), ours, theirs)
-
-    return replace(new, **{field.name: rows(field.name) for field in fields(new)})
 
 
 @dataclass(frozen=True)
@@ -95,7 +67,7 @@ class ReferenceController:
     def __init__(self, design: Design, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
         settings, products = design.settings, arithmetic(design)
         self.settings = settings
-        self._numbers, self._limits = design.numbers, design.limits
+        self._numbers, self._inputs = design.numbers, Inputs(design)
         self._predictor = Predictor(design, products)
         self._tracker = Tracker(design.tracker, products) if design.tracker else None
         self._rprop = Rprop(settings, products)
@@ -106,7 +78,7 @@ class ReferenceController:
         self.memory = Memory(
             command_rad=np.zeros((n, 2), computed),
             plan_rad=np.zeros((n, control, 2), computed),
-            weights=np.tile(self._quantize([weights], WEIGHTS), (n, 1)),
+            weights=np.tile(self._inputs.numbers([weights], WEIGHTS), (n, 1)),
             cost=np.zeros(n, computed),
             gradient=np.zeros((n, control, 2), computed),
             iterations=np.zeros(n, np.int64),
@@ -120,10 +92,7 @@ class ReferenceController:
         Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
         nothing.
         """
-        given = self._quantize(command_rad, COMMAND)
-        good = _within(given, self._limits.attitude)
-        limit = self._limits.tilt
-        command = np.minimum(np.maximum(given, -limit), limit)
+        command, good = self._inputs.command(command_rad)
         plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
         new = replace(self.memory, command_rad=command, plan_rad=plan, target=unknown_motion(command))
         self.memory = choose(good, new, self.memory)
@@ -134,8 +103,8 @@ class ReferenceController:
 
         Returns a status (n,); bad weights change nothing.
         """
-        given = self._quantize(weights, WEIGHTS)
-        good = np.all((given >= 0) & (given <= self._limits.weights), axis=1)
+        given = self._inputs.numbers(weights, WEIGHTS)
+        good = np.all((given >= 0) & (given <= self._inputs.limits.weights), axis=1)
         self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
         return np.where(good, Status.OK, Status.BAD_WEIGHT)
 
@@ -145,15 +114,17 @@ class ReferenceController:
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
         target (n, 4): x, y (m), vx, vy (m/s). thrust_acceleration_m_s2 (n,): thrust over mass, up.
         """
-        states, targets = self._quantize(state, STATE), self._quantize(target, TARGET)
-        thrusts = self._quantize(np.asarray(thrust_acceleration_m_s2)[:, None], THRUST)[:, 0]
-        status = self._check(states, targets, thrusts)
+        states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
+        status = self._inputs.status(*self._inputs.check(states, targets, thrusts))
         good = status == Status.OK
         zero = self._numbers.computed(0)
         states, targets = (np.where(good[:, None], given, zero) for given in (states, targets))
         motion = self._track(targets)
         searched = self._search(
-            states, targets, np.where(good, thrusts, self._limits.thrust_least), motion.acceleration_m_step2
+            states,
+            targets,
+            np.where(good, thrusts, self._inputs.limits.thrust_least),
+            motion.acceleration_m_step2,
         )
         new = replace(
             self.memory,
@@ -177,9 +148,6 @@ class ReferenceController:
             converged=new.converged,
         )
 
-    def _quantize(self, values: ArrayLike, quantities: Sequence[str]) -> Real:
-        return self._numbers.quantize(values, quantities).astype(self._numbers.computed)
-
     def _track(self, target: Real) -> TargetMotion:
         if self._tracker is None:
             return self.memory.target
@@ -197,25 +165,3 @@ class ReferenceController:
         if self.settings.optimizer.warm_start == "last_command":
             start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
         return self._minimize(self._rprop, evaluate, start)
-
-    def _check(self, state: Real, target: Real, thrust: Real) -> NDArray[np.int64]:
-        limits = self._limits
-        good_state = (
-            _within(state[:, 0:2], limits.position)
-            & _within(state[:, 2:4], limits.velocity)
-            & _within(state[:, 4:6], limits.attitude)
-            & _within(state[:, 6:7], limits.yaw)
-        )
-        good_target = _within(target[:, 0:2], limits.position) & _within(target[:, 2:4], limits.velocity)
-        good_thrust = (thrust >= limits.thrust_least) & (thrust <= limits.thrust_most)
-        return np.select(
-            [~good_state, ~good_target, ~good_thrust],
-            [Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST],
-            Status.OK,
-        )
-
-
-def _within(values: Real, limit: Any) -> NDArray[np.bool_]:
-    """Return for each row of (n, k) whether all values lie in -limit..limit; NaN does not."""
-    inside: NDArray[np.bool_] = np.all((values >= -limit) & (values <= limit), axis=1)
-    return inside

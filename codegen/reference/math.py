@@ -67,6 +67,13 @@ def rounded(product: Real, bits: int) -> Real:
     return nearest
 
 
+def clamp(values: Real, limit: Any) -> Real:
+    """Saturate `values` at plus or minus `limit`, with the comparisons of the C."""
+    above: Real = np.where(values > -limit, values, -limit)
+    clamped: Real = np.where(above < limit, above, limit)
+    return clamped
+
+
 def sign(value: Real) -> Real:
     """Return -1, 0 or 1 in the type of `value`; 0 for +0 and -0 (departure 14 of docs/paper.md)."""
     scalar = value.dtype.type

@@ -1,13 +1,13 @@
 """Target tracker: the target's acceleration, estimated from its velocities by an alpha-beta filter."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.reference.arithmetic import Arithmetic
-from mambo_nmpc.codegen.reference.math import Real
+from mambo_nmpc.codegen.reference.exact_arithmetic import ExactArithmetic
+from mambo_nmpc.codegen.reference.math import Real, clamp
 from mambo_nmpc.codegen.tracker import TrackerConstants
 
 
@@ -36,7 +36,7 @@ def unknown_motion(like: Real) -> TargetMotion:
 class Tracker:
     """The constants of the tracker, in the scalar type of the controller."""
 
-    def __init__(self, constants: TrackerConstants, arithmetic: Arithmetic) -> None:
+    def __init__(self, constants: TrackerConstants, arithmetic: Arithmetic | ExactArithmetic) -> None:
         constant = arithmetic.numbers.constant
         self._arithmetic = arithmetic
         self._change_limit = constant(constants.change_limit_m_s, "velocity")
@@ -50,22 +50,16 @@ class Tracker:
         """Take the target's velocity (n, 2) of a control step into the estimates."""
         product = self._arithmetic.tracker_product
         change = velocity_m_s - motion.velocity_m_s
-        limited = _clamp(change, self._change_limit)
+        limited = clamp(change, self._change_limit)
         steady = motion.is_known[:, None] & (limited == change)
         measured = self._arithmetic.change_product(self._step_squared_per_update, limited)
         predicted = motion.acceleration_m_step2 + motion.jerk_m_step2_update
         difference = measured - predicted
-        acceleration = _clamp(predicted + product(self._gain, difference), self._acceleration_limit)
-        jerk = _clamp(motion.jerk_m_step2_update + product(self._jerk_gain, difference), self._jerk_limit)
+        acceleration = clamp(predicted + product(self._gain, difference), self._acceleration_limit)
+        jerk = clamp(motion.jerk_m_step2_update + product(self._jerk_gain, difference), self._jerk_limit)
         return TargetMotion(
             velocity_m_s=velocity_m_s,
             acceleration_m_step2=np.where(steady, acceleration, motion.acceleration_m_step2),
             jerk_m_step2_update=np.where(steady, jerk, np.zeros_like(jerk)),
             is_known=np.ones_like(motion.is_known),
         )
-
-
-def _clamp(values: Real, limit: Any) -> Real:
-    """Saturate `values` at plus or minus `limit`."""
-    clamped: Real = np.minimum(np.maximum(values, -limit), limit)
-    return clamped

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
 from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, spell
 from mambo_nmpc.codegen.settings.messages import faults
+from mambo_nmpc.codegen.settings.methods import used_values
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 
@@ -53,12 +54,14 @@ def with_option(settings: Settings, path: str, value: object, source: str = "set
 
 
 def to_toml(settings: Settings, title: str = _TITLE) -> str:
-    """Return a complete controller.toml with a comment above every key; reading it gives equal settings."""
+    """Return a complete controller.toml with a comment above every key; reading it gives equal settings.
+
+    Keys that the controller does not use are left out.
+    """
     parts = [_comment(title), _comment("A missing key takes the value of preset table1.")]
-    values = settings.model_dump()
-    for section, about in SECTIONS.items():
-        parts += ["", _comment(about), f"[{section}]"]
-        for name, value in values[section].items():
+    for section, values in used_values(settings).items():
+        parts += ["", _comment(SECTIONS[section]), f"[{section}]"]
+        for name, value in values.items():
             key = KEYS[f"{section}.{name}"]
             admits = _comment(f"{key.kind.capitalize()}: {key.domain}.")
             parts += ["", _comment(key.description), admits, f"{name} = {spell(value)}"]

@@ -1,13 +1,16 @@
-"""The settings of one controller: its sections, the rule between sections, and their digest."""
+"""The settings of one controller: its sections, the rules between sections, and their digest."""
 
 import hashlib
 import json
+from collections.abc import Iterator
 from typing import Any, Self
 
 from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from mambo_nmpc.codegen.fixed_point import refusals
+from mambo_nmpc.codegen.fixed_point import Refusal, refusals
+from mambo_nmpc.codegen.quadratic import quadratic_refusals
+from mambo_nmpc.codegen.settings.methods import is_used, used_values
 from mambo_nmpc.codegen.settings.sections import Sections, Target
 
 
@@ -15,14 +18,18 @@ class Settings(Sections):
     """Settings of a mambo-nmpc controller (controller.toml)."""
 
     @model_validator(mode="after")
-    def _representable(self) -> Self:
-        refused = refusals(self) if self.code.scalar == "fixed" else []
+    def _obeys_joint_rules(self) -> Self:
+        refused = list(self._unused())
+        if not refused and self.cost.norm == "quadratic":
+            refused = quadratic_refusals(self)
+        if not refused and self.code.scalar == "fixed":
+            refused = refusals(self)
         if refused:
             raise ValidationError.from_exception_data(
                 "Settings",
                 [
                     InitErrorDetails(
-                        type=PydanticCustomError("fixed", "{rule}", {"rule": refusal.rule}),
+                        type=PydanticCustomError("joint", "{rule}", {"rule": refusal.rule}),
                         loc=(refusal.section, refusal.name),
                         input=getattr(getattr(self, refusal.section), refusal.name),
                     )
@@ -31,14 +38,25 @@ class Settings(Sections):
             )
         return self
 
+    def _unused(self) -> Iterator[Refusal]:
+        """Refuse every value that would have no effect, unless it is the default."""
+        for section, values in self.model_dump().items():
+            defaults = type(self).model_fields[section].default
+            for name, value in values.items():
+                if not is_used(self, section, name) and value != getattr(defaults, name):
+                    yield Refusal(
+                        section, name, f'has no effect with cost.norm = "{self.cost.norm}"; leave it out'
+                    )
+
     @property
     def in_use(self) -> dict[str, dict[str, Any]]:
-        """The values by section, without [target] at its default, with which the C has nothing of it."""
-        return {
-            section: values
-            for section, values in self.model_dump().items()
-            if section != "target" or self.target != Target()
-        }
+        """The values that the C depends on, by section: without [target] and cost.norm at their defaults."""
+        values = used_values(self)
+        if self.cost.norm == "1-norm":
+            del values["cost"]["norm"]
+        if self.target == Target():
+            del values["target"]
+        return values
 
     @property
     def digest(self) -> str:

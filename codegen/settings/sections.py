@@ -24,6 +24,10 @@ SHORTEST_LAG_S = 0.001
 """An attitude lag is 0 (none) or at least this; a shorter one is negligible."""
 
 
+SHORTEST_RAMP_S = 0.02
+"""A ramp is 0 (none) or at least this."""
+
+
 def _without_minus_zero(value: float) -> float:
     """Return `value` with -0.0 as 0.0, so that equal settings have equal digests and equal C."""
     return value + 0.0
@@ -36,11 +40,28 @@ def _none_or_lag(value: float) -> float:
     return value
 
 
+def _none_or_ramp(value: float) -> float:
+    """Return a ramp in seconds; refuse one between 0 and SHORTEST_RAMP_S."""
+    if 0 < value < SHORTEST_RAMP_S:
+        raise PydanticCustomError("ramp", f"must be 0 or lie in {SHORTEST_RAMP_S}..2; 0 means one free move")
+    return value
+
+
 Number = Annotated[float, AfterValidator(_without_minus_zero)]
 Lag = Annotated[
     float,
     Field(ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}),
     AfterValidator(_none_or_lag),
+    AfterValidator(_without_minus_zero),
+]
+
+
+Ramp = Annotated[
+    float,
+    Field(
+        ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_RAMP_S}}
+    ),
+    AfterValidator(_none_or_ramp),
     AfterValidator(_without_minus_zero),
 ]
 
@@ -90,6 +111,12 @@ class Horizon(_Section):
         description="Update period, in seconds: time between two calls of the step function (100 Hz in "
         "the paper).",
     )
+    ramp_s: Ramp = Field(
+        0.0,
+        description="Duration of the ramp that leads from the first free move, the command, to the second, "
+        "in seconds; 0 for one free move. With a ramp of 0.3 to 0.6 s the controller sees its tilt limit "
+        "coming.",
+    )
 
     @field_validator("control")
     @classmethod
@@ -126,6 +153,58 @@ class Model(_Section):
         "pitch loop.",
     )
 
+    roll_gain: Number = Field(
+        1.0, ge=0.2, le=2, description="Measured roll per commanded roll when the attitude loop has settled."
+    )
+    pitch_gain: Number = Field(
+        1.0,
+        ge=0.2,
+        le=2,
+        description="Measured pitch per commanded pitch when the attitude loop has settled.",
+    )
+    roll_delay_s: Lag = Field(
+        0.0,
+        description="Dead time of the roll loop and its lags other than roll_lag_s, in seconds, together: "
+        "they count as one first-order lag.",
+    )
+    pitch_delay_s: Lag = Field(
+        0.0, description="The same for the pitch loop: dead time and the lags other than pitch_lag_s."
+    )
+    roll_integral_1_s: Number = Field(
+        0.0,
+        ge=0,
+        le=20,
+        description="Integral gain of the roll loop over its angle gain, in 1/s; 0 for a loop without an "
+        "integrator.",
+    )
+    pitch_integral_1_s: Number = Field(
+        0.0, ge=0, le=20, description="Integral gain of the pitch loop over its angle gain, in 1/s."
+    )
+    roll_trim_rad: Number = Field(
+        0.0,
+        ge=-0.2,
+        le=0.2,
+        description="Measured roll at which the drone does not accelerate, in radians.",
+    )
+    pitch_trim_rad: Number = Field(
+        0.0,
+        ge=-0.2,
+        le=0.2,
+        description="Measured pitch at which the drone does not accelerate, in radians.",
+    )
+    acceleration_per_tilt: Number = Field(
+        1.0,
+        ge=0.2,
+        le=2,
+        description="Horizontal acceleration per radian of measured tilt, in units of 9.81 m/s^2.",
+    )
+    drag_1_s: Number = Field(0.0, ge=0, le=5, description="Linear drag: deceleration over velocity, in 1/s.")
+    attitude: Literal["measured", "predicted"] = Field(
+        "measured",
+        description='Attitude at the start of the prediction: "measured", or "predicted" from the past '
+        "commands, which closes no quick loop through the attitude and so tolerates slow motors.",
+    )
+
     @field_validator("roll_lag_s", "pitch_lag_s")
     @classmethod
     def _no_lag_in_print(cls, lag: float, info: ValidationInfo) -> float:
@@ -148,10 +227,23 @@ class Target(_Section):
         "successive steps and holds it over the horizon, which removes most of the tracking error on curved "
         "paths. The target's velocity must then be that of its motion, without noise.",
     )
+    tracker_gain: Number = Field(
+        0.3,
+        ge=0.01,
+        le=1,
+        description="Share of a new acceleration that the estimate takes: a larger gain follows faster and "
+        "is noisier.",
+    )
 
 
 class Cost(_Section):
-    """The weights of the cost: distance from the target, and changes of the attitude command."""
+    """The cost: distance from the target, and changes of the attitude command."""
+
+    norm: Literal["1-norm", "quadratic"] = Field(
+        "1-norm",
+        description='"1-norm" sums absolute values, as the paper does (eq 12), and RPROP searches for a '
+        'small cost; "quadratic" sums squares, and its exact minimum is a matter of a few products.',
+    )
 
     tracking_weight: Number = Field(
         2250.0,
@@ -166,6 +258,74 @@ class Cost(_Section):
         le=1e6,
         description="lambda_2, in 1/rad: weight of the 1-norm of the change from one move to the next "
         "(eq 12, Table I). A larger weight gives calmer commands and larger tracking errors.",
+    )
+
+    response_time_s: Number = Field(
+        0.215,
+        ge=0.02,
+        le=2,
+        description="Time in which the drone answers an error, in seconds: its cube is the weight of the "
+        "command's rate, in s^3. Shorter is closer to the target and less robust.",
+    )
+    velocity_weight_s: Number = Field(
+        0.0,
+        ge=0,
+        le=2,
+        description="Weight of the velocity's error beside the position's, in seconds: more damping after "
+        "large steps.",
+    )
+
+
+class Observer(_Section):
+    """The estimate of position, velocity and disturbance: a Kalman filter with fixed gains."""
+
+    acceleration_noise: Number = Field(
+        0.3, ge=1e-4, le=100, description="Noise density of the acceleration, in m/s^2 per root Hz."
+    )
+    disturbance_noise: Number = Field(
+        0.3,
+        ge=1e-4,
+        le=100,
+        description="Noise density of the disturbance's rate, in m/s^3 per root Hz: a larger one learns wind "
+        "and model errors faster.",
+    )
+    position_noise: Number = Field(
+        0.01, ge=1e-5, le=10, description="Noise density of the measured position, in m per root Hz."
+    )
+    velocity_noise: Number = Field(
+        0.05, ge=1e-5, le=100, description="Noise density of the measured velocity, in m/s per root Hz."
+    )
+    disturbance_limit_m_s2: Number = Field(
+        3.0, ge=0, le=20, description="Largest disturbance, in m/s^2; 0 for none."
+    )
+    age_s: Number = Field(
+        0.0,
+        ge=0,
+        le=0.2,
+        description="Age of the measured position and velocity, in seconds. Never more than measured: a "
+        "wrong age of 0.04 s crashes.",
+    )
+    outage_s: Number = Field(
+        0.5,
+        ge=0,
+        le=2,
+        description="Time without a good state, in seconds, over which the controller flies on by its "
+        "prediction; after it the last command holds. At most 250 update periods.",
+    )
+
+
+class Damping(_Section):
+    """Feedback of the attitude's rates to the commands."""
+
+    roll_rate_feedback_s: Number = Field(
+        0.0,
+        ge=0,
+        le=0.2,
+        description="Command of roll per rate of roll, in seconds; positive feedback, which takes excess "
+        "damping off a slow roll loop. 0 for none.",
+    )
+    pitch_rate_feedback_s: Number = Field(
+        0.0, ge=0, le=0.2, description="Command of pitch per rate of pitch, in seconds. 0 for none."
     )
 
 
@@ -334,7 +494,14 @@ class Sections(_Section):
         Target(),
         description="What the controller knows of the target's motion beyond its position and velocity.",
     )
-    cost: Cost = Field(Cost(), description="The weights of the cost: distance and effort.")
+    cost: Cost = Field(
+        Cost(), description="The cost: distance from the target, and changes of the attitude command."
+    )
+    observer: Observer = Field(
+        Observer(),
+        description="The estimate of position, velocity and disturbance: a Kalman filter with fixed gains.",
+    )
+    damping: Damping = Field(Damping(), description="Feedback of the attitude's rates to the commands.")
     optimizer: Optimizer = Field(Optimizer(), description="The RPROP search for the moves.")
     limits: Limits = Field(Limits(), description="The limits of the commands.")
     ranges: Ranges = Field(

@@ -10,7 +10,7 @@ import typer
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.reference import reference_controller
 from mambo_nmpc.codegen.representation import TARGET
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.options import FlyOptions, load, show
@@ -127,7 +127,7 @@ def _controller(options: FlyOptions, settings: Settings) -> PositionController:
         case "pd":
             return PdController()
         case "reference":
-            return ReferenceController(Design(settings))
+            return reference_controller(Design(settings))
         case "nmpc":
             return CompiledController(settings)
 

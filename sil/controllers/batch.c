@@ -4,6 +4,28 @@
  */
 #include "nmpc.h"
 
+#ifdef NMPC_STORED_NUMBERS
+/* Output arrays of a step: for each controller one element, of stored NMPC_STORED_NUMBERS. */
+typedef struct {
+    int *status;
+    nmpc_command_t *command;
+    int *missed;
+    int *saturated;
+    nmpc_real_t *stored;
+} nmpc_outcome_t;
+
+static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcome)
+{
+    const nmpc_real_t *stored = (const nmpc_real_t *)(const void *)self;
+    int k;
+
+    outcome->missed[i] = (int)self->missed;
+    outcome->saturated[i] = nmpc_is_saturated(self);
+    for (k = 0; k < NMPC_STORED_NUMBERS; k++) {
+        outcome->stored[(i * NMPC_STORED_NUMBERS) + k] = stored[k];
+    }
+}
+#else
 /* Output arrays of a step: for each controller one element, of gradient and plan_rad NMPC_MOVES. */
 typedef struct {
     int *status;
@@ -14,6 +36,20 @@ typedef struct {
     int *iterations;
     int *converged;
 } nmpc_outcome_t;
+
+static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcome)
+{
+    int k;
+
+    outcome->cost[i] = nmpc_last_cost(self);
+    outcome->iterations[i] = nmpc_last_iterations(self);
+    outcome->converged[i] = nmpc_has_converged(self);
+    for (k = 0; k < NMPC_MOVES; k++) {
+        outcome->gradient[(i * NMPC_MOVES) + k] = self->gradient[k];
+        outcome->plan_rad[(i * NMPC_MOVES) + k] = self->plan_rad[k];
+    }
+}
+#endif
 
 void nmpc_batch_init(nmpc_t *controllers, int n)
 {
@@ -28,20 +64,11 @@ void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, cons
                             const nmpc_real_t *thrust_acceleration_m_s2, const nmpc_outcome_t *outcome)
 {
     int i;
-    int k;
 
     for (i = 0; i < n; i++) {
-        const nmpc_t *self = &controllers[i];
-
         outcome->status[i] = (int)nmpc_step(&controllers[i], &state[i], &target[i], thrust_acceleration_m_s2[i],
                                             &outcome->command[i]);
-        outcome->cost[i] = nmpc_last_cost(self);
-        outcome->iterations[i] = nmpc_last_iterations(self);
-        outcome->converged[i] = nmpc_has_converged(self);
-        for (k = 0; k < NMPC_MOVES; k++) {
-            outcome->gradient[(i * NMPC_MOVES) + k] = self->gradient[k];
-            outcome->plan_rad[(i * NMPC_MOVES) + k] = self->plan_rad[k];
-        }
+        read_outcome(&controllers[i], i, outcome);
     }
 }
 

@@ -27,11 +27,15 @@ DECLARATIONS: Final = """
     unsigned long nmpc_batch_instance_bytes(void);
     void nmpc_host_reset(void *controllers, int n, const void *command, int *status);
     void nmpc_host_set_weights(void *controllers, int n, const void *weights, int *status);
+    void nmpc_host_set_command(void *controllers, int n, const void *command, int *status);
     int64_t nmpc_host_step(void *controller, const double *state, const double *target,
                            double thrust_acceleration_m_s2, double *command_rad);
     unsigned long nmpc_self_test_episode(void *scratch, int episode, unsigned long digest);
 """
-"""The functions that Python calls in a library: those of the glue, and one step of the self-test."""
+"""The functions that Python calls in a library: those of the glue, and one step of the self-test.
+
+nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost.
+"""
 
 ffi: Final = cffi.FFI()
 ffi.cdef(DECLARATIONS)

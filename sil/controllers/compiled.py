@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import Step
+from mambo_nmpc.codegen.reference import ExactStep, Step
 from mambo_nmpc.codegen.representation import COMMAND, OUTCOME, STATE, TARGET, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
@@ -47,8 +47,17 @@ def as_array(
     return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
 
 
-def empty_outcome(numbers: Representation, moves: int, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
+def empty_outcome(design: Design, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
     """Return the arrays that a step of n controllers fills, in the order of nmpc_outcome_t."""
+    numbers, moves = design.numbers, design.settings.horizon.control
+    if design.is_quadratic:
+        return {
+            "status": np.empty(n, integer),
+            "command_rad": np.empty((n, 2), numbers.scalar),
+            "missed": np.empty(n, integer),
+            "saturated": np.empty(n, integer),
+            "stored": np.empty((n, len(design.stored)), numbers.scalar),
+        }
     return {
         "status": np.empty(n, integer),
         "command_rad": np.empty((n, 2), numbers.scalar),
@@ -60,12 +69,21 @@ def empty_outcome(numbers: Representation, moves: int, n: int, integer: DTypeLik
     }
 
 
-def as_step(numbers: Representation, outcome: dict[str, NDArray[Any]]) -> Step:
+def as_step(design: Design, outcome: dict[str, NDArray[Any]]) -> Step | ExactStep:
     """Return the arrays that a step filled in SI units and with the types of the reference."""
+    to_si = design.numbers.to_si
+    if design.is_quadratic:
+        return ExactStep(
+            status=outcome["status"].astype(np.int64),
+            command_rad=to_si(outcome["command_rad"], *COMMAND),
+            missed=outcome["missed"].astype(np.int64),
+            saturated=outcome["saturated"].astype(np.bool_),
+            stored=to_si(outcome["stored"], *design.stored),
+        )
     types = {"status": np.int64, "iterations": np.int64, "converged": np.bool_}
     return Step(
         **{name: outcome[name].astype(kind) for name, kind in types.items()},
-        **{name: numbers.to_si(outcome[name], quantity) for name, quantity in OUTCOME.items()},
+        **{name: to_si(outcome[name], quantity) for name, quantity in OUTCOME.items()},
     )
 
 
@@ -74,11 +92,12 @@ DIRT = b"\xa5"
 
 
 class CompiledController:
-    """n controllers in generated C, with the interface of `codegen.reference.ReferenceController`."""
+    """n controllers in generated C, with the interface of the reference controller of their norm."""
 
     def __init__(self, settings: Settings, n: int = 1, library: Any = None) -> None:
         self.settings = settings
-        self._numbers = Design(settings).numbers
+        self._design = Design(settings)
+        self._numbers = self._design.numbers
         self.scalar = self._numbers.scalar
         self._n = n
         self._library = library or build_library(settings, host_toolchain())
@@ -96,16 +115,23 @@ class CompiledController:
         return self._set_each(self._library.nmpc_host_reset, command_rad, COMMAND)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Set tracking and effort weight to `weights` (n, 2); returns a status (n,)."""
+        """Set tracking and effort weight to `weights` (n, 2), of a 1-norm; returns a status (n,)."""
         return self._set_each(self._library.nmpc_host_set_weights, weights, WEIGHTS)
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
-        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
+    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Tell that `command_rad` (n, 2) was sent, with a quadratic cost; returns a status (n,)."""
+        return self._set_each(self._library.nmpc_host_set_command, command_rad, COMMAND)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
+        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
+
+        Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
+        """
         inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
-        outcome = empty_outcome(self._numbers, self.settings.horizon.control, self._n, np.intc)
+        outcome = empty_outcome(self._design, self._n, np.intc)
         addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
         self._library.nmpc_batch_step(self._controllers, self._n, *map(_address, inputs), addresses)
-        return as_step(self._numbers, outcome)
+        return as_step(self._design, outcome)
 
     def _set_each(self, function: Any, values: ArrayLike, quantities: Sequence[str]) -> NDArray[np.int64]:
         array = as_array(self._numbers, values, quantities, (self._n, 2))

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import TICKS
-from mambo_nmpc.codegen.reference import Step
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.build import batch_source, with_default_prefix
@@ -27,6 +26,9 @@ _MAX_WORK: Final = 2_000
 
 _SECONDS_PER_WORK: Final = 2e-4
 """Time limit for each of these, ten times what the slowest core takes on a slow machine."""
+
+_EXACT_WORK: Final = 50
+"""What a step with a quadratic cost counts as."""
 
 _MAX_PADDING: Final = 16
 """Upper bound of the bytes that alignment adds to an array."""
@@ -48,7 +50,8 @@ class EmulatedController:
         self, settings: Settings, elf: Path, core: str, n: int = 1, *, counting: bool = False
     ) -> None:
         self.settings = settings
-        self._numbers = Design(settings).numbers
+        self._design = Design(settings)
+        self._numbers = self._design.numbers
         self.scalar = self._numbers.scalar
         self._n = n
         work = _work(settings)
@@ -75,8 +78,11 @@ class EmulatedController:
         for batch in self._batches():
             self._run_batch(batch, "nmpc_batch_init")
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
-        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,)."""
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
+        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
+
+        Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
+        """
         inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
         outcome = self._empty_outcome(self._n)
         for batch in self._batches():
@@ -86,7 +92,7 @@ class EmulatedController:
             for name, values in outcome.items():
                 content = self.machine.read(self._outputs[name], values[batch].nbytes)
                 values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
-        return as_step(self._numbers, outcome)
+        return as_step(self._design, outcome)
 
     def save(self) -> bytes:
         """Return the instances as they are now."""
@@ -97,7 +103,7 @@ class EmulatedController:
         self._instances[:] = instances
 
     def _empty_outcome(self, n: int) -> dict[str, NDArray[Any]]:
-        return empty_outcome(self._numbers, self.settings.horizon.control, n, f"<i{self.machine.word_bytes}")
+        return empty_outcome(self._design, n, f"<i{self.machine.word_bytes}")
 
     def _batches(self) -> Iterator[slice]:
         """Yield the indices of the controllers of each batch."""
@@ -125,4 +131,6 @@ def digest_emulated(settings: Settings, elf: Path, core: str, episodes: int) -> 
 
 
 def _work(settings: Settings) -> int:
+    if settings.cost.norm == "quadratic":
+        return _EXACT_WORK
     return settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations

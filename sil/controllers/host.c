@@ -10,7 +10,9 @@
 typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
 typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == 4 * sizeof(nmpc_real_t)) ? 1 : -1];
 typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
+#ifndef NMPC_STORED_NUMBERS
 typedef char assert_weights_are_an_array[(sizeof(nmpc_weights_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
+#endif
 
 void nmpc_host_reset(nmpc_t *controllers, int n, const nmpc_command_t *command, int *status)
 {
@@ -21,6 +23,16 @@ void nmpc_host_reset(nmpc_t *controllers, int n, const nmpc_command_t *command, 
     }
 }
 
+#ifdef NMPC_STORED_NUMBERS
+void nmpc_host_set_command(nmpc_t *controllers, int n, const nmpc_command_t *command, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_set_command(&controllers[i], &command[i]);
+    }
+}
+#else
 void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *weights, int *status)
 {
     int i;
@@ -29,6 +41,7 @@ void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *wei
         status[i] = (int)nmpc_set_weights(&controllers[i], &weights[i]);
     }
 }
+#endif
 
 #ifdef NMPC_ANGLE_BITS
 /* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */

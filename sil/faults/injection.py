@@ -194,7 +194,8 @@ class ReweightedController:
             status = self._controller.set_weights(weights)
             self.answers += [(change.row, int(status[change.row])) for change in due]
         self._update += 1
-        return self._controller.step(state, target, thrust_acceleration_m_s2)
+        outcome: Outcome = self._controller.step(state, target, thrust_acceleration_m_s2)
+        return outcome
 
 
 class LevellingCaller:

@@ -80,7 +80,7 @@ class CountingController:
         """Step once with state (1, 7), target (1, 4) and thrust_acceleration_m_s2 (1,)."""
         before = self._emulated.save()
         self._emulated.machine.take_counts()
-        outcome = self._emulated.step(state, target, thrust_acceleration_m_s2)
+        outcome: Step = self._emulated.step(state, target, thrust_acceleration_m_s2)
         by_function: Counter[str] = Counter()
         for address, instructions in self._emulated.machine.take_counts().items():
             name = self._name_of(address).partition("+")[0]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mambo_nmpc.codegen.settings.keys import KEYS, Key, spell
+from mambo_nmpc.codegen.settings.methods import is_used
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
 from tests.support.cases import SCALARS
@@ -37,7 +38,7 @@ def numbers(path: str, low: float | None = None, high: float | None = None) -> s
 
 @st.composite
 def valid_values(draw: st.DrawFn) -> Values:
-    """Draw valid settings, every key free within the rules, by their dotted paths.
+    """Draw valid settings of a 1-norm, every key that it uses free within the rules, by their dotted paths.
 
     All are of floating point, for fixed point refuses some: see `any_settings`.
     """
@@ -69,8 +70,8 @@ def valid_values(draw: st.DrawFn) -> Values:
         key.path: draw(st.sampled_from(choices_of(key))) for key in CHOICES if key.path not in constrained
     }
     free = {key.path: draw(numbers(key.path)) for key in NUMBERS if key.path not in constrained}
-    drawn = constrained | choices | free
-    return {path: drawn[path] for path in KEYS}
+    drawn = constrained | choices | free | {"cost.norm": "1-norm"}
+    return {path: drawn[path] for path in KEYS if is_used(Settings(), *path.split("."))}
 
 
 @cache
