@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from mambo_nmpc.codegen.attitude import AttitudeConstants, attitude_constants
+from mambo_nmpc.codegen.exact_fixed_point import exact_formats
 from mambo_nmpc.codegen.fixed_point import formats
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
 from mambo_nmpc.codegen.observer import ObserverConstants, observer_constants
@@ -66,7 +67,7 @@ class Design:
     @property
     def stored(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_t, in their order; for a quadratic cost."""
-        observer = [*["estimate"] * 2, *["speed"] * 2, *["acceleration"] * 2]
+        observer = [*["position"] * 2, *["speed"] * 2, *["acceleration"] * 2]
         attitude = [*["acceleration"] * 8, *["sine"] * 2]
         tracker = [*["velocity"] * 2, *["acceleration"] * 4] if self.tracker else []
         tilt = ["angle"] * 2 if self.feedback_steps else []
@@ -76,7 +77,12 @@ class Design:
     def numbers(self) -> Representation:
         """The scalar type of the C, and in fixed point the format of each quantity."""
         scalar = self.settings.code.scalar
-        return Representation(scalar, formats(self.settings, self.tables) if scalar == "fixed" else None)
+        if scalar != "fixed":
+            return Representation(scalar, None)
+        exact = self.is_quadratic
+        return Representation(
+            scalar, exact_formats(self.settings) if exact else formats(self.settings, self.tables)
+        )
 
     @cached_property
     def limits(self) -> InputLimits:

@@ -139,37 +139,37 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
     bounds, tracker = _bounds(settings, tables), tracker_constants(settings)
 
-    factor = _fractional_bits(optimizer.increase)
-    angle = _fractional_bits(
+    factor = fractional_bits(optimizer.increase)
+    angle = fractional_bits(
         ATTITUDE_LIMIT_RAD + (tilt if tables.has_lag else 0),
         2 * tilt,
         tilt + optimizer.step_max_rad,
         optimizer.step_max_rad * optimizer.increase,
         math.ldexp(optimizer.step_max_rad, UPPER_BITS - factor),
     )
-    share = _fractional_bits(
+    share = fractional_bits(
         tables.displacement_share,
         *(size for angle in tables.angles for size in map(abs, astuple(angle))),
     )
-    acceleration = _fractional_bits(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
+    acceleration = fractional_bits(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
     error_limit = min(2 * ranges.position_m, bounds.error) * _MARGIN
     error = min(
-        _fractional_bits(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1
+        fractional_bits(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1
     )
-    position = min(_fractional_bits(2 * ranges.position_m), error)
+    position = min(fractional_bits(2 * ranges.position_m), error)
     gradient_bound = 2 * gain * bounds.response
-    distance_gradient = _fractional_bits(gradient_bound)
+    distance_gradient = fractional_bits(gradient_bound)
 
     distance = 2 * settings.horizon.prediction * (error_limit + bounds.error)
     variation = 4 * settings.horizon.control * tilt
     cost = settings.cost
     effort_limit = _WEIGHT_HEADROOM * (cost.effort_weight or min(1.0, cost.tracking_weight))
     effort = min(
-        _fractional_bits(effort_limit), _PRODUCT_BITS - _integer_bits(variation, effort_limit) - angle
+        fractional_bits(effort_limit), _PRODUCT_BITS - _integer_bits(variation, effort_limit) - angle
     )
     tracking_limit = _WEIGHT_HEADROOM * cost.tracking_weight
     tracking = min(
-        _fractional_bits(tracking_limit),
+        fractional_bits(tracking_limit),
         SUM_BITS
         - 1
         - max(_integer_bits(tracking_limit, distance), _integer_bits(effort_limit, variation))
@@ -183,22 +183,22 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     effort = min(effort, tracking + distance_gradient)
     return Formats(
         position=position,
-        velocity=_fractional_bits(2 * ranges.velocity_m_s),
-        thrust=_fractional_bits(ranges.thrust_acceleration_max_m_s2),
-        yaw=_fractional_bits(YAW_LIMIT_RAD),
+        velocity=fractional_bits(2 * ranges.velocity_m_s),
+        thrust=fractional_bits(ranges.thrust_acceleration_max_m_s2),
+        yaw=fractional_bits(YAW_LIMIT_RAD),
         angle=angle,
-        step=_fractional_bits(step_s),
-        step_squared=_fractional_bits(tables.step_squared_s2),
-        gain=_fractional_bits(gain),
+        step=fractional_bits(step_s),
+        step_squared=fractional_bits(tables.step_squared_s2),
+        gain=fractional_bits(gain),
         acceleration=acceleration,
         error=error,
         share=share,
-        response=_fractional_bits(2 * bounds.response),  # a spare bit: gcc shifts by less than 32 faster
+        response=fractional_bits(2 * bounds.response),  # a spare bit: gcc shifts by less than 32 faster
         distance_gradient=distance_gradient,
         tracking=tracking,
         effort=effort,
         factor=factor,
-        tracker=_fractional_bits(tracker.step_squared_per_update_s) if tracker else 0,
+        tracker=fractional_bits(tracker.step_squared_per_update_s) if tracker else 0,
         cost=tracking + error,
         gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),
@@ -379,7 +379,7 @@ def _tracker_bound(tracker: TrackerConstants | None) -> float:
     return 2 * tracker.acceleration_limit_m_step2 + tracker.jerk_limit_m_step2_update
 
 
-def _fractional_bits(*sizes: float) -> int:
+def fractional_bits(*sizes: float) -> int:
     """Return the most fractional bits with which values of these sizes fit in a word."""
     return WORD_BITS - _integer_bits(max(sizes), 1.0)
 

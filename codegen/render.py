@@ -12,6 +12,7 @@ import jinja2
 from mambo_nmpc.codegen import __version__, boards, literals
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import TICKS, TICKS_PER_INPUT, episode_count, input_scales, self_test_digest
+from mambo_nmpc.codegen.exact_fixed_point import ExactFormats
 from mambo_nmpc.codegen.fixed_point import SINE_BITS
 from mambo_nmpc.codegen.flags import (
     COMPILE_FLAGS,
@@ -222,6 +223,7 @@ def _one_norm_context(design: Design) -> dict[str, object]:
 
 def _quadratic_context(design: Design) -> dict[str, object]:
     period_s, model = design.settings.horizon.update_period_s, design.settings.model
+    formats = design.numbers.formats
     return {
         "quadratic": True,
         "attitude": design.attitude,
@@ -235,8 +237,29 @@ def _quadratic_context(design: Design) -> dict[str, object]:
         "attitude_shares": [period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)],
         "steps_per_s": 1 / period_s,
         "steps2_per_s2": 1 / period_s**2,
-        "wide": "(nmpc_sum_t)" if design.numbers.formats else "",
+        "wide": "(nmpc_sum_t)" if formats else "",
+        "shifts": formats.shifts if isinstance(formats, ExactFormats) else None,
+        "plain_products": _plain_products(design),
     }
+
+
+def _plain_products(design: Design) -> list[str]:
+    """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
+    wanted = {
+        "speed_product": True,
+        "tilt_product": True,
+        "command_product": True,
+        "per_step_product": True,
+        "per_step2_product": True,
+        "drag_product": bool(design.observer.drag_1_step),
+        "aged_position": bool(design.observer.age_steps),
+        "aged_velocity": bool(design.observer.age_steps),
+        "feedback_product": design.feedback_steps is not None,
+        "ratio_product": design.law.moves > 1,
+        "change_product": design.tracker is not None,
+        "tracker_product": design.tracker is not None,
+    }
+    return [name for name, is_wanted in wanted.items() if is_wanted]
 
 
 def _settings_id(settings: Settings) -> str:
@@ -259,8 +282,8 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     bits = numbers.bits or {}
     return {
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
-        for name in (*STATE, *THRUST, *WEIGHTS, "cost")
-        if bits
+        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance")
+        if name in bits
     }
 
 

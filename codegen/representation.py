@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mambo_nmpc.codegen.exact_fixed_point import ExactFormats
 from mambo_nmpc.codegen.fixed_point import LARGEST, SINE_BITS, Formats, raw
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.quadratic import STATES
@@ -55,14 +56,16 @@ class Representation:
     tracking_limit, effort_limit: largest weights, in SI units.
     """
 
-    def __init__(self, scalar: str, formats: Formats | None) -> None:
+    def __init__(self, scalar: str, formats: Formats | ExactFormats | None) -> None:
         self.formats = formats
         self.scalar: Any = np.int32 if formats else SCALARS[scalar]
         self.wide: Any = np.int64 if formats else self.scalar
         self.computed: Any = self.wide
         self.bits: Mapping[str, int] | None = None
         self.tracking_limit = self.effort_limit = WEIGHT_LIMIT
-        if formats:
+        if isinstance(formats, ExactFormats):
+            self.bits = {**formats.bits, "sine": SINE_BITS, "whole": 0}
+        elif formats:
             self.bits = asdict(formats) | {"sine": SINE_BITS, "whole": 0}
             self.tracking_limit = math.ldexp(formats.tracking_limit, -formats.tracking)
             self.effort_limit = math.ldexp(formats.effort_limit, -formats.effort)
@@ -93,6 +96,8 @@ class Representation:
             tilt=self.constant(settings.limits.tilt_rad, "angle"),
             weights=np.array(
                 [self.constant(self.tracking_limit, "tracking"), self.constant(self.effort_limit, "effort")]
+                if settings.cost.norm == "1-norm"
+                else []
             ),
         )
 

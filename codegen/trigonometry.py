@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.exact_fixed_point import ExactFormats
 from mambo_nmpc.codegen.fixed_point import SINE_BITS, WORD_BITS, Formats
 from mambo_nmpc.codegen.literals import SCALARS
 
@@ -55,7 +56,7 @@ class FixedTrigonometry:
     cosine: tuple[int, ...]
 
 
-def fixed_trigonometry(formats: Formats) -> FixedTrigonometry:
+def fixed_trigonometry(formats: Formats | ExactFormats) -> FixedTrigonometry:
     """Derive the constants for the format of yaw in `formats`."""
     return FixedTrigonometry(
         quarter_turns_per_rad=round(2**WORD_BITS / _QUARTER_TURN),

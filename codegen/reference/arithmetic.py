@@ -206,4 +206,4 @@ class FixedArithmetic:
 def arithmetic(design: Design) -> Arithmetic:
     """Return the products of a controller."""
     formats = design.numbers.formats
-    return FloatArithmetic(design) if formats is None else FixedArithmetic(design, formats)
+    return FixedArithmetic(design, formats) if isinstance(formats, Formats) else FloatArithmetic(design)

@@ -46,7 +46,7 @@ class AttitudeModel:
         self._trim = both(attitude.trim_rad, "angle")
         self._trim_command = both(attitude.trim_command_rad, "angle")
         self._limit = constant(attitude.limit_m_step2, "acceleration")
-        self.command_limit = both(attitude.command_limit_m_step2, "acceleration")
+        self.command_limit = both(attitude.command_limit_m_step2, "move")
 
     def set_command(self, attitude: Attitude, command_rad: Real) -> Attitude:
         """Set the last commands to `command_rad` (n, 2), roll and pitch."""
@@ -74,8 +74,8 @@ class AttitudeModel:
     def turn(self, attitude: Attitude, sine: Real, cosine: Real) -> Attitude:
         """Turn tilt and command to the heading with this sine and cosine (n,)."""
         product = self._products.sine_product
-        by_sine = product(sine, attitude.cosine) - product(cosine, attitude.sine)
-        by_cosine = product(cosine, attitude.cosine) + product(sine, attitude.sine)
+        by_sine = self._products.sine_difference(sine, attitude.cosine, cosine, attitude.sine)
+        by_cosine = self._products.sine_sum(cosine, attitude.cosine, sine, attitude.sine)
 
         def turned(vector: Real) -> Real:
             right, forward = vector[:, 0], vector[:, 1]

@@ -6,10 +6,14 @@ multiplication to 64 bits and a shift to the format of the result, rounded to ne
 
 from typing import Any, Protocol
 
+import numpy as np
+
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference.math import Real, sine_cosine
+from mambo_nmpc.codegen.exact_fixed_point import ExactFormats
+from mambo_nmpc.codegen.fixed_point import SINE_BITS
+from mambo_nmpc.codegen.reference.math import Real, fixed_sine_cosine, rounded, sine_cosine
 from mambo_nmpc.codegen.representation import Representation
-from mambo_nmpc.codegen.trigonometry import Trigonometry
+from mambo_nmpc.codegen.trigonometry import FixedTrigonometry, Trigonometry
 
 
 class ExactArithmetic(Protocol):
@@ -23,17 +27,17 @@ class ExactArithmetic(Protocol):
     def sine_product(self, value: Real, sine: Real) -> Real:
         """Return value * sine, in the format of the value."""
 
+    def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        """Return a b - c d of sines and cosines."""
+
+    def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        """Return a b + c d of sines and cosines."""
+
     def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
         """Return factor * change of a velocity, m/step^2."""
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         """Return gain * acceleration, m/step^2."""
-
-    def estimated_position(self, position_m: Real) -> Real:
-        """Return a measured position in the format of estimates."""
-
-    def position_error(self, estimate_m: Real, position_m: Real) -> Real:
-        """Return an estimated position less a target's."""
 
     def speed_product(self, velocity_m_s: Real) -> Real:
         """Return T_s * velocity, m/step."""
@@ -80,8 +84,11 @@ class ExactArithmetic(Protocol):
     def row_sum(self, products: Real) -> Real:
         """Return a sum of products of the optimizer's rows as a move, m/step^2."""
 
-    def ratio_product(self, ratio: Any, acceleration_m_step2: Real) -> Real:
-        """Return ratio * acceleration."""
+    def move_acceleration(self, move_m_step2: Real) -> Real:
+        """Return a move in the format of accelerations."""
+
+    def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
+        """Return ratio * move."""
 
 
 class FloatExactArithmetic:
@@ -95,12 +102,6 @@ class FloatExactArithmetic:
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return sine_cosine(yaw_rad, self._trigonometry)
-
-    def estimated_position(self, position_m: Real) -> Real:
-        return position_m
-
-    def position_error(self, estimate_m: Real, position_m: Real) -> Real:
-        return estimate_m - position_m
 
     def speed_product(self, velocity_m_s: Real) -> Real:
         return self._update_period_s * velocity_m_s
@@ -120,6 +121,15 @@ class FloatExactArithmetic:
     def row_sum(self, products: Real) -> Real:
         return products
 
+    def move_acceleration(self, move_m_step2: Real) -> Real:
+        return move_m_step2
+
+    def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return (a * b) - (c * d)
+
+    def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return (a * b) + (c * d)
+
     def _product(self, a: Any, b: Real) -> Real:
         return a * b
 
@@ -131,6 +141,91 @@ class FloatExactArithmetic:
     position_correction = velocity_correction = disturbance_correction = _correction
 
 
+class FixedExactArithmetic:
+    """Products in fixed point."""
+
+    def __init__(self, design: Design, formats: ExactFormats) -> None:
+        self.numbers = design.numbers
+        self._shifts = formats.shifts
+        self._trigonometry: FixedTrigonometry = design.trigonometry
+        self._update_period_s = self.numbers.constant(design.settings.horizon.update_period_s, "step")
+
+    def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
+        return fixed_sine_cosine(yaw_rad, self._trigonometry)
+
+    def sine_product(self, value: Real, sine: Real) -> Real:
+        return rounded(value * sine, SINE_BITS)
+
+    def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return np.clip(rounded((a * b) - (c * d), SINE_BITS), -(2**SINE_BITS), 2**SINE_BITS)
+
+    def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return np.clip(rounded((a * b) + (c * d), SINE_BITS), -(2**SINE_BITS), 2**SINE_BITS)
+
+    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
+        return self._rounded(factor_s * change_m_s, "change_product")
+
+    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(gain * acceleration_m_step2, "tracker_product")
+
+    def speed_product(self, velocity_m_s: Real) -> Real:
+        return self._rounded(self._update_period_s * velocity_m_s, "speed_product")
+
+    def drag_product(self, drag_1_step: Any, velocity_m_step: Real) -> Real:
+        return self._rounded(drag_1_step * velocity_m_step, "drag_product")
+
+    def aged_position(self, age_steps: Any, velocity_m_step: Real) -> Real:
+        return self._rounded(age_steps * velocity_m_step, "aged_position")
+
+    def aged_velocity(self, age_steps: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(age_steps * acceleration_m_step2, "aged_velocity")
+
+    def position_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return self._rounded((gain * by_m) + (other_gain * by_m_step), "position_correction")
+
+    def velocity_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return self._rounded((gain * by_m) + (other_gain * by_m_step), "velocity_correction")
+
+    def disturbance_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return self._rounded((gain * by_m) + (other_gain * by_m_step), "disturbance_correction")
+
+    def half_change(self, acceleration_m_step2: Real) -> Real:
+        return self._rounded(acceleration_m_step2, "half_change")
+
+    def position_change(self, velocity_m_step: Real) -> Real:
+        return self._rounded(velocity_m_step, "position_change")
+
+    def velocity_change(self, acceleration_m_step2: Real) -> Real:
+        return self._rounded(acceleration_m_step2, "velocity_change")
+
+    def tilt_product(self, gain_m_step2_rad: Any, tilt_rad: Real) -> Real:
+        return self._rounded(gain_m_step2_rad * tilt_rad, "tilt_product")
+
+    def command_product(self, rad_step2_m: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(rad_step2_m * acceleration_m_step2, "command_product")
+
+    def feedback_product(self, steps: Any, change_rad: Real) -> Real:
+        return self._rounded(steps * change_rad, "feedback_product")
+
+    def attitude_sum(self, products: Real) -> Real:
+        return self._rounded(products, "attitude")
+
+    def row_sum(self, products: Real) -> Real:
+        return self._rounded(products, "row")
+
+    def move_acceleration(self, move_m_step2: Real) -> Real:
+        return move_m_step2 * 2 ** self._shifts["move"]
+
+    def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
+        return self._rounded(ratio * move_m_step2, "ratio_product")
+
+    def _rounded(self, product: Real, name: str) -> Real:
+        return rounded(product, self._shifts[name])
+
+
 def exact_arithmetic(design: Design) -> ExactArithmetic:
     """Return the products of a controller with a quadratic cost."""
+    formats = design.numbers.formats
+    if isinstance(formats, ExactFormats):
+        return FixedExactArithmetic(design, formats)
     return FloatExactArithmetic(design)

@@ -151,12 +151,13 @@ class ExactReferenceController:
         motion = memory.target
         if self._tracker is not None:
             motion = choose(commands, self._tracker.update(motion, target[:, 2:4]), motion)
-        moved = replace(attitude, command=self._minimize(attitude, estimate, motion, target, tilt))
+        moves = self._minimize(attitude, estimate, motion, target, tilt)
+        moved = replace(attitude, command=self._products.move_acceleration(moves))
         command = (
             model.command_rad(moved) + feedback if self._feedback is not None else model.command_rad(moved)
         )
         limit = model.command_limit
-        at_limit = np.any((moved.command >= limit) | (moved.command <= -limit), axis=1)
+        at_limit = np.any((moves >= limit) | (moves <= -limit), axis=1)
         self.memory = ExactMemory(
             estimate=self._observer.predict(estimate, world),
             attitude=choose(commands, moved, attitude),
@@ -172,13 +173,13 @@ class ExactReferenceController:
     def _minimize(
         self, attitude: Attitude, estimate: Estimate, motion: TargetMotion, target: Real, tilt: Real
     ) -> Real:
-        """Return the next commands of the model (n, 2), m/step^2."""
+        """Return the first free moves (n, 2), right and forward."""
         disturbance = self._observer.disturbance(estimate)
         jerk = np.zeros_like(disturbance)
         if self._tracker is not None:
             disturbance, jerk = disturbance - motion.acceleration_m_step2, motion.jerk_m_step2_update
         errors = (
-            self._products.position_error(estimate.position_m, target[:, 0:2]),
+            estimate.position_m - target[:, 0:2],
             estimate.velocity_m_step - self._products.speed_product(target[:, 2:4]),
             disturbance,
             jerk,

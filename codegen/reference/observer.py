@@ -34,7 +34,7 @@ class Observer:
                 )
             )
         ]
-        self._position_limit = constant(design.settings.ranges.position_m, "estimate")
+        self._position_limit = constant(design.settings.ranges.position_m, "position")
         self._velocity_limit = constant(observer.velocity_limit_m_step, "speed")
         self._disturbance_limit = constant(observer.disturbance_limit_m_step2, "acceleration")
         self._drag = constant(observer.drag_1_step, "drag") if observer.drag_1_step else None
@@ -43,7 +43,7 @@ class Observer:
     def start(self, estimate: Estimate, state: Real) -> Estimate:
         """Set position and velocity to those of `state` (n, 7)."""
         return Estimate(
-            position_m=self._products.estimated_position(state[:, 0:2]),
+            position_m=state[:, 0:2],
             velocity_m_step=self._products.speed_product(state[:, 2:4]),
             disturbance_m_step2=estimate.disturbance_m_step2,
         )
@@ -59,7 +59,7 @@ class Observer:
         """Correct the estimate by `state` (n, 7), with the tilt's acceleration (n, 2) along x and y."""
         products = self._products
         position, velocity = estimate.position_m, estimate.velocity_m_step
-        measured = products.estimated_position(state[:, 0:2])
+        measured = state[:, 0:2]
         measured_step = products.speed_product(state[:, 2:4])
         if self._age is not None:
             acceleration = tilt_m_step2 + self.disturbance(estimate)

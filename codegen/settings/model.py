@@ -8,6 +8,7 @@ from typing import Any, Self
 from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from mambo_nmpc.codegen.exact_fixed_point import exact_refusals
 from mambo_nmpc.codegen.fixed_point import Refusal, refusals
 from mambo_nmpc.codegen.quadratic import quadratic_refusals
 from mambo_nmpc.codegen.settings.methods import is_used, used_values
@@ -23,7 +24,7 @@ class Settings(Sections):
         if not refused and self.cost.norm == "quadratic":
             refused = quadratic_refusals(self)
         if not refused and self.code.scalar == "fixed":
-            refused = refusals(self)
+            refused = exact_refusals(self) if self.cost.norm == "quadratic" else refusals(self)
         if refused:
             raise ValidationError.from_exception_data(
                 "Settings",
