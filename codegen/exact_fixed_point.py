@@ -25,7 +25,7 @@ from mambo_nmpc.codegen.settings.sections import Sections
 from mambo_nmpc.codegen.tracker import tracker_constants
 
 _TURN: Final = 2.01
-"""A component of a vector that turns is at most this times the larger one, as |sine| and |cosine| are <= 1."""
+"""A component of a vector that turns is at most this times the larger one: |sine|, |cosine| <= 1."""
 
 _SUM_BITS: Final = 62
 """Most bits of a sum of products without its sign: one less than the type has, as rounding adds to it."""
