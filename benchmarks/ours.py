@@ -13,6 +13,9 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 
+ONE_NORM: Final = with_option(presets.load("mambo-1norm"), "target.acceleration", "none")
+"""Preset mambo-1norm without its tracker: the lags of the Mambo, and targets as the peers know them."""
+
 PEERS_MODEL: Final = with_option(presets.load("table1"), "horizon.prediction_step_s", STEP_S)
 """Settings of the peers' problem: preset table1 with their prediction step."""
 

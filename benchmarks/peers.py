@@ -17,14 +17,13 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from benchmarks.markdown import table
-from benchmarks.ours import PEERS_MODEL, Ours, bundle
+from benchmarks.ours import ONE_NORM, PEERS_MODEL, Ours, bundle
 from benchmarks.peers_setups import DOUBLE, PEERS
 from benchmarks.programs import NotHereError, Program, run_tool
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
 from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
 from mambo_nmpc.sil.firmware.gate import find_forbidden
@@ -197,7 +196,7 @@ def main() -> None:
     """Measure ours and every peer, and print one table and the versions."""
     found = builder(boards.load(_BOARD), "-O2")
     programs = [
-        bundle("mambo", "mambo-nmpc, preset mambo", presets.load("mambo")),
+        bundle("mambo", "mambo-nmpc, mambo-1norm", ONE_NORM),
         bundle("table1", "mambo-nmpc, the peers' model", PEERS_MODEL),
         *(peer for peer in PEERS if not peer.name.endswith(DOUBLE)),
     ]

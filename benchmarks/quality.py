@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.markdown import table
+from benchmarks.ours import ONE_NORM
 from benchmarks.searches import Searching, SearchingController, best_iterate, from_zero_moves, optimum
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.settings import presets
@@ -31,7 +32,7 @@ from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
 
-PRESETS: Final = ("table1", "mambo")
+PRESETS: Final = ("table1", "mambo-1norm")
 EFFORT_WEIGHTS: Final = (1.0, 100.0, 200.0, 300.0, 1000.0)
 STARTS: Final = {"last_command": "last command", "plan": "last plan"}
 EXACT: Final = "exact optimum"
@@ -90,7 +91,7 @@ def entrants(preset: str) -> dict[str, Variant]:
 
 def by_weight() -> dict[tuple[str, str], Variant]:
     """Return `mambo` with each effort weight, each with three searches, by two titles."""
-    mambo = presets.load("mambo")
+    mambo = ONE_NORM
     several = {
         f"mambo, {weight:g}": with_option(mambo, "cost.effort_weight", weight) for weight in EFFORT_WEIGHTS
     }

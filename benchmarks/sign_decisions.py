@@ -248,7 +248,7 @@ def decision_table(found: Sequence[Disagreement]) -> str:
 
 def main() -> None:
     """Print both tables for two presets in float32 and in fixed point."""
-    for name in ("mambo", "table1"):
+    for name in ("mambo-1norm", "table1"):
         for scalar in ("float32", "fixed"):
             settings = with_option(presets.load(name), "code.scalar", scalar)
             flights, flown = compare_flights(settings)

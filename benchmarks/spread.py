@@ -31,7 +31,11 @@ CASES: Final[dict[str, dict[str, Any]]] = {
 }
 CONTROLLERS: Final = (
     ("pd", ""),
-    *((preset, scalar) for preset in ("mambo", "table1") for scalar in ("float32", "float64", "fixed")),
+    *(
+        (preset, scalar)
+        for preset in ("mambo", "mambo-1norm", "table1")
+        for scalar in ("float32", "float64", "fixed")
+    ),
 )
 
 

@@ -24,13 +24,12 @@ from scipy.stats import trim_mean
 
 from benchmarks.host_builds import build, plans, silence, sizes
 from benchmarks.optimum import excess
-from benchmarks.ours import PEERS_MODEL, Ours, bundle, rollout
+from benchmarks.ours import ONE_NORM, PEERS_MODEL, Ours, bundle, rollout
 from benchmarks.peers_setups import PEERS
 from benchmarks.programs import BENCHMARKS, ROOT, NotHereError, Program, run_tool
 from benchmarks.states import Inputs, state_sets
 from benchmarks.times_report import COLD, FLAGS, Row, Timing, write_report
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import host_toolchain
 
@@ -55,15 +54,15 @@ _FOLDER: Final = ROOT / "build/bench"
 
 def contenders() -> list[Program]:
     """Return ours, the roll-outs, and the peers."""
-    alike, mambo = PEERS_MODEL, presets.load("mambo")
+    alike, mambo = PEERS_MODEL, ONE_NORM
     return [
         bundle("ours", "mambo-nmpc, the peers' model", alike),
         bundle("ours-20", "the same, 20 iterations", with_option(alike, "optimizer.iterations", 20)),
         bundle("ours-float64", "the same, float64", with_option(alike, "code.scalar", "float64")),
         bundle("ours-fixed", "the same, fixed point", with_option(alike, "code.scalar", "fixed")),
-        bundle("ours-mambo", "mambo-nmpc, preset mambo", mambo),
+        bundle("ours-mambo", "mambo-nmpc, mambo-1norm", mambo),
         rollout("rollout", "the peers' model, plain roll-out", alike),
-        rollout("rollout-mambo", "preset mambo, plain roll-out", mambo),
+        rollout("rollout-mambo", "mambo-1norm, plain roll-out", mambo),
         *PEERS,
     ]
 
@@ -223,7 +222,7 @@ def main() -> None:
     ]
     agreement = {
         "the peers' model": _count_same(planned, "ours", "rollout"),
-        "preset mambo": _count_same(planned, "ours-mambo", "rollout-mambo"),
+        "mambo-1norm": _count_same(planned, "ours-mambo", "rollout-mambo"),
     }
     print(write_report(rows, machine, agreement, empty, _FOLDER))
 

@@ -13,6 +13,7 @@ from benchmarks.searches import Array
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
 
@@ -59,7 +60,7 @@ def test_optimum_is_of_the_problem_of_the_peers() -> None:
 
 
 @pytest.mark.parametrize("kind", ["1-norm", "quadratic"])
-@pytest.mark.parametrize("settings", [PEERS_MODEL, presets.load("mambo")], ids=["no lag", "lag"])
+@pytest.mark.parametrize("settings", [PEERS_MODEL, ONE_NORM], ids=["no lag", "lag"])
 def test_no_neighbour_of_the_optimum_costs_less(kind: Cost, settings: Settings) -> None:
     """Both costs are convex, so a plan that no small step within the limit improves is optimal."""
     inputs = random_inputs(30)

@@ -6,11 +6,11 @@ import pytest
 from benchmarks import optimum
 from benchmarks.iterations import RecordingController, describe, excess_of_set
 from benchmarks.ours import PEERS_MODEL
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.footprint.counts import FLIGHT
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
 INPUTS = np.random.default_rng(0).uniform(-1, 1, (40, 6)) * [0.5, 1.0, 0.5, 1.0, 0.1, 0.1]
@@ -42,7 +42,7 @@ def test_the_excess_is_that_of_the_plan_for_its_input() -> None:
 
 def test_the_last_command_of_a_flight_is_the_one_before() -> None:
     """A plan is never better than the optimum for its own input, and recording does not change the flight."""
-    settings = with_option(presets.load("mambo"), "code.scalar", "float64")
+    settings = with_option(ONE_NORM, "code.scalar", "float64")
     recorder = RecordingController(settings)
     flight = Flight(FLIGHT, duration_s=0.5)
     trace = fly(flight, recorder)

@@ -22,6 +22,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 
 Inputs = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
@@ -87,7 +88,7 @@ def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
 
 def test_searches_are_ordered_by_what_they_find() -> None:
     """The best iterate costs no more than first and last, the optimum no more than the best iterate."""
-    settings, rng = presets.load("mambo"), np.random.default_rng(2)
+    settings, rng = ONE_NORM, np.random.default_rng(2)
     problems = CostModel(settings).problems(*inputs(rng), rng.uniform(-0.2, 0.2, (N, 2)))
     level = np.zeros((N, settings.horizon.control, 2))
     best_rad = optimum(settings, problems, level)

@@ -16,12 +16,12 @@ from benchmarks.sign_decisions import (
 )
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.inner_steps import step_watched
+from tests.support.one_norm import ONE_NORM
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 FIXED = with_option(MAMBO, "code.scalar", "fixed")
 both = pytest.mark.parametrize("settings", [MAMBO, FIXED], ids=["float32", "fixed"])
 

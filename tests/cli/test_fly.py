@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import INTERRUPTED
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import fly
 from mambo_nmpc.sil.flight.scenario import Record, Scenario, flight_of, write_record
 from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 from tests.support.command import command, run
+from tests.support.one_norm import ONE_NORM
 
 
 def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
@@ -164,9 +164,7 @@ def test_a_replayed_crash_is_a_failure(tmp_path: Path) -> None:
     for name, tilt_rad, code in (("upside.json", 1.2, 1), ("level.json", 0.0, 0)):
         scenario = Scenario(duration_s=0.1, start_tilt_rad=(tilt_rad, 0.0))
         flown = fly(flight_of([scenario], 0.01), PdController())
-        record = Record(
-            scenario=scenario, controller="pd", settings=presets.load("mambo"), trace_sha256=flown.digest()
-        )
+        record = Record(scenario=scenario, controller="pd", settings=ONE_NORM, trace_sha256=flown.digest())
         write_record(record, tmp_path / name)
         said, _ = run("fly", "--replay", name, code=code)
         assert "replay: the trace equals the recorded one" in said

@@ -5,11 +5,11 @@ from dataclasses import FrozenInstanceError
 import pytest
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from tests.support.cases import SCALARS
+from tests.support.one_norm import ONE_NORM
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 
 
 @pytest.mark.parametrize("scalar", SCALARS)
@@ -22,7 +22,7 @@ def test_everything_is_derived_once(name: str, scalar: str) -> None:
 
 def test_a_design_is_a_value() -> None:
     """Equal settings make equal designs, whatever has been derived already; nothing can be put in."""
-    one, other = Design(MAMBO), Design(presets.load("mambo"))
+    one, other = Design(MAMBO), Design(ONE_NORM)
     assert one.limits.tilt == other.limits.tilt
     assert (one, hash(one)) == (Design(MAMBO), hash(other))
     assert one != Design(with_option(MAMBO, "cost.effort_weight", 2.0))

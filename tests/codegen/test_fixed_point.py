@@ -24,11 +24,12 @@ from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.verify.calls import ApiFunction, Tape, answers, calls
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.strategies import Values, toml, valid_values
 from tests.support.subjects import played_fault, subject
 from tests.support.tools import require, toolchain
 
-MAMBO = with_option(presets.load("mambo"), "code.scalar", "fixed", "test")
+MAMBO = with_option(ONE_NORM, "code.scalar", "fixed", "test")
 SETTINGS = {
     "mambo": MAMBO,
     "table1-printed": with_option(presets.load("table1-printed"), "code.scalar", "fixed", "test"),

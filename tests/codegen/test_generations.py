@@ -16,6 +16,7 @@ from mambo_nmpc.codegen.atomic import is_left_over
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from tests.support.bundles import FILES, NEXT, content, expected, place
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
 AGAIN = "this file and its headers are of different bundles: run mambo-nmpc generate again"
@@ -144,14 +145,14 @@ def test_files_of_another_version_stop_the_compiler(tmp_path: Path, monkeypatch:
     """The same settings, another version of the generator."""
     place(generation("mambo"), tmp_path)
     monkeypatch.setattr(rendering, "__version__", "99.0")
-    newer = rendering.render(presets.load("mambo"), with_digest=False)
+    newer = rendering.render(ONE_NORM, with_digest=False)
     place({"src/nmpc_math.c": newer["src/nmpc_math.c"]}, tmp_path)
     assert AGAIN in refusal(tmp_path, "src/nmpc_math.c")
 
 
 def test_the_check_carries_the_prefix() -> None:
     """Two controllers in one image have a number each."""
-    files = rendering.render(with_option(presets.load("mambo"), "code.prefix", "roll"), with_digest=False)
+    files = rendering.render(with_option(ONE_NORM, "code.prefix", "roll"), with_digest=False)
     header = files["include/roll.h"]
     assert "#if !defined(ROLL_SETTINGS_ID) || (ROLL_SETTINGS_ID != 0x" in header
     assert f'#error "{AGAIN}"' in header

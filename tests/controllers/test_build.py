@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 
 
 def test_two_processes_may_build_the_same_code_at_once(empty_cache: Path) -> None:

@@ -9,7 +9,6 @@ from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.build import batch_source
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -18,6 +17,7 @@ from mambo_nmpc.sil.emulation.machine import CORES as EMULATED_CORES
 from mambo_nmpc.sil.emulation.machine import Machine, start
 from mambo_nmpc.sil.errors import EmulationError
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.parity import Run, differences, inputs_of_steps
 from tests.support.tools import CORES, board_builder
 
@@ -103,7 +103,7 @@ def test_every_core_has_the_bits_of_the_reference(name: str, scalar: str, index:
 
 def test_memory_is_dirty_before_init(tmp_path: Path) -> None:
     """Without nmpc_init a refused input returns the command in the instance's memory, which is not zero."""
-    settings = presets.load("mambo")
+    settings = ONE_NORM
     glue = batch_source()
     assert glue.count("nmpc_init(&controllers[i]);") == 1
     idle = glue.replace("nmpc_init(&controllers[i]);", "(void)controllers[i];")
@@ -116,7 +116,7 @@ def test_memory_is_dirty_before_init(tmp_path: Path) -> None:
 
 def test_another_shape_is_refused(tmp_path: Path) -> None:
     """An array of a wrong shape would be read beyond its end, or written beyond the inputs of the core."""
-    settings = presets.load("mambo")
+    settings = ONE_NORM
     for controller in (CompiledController(settings, 2), start_emulated("crazyflie", settings, tmp_path, 2)):
         for state, target, thrust in (
             ((1, 7), (2, 4), (2,)),

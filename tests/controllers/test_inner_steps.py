@@ -13,8 +13,9 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.inner_steps import step_watched
 from mambo_nmpc.sil.verify.inputs import random_inputs
 from tests.support.cases import SCALARS
+from tests.support.one_norm import ONE_NORM
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 SETTINGS = {scalar: with_option(MAMBO, "code.scalar", scalar) for scalar in SCALARS}
 N = 300
 

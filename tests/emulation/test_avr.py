@@ -25,6 +25,7 @@ from mambo_nmpc.sil.firmware.elf import FootprintError, load
 from mambo_nmpc.sil.firmware.stack import StackReport, bound_stack
 from tests.support.cases import settings_case
 from tests.support.linking import link
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder, only
 
 SELF_TEST = """
@@ -177,7 +178,7 @@ def test_a_controller_too_large_for_the_ram_is_refused(mega: Builder, tmp_path: 
 
 def test_a_guest_that_leaves_no_room_is_refused(mega: Builder, tmp_path: Path) -> None:
     """A controller with inputs and outputs must fit between data and stack."""
-    settings = presets.load("mambo")
+    settings = ONE_NORM
     glue = batch_source() + "char nmpc_ballast[5750] = {1};"
     elf = mega.guest(render(settings, with_digest=False), glue, (*GUEST, "nmpc_ballast"), tmp_path)
     with pytest.raises(EmulatorError, match=r"^a controller .* takes \d{3} B, but .* has only \d+ B free$"):

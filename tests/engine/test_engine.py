@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -25,10 +24,11 @@ from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.link import Link
+from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH, scenarios
 from tests.support.tools import require, toolchain
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 PERIOD_S = MAMBO.horizon.update_period_s
 SCALARS = ("float32", "float64", "fixed")
 BATCHES = {"truth": TRUTH, "sensed": SENSED, "coupled": COUPLED, "take-off": TAKE_OFF}

@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine.build import HEADERS, SOURCES, ffi, texts
@@ -29,6 +28,7 @@ from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Sensors
 from tests.support.engine_reasons import reason
 from tests.support.engines import TICKS, build, estimates, tabulate, truths
 from tests.support.mutants import Mutant, mutants
+from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH
 
 PERIOD_S: Final = 0.01
@@ -50,7 +50,7 @@ def digests(path: Path) -> list[str]:
     engine = ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
     traces = [fly_compiled(engine, flight, PdController()) for flight in flights]
-    settings = presets.load("mambo")
+    settings = ONE_NORM
     traces += [
         fly_compiled(engine, flight, CompiledController(settings, flight.flights)) for flight in flights[:2]
     ]

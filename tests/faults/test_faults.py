@@ -17,7 +17,6 @@ from mambo_nmpc.codegen import bundle
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.faults.flights import End, Verdict, fly_faults
@@ -48,10 +47,11 @@ from mambo_nmpc.sil.paper.table2 import CASES
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.faults import check, judge
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject
 from tests.support.tools import require
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 EIGHT = next(iter(CASES.values()))
 DOCS = Path(__file__).parents[2] / "docs" / "faults.md"
 NOW = ControllerInput(np.arange(1.0, 8.0), np.arange(4.0), 9.81)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.firmware.elf import FootprintError, load
 from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
 from mambo_nmpc.sil.firmware.sizes import Parts, measure_added, measure_sections
 from tests.support.linking import link
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder, require
 
 SIZES = """
@@ -34,7 +34,7 @@ HELPERS = {
 @pytest.mark.parametrize("board", CORES)
 def test_every_byte_of_a_controller_has_one_owner(board: str, tmp_path: Path) -> None:
     """Parts add up: tables are the controller's own, arithmetic is the compiler's, RAM is the instance."""
-    files = render(presets.load("mambo"), with_digest=False)
+    files = render(ONE_NORM, with_digest=False)
     build = board_builder(board)
     firmware, empty = build.firmware(files, tmp_path), build.firmware(files, tmp_path, empty=True)
     image, added = load(firmware), measure_added(firmware, empty, "nmpc")

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.inner_steps import WatchedController
 from mambo_nmpc.sil.controllers.pd import PdController
@@ -21,8 +20,9 @@ from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.airframe import MAMBO as MAMBO_AIRFRAME
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 from tests.support.command import command
+from tests.support.one_norm import ONE_NORM
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 HARD = Scenario(
     seed=2**62 + 1,
     trajectory="gerono",

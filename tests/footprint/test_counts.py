@@ -11,7 +11,6 @@ import pytest
 import unicorn
 
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.build import batch_source
@@ -29,11 +28,12 @@ from mambo_nmpc.sil.footprint.counts import (
     InstructionCounts,
     count_instructions,
 )
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder
 
 IN_PROCESS = [name for name in CORES if name != "mega"]
 """Boards emulated by Unicorn, which can report every instruction."""
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 
 STRAIGHT = 700
 """Instructions without a branch, more than one translation block holds."""

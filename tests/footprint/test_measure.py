@@ -17,9 +17,10 @@ from mambo_nmpc.sil.firmware.elf import load
 from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
 from mambo_nmpc.sil.footprint import report
 from mambo_nmpc.sil.footprint.measure import Footprint, measure_footprint
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder, only
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 COST = {
     "float32": "return (weight.tracking * distance_m)",
     "fixed": "return nmpc_tracking_cost(weight.tracking, distance_m)",

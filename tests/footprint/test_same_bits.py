@@ -12,7 +12,6 @@ from mambo_nmpc.codegen.digest import TICKS, episode_count, episode_inputs, self
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import ReferenceController, Status
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import read, with_option
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.build import batch_source, load_library
@@ -27,9 +26,10 @@ from mambo_nmpc.sil.footprint.same_bits import (
     run_everywhere,
 )
 from tests.support.cases import SCALARS, settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder, require, toolchain
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 EMULATED = ("mambo", "rp2040", "crazyflie", "teensy41", "rv32")
 GENERATED = Path(__file__).parents[2] / "generated"
 

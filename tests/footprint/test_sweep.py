@@ -11,12 +11,12 @@ import pytest
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.boards import Board
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.executors import processes
 from mambo_nmpc.sil.footprint.plots import draw_sweep
 from mambo_nmpc.sil.footprint.sweep import Grid, Point, closest_fit, measure_grid, write_points
 from tests.support.command import run
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder
 
 POINT = Point(
@@ -148,7 +148,7 @@ def test_a_sweep_yields_the_points_in_order() -> None:
     """A longer horizon takes more flash and instructions, and no less RAM."""
     board_builder("crazyflie")
     grid = Grid(prediction=(5, 8), control=(1, 2), iterations=(3,))
-    points = measured(presets.load("mambo"), boards.load("crazyflie"), grid)
+    points = measured(ONE_NORM, boards.load("crazyflie"), grid)
     assert [(p.prediction, p.control, p.iterations) for p in points] == grid.points()
     assert all(p.fits and math.isfinite(p.iae_m_s) for p in points)
     for less, more in ((0, 1), (0, 2), (1, 3), (2, 3)):
@@ -166,7 +166,7 @@ def test_what_cannot_be_measured_is_not_said_to_fit() -> None:
     document["ram_bytes"]["value"] = 65_536
     document["budget"] |= {"flash_bytes": 131_072, "ram_bytes": 32_768}
     grid = Grid(prediction=(50,), control=(50,), iterations=(1,))
-    (found,) = measured(presets.load("mambo"), Board.model_validate(document), grid)
+    (found,) = measured(ONE_NORM, Board.model_validate(document), grid)
     assert found.ram_bytes <= 32_768
     assert found.stack_bytes > 0
     assert math.isnan(found.time_ms)
@@ -178,6 +178,6 @@ def test_a_small_controller_fits_the_mega() -> None:
     """Five predicted steps, one move and three iterations take less than half of the period."""
     board_builder("mega")
     grid = Grid(prediction=(5,), control=(1,), iterations=(3,))
-    (found,) = measured(presets.load("mambo"), boards.load("mega"), grid)
+    (found,) = measured(ONE_NORM, boards.load("mega"), grid)
     assert found.time_ms < 5
     assert found.fits

@@ -4,9 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.firmware.build import Builder
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder
 
 GUEST = """
@@ -37,5 +37,5 @@ def link(board: str, text: str, folder: Path, *flags: str, keep: tuple[str, ...]
 
 def link_controller(board: str, folder: Path, *flags: str, scalar: str = "float32") -> Path:
     """Link GUEST with the controller of preset mambo; gcc's frame sizes are written beside the program."""
-    files = render(with_option(presets.load("mambo"), "code.scalar", scalar), with_digest=False)
+    files = render(with_option(ONE_NORM, "code.scalar", scalar), with_digest=False)
     return builder_with(board, "-fstack-usage", *flags).guest(files, GUEST, ("run", "fly"), folder)

@@ -21,6 +21,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.dialects import DIALECTS
 from tests.support.bundles import place
 from tests.support.cases import SCALARS, settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
 STRICT = [*WARNING_FLAGS, "-Werror"]
@@ -61,7 +62,7 @@ def named(prefix: str, preset: str = "mambo") -> Settings:
 @pytest.fixture
 def mambo(tmp_path: Path) -> Path:
     """Return a folder with the bundle of preset mambo."""
-    return placed(presets.load("mambo"), tmp_path)
+    return placed(ONE_NORM, tmp_path)
 
 
 def refused(*command: str, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -95,7 +96,7 @@ def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: 
 def test_float64_builds_without_a_word(tmp_path: Path, *, amalgamate: bool) -> None:
     """The same for double, without gcc's warning of a missing suffix: C has none for double."""
     require("gcc", "gcc")
-    placed(with_option(presets.load("mambo"), "code.scalar", "float64"), tmp_path, amalgamate=amalgamate)
+    placed(with_option(ONE_NORM, "code.scalar", "float64"), tmp_path, amalgamate=amalgamate)
     sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
     shell("gcc", "-std=c99", *STRICT, "-O2", "-Iinclude", "-I.", "-c", *sources, folder=tmp_path)
 
@@ -163,7 +164,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     placed(named("drone"), tmp_path, amalgamate=amalgamate)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
-    digest = self_test_digest(Design(presets.load("mambo")), 1000)
+    digest = self_test_digest(Design(ONE_NORM), 1000)
     assert f"digest: 0x{digest:08X} after 100000 steps\n" in printed
     last = [float(word) for word in printed.splitlines()[-1].split()]
     assert abs(last[1] - last[3]) < 0.05
@@ -176,7 +177,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
 def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: str, tmp_path: Path) -> None:
     """They lack operations that gcc and clang have, and loops written out."""
     require("gcc", "gcc")
-    settings = with_option(presets.load("mambo"), "code.scalar", scalar, "test")
+    settings = with_option(ONE_NORM, "code.scalar", scalar, "test")
     sources = sorted(placed(settings, tmp_path).glob("src/*.c"))
     gcc = ("gcc", *COMPILE_FLAGS, "-Iinclude")
     shell(*gcc, "-U__GNUC__", "-c", *sources, folder=tmp_path)
@@ -205,7 +206,7 @@ def test_a_changed_header_is_built_anew(mambo: Path) -> None:
     """New settings over a built bundle: the objects follow the header, and the self-test passes."""
     require("make", "make")
     shell("make", folder=mambo)
-    files = render(with_option(presets.load("mambo"), "horizon.prediction", 20))
+    files = render(with_option(ONE_NORM, "horizon.prediction", 20))
     place({path: text for path, text in files.items() if (mambo / path).read_text() != text}, mambo)
     assert "all steps equal the reference" in shell("make", "-s", "run", folder=mambo)
 
@@ -247,7 +248,7 @@ def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path, 
     require("make", "make")
     require("readelf", "binutils")
     require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
-    placed(presets.load("mambo"), tmp_path, amalgamate=amalgamate)
+    placed(ONE_NORM, tmp_path, amalgamate=amalgamate)
 
     def machine(board: str) -> str:
         printed = shell("readelf", "-h", f"build/{board}/libnmpc_controller.a", folder=tmp_path)

@@ -18,10 +18,11 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from tests.support.extension import build_extension, load_extension
+from tests.support.one_norm import ONE_NORM
 from tests.support.parity import Controller
 from tests.support.tools import toolchain
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 HOVER_STATE, HOVER_TARGET, HOVER_THRUST = np.zeros(7), np.array([0.5, -0.4, 0.0, 0.0]), 9.81
 
 

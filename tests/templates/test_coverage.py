@@ -14,11 +14,12 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify.check import Subject
 from tests.support.cases import SCALARS, settings_case
 from tests.support.coverage_reasons import REASONS
+from tests.support.one_norm import ONE_NORM
 from tests.support.reasons import Key, is_explained, plain
 from tests.support.subjects import played_fault, subject
 from tests.support.tools import require
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 SETTINGS = {name: presets.load(name) for name in presets.names()} | {
     "fixed": with_option(MAMBO, "code.scalar", "fixed", "test"),
     "case 7": settings_case(7, "float64"),

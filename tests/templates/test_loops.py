@@ -6,8 +6,8 @@ from graphlib import CycleError, TopologicalSorter
 import pytest
 
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from tests.support.cases import SCALARS, settings_case
+from tests.support.one_norm import ONE_NORM
 
 NUMBER = r"\(?(?:NMPC_[A-Z_]+|\d+U?)(?: - \d+U?)?\)?"
 STEPS = {"<": rf"\+\+|(?: \+= {NUMBER})", ">=": "--"}
@@ -62,7 +62,7 @@ def is_bounded(loop: re.Match[str], code: str) -> bool:
 @pytest.mark.parametrize("scalar", SCALARS)
 def test_the_work_of_the_generated_c_is_bounded(scalar: str) -> None:
     """A preset and corners of the horizon, in every scalar type."""
-    for settings in (presets.load("mambo"), *(settings_case(index, scalar) for index in (0, 1, 3))):
+    for settings in (ONE_NORM, *(settings_case(index, scalar) for index in (0, 1, 3))):
         files = render(settings, with_digest=False)
         assert sum(text.count("for (") for text in files.values()) > 15
         assert violations(files) == []
@@ -86,7 +86,7 @@ ITERATION = "for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {"
 )
 def test_unbounded_work_is_found(wrong: str) -> None:
     """Each fault alone, in the loop of the search."""
-    files = render(presets.load("mambo"), with_digest=False)
+    files = render(ONE_NORM, with_digest=False)
     path = "src/nmpc_optimizer.c"
     assert files[path].count(ITERATION) == 1, "the template has changed: adapt the faults"
     assert violations(files | {path: files[path].replace(ITERATION, wrong)}) != []

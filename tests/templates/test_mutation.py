@@ -11,11 +11,12 @@ from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.mutants import mutants
 from tests.support.mutation import FILES, Bench, Fate
 from tests.support.mutation_reasons import REASONS
+from tests.support.one_norm import ONE_NORM
 from tests.support.reasons import is_explained
 from tests.support.subjects import subject
 from tests.support.tools import require
 
-MAMBO, TRACKED = presets.load("mambo"), presets.load("mambo-1norm")
+MAMBO, TRACKED = ONE_NORM, presets.load("mambo-1norm")
 TRACKED_FILES = ("src/nmpc_tracker.h", "src/nmpc_tracker.c", "src/nmpc_predictor.c", "src/nmpc.c")
 """The files that the tracker changes."""
 

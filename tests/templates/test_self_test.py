@@ -8,11 +8,11 @@ import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import Toolchain
 from tests.support.bundles import place
 from tests.support.mutants import Mutant, mutants
+from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
 SELF_TEST = "src/nmpc_self_test.c"
@@ -35,7 +35,7 @@ class Bench:
     """Builds the self-test of a bundle, or a mutant of it, against the controller with wrong outputs."""
 
     def __init__(self, scalar: str, folder: Path) -> None:
-        files = render(with_option(presets.load("mambo"), "code.scalar", scalar), with_digest=False)
+        files = render(with_option(ONE_NORM, "code.scalar", scalar), with_digest=False)
         self.text = files[SELF_TEST]
         (steps,) = re.findall(r"#define NMPC_SELF_TEST_STEPS (\d+)", self.text)
         self.steps = int(steps)

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify import bits
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject
 from tests.support.tools import require
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 WRONG_COMMAND = (
     "src/nmpc.c",
     "self->command_rad[1] = self->plan_rad[1];",

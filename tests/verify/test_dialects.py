@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.dialects import DIALECTS, check
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
@@ -27,7 +27,7 @@ def _compilers() -> None:
 @pytest.mark.long
 def test_silent_c_passes(tmp_path: Path) -> None:
     """Every dialect is counted, and what each compiler said is kept."""
-    its = subject(presets.load("mambo"), tmp_path)
+    its = subject(ONE_NORM, tmp_path)
     result = check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["silent"] == list(DIALECTS)
@@ -39,6 +39,6 @@ def test_silent_c_passes(tmp_path: Path) -> None:
 @pytest.mark.parametrize("harm", HARMS)
 def test_a_warning_fails(harm: str, tmp_path: Path) -> None:
     """It is named by dialect, file and line."""
-    result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
+    result = check(subject(ONE_NORM, tmp_path, HARMS[harm]))
     assert result.outcome is CheckOutcome.FAILED
     assert f"{HARMS[harm].path}:" in result.evidence

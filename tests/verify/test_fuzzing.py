@@ -14,6 +14,7 @@ from mambo_nmpc.sil.verify import fuzzing, replay
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from tests.support.bundles import place
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject
 from tests.support.tools import require
 
@@ -71,7 +72,7 @@ def test_a_float64_controller_of_another_name_is_fuzzed(tmp_path: Path) -> None:
 )
 def test_a_broken_promise_is_found_and_can_be_repeated(fault: str, tmp_path: Path) -> None:
     """The evidence says which promise, its command repeats the finding, and no seed was needed for it."""
-    result = fuzzing.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]), runs=FEW_RUNS)
+    result = fuzzing.check(subject(ONE_NORM, tmp_path, FAULTS[fault]), runs=FEW_RUNS)
     assert result.outcome is CheckOutcome.FAILED
     assert "broken promise" in result.evidence or "runtime error" in result.evidence
     command = re.search(r"repeat it with (\S+) (\S+);", result.evidence)
@@ -91,7 +92,7 @@ def test_what_the_harness_cannot_know_is_found_by_the_reference(tmp_path: Path) 
         "    self->weights.tracking = NMPC_TRACKING_WEIGHT;",
         "    self->weights.tracking = NMPC_TRACKING_WEIGHT + (nmpc_real_t)1;",
     )
-    result = fuzzing.check(subject(presets.load("mambo"), tmp_path, fault), runs=1000)
+    result = fuzzing.check(subject(ONE_NORM, tmp_path, fault), runs=1000)
     assert result.outcome is CheckOutcome.FAILED
     assert "reference" in result.evidence
 
@@ -102,7 +103,7 @@ def test_the_same_runs_keep_the_same_corpus(tmp_path: Path) -> None:
     kept = []
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        made = subject(presets.load("mambo"), tmp_path / name)
+        made = subject(ONE_NORM, tmp_path / name)
         assert fuzzing.check(made, runs=5000).outcome is CheckOutcome.PASSED
         kept.append(sorted(path.name for path in (made.folder / "corpus").iterdir()))
     assert kept[0] == kept[1]
@@ -112,7 +113,7 @@ def test_the_same_runs_keep_the_same_corpus(tmp_path: Path) -> None:
 @pytest.mark.parametrize("amalgamate", [False, True])
 def test_the_command_in_the_harness_works(tmp_path: Path, *, amalgamate: bool) -> None:
     """A user repeats the fuzzing from the bundle alone."""
-    place(render(presets.load("mambo"), amalgamate=amalgamate), tmp_path)
+    place(render(ONE_NORM, amalgamate=amalgamate), tmp_path)
     comment = (tmp_path / "fuzz/nmpc_fuzz.c").read_text().partition("*/")[0]
     lines = [line.removeprefix(" *   ") for line in comment.splitlines() if line.startswith(" *   ")]
     script = "\n".join(lines).replace("1000000", "1000")

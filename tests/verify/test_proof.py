@@ -11,6 +11,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.proof import check, read_properties
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
@@ -102,7 +103,7 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
 )
 def test_a_fault_raises_an_alarm(harm: str, tmp_path: Path) -> None:
     """Each is what a slip of the hand would make, and none goes through."""
-    result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
+    result = check(subject(ONE_NORM, tmp_path, HARMS[harm]))
     assert result.outcome is CheckOutcome.FAILED
     (alarm, *_) = result.figures["alarms"]
     assert alarm["place"] in result.evidence
@@ -111,7 +112,7 @@ def test_a_fault_raises_an_alarm(harm: str, tmp_path: Path) -> None:
 
 def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
     """No report is no proof."""
-    result = check(subject(presets.load("mambo"), tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
+    result = check(subject(ONE_NORM, tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
     assert result.outcome is CheckOutcome.FAILED
     assert "frama-c failed" in result.evidence
 
@@ -125,7 +126,7 @@ def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
 )
 def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: Path) -> None:
     """A driver that ends before its promises, or leaves one out, proves nothing."""
-    result = check(subject(presets.load("mambo"), tmp_path, Harm("proof/nmpc_proof.c", right, wrong)))
+    result = check(subject(ONE_NORM, tmp_path, Harm("proof/nmpc_proof.c", right, wrong)))
     assert result.outcome is CheckOutcome.FAILED
     assert "Dead" in result.evidence or "not reached" in result.evidence
 
@@ -137,6 +138,6 @@ def test_make_proof_comes_to_the_same_verdict(harm: str | None, tmp_path: Path, 
     """The command of the bundle, in both layouts, ends in an error unless everything is proven."""
     require("make", "make")
     harms = [HARMS[harm]] if harm else []
-    its = subject(presets.load("mambo"), tmp_path, *harms, amalgamate=amalgamate)
+    its = subject(ONE_NORM, tmp_path, *harms, amalgamate=amalgamate)
     done = subprocess.run(["make", "proof"], cwd=its.bundle, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == (harm is None), done.stdout

@@ -7,7 +7,6 @@ import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.verify import replay
 from mambo_nmpc.sil.verify.calls import (
     NULL_COMMAND,
@@ -20,9 +19,10 @@ from mambo_nmpc.sil.verify.calls import (
 )
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Subject
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import played_fault, subject
 
-MAMBO = presets.load("mambo")
+MAMBO = ONE_NORM
 GOOD = np.array([[0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9.81]])
 REFUSED = np.full((1, 12), np.nan)
 

@@ -12,17 +12,15 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
 SETTINGS = (
     {name: presets.load(name) for name in presets.names()}
     | {f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)}
-    | {"fixed": with_option(presets.load("mambo"), "code.scalar", "fixed", "test")}
-    | {
-        f"{steps} steps": with_option(presets.load("mambo"), "horizon.prediction", steps, "test")
-        for steps in (2, 33)
-    }
+    | {"fixed": with_option(ONE_NORM, "code.scalar", "fixed", "test")}
+    | {f"{steps} steps": with_option(ONE_NORM, "horizon.prediction", steps, "test") for steps in (2, 33)}
 )
 HARMS = {
     "15.1 goto": Harm("src/nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
@@ -62,7 +60,7 @@ def test_nothing_but_listed_deviations_is_found(name: str, tmp_path: Path) -> No
 )
 def test_an_unlisted_finding_fails(harm: str, tmp_path: Path) -> None:
     """It is named by rule, file and line."""
-    result = check(subject(presets.load("mambo"), tmp_path, HARMS[harm]))
+    result = check(subject(ONE_NORM, tmp_path, HARMS[harm]))
     assert result.outcome is CheckOutcome.FAILED
     assert f"rule {harm.split(maxsplit=1)[0]}" in result.evidence
     assert HARMS[harm].path in result.evidence
@@ -75,7 +73,7 @@ def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Pat
     rows = re.findall(r"^\| (\d+\.\d+) \| `(\S+)` \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
     column = {"float32": 2, "fixed": 3}[scalar]
     documented = {row[:2]: int(row[column]) for row in rows if row[column] != "0"}
-    result = check(subject(with_option(presets.load("mambo"), "code.scalar", scalar, "test"), tmp_path))
+    result = check(subject(with_option(ONE_NORM, "code.scalar", scalar, "test"), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     deviations_found = result.figures["deviations"].items()
     assert documented == {(rule, file): n for rule, files in deviations_found for file, n in files.items()}
@@ -89,7 +87,7 @@ def test_every_deviation_is_in_the_manual() -> None:
     documented = {
         (f"misra-c2012-{rule}", file) for rule, files in rows for file in re.findall(r"`([^`]+)`", files)
     }
-    mambo = presets.load("mambo")
+    mambo = ONE_NORM
     bundles = [render(mambo), render(with_option(mambo, "code.scalar", "fixed", "test"))]
     listed = {
         row for files in bundles for row in re.findall(r"^([\w.-]+):(\S+)$", files[DEVIATIONS], re.MULTILINE)
@@ -112,7 +110,7 @@ def test_make_rules_comes_to_the_same_verdict(
 ) -> None:
     """Also where a line has a listed deviation and another finding."""
     require("make", "make")
-    settings = with_option(presets.load("mambo"), "code.scalar", scalar, "test")
+    settings = with_option(ONE_NORM, "code.scalar", scalar, "test")
     its = subject(settings, tmp_path, *([harm] if harm else []))
     done = subprocess.run(
         ["make", "-s", "rules"], cwd=its.bundle, capture_output=True, text=True, check=False
@@ -129,6 +127,6 @@ def test_cppcheck_without_its_addon_is_no_pass(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "cppcheck").write_text("#!/bin/sh\nexit 0\n")
     (tmp_path / "cppcheck").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
-    result = check(subject(presets.load("mambo"), tmp_path))
+    result = check(subject(ONE_NORM, tmp_path))
     assert result.outcome is CheckOutcome.INCOMPLETE
     assert "addon" in result.evidence

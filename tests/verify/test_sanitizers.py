@@ -9,6 +9,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.verify import sanitizers
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from tests.support.cases import CORNER_HORIZONS, settings_case
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject
 from tests.support.tools import require
 
@@ -35,7 +36,7 @@ def _compilers() -> None:
 
 def test_nothing_undefined_happens(tmp_path: Path) -> None:
     """All cases under three builds with sanitizers: no report, and the bits of the reference."""
-    result = sanitizers.check(subject(presets.load("mambo"), tmp_path))
+    result = sanitizers.check(subject(ONE_NORM, tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["calls"] > 15_000
     assert json.loads(json.dumps(result.figures)) == result.figures
@@ -54,7 +55,7 @@ def test_nothing_undefined_happens_whatever_the_settings(name: str, tmp_path: Pa
 @pytest.mark.parametrize("fault", FAULTS)
 def test_what_is_undefined_is_reported(fault: str, tmp_path: Path) -> None:
     """Faults that parity may not see, for the memory beyond happens to be harmless."""
-    result = sanitizers.check(subject(presets.load("mambo"), tmp_path, FAULTS[fault]))
+    result = sanitizers.check(subject(ONE_NORM, tmp_path, FAULTS[fault]))
     assert result.outcome is CheckOutcome.FAILED
     assert "runtime error" in result.evidence or "AddressSanitizer" in result.evidence
 
@@ -63,6 +64,6 @@ def test_what_is_undefined_is_reported(fault: str, tmp_path: Path) -> None:
 def test_memory_that_is_read_before_it_is_written_is_reported(tmp_path: Path) -> None:
     """A weight that nmpc_init leaves out."""
     fault = ("src/nmpc.c", "    self->weights.effort = NMPC_EFFORT_WEIGHT;\n", "")
-    result = sanitizers.check(subject(presets.load("mambo"), tmp_path, fault))
+    result = sanitizers.check(subject(ONE_NORM, tmp_path, fault))
     assert result.outcome is CheckOutcome.FAILED
     assert any("MemorySanitizer" in found for found in result.figures["faults"]), result.evidence

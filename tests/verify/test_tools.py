@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import UnwritableError
-from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.verify import bits
 from mambo_nmpc.sil.verify.tools import run
 from tests.support.command import command
+from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject
 from tests.support.tools import require
 
@@ -53,7 +53,7 @@ def test_a_check_without_space_has_no_result(full: Path) -> None:
     require("gcc", "gcc")
     build = bits.Build("gcc", "gcc", ("-MD", "-MF", str(full)))
     with pytest.raises(UnwritableError, match=NO_SPACE):
-        bits.play(subject(presets.load("mambo"), full.parent), (build,), "bits")
+        bits.play(subject(ONE_NORM, full.parent), (build,), "bits")
 
 
 @pytest.mark.parametrize(

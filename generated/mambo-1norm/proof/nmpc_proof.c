@@ -9,13 +9,13 @@
  * result in NaN is an alarm. refuse_nan() passes NaN: each call is refused and writes nothing into the controller, so
  * the states that take_numbers() covers are all states there are.
  *
- * Settings f1848a6bf1c5efe3. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
+ * Settings af6f458e7d80b6f6. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
  */
 #include <stddef.h>
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x5C19E4A4UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD149173FUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

@@ -39,7 +39,7 @@
 
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x5C19E4A4UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD149173FUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

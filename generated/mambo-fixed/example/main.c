@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Example: run the self-test and its digest, then fly a point mass to a target that moves along x. The point mass takes
- * the commanded attitude at once; `mambo-nmpc fly` simulates the whole drone.
+ * Example: run the self-test and its digest, then fly a point mass to a target that moves along x. The point mass follows
+ * the commanded attitude with the lags of the settings; `mambo-nmpc fly` simulates the whole drone.
  */
 #include <stdio.h>
 
@@ -9,29 +9,32 @@
 #include "nmpc_float.h"
 #include "nmpc_self_test.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
 #define THRUST_ACCELERATION_M_S2 9.81f
 #define STEPS_PER_LINE 50
 #define LINES 11
+/* Of the way to its command, what an angle covers in an update period. */
+#define ROLL_SHARE 0.03448276f
+#define PITCH_SHARE 0.06097561f
 
 static nmpc_t controller;
 
 /* Integrate the point mass over one update period, at yaw 0. */
 static void fly(nmpc_float_state_t *state, const nmpc_float_command_t *command)
 {
-    const float acceleration_m_s2[2] = { -THRUST_ACCELERATION_M_S2 * command->pitch_rad,
-                                               THRUST_ACCELERATION_M_S2 * command->roll_rad };
+    const float acceleration_m_s2[2] = { -THRUST_ACCELERATION_M_S2 * state->pitch_rad,
+                                               THRUST_ACCELERATION_M_S2 * state->roll_rad };
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
         state->position_m[axis] += NMPC_UPDATE_PERIOD_S * state->velocity_m_s[axis];
         state->velocity_m_s[axis] += NMPC_UPDATE_PERIOD_S * acceleration_m_s2[axis];
     }
-    state->roll_rad = command->roll_rad;
-    state->pitch_rad = command->pitch_rad;
+    state->roll_rad += ROLL_SHARE * (command->roll_rad - state->roll_rad);
+    state->pitch_rad += PITCH_SHARE * (command->pitch_rad - state->pitch_rad);
 }
 
 int main(void)
@@ -63,13 +66,13 @@ int main(void)
     }
     (void)printf("\n");
 
-    (void)printf("  time s    x m      y m    target x  roll rad  pitch rad  cost\n");
+    (void)printf("  time s    x m      y m    target x  roll rad  pitch rad\n");
     nmpc_init(&controller);
     for (line = 0; line < LINES; line++) {
-        (void)printf("%7.2f  %7.3f  %7.3f  %7.3f  %8.4f  %8.4f  %8.1f\n",
+        (void)printf("%7.2f  %7.3f  %7.3f  %7.3f  %8.4f  %8.4f\n",
                      (double)(line * STEPS_PER_LINE) * (double)NMPC_UPDATE_PERIOD_S,
                      (double)state.position_m[0], (double)state.position_m[1], (double)target.position_m[0], (double)command.roll_rad,
-                     (double)command.pitch_rad, (double)nmpc_float_last_cost(&controller));
+                     (double)command.pitch_rad);
         for (step = 0; step < STEPS_PER_LINE; step++) {
             if (nmpc_float_step(&controller, &state, &target, THRUST_ACCELERATION_M_S2, &command) != NMPC_OK) {
                 refused++; /* out of range: the command repeats the last one */

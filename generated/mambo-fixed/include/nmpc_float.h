@@ -8,7 +8,7 @@
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -36,18 +36,20 @@ typedef struct {
 } nmpc_float_command_t;
 
 typedef struct {
-    float tracking; /* 1/m */
-    float effort;   /* 1/rad */
-} nmpc_float_weights_t;
+    float position_m[2];
+    float velocity_m_s[2];
+    float disturbance_m_s2[2];
+    int is_valid;
+} nmpc_float_estimate_t;
 
-/* nmpc_step(), nmpc_reset(), nmpc_set_weights() and nmpc_last_cost() with floats, which are rounded to the
+/* nmpc_step(), nmpc_reset(), nmpc_set_command() and nmpc_last_estimate() with floats, which are rounded to the
  * nearest number, ties away from zero. NaN, infinity and what overflows become the largest number, which is
  * outside of every range and so refused, as in nmpc.h. */
 nmpc_status_t nmpc_float_step(nmpc_t *self, const nmpc_float_state_t *state, const nmpc_float_target_t *target,
                               float thrust_acceleration_m_s2, nmpc_float_command_t *command);
 nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command);
-nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *weights);
-float nmpc_float_last_cost(const nmpc_t *self);
+nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *command);
+nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate);
 
 #ifdef __cplusplus
 }

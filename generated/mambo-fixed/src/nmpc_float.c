@@ -7,20 +7,20 @@
 
 #include "nmpc_float.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
 /* Factors from SI units to numbers, and from numbers to SI units. */
 #define NMPC_POSITION_SCALE 524288.0f
 #define NMPC_VELOCITY_SCALE 8.388608e+06f
-#define NMPC_ANGLE_SCALE 5.368709e+08f
+#define NMPC_ANGLE_SCALE 3.3554432e+07f
 #define NMPC_YAW_SCALE 1.048576e+06f
 #define NMPC_THRUST_SCALE 3.3554432e+07f
-#define NMPC_TRACKING_SCALE 64.0f
-#define NMPC_EFFORT_SCALE 2.6843546e+08f
-#define NMPC_ANGLE_UNIT 1.8626451e-09f
-#define NMPC_COST_UNIT 2.9802322e-08f
+#define NMPC_ANGLE_UNIT 2.9802322e-08f
+#define NMPC_POSITION_UNIT 1.9073486e-06f
+#define NMPC_VELOCITY_UNIT 1.1920929e-07f
+#define NMPC_DISTURBANCE_UNIT 1.8626451e-09f
 
 /* 2^31: every number is smaller. */
 #define NMPC_NUMBERS_END 2147483648.0f
@@ -94,20 +94,33 @@ nmpc_status_t nmpc_float_reset(nmpc_t *self, const nmpc_float_command_t *command
     return nmpc_reset(self, &fixed_command);
 }
 
-nmpc_status_t nmpc_float_set_weights(nmpc_t *self, const nmpc_float_weights_t *weights)
+nmpc_status_t nmpc_float_set_command(nmpc_t *self, const nmpc_float_command_t *command)
 {
-    nmpc_weights_t fixed_weights;
+    nmpc_command_t fixed_command;
 
-    if (weights == NULL) {
+    if (command == NULL) {
         return NMPC_NULL_POINTER;
     }
 
-    fixed_weights.tracking = quantize(weights->tracking, NMPC_TRACKING_SCALE);
-    fixed_weights.effort = quantize(weights->effort, NMPC_EFFORT_SCALE);
-    return nmpc_set_weights(self, &fixed_weights);
+    fixed_command.roll_rad = quantize(command->roll_rad, NMPC_ANGLE_SCALE);
+    fixed_command.pitch_rad = quantize(command->pitch_rad, NMPC_ANGLE_SCALE);
+    return nmpc_set_command(self, &fixed_command);
 }
 
-float nmpc_float_last_cost(const nmpc_t *self)
+nmpc_status_t nmpc_float_last_estimate(const nmpc_t *self, nmpc_float_estimate_t *estimate)
 {
-    return (float)nmpc_last_cost(self) * NMPC_COST_UNIT;
+    nmpc_estimate_t fixed_estimate;
+    int axis;
+
+    if ((estimate == NULL) || (nmpc_last_estimate(self, &fixed_estimate) != NMPC_OK)) {
+        return NMPC_NULL_POINTER;
+    }
+
+    for (axis = 0; axis < 2; axis++) {
+        estimate->position_m[axis] = (float)fixed_estimate.position_m[axis] * NMPC_POSITION_UNIT;
+        estimate->velocity_m_s[axis] = (float)fixed_estimate.velocity_m_s[axis] * NMPC_VELOCITY_UNIT;
+        estimate->disturbance_m_s2[axis] = (float)fixed_estimate.disturbance_m_s2[axis] * NMPC_DISTURBANCE_UNIT;
+    }
+    estimate->is_valid = fixed_estimate.is_valid;
+    return NMPC_OK;
 }

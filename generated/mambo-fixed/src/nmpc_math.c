@@ -5,7 +5,7 @@
  */
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

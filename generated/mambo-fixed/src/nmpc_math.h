@@ -8,7 +8,7 @@
 
 #include "nmpc_config.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -28,12 +28,6 @@ extern "C" {
 #define NMPC_UNROLL
 #endif
 
-/* -1, 0 or 1; 0 for +0 and -0. */
-static inline int nmpc_sign(nmpc_sum_t value)
-{
-    return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);
-}
-
 /* The bits of a value; the most significant one is its sign. Without an FPU, reading bits takes far fewer
  * instructions than a comparison. */
 #if defined(__SIZEOF_INT__) && (__SIZEOF_INT__ < 4)
@@ -51,39 +45,6 @@ static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
 
     view.real = value;
     return view.bits;
-}
-
-/* One bit per prediction step, the first step in the most significant bit, the last in bit 0. Steps count from 0
- * to NMPC_LAST_STEP, in the paper from 1 to N_p: step i has bit NMPC_LAST_STEP - i. */
-typedef unsigned long nmpc_steps_t;
-#define NMPC_LAST_STEP 9U
-
-/* The sign bit: 1 for negative values, else 0. */
-static inline nmpc_steps_t nmpc_is_negative(nmpc_real_t value)
-{
-    const nmpc_bits_t sign = nmpc_bits(value) >> 31U;
-
-    return (nmpc_steps_t)sign;
-}
-
-/* Index of the least significant set bit; `word` must not be 0. */
-static inline unsigned int nmpc_lowest_set_bit(nmpc_steps_t word)
-{
-#if defined(__GNUC__)
-    return (unsigned int)__builtin_ctzl(word);
-#else
-    unsigned int index;
-
-    for (index = 0U; ((index + 1U) < NMPC_LAST_STEP) && (((word >> index) & 1U) == 0U); index++) {
-        /* Test the next bit. */
-    }
-    return index;
-#endif
-}
-
-static inline nmpc_sum_t nmpc_absolute(nmpc_sum_t value)
-{
-    return (value < (nmpc_sum_t)0) ? -value : value;
 }
 
 static inline nmpc_real_t nmpc_smaller(nmpc_real_t a, nmpc_real_t b)
@@ -121,89 +82,132 @@ static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
 /* Shift a sum right by `bits`, rounded to nearest, ties up. */
 #define NMPC_ROUNDED(sum, bits) (((sum) + ((nmpc_sum_t)1 << ((bits) - 1))) >> (bits))
 
-/* Products, named after their factors: a multiplication to 64 bits, and a shift to the format of the result.
- * The formats of nmpc_config.h are chosen such that no product overflows for inputs within their ranges. */
-static inline nmpc_real_t nmpc_thrust_product(nmpc_real_t thrust_m_s2, nmpc_real_t step_squared_s2)
-{
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)thrust_m_s2 * step_squared_s2,
-                                     NMPC_THRUST_BITS + NMPC_STEP_SQUARED_BITS - NMPC_GAIN_BITS);
-}
-
+/* Products, named after their factors or their results: multiplications to 64 bits, and a shift to the format of the
+ * result. The formats are chosen such that no product and no sum overflows for inputs within their ranges. */
 static inline nmpc_real_t nmpc_sine_product(nmpc_real_t value, nmpc_real_t sine)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)value * sine, NMPC_SINE_BITS);
 }
 
-/* Half of the resolution of an error is added, so that nmpc_error_change() rounds to nearest. */
-static inline nmpc_real_t nmpc_velocity_product(nmpc_real_t step_s, nmpc_real_t velocity_m_s)
+/* a b - c d and a b + c d of sines and cosines, at most 1. */
+static inline nmpc_real_t nmpc_unit(nmpc_sum_t product)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)step_s * velocity_m_s,
-                                     NMPC_STEP_BITS + NMPC_VELOCITY_BITS - NMPC_ACCELERATION_BITS)
-           + ((nmpc_real_t)1 << (NMPC_ACCELERATION_BITS - NMPC_ERROR_BITS - 1));
+    const nmpc_sum_t value = NMPC_ROUNDED(product, NMPC_SINE_BITS);
+
+    return (nmpc_real_t)((value > NMPC_ONE) ? NMPC_ONE : ((value < -NMPC_ONE) ? -NMPC_ONE : value));
 }
 
-/* The products of a roll-out, with a gain and with a share, are rounded down: that halves the instructions of each. */
-static inline nmpc_real_t nmpc_gain_product(nmpc_real_t gain_m_step2_rad, nmpc_real_t tilt_rad)
+static inline nmpc_real_t nmpc_sine_difference(nmpc_real_t a, nmpc_real_t b, nmpc_real_t c, nmpc_real_t d)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)gain_m_step2_rad * tilt_rad)
-                         >> (NMPC_GAIN_BITS + NMPC_ANGLE_BITS - NMPC_ACCELERATION_BITS));
+    return nmpc_unit(((nmpc_sum_t)a * b) - ((nmpc_sum_t)c * d));
 }
 
-/* The acceleration has room to be shifted left first: then the result is the upper word of the product. */
-static inline nmpc_real_t nmpc_share_product(nmpc_real_t share, nmpc_real_t acceleration_m_step2)
+static inline nmpc_real_t nmpc_sine_sum(nmpc_real_t a, nmpc_real_t b, nmpc_real_t c, nmpc_real_t d)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)share
-                          * (nmpc_real_t)(acceleration_m_step2 * ((nmpc_real_t)1 << (32 - NMPC_SHARE_BITS))))
-                         >> 32);
+    return nmpc_unit(((nmpc_sum_t)a * b) + ((nmpc_sum_t)c * d));
 }
 
-/* Clamping an error whose sign no plan can change changes neither the gradient nor a difference of costs. */
-static inline nmpc_real_t nmpc_initial_error(nmpc_real_t difference_m)
+static inline nmpc_real_t nmpc_speed_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return nmpc_clamp(difference_m, NMPC_ERROR_LIMIT_M)
-           * ((nmpc_real_t)1 << (NMPC_ERROR_BITS - NMPC_POSITION_BITS));
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 32);
 }
 
-static inline nmpc_real_t nmpc_error_change(nmpc_real_t displacement_m_step)
+static inline nmpc_real_t nmpc_tilt_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return displacement_m_step >> (NMPC_ACCELERATION_BITS - NMPC_ERROR_BITS);
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 29);
 }
 
-/* Rounded down as well. */
-static inline nmpc_real_t nmpc_distance_gradient(nmpc_real_t gain_x_m_step2_rad, nmpc_real_t subgradient_x,
-                                                 nmpc_real_t gain_y_m_step2_rad, nmpc_real_t subgradient_y)
+static inline nmpc_real_t nmpc_command_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)((((nmpc_sum_t)gain_x_m_step2_rad * subgradient_x)
-                          + ((nmpc_sum_t)gain_y_m_step2_rad * subgradient_y))
-                         >> (NMPC_GAIN_BITS + NMPC_RESPONSE_BITS - NMPC_DISTANCE_GRADIENT_BITS));
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 31);
 }
 
-static inline nmpc_sum_t nmpc_tracking_cost(nmpc_real_t weight, nmpc_sum_t distance_m)
+static inline nmpc_real_t nmpc_per_step_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return weight * distance_m;
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 29);
 }
 
-static inline nmpc_sum_t nmpc_effort_cost(nmpc_real_t weight, nmpc_sum_t variation_rad)
+static inline nmpc_real_t nmpc_per_step2_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return NMPC_ROUNDED(weight * variation_rad, NMPC_EFFORT_BITS + NMPC_ANGLE_BITS - NMPC_COST_BITS);
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 24);
 }
 
-static inline nmpc_sum_t nmpc_tracking_gradient(nmpc_real_t weight, nmpc_real_t distance_gradient_m_rad)
+static inline nmpc_real_t nmpc_drag_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_sum_t)weight * distance_gradient_m_rad;
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 33);
 }
 
-static inline nmpc_sum_t nmpc_effort_gradient(nmpc_real_t weight)
+static inline nmpc_real_t nmpc_feedback_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return weight * ((nmpc_sum_t)1 << (NMPC_GRADIENT_BITS - NMPC_EFFORT_BITS));
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 28);
 }
 
-/* The step size is shifted left first too, and the product is rounded down. */
-static inline nmpc_real_t nmpc_step_product(nmpc_real_t step_rad, nmpc_real_t factor)
+static inline nmpc_real_t nmpc_ratio_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)(((nmpc_sum_t)factor
-                          * (nmpc_real_t)(step_rad * ((nmpc_real_t)1 << (32 - NMPC_FACTOR_BITS))))
-                         >> 32);
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 31);
+}
+
+static inline nmpc_real_t nmpc_change_product(nmpc_real_t factor, nmpc_real_t value)
+{
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 24);
+}
+
+static inline nmpc_real_t nmpc_tracker_product(nmpc_real_t factor, nmpc_real_t value)
+{
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 30);
+}
+
+static inline nmpc_real_t nmpc_position_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
+                                          nmpc_real_t innovation_m_step)
+{
+    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)by_position * innovation_m)
+                                     + ((nmpc_sum_t)by_velocity * innovation_m_step), 35);
+}
+
+static inline nmpc_real_t nmpc_velocity_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
+                                          nmpc_real_t innovation_m_step)
+{
+    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)by_position * innovation_m)
+                                     + ((nmpc_sum_t)by_velocity * innovation_m_step), 31);
+}
+
+static inline nmpc_real_t nmpc_disturbance_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
+                                          nmpc_real_t innovation_m_step)
+{
+    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)by_position * innovation_m)
+                                     + ((nmpc_sum_t)by_velocity * innovation_m_step), 30);
+}
+
+/* Changes of format; an input position has that of the estimates. */
+static inline nmpc_real_t nmpc_half_change(nmpc_real_t acceleration_m_step2)
+{
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)acceleration_m_step2, 9);
+}
+
+static inline nmpc_real_t nmpc_velocity_change(nmpc_real_t acceleration_m_step2)
+{
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)acceleration_m_step2, 8);
+}
+
+static inline nmpc_real_t nmpc_position_change(nmpc_real_t velocity_m_step)
+{
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_step, 9);
+}
+
+static inline nmpc_real_t nmpc_move_acceleration(nmpc_real_t move_m_step2)
+{
+    return move_m_step2 * ((nmpc_real_t)1 << 10);
+}
+
+/* Sums of the products of a row. */
+static inline nmpc_real_t nmpc_attitude_sum(nmpc_sum_t sum)
+{
+    return (nmpc_real_t)NMPC_ROUNDED(sum, 30);
+}
+
+static inline nmpc_real_t nmpc_row_sum(nmpc_sum_t sum)
+{
+    return (nmpc_real_t)NMPC_ROUNDED(sum, 33);
 }
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, with absolute errors of at most 2e-09. */

@@ -1,13 +1,29 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Optimizer: RPROP with a fixed number of iterations.
+ * Optimizer: the exact minimum of the quadratic cost (not in the paper).
+ *
+ * Along one axis of the heading, right or forward, let e and v be the errors of position and velocity, w the
+ * disturbance less the target's acceleration, j the target's jerk, and a, i, c, u the attitude model's states
+ * (nmpc_attitude.h). In seconds and metres
+ *
+ *     e' = v,   v' = a + w,   w' = -j,   j' = -j / 1 s,
+ *
+ * and the cost is the sum over all control steps to come of
+ *
+ *     e^2 + (velocity_weight v)^2 + (response_time^3 (u(k+i) - u(k+i-1)) / T_s)^2.
+ *
+ * Free are U1, the command of this control step, and U2, to which the command then runs in a ramp of 0.4 s; behind
+ * it the cost to go is that of the Riccati equation. Without limits the minimum is U = rows [e v w j a i c u]. Each of
+ * U1 and U2 is limited to the same box, and the minimum in the box is found in closed form: at most one comparison of
+ * two costs.
+ * The axes do not interact, so there is one such problem for each.
  */
 #ifndef NMPC_OPTIMIZER_H
 #define NMPC_OPTIMIZER_H
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD4C905DCUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -15,10 +31,11 @@
 extern "C" {
 #endif
 
-/* Run I_max iterations of RPROP on `self->plan_rad`, starting from its present value. The cost may rise from one
- * iteration to the next; the plan after the last update is not evaluated, unless the search
- * has converged. */
-void nmpc_optimizer_minimize(nmpc_t *self);
+#define NMPC_STATES 8
+
+/* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
+ * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`. */
+nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2);
 
 #ifdef __cplusplus
 }

@@ -6,7 +6,7 @@
  */
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x8D00AE40UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF1B3B6C8UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

@@ -8,7 +8,7 @@
 
 #include "nmpc_config.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x8D00AE40UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF1B3B6C8UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -41,12 +41,6 @@ extern "C" {
 #define NMPC_UNROLL
 #endif
 
-/* -1, 0 or 1; 0 for +0 and -0. */
-static inline int nmpc_sign(nmpc_sum_t value)
-{
-    return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);
-}
-
 /* The bits of a value; the most significant one is its sign. Without an FPU, reading bits takes far fewer
  * instructions than a comparison. */
 typedef unsigned long long nmpc_bits_t;
@@ -60,43 +54,6 @@ static inline nmpc_bits_t nmpc_bits(nmpc_real_t value)
 
     view.real = value;
     return view.bits;
-}
-
-/* One bit per prediction step, the first step in the most significant bit, the last in bit 0. Steps count from 0
- * to NMPC_LAST_STEP, in the paper from 1 to N_p: step i has bit NMPC_LAST_STEP - i. */
-typedef unsigned long nmpc_steps_t;
-#define NMPC_LAST_STEP 9U
-
-/* The sign bit: 1 for negative values and -0, else 0. */
-static inline nmpc_steps_t nmpc_is_negative(nmpc_real_t value)
-{
-    const nmpc_bits_t sign = nmpc_bits(value) >> 63U;
-
-    return (nmpc_steps_t)sign;
-}
-
-/* Index of the least significant set bit; `word` must not be 0. */
-static inline unsigned int nmpc_lowest_set_bit(nmpc_steps_t word)
-{
-#if defined(__GNUC__)
-    return (unsigned int)__builtin_ctzl(word);
-#else
-    unsigned int index;
-
-    for (index = 0U; ((index + 1U) < NMPC_LAST_STEP) && (((word >> index) & 1U) == 0U); index++) {
-        /* Test the next bit. */
-    }
-    return index;
-#endif
-}
-
-static inline nmpc_sum_t nmpc_absolute(nmpc_sum_t value)
-{
-#if defined(__GNUC__)
-    return __builtin_fabs(value);
-#else
-    return (value < (nmpc_sum_t)0) ? -value : value;
-#endif
 }
 
 static inline nmpc_real_t nmpc_smaller(nmpc_real_t a, nmpc_real_t b)

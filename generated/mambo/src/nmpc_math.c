@@ -6,7 +6,7 @@
  */
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x80B9AE27UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

@@ -1,86 +1,82 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Optimizer: RPROP with a fixed number of iterations, variant rprop+
- * (Riedmiller and Braun 1993; Igel and Huesken 2000).
+ * Optimizer: the exact minimum of the quadratic cost (not in the paper).
  */
 #include "nmpc_optimizer.h"
 
-#include "nmpc_cost.h"
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C22561DUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x80B9AE27UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
-/* State of RPROP for one move. */
-typedef struct {
-    nmpc_real_t step_rad;     /* Delta: the step size */
-    nmpc_real_t previous_rad; /* the move before its last update */
-    int previous_sign;        /* sign of dJ/du at the last update; 0 after a step back */
-} nmpc_rprop_t;
-
-/* Return the updated move, within the tilt limit. RPROP uses the sign of the gradient dJ/du, not its size:
- * while the sign stays the same the step size is multiplied by eta+, where it changes by eta-. */
-static nmpc_real_t update(nmpc_rprop_t *rprop, nmpc_real_t move_rad, int sign)
-{
-    const int agreement = sign * rprop->previous_sign;
-    nmpc_real_t next_rad = move_rad;
-
-    if (agreement < 0) {
-        /* The last update stepped over a minimum: undo it and reduce the step size. */
-        next_rad = rprop->previous_rad;
-        rprop->step_rad = nmpc_larger(rprop->step_rad * NMPC_DECREASE, NMPC_STEP_MIN_RAD);
-        rprop->previous_sign = 0;
-    } else {
-        if (agreement > 0) {
-            rprop->step_rad = nmpc_smaller(rprop->step_rad * NMPC_INCREASE, NMPC_STEP_MAX_RAD);
-        }
-        if (sign > 0) {
-            next_rad = nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD);
-        } else if (sign < 0) {
-            next_rad = nmpc_smaller(move_rad + rprop->step_rad, NMPC_TILT_LIMIT_RAD);
-        } else {
-            /* Zero gradient: the move stays. */
-        }
-        rprop->previous_rad = move_rad;
-        rprop->previous_sign = sign;
+/* U1 and U2 from e, v, w, j, a, i, c, u, for right and forward. */
+static const nmpc_real_t rows[2][2][NMPC_STATES] = {
+    {
+    { -0.00015450605f, -0.009620338f, -0.28908563f, 4.440467f, -0.1321711f, -0.14134839f, -0.023668297f,
+      0.86670667f },
+    { -0.0005871076f, -0.055458635f, -2.6105266f, 64.8076f, -0.77071905f, -1.4504563f, -0.14396101f,
+      -0.69664025f }
+    },
+    {
+    { -0.00015500613f, -0.0092341965f, -0.2645419f, 3.8503215f, -0.09659703f, -0.15462872f, -0.033424035f,
+      0.86543876f },
+    { -0.0005847064f, -0.053673804f, -2.4546027f, 59.541954f, -0.55721337f, -1.5712584f, -0.20387267f,
+      -0.69424224f }
     }
-    return next_rad;
-}
+};
 
-void nmpc_optimizer_minimize(nmpc_t *self)
+/* H12/H11, H12/H22 and H22/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
+static const nmpc_real_t ratios[2][3] = {
+    { 0.31660557f, 0.8037786f, 0.3938965f },
+    { 0.3174149f, 0.8021853f, 0.39568773f }
+};
+
+static nmpc_real_t row_product(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
 {
-    nmpc_rprop_t rprop[NMPC_MOVES];
-    int updates = 0;
-    int converged = 0;
-    int iteration;
+    nmpc_sum_t sum = row[0] * state[0];
     int k;
 
     NMPC_UNROLL
-    for (k = 0; k < NMPC_MOVES; k++) {
-        rprop[k].step_rad = NMPC_INITIAL_STEP_RAD;
-        rprop[k].previous_rad = self->plan_rad[k];
-        rprop[k].previous_sign = 0;
+    for (k = 1; k < NMPC_STATES; k++) {
+        sum = sum + (row[k] * state[k]);
     }
+    return sum;
+}
 
-    for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {
-        const nmpc_sum_t previous_cost = self->cost;
+/* The cost above the minimum without limits, over H11/2, of moves that differ from it by these. */
+static nmpc_sum_t excess(const nmpc_real_t ratio[3], nmpc_real_t first_m_step2, nmpc_real_t second_m_step2)
+{
+    const nmpc_sum_t cross = (ratio[0] * second_m_step2) * first_m_step2;
+    const nmpc_sum_t square = (ratio[2] * second_m_step2) * second_m_step2;
 
-        self->cost = nmpc_cost_evaluate(self);
-        if ((iteration > 0) && (nmpc_absolute(self->cost - previous_cost) < NMPC_TOLERANCE)) {
-            converged = 1;
-        }
-        if (converged == 0) {
-            updates++;
-        }
-        /* After convergence the signs are taken as 0: the plan is frozen, and the iterations still run, so
-         * that the work of a control step is constant. */
-        for (k = 0; k < NMPC_MOVES; k++) {
-            const int sign = (converged == 0) ? nmpc_sign(self->gradient[k]) : 0;
+    return ((first_m_step2 * first_m_step2) + (cross + cross)) + square;
+}
 
-            self->plan_rad[k] = update(&rprop[k], self->plan_rad[k], sign);
+nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
+{
+    const nmpc_real_t *const ratio = ratios[axis];
+    const nmpc_real_t first = row_product(rows[axis][0], state);
+    const nmpc_real_t second = row_product(rows[axis][1], state);
+    const nmpc_real_t first_limited = nmpc_clamp(first, limit_m_step2);
+    const nmpc_real_t second_limited = nmpc_clamp(second, limit_m_step2);
+    nmpc_real_t move = first_limited;
+
+    if (second_limited != second) {
+        /* The second move is at its limit: the best first one beside it. */
+        const nmpc_real_t second_change = second_limited - second;
+
+        move = nmpc_clamp(first - (ratio[0] * second_change), limit_m_step2);
+        if (first_limited != first) {
+            /* Or the first one is: the best second one beside it. */
+            const nmpc_real_t first_change = first_limited - first;
+            const nmpc_real_t other =
+                nmpc_clamp(second - (ratio[1] * first_change), limit_m_step2);
+
+            if (excess(ratio, first_change, other - second) < excess(ratio, move - first, second_change)) {
+                move = first_limited;
+            }
         }
     }
-    self->iterations = (unsigned char)updates;
-    self->converged = (unsigned char)converged;
+    return move;
 }

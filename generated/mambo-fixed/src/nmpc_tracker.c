@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Target tracker: the target's acceleration, estimated from its velocities by an alpha-beta filter (not in the paper).
+ */
+#include "nmpc_tracker.h"
+
+#include "nmpc_math.h"
+
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
+void nmpc_tracker_clear(nmpc_t *self)
+{
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        self->tracker.velocity_m_s[axis] = (nmpc_real_t)0;
+        self->tracker.acceleration_m_step2[axis] = (nmpc_real_t)0;
+        self->tracker.jerk_m_step2_update[axis] = (nmpc_real_t)0;
+    }
+    self->has_target = 0U;
+}
+
+void nmpc_tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
+{
+    nmpc_tracker_t *const tracker = &self->tracker;
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t change_m_s = velocity_m_s[axis] - tracker->velocity_m_s[axis];
+        const nmpc_real_t limited_m_s = nmpc_clamp(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
+
+        /* A jump is what the limit cuts. */
+        if ((self->has_target != 0U) && (limited_m_s == change_m_s)) {
+            const nmpc_real_t measured_m_step2 = nmpc_change_product(NMPC_STEP_SQUARED_PER_UPDATE_S, limited_m_s);
+            const nmpc_real_t predicted_m_step2 =
+                tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
+            const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
+
+            tracker->acceleration_m_step2[axis] =
+                nmpc_clamp(predicted_m_step2 + nmpc_tracker_product(NMPC_TRACKER_GAIN, difference_m_step2),
+                           NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2);
+            tracker->jerk_m_step2_update[axis] =
+                nmpc_clamp(tracker->jerk_m_step2_update[axis]
+                               + nmpc_tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
+                           NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+        } else {
+            /* The first velocity, or a jump: the acceleration stays. */
+            tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;
+        }
+        tracker->velocity_m_s[axis] = velocity_m_s[axis];
+    }
+    self->has_target = 1U;
+}

@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Attitude model: how the drone accelerates in answer to the commands (not in the paper).
+ */
+#include "nmpc_attitude.h"
+
+#include "nmpc_math.h"
+
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF1B3B6C8UL)
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+
+#define NMPC_ATTITUDE_STATES 4
+
+/* The next a and i of each axis from a, i, c, u; and the share of u - c that c takes in a step. */
+static const nmpc_real_t tilt_rows[2][NMPC_ATTITUDE_STATES] = {
+    { 0.9572421847877065, 0.042543334748042776, 0.038117181341567156, 0.004640633870726307 },
+    { 0.9368888881936733, 0.0628661295694119, 0.057854498645625155, 0.005256613160701482 }
+};
+static const nmpc_real_t integral_rows[2][NMPC_ATTITUDE_STATES] = {
+    { -0.00978496699204984, 0.9997757345687572, -0.00019918586665540236, 0.009984152858705242 },
+    { -0.007454665644340864, 0.9997453363791315, -0.00023155124175345282, 0.007686216886094316 }
+};
+static const nmpc_real_t lagged_shares[2] = { 0.19926259708319197, 0.15351827510938593 };
+
+static nmpc_real_t next(const nmpc_real_t row[NMPC_ATTITUDE_STATES], const nmpc_real_t state[NMPC_ATTITUDE_STATES])
+{
+    nmpc_sum_t sum = row[0] * state[0];
+    int k;
+
+    NMPC_UNROLL
+    for (k = 1; k < NMPC_ATTITUDE_STATES; k++) {
+        sum = sum + (row[k] * state[k]);
+    }
+    return nmpc_clamp(sum, NMPC_ATTITUDE_LIMIT_M_STEP2);
+}
+
+void nmpc_attitude_set_command(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+{
+    self->attitude.command_m_step2[NMPC_RIGHT] =
+        NMPC_ROLL_GAIN_M_STEP2_RAD * (roll_rad - NMPC_ROLL_TRIM_COMMAND_RAD);
+    self->attitude.command_m_step2[NMPC_FORWARD] =
+        -(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD));
+}
+
+void nmpc_attitude_reset(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
+{
+    int axis;
+
+    nmpc_attitude_set_command(self, roll_rad, pitch_rad);
+    for (axis = 0; axis < 2; axis++) {
+        self->attitude.tilt_m_step2[axis] = self->attitude.command_m_step2[axis];
+        self->attitude.integral_m_step2[axis] = (nmpc_real_t)0;
+        self->attitude.lagged_m_step2[axis] = self->attitude.command_m_step2[axis];
+    }
+    self->attitude.sine = (nmpc_real_t)0;
+    self->attitude.cosine = NMPC_ONE;
+}
+
+nmpc_real_t nmpc_attitude_roll(const nmpc_t *self)
+{
+    return (NMPC_ROLL_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_RIGHT])
+           + NMPC_ROLL_TRIM_COMMAND_RAD;
+}
+
+nmpc_real_t nmpc_attitude_pitch(const nmpc_t *self)
+{
+    return NMPC_PITCH_TRIM_COMMAND_RAD
+           - (NMPC_PITCH_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_FORWARD]);
+}
+
+void nmpc_attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2])
+{
+    tilt_m_step2[NMPC_RIGHT] = NMPC_GAIN_M_STEP2_RAD * (state->roll_rad - NMPC_ROLL_TRIM_RAD);
+    tilt_m_step2[NMPC_FORWARD] = -(NMPC_GAIN_M_STEP2_RAD * (state->pitch_rad - NMPC_PITCH_TRIM_RAD));
+}
+
+void nmpc_attitude_advance(nmpc_t *self)
+{
+    nmpc_attitude_t *const attitude = &self->attitude;
+    int axis;
+
+    for (axis = 0; axis < 2; axis++) {
+        const nmpc_real_t state[NMPC_ATTITUDE_STATES] = { attitude->tilt_m_step2[axis],
+                                                          attitude->integral_m_step2[axis],
+                                                          attitude->lagged_m_step2[axis],
+                                                          attitude->command_m_step2[axis] };
+
+        attitude->tilt_m_step2[axis] = next(tilt_rows[axis], state);
+        attitude->integral_m_step2[axis] = next(integral_rows[axis], state);
+        attitude->lagged_m_step2[axis] =
+            nmpc_clamp(state[2] + ((state[3] - state[2]) * lagged_shares[axis]),
+                       NMPC_ATTITUDE_LIMIT_M_STEP2);
+    }
+}
+
+/* Turn the vector (right, forward) by the angle of which sine and cosine are given. */
+static void turn(nmpc_real_t vector_m_step2[2], nmpc_real_t sine, nmpc_real_t cosine)
+{
+    const nmpc_real_t right = vector_m_step2[NMPC_RIGHT];
+    const nmpc_real_t forward = vector_m_step2[NMPC_FORWARD];
+
+    vector_m_step2[NMPC_RIGHT] =
+        nmpc_clamp((right * cosine) - (forward * sine), NMPC_ATTITUDE_LIMIT_M_STEP2);
+    vector_m_step2[NMPC_FORWARD] =
+        nmpc_clamp((forward * cosine) + (right * sine), NMPC_ATTITUDE_LIMIT_M_STEP2);
+}
+
+void nmpc_attitude_turn(nmpc_t *self, nmpc_real_t sine, nmpc_real_t cosine)
+{
+    nmpc_attitude_t *const attitude = &self->attitude;
+    /* Sine and cosine of the change of the heading. */
+    const nmpc_real_t sine_change =
+        (sine * attitude->cosine) - (cosine * attitude->sine);
+    const nmpc_real_t cosine_change =
+        (cosine * attitude->cosine) + (sine * attitude->sine);
+
+    turn(attitude->tilt_m_step2, sine_change, cosine_change);
+    turn(attitude->command_m_step2, sine_change, cosine_change);
+    attitude->sine = sine;
+    attitude->cosine = cosine;
+}
