@@ -135,12 +135,22 @@ class Flight:
 
         Raises `FlightError` if the number of trajectories is not the number of flights.
         """
-        target = self.trajectory.target(self.times_s())
-        if target.ndim == 2:
-            return np.broadcast_to(target[:, np.newaxis, :], (len(target), self.flights, 4))
-        if target.shape[1] != self.flights:
-            raise FlightError(f"flights = {self.flights} must be {target.shape[1]}, one for each trajectory")
-        return target
+        return self._for_each_flight(self.trajectory.target(self.times_s()))
+
+    def target_accelerations_m_s2(self) -> FloatArray:
+        """Return the targets' accelerations (k, n, 2) at the times of the updates.
+
+        Raises `FlightError` as `targets`.
+        """
+        return self._for_each_flight(self.trajectory.acceleration(self.times_s()))
+
+    def _for_each_flight(self, values: FloatArray) -> FloatArray:
+        """Return values of one trajectory (k, m), or of each (k, n, m), as (k, n, m)."""
+        if values.ndim == 2:
+            return np.broadcast_to(values[:, np.newaxis, :], (len(values), self.flights, values.shape[1]))
+        if values.shape[1] != self.flights:
+            raise FlightError(f"flights = {self.flights} must be {values.shape[1]}, one for each trajectory")
+        return values
 
 
 def fly(

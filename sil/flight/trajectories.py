@@ -1,6 +1,7 @@
-"""Trajectories: target position and velocity in the world frame as pure functions of time.
+"""Trajectories: target position, velocity and acceleration in the world frame as pure functions of time.
 
 Every curve is centred at the origin. Before t = 0 the target rests on the first point of its curve.
+A jump of the position or of the velocity has no acceleration.
 Half-width and radius are in metres, the angular rate in rad/s.
 """
 
@@ -44,12 +45,21 @@ class Trajectory(Protocol):
         """
         ...
 
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] in m/s^2: (..., 2), or (..., n, 2)."""
+        ...
+
 
 def _rest_before_start(time_s: ArrayLike, *target: FloatArray) -> FloatArray:
     """Return x, y, vx, vy, each (...), as (..., 4), with velocity 0 where the time (...) is before t = 0."""
     stacked = np.stack(target, axis=-1)
     stacked[..., 2:] *= (np.asarray(time_s) >= 0.0)[..., np.newaxis]
     return stacked
+
+
+def _none_before_start(time_s: ArrayLike, *acceleration: FloatArray) -> FloatArray:
+    """Return ax, ay, each (...), as (..., 2), with 0 where the time (...) is before t = 0."""
+    return np.stack(acceleration, axis=-1) * (np.asarray(time_s) >= 0.0)[..., np.newaxis]
 
 
 @dataclass(frozen=True)
@@ -69,6 +79,16 @@ class Bernoulli:
         vx = speed * cosine * (denominator + 2.0 * sine * sine)
         return _rest_before_start(time_s, x, x * cosine, vx, speed * (3.0 * cosine * cosine - 1.0))
 
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        rate = self.angular_rate_rad_s
+        sine, cosine = sine_cosine(rate * np.maximum(time_s, 0.0))
+        square = cosine * cosine
+        denominator = 1.0 + square
+        scale = self.half_width_m * rate * rate * sine / (denominator * denominator * denominator)
+        ax = scale * ((12.0 - square) * square - 3.0)
+        return _none_before_start(time_s, ax, 2.0 * scale * cosine * (3.0 * square - 5.0))
+
 
 @dataclass(frozen=True)
 class Lissajous:
@@ -85,6 +105,12 @@ class Lissajous:
         (sine, cosine), (sine_2, cosine_2) = sine_cosine(phase), sine_cosine(2.0 * phase)
         vx, vy = width * rate * cosine, 2.0 * height * rate * cosine_2
         return _rest_before_start(time_s, width * sine, height * sine_2, vx, vy)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        x, y = np.moveaxis(self.target(time_s)[..., :2], -1, 0)
+        square = self.angular_rate_rad_s * self.angular_rate_rad_s
+        return _none_before_start(time_s, -square * x, -4.0 * square * y)
 
 
 @dataclass(frozen=True)
@@ -109,6 +135,12 @@ class Circle:
         x, y = self.radius_m * cosine, self.radius_m * sine
         return _rest_before_start(time_s, x, y, -rate * y, rate * x)
 
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        x, y = np.moveaxis(self.target(time_s)[..., :2], -1, 0)
+        square = self.angular_rate_rad_s * self.angular_rate_rad_s
+        return _none_before_start(time_s, -square * x, -square * y)
+
 
 @dataclass(frozen=True)
 class Hover:
@@ -117,6 +149,10 @@ class Hover:
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., 4)."""
         return np.zeros((*np.shape(time_s), 4))
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return zeros (..., 2)."""
+        return np.zeros((*np.shape(time_s), 2))
 
 
 @dataclass(frozen=True)
@@ -130,6 +166,10 @@ class PositionStep:
         """Return [x, y, vx, vy] (..., 4)."""
         stepped = np.asarray(time_s) >= STEP_TIME_S
         return np.where(stepped[..., np.newaxis], [self.x_m, self.y_m, 0.0, 0.0], 0.0)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return zeros (..., 2)."""
+        return np.zeros((*np.shape(time_s), 2))
 
 
 @dataclass(frozen=True)
@@ -173,6 +213,10 @@ class Waypoints:
         leg = np.searchsorted(knots, clock, side="right")
         vx, vy = (np.concatenate([[0.0], np.diff(each) / np.diff(knots), [0.0]])[leg] for each in (x, y))
         return _rest_before_start(time_s, np.interp(clock, knots, x), np.interp(clock, knots, y), vx, vy)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return zeros (..., 2)."""
+        return np.zeros((*np.shape(time_s), 2))
 
 
 def _check(places: Sequence[str], points: Sequence[Point]) -> None:
@@ -235,6 +279,10 @@ class Trajectories:
     def target(self, time_s: ArrayLike) -> FloatArray:
         """Return [x, y, vx, vy] (..., n, 4)."""
         return np.stack([trajectory.target(time_s) for trajectory in self.each], axis=-2)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., n, 2)."""
+        return np.stack([trajectory.acceleration(time_s) for trajectory in self.each], axis=-2)
 
 
 CURVES: Final[dict[CurveName, Callable[[float, float], Trajectory]]] = {

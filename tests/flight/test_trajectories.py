@@ -46,6 +46,25 @@ def test_velocity_is_the_derivative_of_the_position(trajectory: Trajectory) -> N
 
 
 @pytest.mark.parametrize("trajectory", ALL, ids=lambda each: type(each).__name__)
+def test_acceleration_is_the_derivative_of_the_velocity(trajectory: Trajectory) -> None:
+    """Analytic accelerations agree with central differences of the velocities."""
+    half_s = 1e-6
+    ahead, behind = trajectory.target(TIMES_S + half_s), trajectory.target(TIMES_S - half_s)
+    differences = (ahead[:, 2:] - behind[:, 2:]) / (2.0 * half_s)
+    np.testing.assert_allclose(trajectory.acceleration(TIMES_S), differences, atol=1e-8)
+
+
+@pytest.mark.parametrize("trajectory", ALL, ids=lambda each: type(each).__name__)
+def test_accelerations_have_the_shape_of_the_times_and_begin_at_the_start(trajectory: Trajectory) -> None:
+    """One time gives (2,), k times (k, 2), n trajectories (k, n, 2); before t = 0 all are 0."""
+    many = trajectory.acceleration(TIMES_S)
+    assert many.shape == (len(TIMES_S), 2)
+    np.testing.assert_allclose(trajectory.acceleration(float(TIMES_S[700])), many[700], rtol=1e-14)
+    np.testing.assert_array_equal(Trajectories((Hover(), trajectory)).acceleration(TIMES_S)[:, 1], many)
+    np.testing.assert_array_equal(trajectory.acceleration(np.array([-5.0, -0.01])), 0.0)
+
+
+@pytest.mark.parametrize("trajectory", ALL, ids=lambda each: type(each).__name__)
 def test_target_rests_on_the_first_point_before_the_start(trajectory: Trajectory) -> None:
     """Before t = 0 the position is that at t = 0 and the velocity is 0."""
     before = trajectory.target(np.array([-5.0, -0.01]))
