@@ -1,14 +1,20 @@
-"""The stock PD position controller of the Mambo, the paper's baseline.
+"""The PDs with which the NMPC is compared: the paper's, and one with feed-forward.
 
-Source: block "XY to angles" of the MathWorks asbQuadcopter example; Kp = 0.24, Kd = 0.1 as in the paper
-(section III), after Pounds et al.
+`PdController` is the stock PD position controller of the Mambo, the paper's baseline. Source: block "XY to
+angles" of the MathWorks asbQuadcopter example; Kp = 0.24, Kd = 0.1 as in the paper (section III), after
+Pounds et al. It neither knows that the target moves nor that it turns.
+
+`PdFeedForwardController` does. Source of its gains: the search in benchmarks/pd_feedforward.py.
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.names import PdName
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import sine_cosine
 
@@ -54,3 +60,63 @@ class PdController:
             POSITION_P_RAD_M * forward
         )
         return PdOutcome(command_rad, np.zeros(len(state), dtype=np.int64))
+
+
+@dataclass(frozen=True)
+class PdGains:
+    """Gains of the PD with feed-forward.
+
+    position_rad_m:        tilt per position error.
+    velocity_rad_s_m:      tilt per velocity error.
+    acceleration_rad_s2_m: tilt per acceleration of the target; 1/g would be that of a drone without lag.
+    """
+
+    position_rad_m: float
+    velocity_rad_s_m: float
+    acceleration_rad_s2_m: float
+
+
+GAINS: Final = PdGains(0.436, 0.357, 0.0905)
+TILT_LIMIT_RAD: Final = 0.35
+"""The tilt limit of the presets."""
+
+
+class PdFeedForwardController:
+    """Tilt = P x position error + D x velocity error + A x target acceleration, in body axes, clamped.
+
+    Position and velocity errors are those to the moving target. The accelerations are the exact ones of the
+    trajectory, so nothing estimates them. An instance flies one flight, from its first update to its last.
+    """
+
+    def __init__(self, flight: Flight, gains: PdGains = GAINS) -> None:
+        self.gains = gains
+        accelerations = flight.target_accelerations_m_s2()
+        self.acceleration_m_s2 = np.ascontiguousarray(accelerations.transpose(1, 0, 2))
+        """Of the n targets at the k updates, in the world frame (n, k, 2)."""
+        self._update = 0
+
+    def step(
+        self,
+        state: FloatArray,
+        target: FloatArray,
+        thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
+    ) -> PdOutcome:
+        """Return the commands of the next update; arguments as in `PdController.step`."""
+        gains, acceleration = self.gains, self.acceleration_m_s2[:, self._update]
+        self._update += 1
+        sine, cosine = sine_cosine(state[:, 6])
+        tilt_x, tilt_y = (
+            gains.position_rad_m * (target[:, axis] - state[:, axis])
+            + gains.velocity_rad_s_m * (target[:, 2 + axis] - state[:, 2 + axis])
+            + gains.acceleration_rad_s2_m * acceleration[:, axis]
+            for axis in (0, 1)
+        )
+        command_rad = np.stack([cosine * tilt_y - sine * tilt_x, -(cosine * tilt_x + sine * tilt_y)], axis=-1)
+        return PdOutcome(
+            np.clip(command_rad, -TILT_LIMIT_RAD, TILT_LIMIT_RAD), np.zeros(len(state), dtype=np.int64)
+        )
+
+
+def pd_controller(name: PdName, flight: Flight) -> PdController | PdFeedForwardController:
+    """Return the PD called `name` for a flight."""
+    return PdController() if name == "pd" else PdFeedForwardController(flight)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * The stock PD position controller: sil/controllers/pd.py.
+ * The PD position controllers: sil/controllers/pd.py.
  */
 #include "elementary.h"
 #include "engine.h"
@@ -24,5 +24,30 @@ int64_t engine_pd_step(void *self, const double *state, const double *target, do
                      - (pd->position_d_rad_s_m * ((cosine * state[3]) - (sine * state[2])));
     command_rad[1] = (pd->position_d_rad_s_m * ((cosine * state[2]) + (sine * state[3])))
                      - (pd->position_p_rad_m * forward_m);
+    return 0;
+}
+
+/* Tilt towards the target along one axis of the world. */
+static inline double tilt(const engine_pd_feedforward_t *pd, const double *state, const double *target, int axis)
+{
+    return ((pd->position_rad_m * (target[axis] - state[axis]))
+            + (pd->velocity_rad_s_m * (target[2 + axis] - state[2 + axis])))
+           + (pd->acceleration_rad_s2_m * pd->acceleration_m_s2[axis]);
+}
+
+int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,
+                                   double thrust_acceleration_m_s2, double *command_rad)
+{
+    engine_pd_feedforward_t *pd = self;
+    const double tilt_x = tilt(pd, state, target, 0);
+    const double tilt_y = tilt(pd, state, target, 1);
+    double sine;
+    double cosine;
+
+    (void)thrust_acceleration_m_s2;
+    sine_cosine(state[6], &sine, &cosine);
+    command_rad[0] = clip((cosine * tilt_y) - (sine * tilt_x), -pd->tilt_limit_rad, pd->tilt_limit_rad);
+    command_rad[1] = clip(-((cosine * tilt_x) + (sine * tilt_y)), -pd->tilt_limit_rad, pd->tilt_limit_rad);
+    pd->acceleration_m_s2 += 2;
     return 0;
 }

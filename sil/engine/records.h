@@ -151,3 +151,16 @@ typedef struct {
 
 int64_t engine_pd_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
                        double *command_rad);
+
+/* The PD with feed-forward: PdFeedForwardController. The acceleration is that of the target at the next update, x and
+ * y in the world frame; those of all later updates follow. */
+typedef struct {
+    double position_rad_m;
+    double velocity_rad_s_m;
+    double acceleration_rad_s2_m;
+    double tilt_limit_rad;
+    const double *acceleration_m_s2;
+} engine_pd_feedforward_t;
+
+int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,
+                                   double thrust_acceleration_m_s2, double *command_rad);

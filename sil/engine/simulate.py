@@ -10,7 +10,14 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.build import ffi as controller_ffi
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import ERROR_LIMIT_M, POSITION_D_RAD_S_M, POSITION_P_RAD_M, PdController
+from mambo_nmpc.sil.controllers.pd import (
+    ERROR_LIMIT_M,
+    POSITION_D_RAD_S_M,
+    POSITION_P_RAD_M,
+    TILT_LIMIT_RAD,
+    PdController,
+    PdFeedForwardController,
+)
 from mambo_nmpc.sil.engine.build import ffi, load, pointer
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
 from mambo_nmpc.sil.flight import loop
@@ -25,7 +32,7 @@ DELAY_TICKS_MAX: Final = 200
 
 _PD: Final = ffi.new("engine_pd_t *", (POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M))
 
-EngineController = CompiledController | PdController
+EngineController = CompiledController | PdController | PdFeedForwardController
 """Controllers whose step is a C function."""
 
 Progress = Callable[[float], None]
@@ -58,14 +65,17 @@ def fly(
 def fly_compiled(
     engine: Any, flight: Flight, controller: EngineController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate the flights in a library of `build.load`, one after the other."""
+    """Simulate the flights in a library of `build.load`, one after the other.
+
+    Raises ValueError for a PD with feed-forward that was made for another flight.
+    """
     times_s, targets = flight.times_s(), np.ascontiguousarray(flight.targets())
     simulation = simulation_record(flight, times_s)
     flights = flight_records(flight, targets[0])
     trace = allocate_trace(times_s, targets, sensed=flight.sensors is not None)
     ticks = len(times_s) * flight.ticks_per_update
     draws = _Buffers(flight, len(times_s), ticks)
-    step, instances, stride = _native(engine, controller)
+    step, instances, stride = _native(engine, controller, trace)
     record = ffi.new(
         "engine_trace_t *",
         {
@@ -81,7 +91,7 @@ def fly_compiled(
             pointer("double *", times_s),
             draws.draw(seed),
             step,
-            instances + index * stride,
+            ffi.cast("char *", instances) + index * stride,
             record,
         )
         if progress is not None:
@@ -111,12 +121,39 @@ class _Buffers:
         return self._record
 
 
-def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
-    """Return the function of a step, the address of the first instance, and the bytes to the next one."""
+def _native(engine: Any, controller: EngineController, trace: Trace) -> tuple[Any, Any, int]:
+    """Return the function of a step, the instances, which the caller keeps, and the bytes of each."""
     if isinstance(controller, PdController):
-        return engine.engine_pd_step, ffi.cast("char *", _PD), 0
+        return engine.engine_pd_step, _PD, 0
+    if isinstance(controller, PdFeedForwardController):
+        instances = _feed_forward_instances(controller, trace)
+        return engine.engine_pd_feedforward_step, instances, ffi.sizeof(instances[0])
     step, instances, stride = controller.native
     return _cast("engine_controller_t", step), _cast("char *", instances), stride
+
+
+def _feed_forward_instances(controller: PdFeedForwardController, trace: Trace) -> Any:
+    """Return an engine_pd_feedforward_t for each flight; raises ValueError."""
+    accelerations, gains = controller.acceleration_m_s2, controller.gains
+    updates, flights = trace.target.shape[:2]
+    if accelerations.shape[:2] != (flights, updates):
+        raise ValueError(
+            f"the PD with feed-forward is that of {accelerations.shape[0]} flights with "
+            f"{accelerations.shape[1]} updates, and not of {flights} with {updates}"
+        )
+    return ffi.new(
+        "engine_pd_feedforward_t[]",
+        [
+            (
+                gains.position_rad_m,
+                gains.velocity_rad_s_m,
+                gains.acceleration_rad_s2_m,
+                TILT_LIMIT_RAD,
+                pointer("double *", one),
+            )
+            for one in accelerations
+        ],
+    )
 
 
 def _cast(kind: str, address: Any) -> Any:

@@ -7,11 +7,16 @@ Start = Literal["hover", "take-off"]
 """In the air, or on the ground 5 s before the trajectory begins."""
 SensorsName = Literal["none", "mambo", "mambo-derotated"]
 """`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
-ControllerName = Literal["nmpc", "pd", "reference"]
-"""The generated C, the stock PD, or the reference in Python."""
+PdName = Literal["pd", "pd-feedforward"]
+"""The stock PD of the paper, or the PD with feed-forward of the target's velocity and acceleration."""
+ControllerName = Literal["nmpc", PdName, "reference"]
+"""The generated C, one of the PDs, or the reference in Python."""
 EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""
 
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
 PD: Final = "PD"
-"""What tables and pictures call the stock PD."""
+PD_FEEDFORWARD: Final = "PD-feedforward"
+PD_NAMES: Final[tuple[PdName, ...]] = get_args(PdName)
+PD_TITLES: Final[dict[str, str]] = {"pd": PD, "pd-feedforward": PD_FEEDFORWARD}
+"""What tables and pictures call the PDs, by name."""

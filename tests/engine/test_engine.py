@@ -15,12 +15,13 @@ from mambo_nmpc.codegen.reference import ReferenceController
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import PdController, PdFeedForwardController, pd_controller
 from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, load, texts
 from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
 from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.names import PD_NAMES
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.link import Link
@@ -41,24 +42,25 @@ BUILDS = [
 ]
 
 
-def controller(kind: str, n: int) -> CompiledController | PdController:
-    """Make n controllers: the PD, or preset mambo in a scalar type."""
-    if kind == "pd":
-        return PdController()
-    return CompiledController(with_option(MAMBO, "code.scalar", kind, "test"), n)
+def controller(kind: str, flight: Flight) -> CompiledController | PdController | PdFeedForwardController:
+    """Make controllers for a flight: a PD, or preset mambo in a scalar type."""
+    for name in PD_NAMES:
+        if kind == name:
+            return pd_controller(name, flight)
+    return CompiledController(with_option(MAMBO, "code.scalar", kind, "test"), flight.flights)
 
 
 def assert_same_bits(flight: Flight, kind: str) -> None:
     """Fly in C and in NumPy, and compare every array."""
     toolchain("gcc")
-    ours = fly(flight, controller(kind, flight.flights))
-    theirs = loop.fly(flight, controller(kind, flight.flights))
+    ours = fly(flight, controller(kind, flight))
+    theirs = loop.fly(flight, controller(kind, flight))
     assert type(ours) is type(theirs)
     for column in fields(theirs):
         assert getattr(ours, column.name).tobytes() == getattr(theirs, column.name).tobytes(), column.name
 
 
-@pytest.mark.parametrize("kind", ["pd", *SCALARS])
+@pytest.mark.parametrize("kind", [*PD_NAMES, *SCALARS])
 @pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)
 def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...], kind: str) -> None:
     """Every array of the trace: every disturbance, sensor, gate, and flights that are lost."""
@@ -75,15 +77,17 @@ def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
         "start": "take-off" if data.draw(st.integers(0, 9)) == 0 else "hover",
     }
     batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=2))
-    assert_same_bits(flight_of(batch, PERIOD_S), data.draw(st.sampled_from(["pd", *SCALARS])))
+    assert_same_bits(flight_of(batch, PERIOD_S), data.draw(st.sampled_from([*PD_NAMES, *SCALARS])))
 
 
 def digests(engine: Any) -> list[str]:
     """Fly every batch in `engine`; return the digests of all flights."""
     found = []
     for batch in BATCHES.values():
-        trace = fly_compiled(engine, flight_of(batch, PERIOD_S), PdController())
-        found += [trace.digest(index) for index in range(len(batch))]
+        flight = flight_of(batch, PERIOD_S)
+        for name in PD_NAMES:
+            trace = fly_compiled(engine, flight, pd_controller(name, flight))
+            found += [trace.digest(index) for index in range(len(batch))]
     return found
 
 
@@ -133,6 +137,15 @@ def test_what_is_no_c_flies_in_numpy() -> None:
     assert reference.same_bits(fly(flight, CompiledController(MAMBO)))
     late = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, link=Link(delay_ticks=201))
     assert fly(late, PdController()).same_bits(loop.fly(late, PdController()))
+
+
+def test_a_pd_with_feed_forward_flies_only_the_flight_it_was_made_for() -> None:
+    """The C would read beside its accelerations."""
+    toolchain("gcc")
+    made, longer, more = (Flight(Bernoulli(2.0, 0.5), *size) for size in ((0.2, 2), (0.3, 2), (0.2, 3)))
+    for other in (longer, more):
+        with pytest.raises(ValueError, match="is that of 2 flights with 21 updates, and not of"):
+            fly(other, PdFeedForwardController(made))
 
 
 def test_without_a_compiler_the_flight_is_the_same_and_says_so(

@@ -18,10 +18,11 @@ import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.build import HEADERS, SOURCES, ffi, texts
 from mambo_nmpc.sil.engine.simulate import fly_compiled
 from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.names import PD_NAMES
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.trajectories import Hover
 from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Sensors
@@ -49,7 +50,9 @@ def digests(path: Path) -> list[str]:
     """Return the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
     engine = ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
-    traces = [fly_compiled(engine, flight, PdController()) for flight in flights]
+    traces = [
+        fly_compiled(engine, flight, pd_controller(name, flight)) for name in PD_NAMES for flight in flights
+    ]
     settings = ONE_NORM
     traces += [
         fly_compiled(engine, flight, CompiledController(settings, flight.flights)) for flight in flights[:2]

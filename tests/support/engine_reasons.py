@@ -60,7 +60,10 @@ REASONS: Final[Mapping[Key, str]] = {
         ("loop.c", "double thrust_share = <real>;", change): "read only with disturbances, which set it"
         for change in ("negative", "next number")
     },
-    ("pd.c", "(void)thrust_acceleration_m_s2;", "left out"): "only silences a warning",
+    **{
+        ("pd.c", "(void)thrust_acceleration_m_s2;", change): "only silences a warning"
+        for change in ("left out", "left out #1")
+    },
     ("rigid_body.h", "to_world(r, state + VELOCITY, rate + POSITION);", "+ -> - #1"): "POSITION is 0",
     **{
         ("vehicle.h", "for (i = 0; i < 4; i++) {", change): _BESIDE

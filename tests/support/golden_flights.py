@@ -14,9 +14,9 @@ from typing import Final
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.sil.campaign.file import default, scenario
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.names import EngineName
+from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES, EngineName
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
@@ -45,7 +45,7 @@ SCENARIOS: Final = {
 
 
 def digests(engine: EngineName) -> dict[str, str]:
-    """Fly every scenario with the PD and with the preset; return the digests of the traces."""
+    """Fly every scenario with both PDs and with the preset; return the digests of the traces."""
     settings = presets.load(PRESET)
     batches = defaultdict(list)
     for name, flown in SCENARIOS.items():
@@ -53,7 +53,7 @@ def digests(engine: EngineName) -> dict[str, str]:
     found: dict[str, str] = {}
     for names in batches.values():
         flight = flight_of([SCENARIOS[name] for name in names], settings.horizon.update_period_s)
-        traces = {"PD": fly(flight, PdController(), engine=engine)}
+        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd, flight), engine=engine) for pd in PD_NAMES}
         traces[PRESET] = fly(flight, CompiledController(settings, len(names)), engine=engine)
         for index, name in enumerate(names):
             found |= {f"{name}: {controller}": trace.digest(index) for controller, trace in traces.items()}

@@ -1,0 +1,154 @@
+"""Search the gains of the PD with feed-forward on drawn flights through sensors; takes five minutes.
+
+Three curves with 60 flights of 40 s each. Sizes and rates, headings, drones, wind, sensors and links differ
+from flight to flight, as in a campaign. The error of a candidate is the geometric mean over the curves of the
+median IAE of the estimated position; that of a crashed flight is infinite. A candidate that crashes more
+often than the paper's PD is out.
+
+The search draws candidates round the best one, in steps that shrink from round to round. Where the error is
+least the roll loop rings: the command varies ten times as much as the curve asks for. So of all candidates
+whose error is at most `SLACK` times the least one, that with the smallest command variation is chosen.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.markdown import table
+from mambo_nmpc.sil.campaign.file import CampaignFile, distributions, scenario
+from mambo_nmpc.sil.campaign.parameters import draw
+from mambo_nmpc.sil.controllers.pd import GAINS, PdController, PdFeedForwardController, PdGains
+from mambo_nmpc.sil.engine.simulate import fly
+from mambo_nmpc.sil.flight.crashes import detect_crashes
+from mambo_nmpc.sil.flight.loop import Flight, PositionController
+from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.scenario import flight_of
+from mambo_nmpc.sil.flight.traces import SensedTrace
+
+CURVES: Final[dict[str, dict[str, Any]]] = {
+    "bernoulli": {"size_m": {"uniform": [1.0, 2.0]}, "rate_rad_s": {"uniform": [0.25, 0.75]}},
+    "circle": {"size_m": {"uniform": [0.5, 1.0]}, "rate_rad_s": {"uniform": [0.5, 1.5]}},
+    "step": {"size_m": {"uniform": [1.0, 3.0]}},
+}
+SEED: Final = 31
+"""Of the flights; the default campaign has seed 0."""
+FLIGHTS: Final = 60
+DURATION_S: Final = 40.0
+PERIOD_S: Final = 0.01
+
+FIRST: Final = PdGains(0.24, 0.1, 0.102)
+"""The stock gains, and the reciprocal of gravity."""
+STEPS: Final = (0.5, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.1)
+"""Standard deviation of the logarithms of the gains, in each round."""
+DRAWS: Final = 12
+SLACK: Final = 1.1
+
+MakeController = Callable[[Flight], PositionController]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """How a controller flies: median seen IAE and median command variation by curve, and crashes of all."""
+
+    iae_m_s: tuple[float, ...]
+    variation_rad: tuple[float, ...]
+    crashes: int
+
+    @property
+    def error_m_s(self) -> float:
+        """The geometric mean of the IAE over the curves."""
+        return math.prod(self.iae_m_s) ** (1.0 / len(self.iae_m_s))
+
+    @property
+    def mean_variation_rad(self) -> float:
+        """The geometric mean of the command variation over the curves."""
+        return math.prod(self.variation_rad) ** (1.0 / len(self.variation_rad))
+
+
+def drawn_flights() -> list[Flight]:
+    """Return the flights of each curve."""
+    found = []
+    for curve, drawn in CURVES.items():
+        section = {"trajectory": curve, "duration_s": DURATION_S, **drawn}
+        file = CampaignFile.model_validate({"seed": SEED, "flight": section})
+        parameters, shared = distributions(file.flight, file.draws), file.flight.model_dump()
+        scenarios = [scenario(shared, draw(SEED, number, parameters)) for number in range(FLIGHTS)]
+        found.append(flight_of(scenarios, PERIOD_S))
+    return found
+
+
+def judge(flights: list[Flight], make: MakeController) -> Judged:
+    """Fly all flights with the controllers that `make` returns."""
+    iae_m_s, variation_rad, crashes = [], [], 0
+    for flight in flights:
+        trace = fly(flight, make(flight))
+        assert isinstance(trace, SensedTrace)
+        crashed = detect_crashes(trace)
+        crashes += int(crashed.sum())
+        iae_m_s.append(float(np.median(np.where(crashed, np.inf, measure(trace.as_seen()).iae_m_s))))
+        variation_rad.append(
+            float(np.median(np.where(crashed, np.inf, measure(trace).command_variation_rad)))
+        )
+    return Judged(tuple(iae_m_s), tuple(variation_rad), crashes)
+
+
+def search(judge_gains: Callable[[PdGains], Judged], most_crashes: int) -> Iterator[tuple[PdGains, Judged]]:
+    """Yield every candidate that crashes at most `most_crashes` times, as the search comes upon it."""
+    rng = np.random.default_rng(0)
+    best, least = FIRST, math.inf
+    for step in (0.0, *STEPS):
+        centre = np.log(astuple(best))
+        for _ in range(DRAWS if step else 1):
+            drawn = np.exp(centre + step * rng.standard_normal(3))
+            gains = PdGains(*(float(f"{gain:.3g}") for gain in drawn))
+            judged = judge_gains(gains)
+            if judged.crashes <= most_crashes:
+                yield gains, judged
+                if judged.error_m_s < least:
+                    best, least = gains, judged.error_m_s
+
+
+def choose(found: dict[PdGains, Judged]) -> PdGains:
+    """Return the gains with the smallest command variation among those with nearly the least error."""
+    most = SLACK * min(judged.error_m_s for judged in found.values())
+    near = [gains for gains, judged in found.items() if judged.error_m_s <= most]
+    return min(near, key=lambda gains: found[gains].mean_variation_rad)
+
+
+def row(name: str, gains: PdGains | None, judged: Judged) -> dict[str, str]:
+    """Return a row of the printed table."""
+    spelled = ("", "", "") if gains is None else tuple(f"{gain:g}" for gain in astuple(gains))
+    curves = zip(CURVES, judged.iae_m_s, judged.variation_rad, strict=True)
+    return {
+        "": name,
+        **dict(zip(("P, rad/m", "D, rad s/m", "A, rad s^2/m"), spelled, strict=True)),
+        **{curve: f"{iae_m_s:.3g} ({variation:.2g})" for curve, iae_m_s, variation in curves},
+        "mean": f"{judged.error_m_s:.3g}",
+        "crashed": str(judged.crashes),
+    }
+
+
+def main() -> None:
+    """Print the paper's PD, the least error and the chosen gains as a table; the latter must be `GAINS`."""
+    flights = drawn_flights()
+    stock = judge(flights, lambda _: PdController())
+    found: dict[PdGains, Judged] = {}
+
+    def judge_gains(gains: PdGains) -> Judged:
+        return judge(flights, lambda flight: PdFeedForwardController(flight, gains))
+
+    for gains, judged in search(judge_gains, stock.crashes):
+        found[gains] = judged
+        print(f"{astuple(gains)}: {judged}", flush=True)
+    chosen, closest = choose(found), min(found, key=lambda gains: found[gains].error_m_s)
+    rows = [row("the paper's PD", None, stock)]
+    rows += [row(name, gains, found[gains]) for name, gains in (("least error", closest), ("chosen", chosen))]
+    print(f"\nmedian IAE as seen, m s (command variation, rad); {len(found)} candidates\n\n{table(rows)}")
+    print(f"\nsil/controllers/pd.py has {'the chosen gains' if chosen == GAINS else f'other gains: {GAINS}'}")
+
+
+if __name__ == "__main__":
+    main()
