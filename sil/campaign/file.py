@@ -29,10 +29,8 @@ from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
 from mambo_nmpc.sil.campaign.parameters import OF_THE_CURVE, PARAMETERS, Draw, draw, scenario_values
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.names import SensorsName, Start
+from mambo_nmpc.sil.flight.names import PD_NAMES, PdName, SensorsName, Start
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
-
-PD: Final = "pd"
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _LONGEST_LIST: Final = 10
@@ -90,7 +88,7 @@ class CampaignFile(FileSection):
     """The keys of campaign.toml; a missing key has its value in the default campaign."""
 
     seed: int = Field(0, ge=0, le=2**63 - 1)
-    controllers: tuple[str, ...] = Field((PD, "mambo"), strict=False)
+    controllers: tuple[str, ...] = Field(("pd", "pd-feedforward", "mambo"), strict=False)
     flight: FlightSection = FlightSection()
     draws: Draws = Draws()
 
@@ -106,12 +104,12 @@ class CampaignFile(FileSection):
 
 @dataclass(frozen=True)
 class Entrant:
-    """One controller of a campaign: the stock PD, or generated C."""
+    """One controller of a campaign: a PD, or generated C."""
 
     name: str
-    kind: Literal["pd", "nmpc"]
+    kind: Literal[PdName, "nmpc"]
     settings: Settings
-    """The PD uses their update period only."""
+    """A PD uses their update period only."""
 
     def document(self) -> dict[str, Any]:
         """Return the controller as plain values, for other processes and for files."""
@@ -209,19 +207,20 @@ def load_settings(named: str, folder: Path, place: str) -> Settings:
 
 
 def load_entrant(named: str, folder: Path, place: str) -> Entrant:
-    """Return the controller called `named`: PD, preset or file in `folder`.
+    """Return the controller called `named`: a PD, a preset or a file in `folder`.
 
     Raises InvalidSettingsError, whose lines begin with `place`.
     """
-    if named == PD:
-        return Entrant(PD, "pd", Settings())
+    for pd in PD_NAMES:
+        if named == pd:
+            return Entrant(pd, pd, Settings())
     settings = load_settings(named, folder, place)
     name = named if named in presets.names() else Path(named).stem
-    if not _NAME.fullmatch(name) or name == PD:
+    if not _NAME.fullmatch(name) or name in PD_NAMES:
         raise InvalidSettingsError(
             (
                 f"{place}: {echo(named)} must have a name of at most 40 letters, digits, - and "
-                f"_, other than {PD}: results are named after it",
+                f"_, other than {' and '.join(PD_NAMES)}: results are named after it",
             )
         )
     return Entrant(name, "nmpc", settings)

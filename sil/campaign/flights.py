@@ -14,11 +14,11 @@ from mambo_nmpc.sil.campaign.executors import report_share
 from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.flight.crashes import detect_crashes
-from mambo_nmpc.sil.flight.loop import PositionController
+from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.metrics import Metrics, measure
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
@@ -70,11 +70,8 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     """
     rows: list[Row] = [{} for _ in scenarios]
     for number, entrant in enumerate(entrants):
-        trace = fly(
-            flight_of(scenarios, entrant.settings.horizon.update_period_s),
-            _controller(entrant, len(scenarios)),
-            partial(_report_part, number, len(entrants)),
-        )
+        flight = flight_of(scenarios, entrant.settings.horizon.update_period_s)
+        trace = fly(flight, _controller(entrant, flight), partial(_report_part, number, len(entrants)))
         for key, values in _evaluate(trace).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
@@ -87,11 +84,11 @@ def _report_part(number: int, parts: int, share: float) -> None:
     report_share((number + share) / parts)
 
 
-def _controller(entrant: Entrant, n: int) -> PositionController:
-    if entrant.kind == "pd":
-        return PdController()
+def _controller(entrant: Entrant, flight: Flight) -> PositionController:
+    if entrant.kind != "nmpc":
+        return pd_controller(entrant.kind, flight)
     with _BUILDING:
-        return CompiledController(entrant.settings, n)
+        return CompiledController(entrant.settings, flight.flights)
 
 
 def _evaluate(trace: Trace) -> dict[str, list[Any]]:

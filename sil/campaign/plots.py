@@ -1,6 +1,7 @@
 """Pictures of a campaign: indices over all flights, and the improvement flight by flight."""
 
 from collections.abc import Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Final
 
@@ -11,14 +12,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from mambo_nmpc.sil.campaign.file import PD
 from mambo_nmpc.sil.campaign.flights import CRASHED
 from mambo_nmpc.sil.campaign.statistics import COMPARED, Table, index_values
 from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, PlainLogFormatter, inline, save, style
+from mambo_nmpc.sil.show.plots import (
+    COMMAND,
+    FLOWN,
+    PANEL_INCHES,
+    THIRD,
+    PlainLogFormatter,
+    inline,
+    save,
+    style,
+)
 
 _LABELS: Final = ("IAE, m s", "ISE, m² s", "ITSE, m² s²", "ITAE, m s²")
-_HUES: Final = ("#2ca02c", FLOWN, "#9467bd", "#8c564b", "#e377c2")
+_PD_HUES: Final = {"pd": COMMAND, "pd-feedforward": THIRD}
+_HUES: Final = (FLOWN, "#9467bd", "#8c564b", "#e377c2")
 _SHOWN: Final = {
     "iae_m_s": "IAE, m s",
     "max_error_m": "largest error, m",
@@ -88,9 +98,10 @@ def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup
         for index, label in _SHOWN.items():
             figure = Figure(figsize=(PANEL_INCHES, 3.2), layout="constrained")
             axes = figure.subplots()
-            for row, name in enumerate(controllers):
+            hues = cycle(_HUES)
+            for name in controllers:
+                colour = _PD_HUES.get(name) or next(hues)
                 if {f"{name}_{index}", f"{name}_{CRASHED}"} <= table.keys():
-                    colour = COMMAND if name == PD else _HUES[row % len(_HUES)]
                     _draw_shares(axes, index_values(table, name, index), colour, name, whole=100.0)
             if not axes.lines:
                 continue

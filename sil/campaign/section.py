@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from mambo_nmpc.sil.campaign.file import PD
 from mambo_nmpc.sil.campaign.plots import distribution_panels
 from mambo_nmpc.sil.campaign.report import CampaignSummary, UnfinishedCampaign
 from mambo_nmpc.sil.campaign.statistics import read_table
 from mambo_nmpc.sil.campaign.store import TABLE
+from mambo_nmpc.sil.flight.names import PD_TITLES
 from mambo_nmpc.sil.flight.report import named
 from mambo_nmpc.sil.show.section import Section
 
@@ -35,6 +35,6 @@ def campaign_section(folder: Path, summary: CampaignSummary | UnfinishedCampaign
     else:
         crashes = ", ".join(f"{one.crashed.count} with {name}" for name, one in found.items())
         finding = f"{finished.flights} flights; crashed: {crashes}"
-        good = all(one.crashed.count == 0 for name, one in found.items() if name != PD)
+        good = all(one.crashed.count == 0 for name, one in found.items() if name not in PD_TITLES)
     missing = [] if path.is_file() else [TABLE]
     return Section("campaign", f"Campaign, {drawn.flight.trajectory.text()}", good, finding, content, missing)

@@ -16,13 +16,13 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.cli.options import FlyOptions, load, show
 from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.simulate import fly as simulate
 from mambo_nmpc.sil.errors import FlightError, TrajectoryError
 from mambo_nmpc.sil.files.folders import new_results
 from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD_TITLES
 from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, flight_text, judge
 from mambo_nmpc.sil.flight.traces import Trace, write_csv, write_npz
 from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectory, Waypoints
@@ -71,18 +71,20 @@ def fly_once(options: FlyOptions) -> None:
             f"{name}: horizon.{error}; only the simulation requires this, because its stock loops run at "
             "200 Hz"
         ) from error
-    if options.controller != "pd":
+    if options.controller not in PD_TITLES:
         _check_ranges(flight, settings, options.trajectory)
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
-        controller = _controller(options, settings) if options.on is None else _on_board(options, settings)
+        controller = _on_board(options, settings) if options.on else _controller(options, settings, flight)
         with progress_bar("flying") as progress:
             trace = simulate(flight, controller, progress, engine=options.engine)
         same_bits = (
-            None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
+            None
+            if options.on is None
+            else trace.same_bits(simulate(flight, _controller(options, settings, flight)))
         )
         write_trace(trace, folder)
         if options.pictures:
-            draw_flight(trace, PD if options.controller == "pd" else f"NMPC, {name}", folder)
+            draw_flight(trace, PD_TITLES.get(options.controller, f"NMPC, {name}"), folder)
         waypoints = Path(options.trajectory) if isinstance(curve, Waypoints) else None
         summary = FlySummary(
             **vars(options)
@@ -122,14 +124,14 @@ def finish(summary: FlightSummary, options: FlyOptions, files: tuple[str, ...]) 
         raise typer.Exit(1)
 
 
-def _controller(options: FlyOptions, settings: Settings) -> PositionController:
+def _controller(options: FlyOptions, settings: Settings, flight: Flight) -> PositionController:
     match options.controller:
-        case "pd":
-            return PdController()
         case "reference":
             return reference_controller(Design(settings))
         case "nmpc":
             return CompiledController(settings)
+        case pd:
+            return pd_controller(pd, flight)
 
 
 def _on_board(options: FlyOptions, settings: Settings) -> PositionController:

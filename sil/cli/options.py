@@ -46,7 +46,10 @@ class FlyOptions:
     output: Results = Path("flight")
     controller: Annotated[
         ControllerName,
-        typer.Option(help="The generated C (nmpc), the stock PD controller, or the reference in Python."),
+        typer.Option(
+            help="The generated C (nmpc), the paper's PD, a PD with feed-forward of the target's velocity "
+            "and acceleration, or the reference in Python."
+        ),
     ] = "nmpc"
     trajectory: Annotated[
         str,

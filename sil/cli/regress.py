@@ -19,7 +19,7 @@ def regress(
     suite: Annotated[str, typer.Argument(help="A shipped suite or a TOML file.")] = "envelope",
     *,
     controller: Annotated[
-        str, typer.Option(help="A preset, a controller.toml, or pd.", metavar="SOURCE")
+        str, typer.Option(help="A preset, a controller.toml, pd, or pd-feedforward.", metavar="SOURCE")
     ] = "mambo",
     output: Results = Path("regress"),
     update: Annotated[

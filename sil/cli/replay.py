@@ -7,9 +7,10 @@ from mambo_nmpc.sil.cli.flight import FLIGHT_FILES, TRACE_FILES, draw_flight, fi
 from mambo_nmpc.sil.cli.options import FlyOptions
 from mambo_nmpc.sil.cli.progress import progress_bar
 from mambo_nmpc.sil.controllers.inner_steps import WatchedController, write_inner_steps
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.files.folders import new_results
+from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.loop import fly as simulate
 from mambo_nmpc.sil.flight.report import ReplaySummary, judge
 from mambo_nmpc.sil.flight.scenario import flight_of, read_record
@@ -33,12 +34,17 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
             raise FlightError(f"--replay {echo(str(file))} contains the whole flight: leave out {option}")
     record = read_record(file)
-    watched = WatchedController(record.settings) if record.controller != "pd" else None
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
+    watched: WatchedController | None = None
+    match record.controller:
+        case "pd" | "pd-feedforward":
+            controller: PositionController = pd_controller(record.controller, flight)
+        case _:
+            controller = watched = WatchedController(record.settings)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(options.output, ReplaySummary.command, files) as folder:
         with progress_bar("replaying") as progress:
-            trace = simulate(flight, PdController() if watched is None else watched, progress)
+            trace = simulate(flight, controller, progress)
         write_trace(trace, folder)
         if options.pictures:
             draw_flight(trace, file.name, folder)

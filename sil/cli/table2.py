@@ -24,11 +24,11 @@ def table2(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly Table II of the paper with the PD controller and every preset, and check the paper's claims."""
+    """Fly Table II of the paper with both PDs and every preset, and check the paper's claims."""
     from mambo_nmpc.codegen.settings import presets
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
-    from mambo_nmpc.sil.flight.names import PD
+    from mambo_nmpc.sil.flight.names import PD_TITLES
     from mambo_nmpc.sil.flight.plots import draw_flights
     from mambo_nmpc.sil.flight.traces import write_npz
     from mambo_nmpc.sil.paper.table2 import Table2Summary, fly_table2, judge_table2, table2_text
@@ -37,13 +37,14 @@ def table2(
         _fly_with_sensors(output, scalar, as_json=as_json)
         return
     settings = {name: load(name, scalar) for name in presets.names()}
-    files = {name: f"{name.lower()}.npz" for name in (PD, *settings)}
+    files = {name: f"{name.lower()}.npz" for name in (*PD_TITLES.values(), *settings)}
     with new_results(output, Table2Summary.command, (*files.values(), *PICTURES)) as folder:
         with progress_bar("flying Table II") as progress:
             traces = fly_table2(settings, progress)
         for name, trace in traces.items():
             write_npz(trace, folder / files[name])
-        draw_flights({PD: traces[PD], "NMPC, mambo": traces["mambo"]}, folder / "figure3")
+        drawn = {name: traces[name] for name in PD_TITLES.values()} | {"NMPC, mambo": traces["mambo"]}
+        draw_flights(drawn, folder / "figure3")
         summary = judge_table2(traces, scalar)
         summary.write(folder)
     show(summary, table2_text(summary), as_json=as_json)

@@ -7,12 +7,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD, PD_FEEDFORWARD
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 LONGEST_S: Final = 200.0
 """Part of a long flight that is shown."""
+
+_HUES: Final = {PD: 1, PD_FEEDFORWARD: 2}
+"""Colour of a PD by its title; all others have 0."""
 
 _STEP_S: Final = 0.1
 _LEAST_SPAN_CM: Final = 100.0
@@ -36,7 +39,7 @@ class View:
 class Animation:
     """Flights along one target, in two views.
 
-    hues:    number of each drone's colour; the PD has its own.
+    hues:    number of each drone's colour; each PD has its own.
     shown_s: end of the part that is shown; `whole` is true if that is the whole flight.
     data:    positions in cm, angles in mrad and times in s, from which the script draws the drones.
     """
@@ -76,7 +79,7 @@ def animate(flights: Mapping[str, Trace]) -> Animation:
     grid_cm = _grid(max(x[1] - x[0], y[1] - y[0]))
     return Animation(
         names=list(flights),
-        hues=[int(name == PD) for name in flights],
+        hues=[_HUES.get(name, 0) for name in flights],
         above=_view(x, y, grid_cm, _path(target_cm), [_path(drone[:, :2]) for drone in drones_cm]),
         side=_view(x, z, grid_cm, "", [_path(drone[:, [0, 2]]) for drone in drones_cm]),
         grid_m=grid_cm / 100.0,

@@ -151,7 +151,7 @@ class Record(_Record):
     scenario: Scenario
     controller: ControllerName = "nmpc"
     settings: Settings
-    """Settings of the NMPC; the PD uses their update period only."""
+    """Settings of the NMPC; a PD uses their update period only."""
     trace_sha256: str | None = None
     """`Trace.digest` of the original flight, if known."""
 

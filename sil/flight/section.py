@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from mambo_nmpc.sil.flight.animation import animate
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD_TITLES
 from mambo_nmpc.sil.flight.plots import flight_columns
 from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, ReplaySummary, named
 from mambo_nmpc.sil.flight.scenario import Scenario
@@ -15,7 +15,7 @@ from mambo_nmpc.sil.show.section import Section
 
 def fly_section(folder: Path, summary: FlySummary) -> Section:
     """Return the section of a flight; raises TraceError."""
-    name = PD if summary.controller == "pd" else f"NMPC, {summary.source}"
+    name = PD_TITLES.get(summary.controller, f"NMPC, {summary.source}")
     bits = "" if summary.same_bits_as_host is not True else ", bit for bit as on the host"
     facts = {
         **_course(summary),
@@ -34,7 +34,7 @@ def fly_section(folder: Path, summary: FlySummary) -> Section:
 
 def replay_section(folder: Path, summary: ReplaySummary) -> Section:
     """Return the section of a replayed flight; raises TraceError."""
-    name = PD if summary.controller == "pd" else "NMPC"
+    name = PD_TITLES.get(summary.controller, "NMPC")
     facts = {
         "record": summary.replay,
         **_course(summary.scenario),

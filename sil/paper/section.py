@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD, PD_TITLES
 from mambo_nmpc.sil.flight.section import pictures, traces
 from mambo_nmpc.sil.paper.sensed import SensedSummary
 from mambo_nmpc.sil.paper.table2 import INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD, Table2Summary
@@ -12,11 +12,14 @@ _PRINTED = [(PD, PRINTED_PD, None), ("NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
 
 
 def table2_section(folder: Path, summary: Table2Summary) -> Section:
-    """Return the section of Table II, with the flights of the PD and of `mambo`; raises TraceError."""
+    """Return the section of Table II, with the flights of the PDs and of `mambo`; raises TraceError."""
     controllers = list(dict.fromkeys(row.controller for row in summary.rows))
-    nmpc = [name for name in controllers if name != PD]
+    pds = PD_TITLES.values()
+    nmpc = [name for name in controllers if name not in pds]
     shown = next((name for name in ("mambo", *nmpc) if name in nmpc), None)
-    wanted = {PD: PD} if shown is None else {PD: PD, f"NMPC, {shown}": shown}
+    wanted = {name: name for name in pds if name in controllers}
+    if shown is not None:
+        wanted[f"NMPC, {shown}"] = shown
     flights, missing = traces(folder, {title: f"{name.lower()}.npz" for title, name in wanted.items()})
     cases = list(dict.fromkeys(row.case for row in summary.rows))
     tables = [

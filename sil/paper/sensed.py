@@ -1,4 +1,4 @@
-"""The Table II case with sensors: PD and NMPC with the true state, and with both estimators."""
+"""The Table II case with sensors: PDs and NMPC with the true state, and with both estimators."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,12 +8,12 @@ import numpy as np
 
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.files.summary import Number, Summary
-from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.paper.table2 import (
     CASES,
@@ -30,7 +30,7 @@ from mambo_nmpc.sil.sensors.instruments import Sensors
 from mambo_nmpc.sil.show.numbers import digits
 
 PRESETS: Final = ("mambo", "table1")
-"""Presets that are compared with the PD."""
+"""Presets that are compared with the PDs."""
 FLIGHTS: Final = 20
 """Flights of a row with noise; their seeds count from 0."""
 
@@ -78,18 +78,21 @@ def fly_sensed(
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
 ) -> list[SensedRow]:
-    """Fly the case with the PD and the compiled C of `settings` by name, each with every one of `VIEWS`.
+    """Fly the case with both PDs and the compiled C of `settings` by name, each with every one of `VIEWS`.
 
     Calls `progress` with the share done; rows without noise have one flight.
     """
-    jobs = [(name, view) for name in (PD, *settings) for view in VIEWS]
+    pds = {PD_TITLES[name]: name for name in PD_NAMES}
+    jobs = [(name, view) for name in (*pds, *settings) for view in VIEWS]
     case = next(iter(CASES.values()))
     rows = []
     for index, (name, view) in enumerate(jobs):
         sensors = VIEWS[view]
         n = flights if sensors is not None and sensors.noise_scale else 1
         flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
-        controller = PdController() if name == PD else CompiledController(settings[name], n)
+        controller: PositionController = (
+            pd_controller(pds[name], flight) if name in pds else CompiledController(settings[name], n)
+        )
         trace = fly(flight, controller, report_part(progress, index, len(jobs)))
         rows.append(_judge(name, view, trace))
     return rows

@@ -16,6 +16,7 @@ from matplotlib.ticker import LogFormatter
 
 TARGET, FLOWN, COMMAND = "#c4c4c4", "#0072B2", "#E69F00"
 """Colours that colour-blind readers and grey prints can distinguish (Okabe and Ito)."""
+THIRD = "#2ca02c"
 
 PANEL_INCHES: Final = 4.2
 """Width of a picture on a page, which shows two side by side."""
@@ -40,10 +41,11 @@ _VARIABLES: Final = {
     TARGET.lower(): "var(--target)",
     FLOWN.lower(): "var(--flown)",
     COMMAND.lower(): "var(--other)",
+    THIRD: "var(--good)",
     "#1f77b4": "var(--flown)",
     "#ff7f0e": "var(--other)",
 }
-"""CSS variable of the page for each colour of a picture, the first two of matplotlib's cycle included."""
+"""CSS variable of the page for each colour of a picture, the first three of matplotlib's cycle included."""
 
 
 @contextlib.contextmanager

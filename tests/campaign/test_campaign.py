@@ -198,10 +198,14 @@ def test_scales_apply_to_the_nominal_mambo() -> None:
 
 
 def test_an_empty_file_is_the_default_campaign(tmp_path: Path) -> None:
-    """The defaults are PD and preset mambo, 100 s on the figure of eight, derotated sensors."""
+    """The defaults are both PDs and preset mambo, 100 s on the figure of eight, derotated sensors."""
     read = file.read(written(tmp_path, ""))
     assert read == file.default()
-    assert [(entrant.name, entrant.kind) for entrant in read.entrants] == [("pd", "pd"), ("mambo", "nmpc")]
+    assert [(entrant.name, entrant.kind) for entrant in read.entrants] == [
+        ("pd", "pd"),
+        ("pd-feedforward", "pd-feedforward"),
+        ("mambo", "nmpc"),
+    ]
     assert read.file.flight.duration_s == 100.0
     assert read.file.flight.sensors == "mambo-derotated"
 
@@ -258,6 +262,7 @@ BAD = {
     "controllers = []": "controllers = [] must name 1 to 10 controllers",
     'controllers = ["mamba"]': "controllers: mamba is neither a preset nor a file (did you mean mambo?)",
     'controllers = ["pd", "pd"]': "controllers: two are called pd",
+    'controllers = ["pd-feedforward.toml"]': "and _, other than pd and pd-feedforward: results are named",
     'controllers = ["odd.toml"]': "controllers: odd.toml: horizon.update_period_s = 0.007 must be a whole",
     'controllers = ["wrong.toml"]': "wrong.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)",
     'controllers = ["a b.toml"]': "controllers: a b.toml must have a name of at most 40 letters",
@@ -290,6 +295,7 @@ def test_an_error_names_key_value_and_rule(text: str, tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.007\n")
     (tmp_path / "wrong.toml").write_text("[horizon]\ncontrol = 11\n")
     (tmp_path / "a b.toml").write_text("")
+    (tmp_path / "pd-feedforward.toml").write_text("")
     (fault,) = faults(tmp_path, text)
     assert BAD[text] in fault
 

@@ -11,11 +11,12 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.file import Entrant, FlightSection, scenario
 from mambo_nmpc.sil.campaign.flights import _evaluate, columns, fly_batch
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import PdController, pd_controller
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.names import PD_NAMES, PdName
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
@@ -73,27 +74,29 @@ def test_a_crash_at_the_start_of_the_clock_counts() -> None:
     assert detect_crashes(trace).tolist() == [False, True]
 
 
-def expected_row(trace: Trace) -> dict[str, object]:
-    """Return the row of a flight of the PD alone, without its counts."""
-    row: dict[str, object] = {"pd_trace_sha256": trace.digest()}
-    row |= {f"pd_{name}": float(values[0]) for name, values in vars(measure(trace)).items()}
+def expected_row(trace: Trace, pd: str) -> dict[str, object]:
+    """Return the row of a flight of a PD alone, without its counts."""
+    row: dict[str, object] = {f"{pd}_trace_sha256": trace.digest()}
+    row |= {f"{pd}_{name}": float(values[0]) for name, values in vars(measure(trace)).items()}
     if isinstance(trace, SensedTrace):
         seen = vars(measure(trace.as_seen()))
-        row |= {f"pd_seen_{name}": float(seen[name][0]) for name in seen if "rad" not in name}
+        row |= {f"{pd}_seen_{name}": float(seen[name][0]) for name in seen if "rad" not in name}
     return row
 
 
+@pytest.mark.parametrize("pd", PD_NAMES)
 @pytest.mark.parametrize("sensors", ["none", "mambo-derotated"])
-def test_a_row_holds_the_results_of_the_flight_alone(sensors: str) -> None:
+def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -> None:
     """Metrics of the true flight, with sensors also of the estimated error, and digest are those of `fly`."""
     flight = FlightSection(duration_s=1.0).model_dump() | {"sensors": sensors}
     drawn = [draw(3, number, PARAMETERS) | {"dropped_share": 0.3} for number in range(2)]
-    pd = Entrant("pd", "pd", Settings()).document()
-    for row, one in zip(fly_batch(__version__, [pd], flight, drawn), drawn, strict=True):
-        alone = fly(flight_of([scenario(flight, one)], 0.01), PdController())
+    document = Entrant(pd, pd, Settings()).document()
+    for row, one in zip(fly_batch(__version__, [document], flight, drawn), drawn, strict=True):
+        single = flight_of([scenario(flight, one)], 0.01)
+        alone = fly(single, pd_controller(pd, single))
         assert (alone.status == NOT_CALLED).any()
-        assert row == {"pd_crashed": 0, "pd_refused_updates": 0} | expected_row(alone)
-        assert set(row) == set(columns(["pd"], sensed=sensors != "none"))
+        assert row == {f"{pd}_crashed": 0, f"{pd}_refused_updates": 0} | expected_row(alone, pd)
+        assert set(row) == set(columns([pd], sensed=sensors != "none"))
 
 
 def test_the_table_has_crashes_and_counts_before_metrics_and_digest() -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import INTERRUPTED
-from mambo_nmpc.sil.controllers.pd import PdController
+from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.flight.loop import fly
+from mambo_nmpc.sil.flight.names import PD_NAMES, PdName
 from mambo_nmpc.sil.flight.scenario import Record, Scenario, flight_of, write_record
 from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 from tests.support.command import command, run
@@ -159,16 +160,33 @@ def test_a_crash_is_a_failure_that_says_when_and_how(tmp_path: Path) -> None:
     assert "the thrust limit no longer carries the weight" in line
 
 
-def test_a_replayed_crash_is_a_failure(tmp_path: Path) -> None:
+@pytest.mark.parametrize("pd", PD_NAMES)
+def test_a_replayed_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
     """Exit 1 although the trace is the recorded one; a record that does not crash exits 0."""
     for name, tilt_rad, code in (("upside.json", 1.2, 1), ("level.json", 0.0, 0)):
         scenario = Scenario(duration_s=0.1, start_tilt_rad=(tilt_rad, 0.0))
-        flown = fly(flight_of([scenario], 0.01), PdController())
-        record = Record(scenario=scenario, controller="pd", settings=ONE_NORM, trace_sha256=flown.digest())
+        flight = flight_of([scenario], 0.01)
+        flown = fly(flight, pd_controller(pd, flight))
+        record = Record(
+            scenario=scenario, controller=pd, settings=ONE_NORM, trace_sha256=flown.digest()
+        )
         write_record(record, tmp_path / name)
         said, _ = run("fly", "--replay", name, code=code)
         assert "replay: the trace equals the recorded one" in said
         assert ("CRASHED at 0.00 s: tilted 68.8 degrees" in said) == (code == 1)
+
+
+def test_the_pd_with_feed_forward_flies_closer_than_the_stock_pd(tmp_path: Path) -> None:
+    """The page names which of them flew."""
+    iae_m_s = []
+    for pd in PD_NAMES:
+        said, _ = run("fly", "--controller", pd, "--duration-s", "20", "--json", "-o", pd)
+        iae_m_s.append(json.loads(said)["metrics"]["iae_m_s"])
+    assert iae_m_s[1] < 0.2 * iae_m_s[0]
+    run("report", "pd", "pd-feedforward", "-o", "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert "Flight: PD, bernoulli" in page
+    assert "Flight: PD-feedforward, bernoulli" in page
 
 
 def test_refusals_during_lift_off_are_explained() -> None:

@@ -52,7 +52,7 @@ def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
     text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
     above, header = text.splitlines()[:2]
-    assert above.index("PD over NMPC") > header.index("ITAE")
+    assert above.index("PD over this") > header.index("ITAE")
     assert header.split()[3:] == ["IAE", "ISE", "ITSE", "ITAE"] * 2
     assert text.endswith(
         "the paper's claims, as flown here:\n  holds          it flies: 1 %\n  does not hold  it lands: 90 %"

@@ -3,7 +3,7 @@
 import pytest
 
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD_TITLES
 from mambo_nmpc.sil.paper.sensed import PRESETS, VIEWS, fly_sensed, text
 
 
@@ -13,7 +13,8 @@ def test_sensed_table_has_a_row_for_every_controller_and_view() -> None:
     shares: list[float] = []
     settings = {name: presets.load(name) for name in PRESETS}
     rows = fly_sensed(settings, shares.append, duration_s=1.0, flights=2)
-    assert [(row.controller, row.view) for row in rows] == [(c, v) for c in (PD, *PRESETS) for v in VIEWS]
+    controllers = (*PD_TITLES.values(), *PRESETS)
+    assert [(row.controller, row.view) for row in rows] == [(c, v) for c in controllers for v in VIEWS]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     for row in rows:

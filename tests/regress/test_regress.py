@@ -11,6 +11,7 @@ import pytest
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, InvalidSettingsError
 from mambo_nmpc.sil.campaign.file import Entrant, load_entrant
 from mambo_nmpc.sil.campaign.flights import INDICES, Row
+from mambo_nmpc.sil.flight.names import PD_NAMES
 from mambo_nmpc.sil.flight.scenario import read_record
 from mambo_nmpc.sil.regress.baseline import (
     baseline_path,
@@ -128,12 +129,13 @@ def test_same_bits_want_a_recorded_digest(tmp_path: Path) -> None:
     assert summary.failed == []
 
 
-def test_the_record_of_a_failed_flight_names_the_kind_of_controller(tmp_path: Path) -> None:
-    """The stock PD's flight is replayed with it."""
-    found, pd = suite(tmp_path), load_entrant("pd", Path(), "test")
+@pytest.mark.parametrize("name", PD_NAMES)
+def test_the_record_of_a_failed_flight_names_the_kind_of_controller(tmp_path: Path, name: str) -> None:
+    """A PD's flight is replayed with it."""
+    found, pd = suite(tmp_path), load_entrant(name, Path(), "test")
     rows = [row(4.0), row(1.0), row(1.0)]
     write_records(judge(found, pd, rows, None, tmp_path), found, pd, rows, tmp_path)
-    assert read_record(tmp_path / RECORDS / "0000-eight.json").controller == "pd"
+    assert read_record(tmp_path / RECORDS / "0000-eight.json").controller == name
 
 
 def test_a_crashed_or_lost_flight_fails(tmp_path: Path) -> None:

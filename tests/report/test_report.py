@@ -26,7 +26,16 @@ SEEN = {
     "fly": ("max error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
     "replay": ("Replay: PD", "✗", "the trace differs from the recorded one", "<dt>state</dt>", "Play"),
     "sensed": ("20 flights, 1 lost", "7.123", "0.77", "drift, m"),
-    "table2": ("63.02", "204.2", "7.123", "✓ holds", "✗ does not hold", "2.50", "Play"),
+    "table2": (
+        "PD-feedforward, flown",
+        "63.02",
+        "204.2",
+        "7.123",
+        "✓ holds",
+        "✗ does not hold",
+        "2.50",
+        "Play",
+    ),
     "footprint": ("3000 B", "is over its budget", "Arduino Mega 2560", "there is no emulator", "incomplete"),
     "sweep": ("closest tracking that fits: prediction 10", "All 5 controllers", "IAE, m s", "\N{EN DASH}"),
     "faults": ("state NaN to the end", "crashed", "2376.50", "OK, BAD_STATE"),
@@ -177,6 +186,10 @@ def test_missing_traces_are_named_and_the_rest_is_shown() -> None:
     Path("table2/pd.npz").unlink()
     page = page_of("table2")
     assert "therefore not shown: pd.npz, mambo.npz" in page
+    assert page.count("Play</button>") == 1
+    Path("table2/pd-feedforward.npz").unlink()
+    page = page_of("table2")
+    assert "therefore not shown: pd.npz, pd-feedforward.npz, mambo.npz" in page
     assert "Play" not in page
     assert "7.123" in page
 
@@ -325,6 +338,13 @@ def test_what_moves_is_what_was_flown() -> None:
         assert drone["position"][sample] == pytest.approx(100 * flown.position_m[instant, 0], abs=0.051)
         assert drone["angles"][sample] == pytest.approx(1000 * flown.euler_rad[instant, 0], abs=0.51)
         assert data["target"][sample] == pytest.approx(100 * flown.target[instant, 0, :2], abs=0.051)
+
+
+def test_each_pd_has_its_own_colour_on_every_page() -> None:
+    """Whatever flies beside it; the NMPC has the first one."""
+    flown = trace()
+    assert animate({"NMPC, mambo": flown, "PD": flown, "PD-feedforward": flown}).hues == [0, 1, 2]
+    assert animate({"PD-feedforward": flown}).hues == [2]
 
 
 def test_the_view_holds_the_target_and_does_not_follow_a_stray() -> None:

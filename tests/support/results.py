@@ -19,7 +19,7 @@ from mambo_nmpc.sil.faults.flights import End, FaultsSummary, Verdict
 from mambo_nmpc.sil.firmware.sizes import Added, Parts, SectionBytes
 from mambo_nmpc.sil.flight import report
 from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.names import PD
+from mambo_nmpc.sil.flight.names import PD, PD_TITLES
 from mambo_nmpc.sil.flight.report import FlySummary, ReplaySummary
 from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.flight.traces import Trace, write_npz
@@ -93,14 +93,15 @@ def sensed_folder(folder: Path) -> None:
 
 
 def table2_folder(folder: Path) -> None:
-    """Write Table II with two controllers and made-up rows."""
+    """Write Table II with both PDs, a preset and made-up rows."""
     flown = trace()
     write_npz(flown, folder / "pd.npz")
+    write_npz(flown, folder / "pd-feedforward.npz")
     write_npz(flown, folder / "mambo.npz")
     rows = [
         Table2Row(case, name, (7.123, 0.5, 40.0, 1234.5), None if name == PD else (2.5, 3.0, 4.0, 5.0))
         for case in CASES
-        for name in (PD, "mambo", HOSTILE)
+        for name in (*PD_TITLES.values(), "mambo", HOSTILE)
     ]
     claims = [Claim(f"holds, says {HOSTILE}", True, "as shown"), Claim("does not", False, "as shown")]
     Table2Summary(scalar=None, cases=list(CASES), rows=rows, claims=claims).write(folder)
