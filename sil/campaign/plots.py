@@ -49,22 +49,28 @@ def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path,
         figure = Figure(figsize=(11.0, 0.6 + 2.7 * rows), layout="constrained")
         panels = figure.subplots(rows, len(COMPARED), squeeze=False, sharey=True)
         for axes, index, label in zip(panels[0], COMPARED, _LABELS, strict=True):
-            for colour, name in enumerate(names):
-                _draw_shares(axes, index_values(table, name, index), f"C{colour}", name)
+            for name, colour in _colours(names).items():
+                _draw_shares(axes, index_values(table, name, index), colour, name)
             axes.set(xscale="log", xlabel=label, ylim=(0.0, 1.0))
             _label_plainly(axes)
         figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(names))
         for axes, index, label in zip(panels[-1] if rows > 1 else (), COMPARED, _LABELS, strict=False):
-            for colour, name in enumerate(names[1:], start=1):
+            for name in names[1:]:
                 theirs, ours = index_values(table, names[0], index), index_values(table, name, index)
                 with np.errstate(invalid="ignore", divide="ignore"):
-                    _draw_shares(axes, theirs / ours, f"C{colour}", name)
+                    _draw_shares(axes, theirs / ours, _colours(names)[name], name)
             axes.axvline(1.0, color="#444444", linewidth=0.8)
             axes.set(xscale="log", xlabel=f"{label.partition(',')[0]}: {names[0]} over {other}")
             _label_plainly(axes)
         for axes in panels[:, 0]:
             axes.set_ylabel("share of flights")
         return save(figure, stem)
+
+
+def _colours(names: Sequence[str]) -> dict[str, str]:
+    """Return the colour of each controller; those of the PDs are theirs alone."""
+    hues = cycle(_HUES)
+    return {name: _PD_HUES.get(name) or next(hues) for name in names}
 
 
 def _label_plainly(axes: Axes) -> None:
@@ -98,9 +104,7 @@ def distribution_panels(table: Table, controllers: Sequence[str]) -> list[Markup
         for index, label in _SHOWN.items():
             figure = Figure(figsize=(PANEL_INCHES, 3.2), layout="constrained")
             axes = figure.subplots()
-            hues = cycle(_HUES)
-            for name in controllers:
-                colour = _PD_HUES.get(name) or next(hues)
+            for name, colour in _colours(controllers).items():
                 if {f"{name}_{index}", f"{name}_{CRASHED}"} <= table.keys():
                     _draw_shares(axes, index_values(table, name, index), colour, name, whole=100.0)
             if not axes.lines:
