@@ -68,14 +68,14 @@ class Judged:
         return math.prod(self.variation_rad) ** (1.0 / len(self.variation_rad))
 
 
-def drawn_flights() -> list[Flight]:
-    """Return the flights of each curve."""
+def drawn_flights(count: int = FLIGHTS) -> list[Flight]:
+    """Return `count` flights of each curve."""
     found = []
     for curve, drawn in CURVES.items():
         section = {"trajectory": curve, "duration_s": DURATION_S, **drawn}
         file = CampaignFile.model_validate({"seed": SEED, "flight": section})
         parameters, shared = distributions(file.flight, file.draws), file.flight.model_dump()
-        scenarios = [scenario(shared, draw(SEED, number, parameters)) for number in range(FLIGHTS)]
+        scenarios = [scenario(shared, draw(SEED, number, parameters)) for number in range(count)]
         found.append(flight_of(scenarios, PERIOD_S))
     return found
 
