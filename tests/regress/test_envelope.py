@@ -1,4 +1,7 @@
-"""The flight envelope of each preset, with what it is known to fail: a change in either direction fails."""
+"""The flight envelope of each preset and of the PD with feed-forward, with what it is known to fail.
+
+A change in either direction fails.
+"""
 
 from pathlib import Path
 from typing import Final
@@ -15,6 +18,8 @@ from mambo_nmpc.sil.regress.run import fly_suite
 EVERY: Final = list(range(-16, 17))
 COURSES: Final = ("eight", "circle", "fast-circle", "step-2m", "step-5m")
 
+PD_FEEDFORWARD: Final = "pd-feedforward"
+
 # Headings by group, as multiples of 11.25 degrees from -16 (south) to 16.
 KNOWN: Final[dict[str, dict[str, list[int]]]] = {
     # fails none
@@ -29,20 +34,21 @@ KNOWN: Final[dict[str, dict[str, list[int]]]] = {
     },
     # does not fly
     "table1-printed": {course + view: EVERY for view in ("", "-sensors") for course in COURSES},
+    PD_FEEDFORWARD: {},
 }
-"""What each preset is known to fail."""
+"""What each controller is known to fail."""
 
 
 def test_the_envelope_of_every_preset_is_known() -> None:
     """A new preset is added above."""
-    assert set(KNOWN) == set(presets.names())
+    assert set(KNOWN) == {*presets.names(), PD_FEEDFORWARD}
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("preset", KNOWN)
-def test_a_preset_fails_where_it_is_known_to(preset: str) -> None:
+@pytest.mark.parametrize("controller", KNOWN)
+def test_a_controller_fails_where_it_is_known_to(controller: str) -> None:
     """No flight more and none less."""
-    suite, entrant = load_suite("envelope"), load_entrant(preset, Path(), "test")
+    suite, entrant = load_suite("envelope"), load_entrant(controller, Path(), "test")
     with processes(2) as pool:
         rows = fly_suite(suite, entrant, pool, lambda _: None)
     summary = judge(suite, entrant, rows, None, Path())
@@ -50,4 +56,4 @@ def test_a_preset_fails_where_it_is_known_to(preset: str) -> None:
     for flight, result in zip(suite.flights, summary.flights, strict=True):
         if result.failures:
             found.setdefault(flight.group, []).append(round(flight.scenario.yaw_rad / 3.14159 * 16))
-    assert found == KNOWN[preset]
+    assert found == KNOWN[controller]
