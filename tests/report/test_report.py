@@ -194,6 +194,18 @@ def test_missing_traces_are_named_and_the_rest_is_shown() -> None:
     assert "7.123" in page
 
 
+def test_a_table2_of_one_pd_lacks_nothing() -> None:
+    """Results of an earlier version, which flew the paper's PD alone."""
+    path = Path(made("table2")) / SUMMARY
+    summary = json.loads(path.read_text())
+    summary["rows"] = [row for row in summary["rows"] if row["controller"] != "PD-feedforward"]
+    path.write_text(json.dumps(summary))
+    (path.parent / "pd-feedforward.npz").unlink()
+    page = page_of("table2")
+    assert "not shown" not in page
+    assert "feedforward" not in page
+
+
 def test_a_campaign_that_goes_on_is_shown_as_it_stands() -> None:
     """Without a summary: the flights so far, less a line cut short."""
     Path("campaign").mkdir()
