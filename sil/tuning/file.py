@@ -11,6 +11,7 @@ from pydantic import Field
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.keys import KEYS
+from mambo_nmpc.codegen.settings.methods import is_used
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
 from mambo_nmpc.sil.campaign.file import (
@@ -25,22 +26,34 @@ from mambo_nmpc.sil.campaign.file import (
 )
 from mambo_nmpc.sil.campaign.parameters import Draw, draw
 
-DEFAULT_SEARCH: Final[dict[str, dict[str, Any]]] = {
-    "horizon": {
-        "prediction": {"choice": [6, 8, 10]},
-        "control": {"choice": [1, 2]},
-        "prediction_step_s": {"uniform": [0.03, 0.12]},
+DEFAULT_SEARCH: Final[dict[str, dict[str, dict[str, Any]]]] = {
+    "1-norm": {
+        "horizon": {
+            "prediction": {"choice": [6, 8, 10]},
+            "control": {"choice": [1, 2]},
+            "prediction_step_s": {"uniform": [0.03, 0.12]},
+        },
+        "model": {"roll_lag_s": {"uniform": [0.05, 0.5]}, "pitch_lag_s": {"uniform": [0.05, 0.5]}},
+        "cost": {"effort_weight": {"log_uniform": [0.1, 10000.0]}},
+        "optimizer": {
+            "iterations": {"choice": [3, 4, 5]},
+            "initial_step_rad": {"log_uniform": [0.0005, 0.05]},
+        },
     },
-    "model": {"roll_lag_s": {"uniform": [0.05, 0.5]}, "pitch_lag_s": {"uniform": [0.05, 0.5]}},
-    "cost": {"effort_weight": {"log_uniform": [0.1, 10000.0]}},
-    "optimizer": {
-        "iterations": {"choice": [3, 4, 5]},
-        "initial_step_rad": {"log_uniform": [0.0005, 0.05]},
+    "quadratic": {
+        "target": {"tracker_gain": {"uniform": [0.2, 0.8]}},
+        "cost": {"response_time_s": {"uniform": [0.15, 0.3]}},
+        "observer": {
+            "disturbance_noise": {"log_uniform": [0.03, 3.0]},
+            "position_noise": {"log_uniform": [0.001, 0.1]},
+            "velocity_noise": {"log_uniform": [0.005, 0.5]},
+        },
     },
 }
-"""The base has the longest horizons and the most iterations, so no trial takes more computation than it.
+"""The default search, by the norm of the base.
 
-The tracking weight stays fixed, because only its ratio to the effort weight matters.
+With a 1-norm the base has the longest horizons and the most iterations, so no trial takes more computation
+than it, and the tracking weight stays fixed, because only its ratio to the effort weight matters.
 """
 
 _FIXED: Final = ("horizon.update_period_s", "cost.tracking_weight")
@@ -54,14 +67,17 @@ class TuningFlight(FlightSection):
 
 
 class TuneFile(FileSection):
-    """The keys of tune.toml; a missing key has its value in the default study."""
+    """The keys of tune.toml; a missing key has its value in the default study.
+
+    A missing search is the default one for the norm of the base.
+    """
 
     seed: int = Field(1, ge=0, le=2**63 - 1)
     base: str = "mambo"
     flights: int = Field(12, ge=1, le=1000)
     flight: TuningFlight = TuningFlight()
     draws: Draws = Draws()
-    search: dict[str, dict[str, Any]] = DEFAULT_SEARCH
+    search: dict[str, dict[str, Any]] | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +139,9 @@ def read(path: Path) -> Tuning:
 def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
     """Load the base and check that every combination of the ranges' ends is valid and can be simulated."""
     base = load_settings(file.base, folder, f"{source}: base")
-    tuning = Tuning(file, base, _search(file.search, base, source))
+    search = DEFAULT_SEARCH[base.cost.norm] if file.search is None else file.search
+    file = TuneFile.model_validate(file.model_dump() | {"search": search})
+    tuning = Tuning(file, base, _search(search, base, source))
     demand_flyable(base, file.flight, tuning.draw_flights()[0], f"{source}: base")
     _demand_valid_corners(tuning, source)
     return tuning
@@ -154,8 +172,12 @@ def _search(
 def _range(path: str, value: Any, base: Settings) -> Distribution:
     """Return the range of one key; raises ValueError, "must ..."."""
     key = KEYS.get(path)
-    if key is None or key.low is None or key.high is None or path in _FIXED:
-        free = [one for one in KEYS if KEYS[one].low is not None and one not in _FIXED]
+    free = [
+        one
+        for one in KEYS
+        if KEYS[one].low is not None and one not in _FIXED and is_used(base, *one.split("."))
+    ]
+    if key is None or key.low is None or key.high is None or path not in free:
         raise ValueError(f"must name a number of a controller.toml that may be tuned: {', '.join(free)}")
     found = parse(value, Domain(key.low, key.high, whole=key.kind == "whole number"))
     if found.kind in ("constant", "normal"):

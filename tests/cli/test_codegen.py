@@ -13,7 +13,6 @@ import pytest
 
 from mambo_nmpc.codegen import errors
 from mambo_nmpc.codegen.settings import controller_toml, presets
-from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.command import run
 
 COMMAND = "from mambo_nmpc.codegen import cli, command; app = command.root(); cli.register(app); app()"
@@ -194,7 +193,7 @@ def test_options_override_the_settings_and_the_bundle_remembers(prefix: str) -> 
     run("generate", "-o", "out", "--prefix", prefix, "--scalar", "float64")
     written = presets.load("out/controller.toml")
     assert (written.code.prefix, written.code.scalar) == (prefix, "float64")
-    assert written.cost == Settings().cost
+    assert written.cost == presets.preset("mambo").cost
     assert Path(f"out/include/{prefix}.h").is_file()
     run("generate", "out/controller.toml", "-o", "out", "--check")
 

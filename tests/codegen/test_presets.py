@@ -28,10 +28,19 @@ def departures(settings: Settings) -> dict[str, Any]:
         (
             "mambo",
             {
-                "horizon.prediction_step_s": 0.055,
-                "model.roll_lag_s": 0.27,
-                "model.pitch_lag_s": 0.15,
-                "optimizer.warm_start": "plan",
+                "horizon.ramp_s": 0.4,
+                "model.roll_lag_s": 0.28,
+                "model.pitch_lag_s": 0.154,
+                "model.roll_delay_s": 0.045,
+                "model.pitch_delay_s": 0.06,
+                "model.roll_integral_1_s": 1.0,
+                "model.pitch_integral_1_s": 0.77,
+                "model.drag_1_s": 0.067,
+                "model.attitude": "predicted",
+                "target.acceleration": "tracked",
+                "target.tracker_gain": 0.5,
+                "cost.norm": "quadratic",
+                "damping.roll_rate_feedback_s": 0.05,
             },
         ),
         (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController
+from mambo_nmpc.codegen.reference import reference_controller
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.sil.controllers.build import build_library
@@ -35,7 +35,7 @@ def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str
     settings = with_option(presets.load(preset), "code.scalar", scalar)
     flight = CONDITIONS[condition]
     library = build_library(settings, toolchain("gcc"))
-    ours, theirs = ReferenceController(Design(settings)), CompiledController(settings, library=library)
+    ours, theirs = reference_controller(Design(settings)), CompiledController(settings, library=library)
     assert fly(flight, ours).same_bits(fly(flight, theirs))
 
 
@@ -45,7 +45,7 @@ def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) ->
     """Over Table II's 100 s, other compilers and optimization levels give the same bits, too."""
     settings = presets.load(preset)
     flight = Flight(CASE)
-    expected = fly(flight, ReferenceController(Design(settings)))
+    expected = fly(flight, reference_controller(Design(settings)))
     for compiler in (("gcc", "-O0"), ("gcc", "-O3"), ("clang", "-O2")):
         library = build_library(settings, toolchain(*compiler))
         assert fly(flight, CompiledController(settings, library=library)).same_bits(expected)

@@ -20,7 +20,7 @@ from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES, EngineName
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
-PRESET: Final = "mambo"
+PRESETS: Final = ("mambo", "mambo-1norm")
 
 SCENARIOS: Final = {
     "figure of eight": Scenario(duration_s=10.0),
@@ -45,16 +45,20 @@ SCENARIOS: Final = {
 
 
 def digests(engine: EngineName) -> dict[str, str]:
-    """Fly every scenario with both PDs and with the preset; return the digests of the traces."""
-    settings = presets.load(PRESET)
+    """Fly every scenario with both PDs and with the presets; return the digests of the traces."""
+    chosen = {name: presets.load(name) for name in PRESETS}
+    period_s = chosen[PRESETS[0]].horizon.update_period_s
     batches = defaultdict(list)
     for name, flown in SCENARIOS.items():
         batches[tuple(getattr(flown, key) for key in SHARED_KEYS)].append(name)
     found: dict[str, str] = {}
     for names in batches.values():
-        flight = flight_of([SCENARIOS[name] for name in names], settings.horizon.update_period_s)
+        flight = flight_of([SCENARIOS[name] for name in names], period_s)
         traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd, flight), engine=engine) for pd in PD_NAMES}
-        traces[PRESET] = fly(flight, CompiledController(settings, len(names)), engine=engine)
+        traces |= {
+            preset: fly(flight, CompiledController(settings, len(names)), engine=engine)
+            for preset, settings in chosen.items()
+        }
         for index, name in enumerate(names):
             found |= {f"{name}: {controller}": trace.digest(index) for controller, trace in traces.items()}
     return found
