@@ -11,7 +11,7 @@ from mambo_nmpc.codegen.reference.math import Real, clamp
 
 
 @dataclass(frozen=True)
-class Attitude:
+class AttitudeState:
     """The models of n controllers, (n, 2) along right and forward, in m/step^2.
 
     tilt, integral, lagged and command are a, i, c, u of `nmpc_attitude.h`; sine and cosine (n,) are those of
@@ -48,19 +48,19 @@ class AttitudeModel:
         self._limit = constant(attitude.limit_m_step2, "acceleration")
         self.command_limit = both(attitude.command_limit_m_step2, "move")
 
-    def set_command(self, attitude: Attitude, command_rad: Real) -> Attitude:
+    def set_command(self, attitude: AttitudeState, command_rad: Real) -> AttitudeState:
         """Set the last commands to `command_rad` (n, 2), roll and pitch."""
         product = self._products.tilt_product(self._command_gain, command_rad - self._trim_command)
         return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
 
-    def steady(self, command_rad: Real) -> Attitude:
+    def steady(self, command_rad: Real) -> AttitudeState:
         """Return the model at the steady attitude of the commands (n, 2)."""
         zeros = np.zeros_like(command_rad)
         sine = zeros[:, 0]
-        command = self.set_command(Attitude(zeros, zeros, zeros, zeros, sine, sine), command_rad).command
-        return Attitude(command, zeros, command, command, sine, np.full_like(sine, self._one))
+        command = self.set_command(AttitudeState(zeros, zeros, zeros, zeros, sine, sine), command_rad).command
+        return AttitudeState(command, zeros, command, command, sine, np.full_like(sine, self._one))
 
-    def advance(self, attitude: Attitude) -> Attitude:
+    def advance(self, attitude: AttitudeState) -> AttitudeState:
         """Let the model answer the last commands over one control step."""
         state = np.stack([attitude.tilt, attitude.integral, attitude.lagged, attitude.command], axis=2)
         change = self._products.sine_product(attitude.command - attitude.lagged, self._lagged_shares)
@@ -71,7 +71,7 @@ class AttitudeModel:
             lagged=clamp(attitude.lagged + change, self._limit),
         )
 
-    def turn(self, attitude: Attitude, sine: Real, cosine: Real) -> Attitude:
+    def turn(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
         """Turn tilt and command to the heading with this sine and cosine (n,)."""
         product = self._products.sine_product
         by_sine = self._products.sine_difference(sine, attitude.cosine, cosine, attitude.sine)
@@ -99,7 +99,7 @@ class AttitudeModel:
         product = self._products.tilt_product(self._gain, tilt_rad - self._trim)
         return np.stack([product[:, 0], -product[:, 1]], axis=1)
 
-    def command_rad(self, attitude: Attitude) -> Real:
+    def command_rad(self, attitude: AttitudeState) -> Real:
         """Return roll and pitch (n, 2) that stand for the last commands."""
         product = self._products.command_product(self._command_rad, attitude.command)
         return np.stack(

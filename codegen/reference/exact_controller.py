@@ -1,23 +1,19 @@
 """Controller with a quadratic cost: estimates the state, models the attitude loops, minimises the cost."""
 
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference.attitude import Attitude, AttitudeModel
+from mambo_nmpc.codegen.reference.attitude import AttitudeModel, AttitudeState
 from mambo_nmpc.codegen.reference.exact_arithmetic import exact_arithmetic
 from mambo_nmpc.codegen.reference.exact_optimizer import ExactOptimizer
 from mambo_nmpc.codegen.reference.inputs import Inputs, Status, choose
 from mambo_nmpc.codegen.reference.math import Real, clamp
-from mambo_nmpc.codegen.reference.observer import Estimate, Observer
+from mambo_nmpc.codegen.reference.observer import Estimate, KalmanObserver
 from mambo_nmpc.codegen.reference.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_nmpc.codegen.representation import COMMAND
-
-WORLD_STATES: Final = 4
-"""Of the states that the cost depends on, those that turn with the heading."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +25,7 @@ class ExactMemory:
     """
 
     estimate: Estimate
-    attitude: Attitude
+    attitude: AttitudeState
     target: TargetMotion
     tilt_rad: Real
     command_rad: Real
@@ -62,7 +58,7 @@ class ExactReferenceController:
         self.settings, self._design = design.settings, design
         self._numbers, self._products = design.numbers, exact_arithmetic(design)
         self._inputs = Inputs(design)
-        self._observer = Observer(design, self._products)
+        self._observer = KalmanObserver(design, self._products)
         self._model = AttitudeModel(design, self._products)
         self._optimizer = ExactOptimizer(design, self._products, self._model.command_limit)
         self._tracker = Tracker(design.tracker, self._products) if design.tracker else None
@@ -171,7 +167,7 @@ class ExactReferenceController:
         )
 
     def _minimize(
-        self, attitude: Attitude, estimate: Estimate, motion: TargetMotion, target: Real, tilt: Real
+        self, attitude: AttitudeState, estimate: Estimate, motion: TargetMotion, target: Real, tilt: Real
     ) -> Real:
         """Return the first free moves (n, 2), right and forward."""
         disturbance = self._observer.disturbance(estimate)
@@ -195,7 +191,7 @@ class ExactReferenceController:
         ]
         return self._optimizer.minimize(np.stack(state, axis=2))
 
-    def _to_world(self, attitude: Attitude, heading: Real) -> Real:
+    def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
         product, right, forward = self._products.sine_product, heading[:, 0], heading[:, 1]
         return np.stack(
             [
@@ -205,7 +201,7 @@ class ExactReferenceController:
             axis=1,
         )
 
-    def _to_heading(self, attitude: Attitude, world: Real) -> Real:
+    def _to_heading(self, attitude: AttitudeState, world: Real) -> Real:
         product, x, y = self._products.sine_product, world[:, 0], world[:, 1]
         return np.stack(
             [

@@ -18,7 +18,7 @@ class Estimate:
     disturbance_m_step2: Real
 
 
-class Observer:
+class KalmanObserver:
     """The constants of the observer, in the scalar type of the controller."""
 
     def __init__(self, design: Design, arithmetic: ExactArithmetic) -> None:

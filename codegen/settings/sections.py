@@ -6,80 +6,16 @@ The descriptions are the comments of controller.toml and part of the JSON schema
 """
 
 import math
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationInfo,
-    field_validator,
-)
+from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from mambo_nmpc.codegen.settings import reserved
-
-SHORTEST_LAG_S = 0.001
-"""An attitude lag is 0 (none) or at least this; a shorter one is negligible."""
+from mambo_nmpc.codegen.settings.fields import Lag, Number, Ramp, SettingsSection
 
 
-SHORTEST_RAMP_S = 0.02
-"""A ramp is 0 (none) or at least this."""
-
-
-def _without_minus_zero(value: float) -> float:
-    """Return `value` with -0.0 as 0.0, so that equal settings have equal digests and equal C."""
-    return value + 0.0
-
-
-def _none_or_lag(value: float) -> float:
-    """Return an attitude lag in seconds; refuse one between 0 and SHORTEST_LAG_S."""
-    if 0 < value < SHORTEST_LAG_S:
-        raise PydanticCustomError("lag", f"must be 0 or lie in {SHORTEST_LAG_S}..2; 0 means no lag")
-    return value
-
-
-def _none_or_ramp(value: float) -> float:
-    """Return a ramp in seconds; refuse one between 0 and SHORTEST_RAMP_S."""
-    if 0 < value < SHORTEST_RAMP_S:
-        raise PydanticCustomError("ramp", f"must be 0 or lie in {SHORTEST_RAMP_S}..2; 0 means one free move")
-    return value
-
-
-Number = Annotated[float, AfterValidator(_without_minus_zero)]
-Lag = Annotated[
-    float,
-    Field(ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}),
-    AfterValidator(_none_or_lag),
-    AfterValidator(_without_minus_zero),
-]
-
-
-Ramp = Annotated[
-    float,
-    Field(
-        ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_RAMP_S}}
-    ),
-    AfterValidator(_none_or_ramp),
-    AfterValidator(_without_minus_zero),
-]
-
-
-class _Section(BaseModel):
-    """The rules of all sections: read-only, no unknown keys, no conversion of types, finite numbers."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        strict=True,
-        allow_inf_nan=False,
-        validate_default=True,
-        field_title_generator=lambda name, _: name,
-    )
-
-
-class Horizon(_Section):
+class Horizon(SettingsSection):
     """How far the controller predicts, and how often it runs."""
 
     prediction: int = Field(
@@ -127,7 +63,7 @@ class Horizon(_Section):
         return control
 
 
-class Model(_Section):
+class Model(SettingsSection):
     """The prediction model of the drone."""
 
     position_update: Literal["exact", "printed"] = Field(
@@ -217,7 +153,7 @@ class Model(_Section):
         return lag
 
 
-class Target(_Section):
+class Target(SettingsSection):
     """What the controller knows of the target's motion beyond its position and velocity."""
 
     acceleration: Literal["none", "tracked"] = Field(
@@ -236,7 +172,7 @@ class Target(_Section):
     )
 
 
-class Cost(_Section):
+class Cost(SettingsSection):
     """The cost: distance from the target, and changes of the attitude command."""
 
     norm: Literal["1-norm", "quadratic"] = Field(
@@ -276,7 +212,7 @@ class Cost(_Section):
     )
 
 
-class Observer(_Section):
+class Observer(SettingsSection):
     """The estimate of position, velocity and disturbance: a Kalman filter with fixed gains."""
 
     acceleration_noise: Number = Field(
@@ -314,7 +250,7 @@ class Observer(_Section):
     )
 
 
-class Damping(_Section):
+class Damping(SettingsSection):
     """Feedback of the attitude's rates to the commands."""
 
     roll_rate_feedback_s: Number = Field(
@@ -329,7 +265,7 @@ class Damping(_Section):
     )
 
 
-class Optimizer(_Section):
+class Optimizer(SettingsSection):
     """The search for the moves by resilient backpropagation (RPROP)."""
 
     variant: Literal["rprop+", "irprop-"] = Field(
@@ -402,7 +338,7 @@ class Optimizer(_Section):
         return step_min
 
 
-class Limits(_Section):
+class Limits(SettingsSection):
     """The limits of the commands."""
 
     tilt_rad: Number = Field(
@@ -414,7 +350,7 @@ class Limits(_Section):
     )
 
 
-class Ranges(_Section):
+class Ranges(SettingsSection):
     """The ranges of the inputs; a step refuses an input out of range with a status."""
 
     position_m: Number = Field(
@@ -454,7 +390,7 @@ class Ranges(_Section):
         return largest
 
 
-class Code(_Section):
+class Code(SettingsSection):
     """Types and names of the C."""
 
     scalar: Literal["float32", "float64", "fixed"] = Field(
@@ -485,7 +421,7 @@ class Code(_Section):
         return prefix
 
 
-class Sections(_Section):
+class Sections(SettingsSection):
     """All sections; `Settings` adds the rule between them."""
 
     horizon: Horizon = Field(Horizon(), description="How far the controller predicts, and how often it runs.")

@@ -1,0 +1,61 @@
+"""What the sections of the settings share: the base of every section, and the types of their numbers."""
+
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+SHORTEST_LAG_S: Final = 0.001
+"""An attitude lag is 0 (none) or at least this; a shorter one is negligible."""
+
+SHORTEST_RAMP_S: Final = 0.02
+"""A ramp is 0 (none) or at least this."""
+
+
+def _without_minus_zero(value: float) -> float:
+    """Return `value` with -0.0 as 0.0, so that equal settings have equal digests and equal C."""
+    return value + 0.0
+
+
+def _none_or_lag(value: float) -> float:
+    """Return an attitude lag in seconds; refuse one between 0 and SHORTEST_LAG_S."""
+    if 0 < value < SHORTEST_LAG_S:
+        raise PydanticCustomError("lag", f"must be 0 or lie in {SHORTEST_LAG_S}..2; 0 means no lag")
+    return value
+
+
+def _none_or_ramp(value: float) -> float:
+    """Return a ramp in seconds; refuse one between 0 and SHORTEST_RAMP_S."""
+    if 0 < value < SHORTEST_RAMP_S:
+        raise PydanticCustomError("ramp", f"must be 0 or lie in {SHORTEST_RAMP_S}..2; 0 means one free move")
+    return value
+
+
+Number = Annotated[float, AfterValidator(_without_minus_zero)]
+Lag = Annotated[
+    float,
+    Field(ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_LAG_S}}),
+    AfterValidator(_none_or_lag),
+    AfterValidator(_without_minus_zero),
+]
+Ramp = Annotated[
+    float,
+    Field(
+        ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_RAMP_S}}
+    ),
+    AfterValidator(_none_or_ramp),
+    AfterValidator(_without_minus_zero),
+]
+
+
+class SettingsSection(BaseModel):
+    """The rules of all sections: read-only, no unknown keys, no conversion of types, finite numbers."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        allow_inf_nan=False,
+        validate_default=True,
+        field_title_generator=lambda name, _: name,
+    )
