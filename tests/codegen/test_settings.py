@@ -18,10 +18,22 @@ from mambo_nmpc.codegen.errors import (
 )
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.keys import KEYS, Key, spell
+from mambo_nmpc.codegen.settings.methods import is_used
 from mambo_nmpc.codegen.settings.model import Settings
-from tests.support.strategies import NUMBERS, RESERVED, any_settings, nested, toml
+from tests.support.strategies import (
+    LAGS,
+    NUMBERS,
+    QUADRATIC,
+    RESERVED,
+    Values,
+    any_settings,
+    base_of,
+    nested,
+    toml,
+)
 
-COMPANIONS: dict[str, dict[str, float]] = {
+COMPANIONS: dict[str, Values] = {
+    "horizon.ramp_s = 2.0": {"cost.response_time_s": 2.0},
     "horizon.prediction = 1": {"horizon.control": 1},
     "horizon.control = 50": {"horizon.prediction": 50},
     "optimizer.initial_step_rad = 1": {"optimizer.step_max_rad": 1},
@@ -32,6 +44,7 @@ COMPANIONS: dict[str, dict[str, float]] = {
 """What other keys must say before one may stand at its bound."""
 
 SCHEMA = jsonschema.Draft202012Validator(Settings.json_schema())
+COST_KEYS = "there are norm, tracking_weight, effort_weight, response_time_s, velocity_weight_s"
 ODD_VALUES = ("nan", "-inf", "-1", "1e300", "true", '"1"', '"\\u001b[31m"', "[]", "{a = 1}", "1979-05-27")
 HUGE_VALUES = ("0x" + "f" * 6000, '"' + "x" * 9000 + '"')
 
@@ -65,15 +78,18 @@ def test_written_settings_read_back_equal_and_fit_their_schema(settings: Setting
     SCHEMA.validate(settings.model_dump())
 
 
-def test_written_file_explains_every_key_within_100_columns() -> None:
+@pytest.mark.parametrize("values", [{}, QUADRATIC], ids=["1-norm", "quadratic"])
+def test_written_file_explains_every_key_in_use_within_100_columns(values: Values) -> None:
     """Every key stands below its description and the values it admits, in lines that fit a screen."""
-    text = controller_toml.to_toml(Settings(), "A title.")
+    settings = Settings.model_validate(nested(values))
+    text = controller_toml.to_toml(settings, "A title.")
     unwrapped = text.replace("\n# ", " ")
     assert text.startswith("# A title.\n")
     assert max(map(len, text.splitlines())) <= 100
     for key in KEYS.values():
-        admits = f"{key.description} {key.kind.capitalize()}: {key.domain}.\n{key.path.split('.')[1]} = "
-        assert admits in unwrapped
+        section, name = key.path.split(".")
+        admits = f"{key.description} {key.kind.capitalize()}: {key.domain}.\n{name} = "
+        assert (admits in unwrapped) == is_used(settings, section, name), key.path
 
 
 @pytest.mark.parametrize("key", NUMBERS, ids=lambda key: key.path)
@@ -81,16 +97,16 @@ def test_bounds_are_closed(key: Key) -> None:
     """A number may stand at its bound and not beyond; the message names key, value and bounds."""
     assert key.low is not None
     assert key.high is not None
+    base = base_of(key.path)
     for bound, outwards in ((key.low, -math.inf), (key.high, math.inf)):
         whole = key.kind == "whole number"
         beyond = int(bound + math.copysign(1, outwards)) if whole else math.nextafter(bound, outwards)
-        (fault, *_) = [
-            line for line in faults_of(toml({key.path: beyond})) if line.startswith(f"slow.toml: {key.path}")
-        ]
+        faults = faults_of(toml({**base, key.path: beyond}))
+        (fault, *_) = [line for line in faults if line.startswith(f"slow.toml: {key.path}")]
         assert f"{key.path} = {beyond} must {key.rule}" in fault
         companions = COMPANIONS.get(f"{key.path} = {spell(bound)}", {})
         if (key.path, bound) != ("ranges.thrust_acceleration_max_m_s2", 0.1):
-            controller_toml.parse(toml({key.path: bound, **companions}), "at the bound")
+            controller_toml.parse(toml({**base, key.path: bound, **companions}), "at the bound")
 
 
 @pytest.mark.parametrize(
@@ -141,12 +157,12 @@ def test_fault_names_key_value_rule_and_fix(text: str, rule: str) -> None:
         ("[[cost]]", "cost = a list must be a section; write [cost] and its keys below"),
         ("horizon.predicton = 9", "horizon.predicton is not a setting; did you mean prediction?"),
         ("cost.iterations = 9", "cost.iterations is not a setting; did you mean optimizer.iterations?"),
-        ("cost.zzz = 9", "cost.zzz is not a setting; there are tracking_weight, effort_weight"),
+        ("cost.zzz = 9", f"cost.zzz is not a setting; {COST_KEYS}"),
         ("[horizn]", "horizn is not a section; did you mean horizon?"),
         ("tolerance = 1", "tolerance is not a section; did you mean optimizer.tolerance?"),
         (
             'cost."a\\u0007b" = 1',
-            r'cost."a\u0007b" is not a setting; there are tracking_weight, effort_weight',
+            rf'cost."a\u0007b" is not a setting; {COST_KEYS}',
         ),
     ],
 )
@@ -221,8 +237,9 @@ def test_digest_depends_on_every_value(key: Key) -> None:
             value = "3"
         case _:
             value = spell(default * 0.9 or 0.1)
-    changed = controller_toml.parse(f"{key.path} = {value}", "changed")
-    assert changed.digest != Settings().digest
+    base = LAGS if key.path == "cost.norm" else base_of(key.path)
+    changed = controller_toml.parse(f"{toml(base)}{key.path} = {value}", "changed")
+    assert changed.digest != Settings.model_validate(nested(base)).digest
 
 
 def test_digest_ignores_spelling() -> None:

@@ -19,6 +19,10 @@ from tests.support.cases import SCALARS
 Values = dict[str, Any]
 """Settings by their dotted paths."""
 
+LAGS: Values = {"model.roll_lag_s": 0.3, "model.pitch_lag_s": 0.3}
+QUADRATIC: Values = LAGS | {"cost.norm": "quadratic"}
+"""The fewest values that make a controller with a quadratic cost."""
+
 RESERVED = KEYWORDS | STANDARD_NAMES
 NUMBERS = [key for key in KEYS.values() if key.low is not None]
 CHOICES = [key for key in KEYS.values() if key.kind == "one of"]
@@ -101,6 +105,11 @@ def settings_in(scalar: str) -> st.SearchStrategy[Settings]:
 
     drawn = valid_values().map(lambda values: values | {"code.scalar": scalar}).filter(representable)
     return drawn.map(lambda values: Settings.model_validate(nested(values)))
+
+
+def base_of(path: str) -> Values:
+    """Return the fewest values beside which a controller uses the key at `path`."""
+    return {} if is_used(Settings(), *path.split(".")) else QUADRATIC
 
 
 def choices_of(key: Key) -> list[str]:
