@@ -12,6 +12,7 @@ A command held over a step gives the constants below. All arithmetic has 40 digi
 float64 once.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -25,7 +26,8 @@ GRAVITY_M_S2: Final = 9.81
 _LEAK_1_S: Final = "0.001"
 """The integral part decays at this rate, so that a loop that never answers has a bounded model."""
 
-_SETTLED: Final = 1e-9
+_SETTLING: Final = 42
+"""Lags after which what decays with at least half their rate is below 1e-9."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,8 @@ class AttitudeConstants:
     tilt_row:                 (2, 4) the next a from [a, i, c, u].
     integral_row:             (2, 4) the next i from the same.
     lagged_share:             (2,) share of u - c that c takes in a step.
-    limit_m_step2:            beyond every |a|, |i|, |c| of such commands, also if they turn with the heading.
+    limit_m_step2:            beyond every |a|, |i|, |c|, |u| of all commands within the tilt limit, also if
+                              they turn with the heading.
     """
 
     gain_m_step2_rad: float
@@ -97,22 +100,25 @@ def attitude_loops(model: Model, damping: Damping) -> tuple[AttitudeLoop, Attitu
 def attitude_constants(settings: Sections) -> AttitudeConstants:
     """Derive the constants of the attitude model."""
     model, period_s = settings.model, mp.mpf(settings.horizon.update_period_s)
-    rows = [_rows(loop, period_s) for loop in attitude_loops(model, settings.damping)]
-    gain = GRAVITY_M_S2 * model.acceleration_per_tilt * settings.horizon.update_period_s**2
+    loops = attitude_loops(model, settings.damping)
+    rows = [_rows(loop, period_s) for loop in loops]
+    step_s = settings.horizon.update_period_s
+    gain = GRAVITY_M_S2 * model.acceleration_per_tilt * (step_s * step_s)
     loop_gains = np.array([model.roll_gain, model.pitch_gain])
     trim_rad = np.array([model.roll_trim_rad, model.pitch_trim_rad])
-    command_limit = gain * ((loop_gains * settings.limits.tilt_rad) - np.abs(trim_rad))
+    tilt_rad = loop_gains * settings.limits.tilt_rad
+    largest = float(np.max(gain * (tilt_rad + np.abs(trim_rad))))
     return AttitudeConstants(
         gain_m_step2_rad=gain,
         command_gain_m_step2_rad=gain * loop_gains,
         command_rad_step2_m=1 / (gain * loop_gains),
         trim_rad=trim_rad,
         trim_command_rad=trim_rad / loop_gains,
-        command_limit_m_step2=command_limit,
+        command_limit_m_step2=gain * (tilt_rad - np.abs(trim_rad)),
         tilt_row=np.array([row[0] for row in rows]),
         integral_row=np.array([row[1] for row in rows]),
         lagged_share=np.array([row[2][3] for row in rows]),
-        limit_m_step2=max(_peak(np.array(row)) for row in rows) * float(np.max(command_limit)),
+        limit_m_step2=max(_peak(*axis, period_s) for axis in zip(rows, loops, strict=True)) * largest,
     )
 
 
@@ -128,13 +134,16 @@ def _rows(loop: AttitudeLoop, period_s: Any) -> list[list[float]]:
     return [[float(value) for value in (*transition[row, :], inputs[row])] for row in range(3)]
 
 
-def _peak(rows: NDArray[np.float64]) -> float:
-    """Return a bound of |a|, |i|, |c| for |u| <= 1: the sum of the absolute impulse responses.
+def _peak(rows: list[list[float]], loop: AttitudeLoop, period_s: Any) -> float:
+    """Return a bound of |a|, |i|, |c| for |u| <= 1: the sums of the absolute impulse responses.
 
+    When all but a slow integral part has settled, responses keep their signs: the sum of the rest is exact.
     Twice that, since the components of a vector that turns are at most the sum of both.
     """
-    response, sums = rows[:, 3].copy(), np.zeros(3)
-    while np.max(np.abs(response)) > _SETTLED:
-        sums += np.abs(response)
-        response = rows[:, :3] @ response
-    return float(2.02 * max(1.0, np.max(sums)))
+    response, sums = [row[3] for row in rows], [0.0] * 3
+    for _ in range(math.ceil(_SETTLING * max(loop.lag_s, loop.delay_s, period_s) / period_s)):
+        a, i, c = response
+        sums = [total + abs(value) for total, value in zip(sums, response, strict=True)]
+        response = [((row[0] * a) + (row[1] * i)) + (row[2] * c) for row in rows]
+    rest = mp.lu_solve(mp.eye(3) - mp.matrix([row[:3] for row in rows]), mp.matrix(response))
+    return 2.02 * max(1.0, *(total + float(abs(value)) for total, value in zip(sums, rest, strict=True)))

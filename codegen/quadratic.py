@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.attitude import AttitudeLoop, attitude_loops
 from mambo_nmpc.codegen.fixed_point import Refusal
-from mambo_nmpc.codegen.riccati import Matrix, feedback_gain, hold, mp, solve_riccati
+from mambo_nmpc.codegen.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
 from mambo_nmpc.codegen.settings.fields import SHORTEST_LAG_S
 from mambo_nmpc.codegen.settings.sections import Cost, Damping, Horizon, Model, Sections
 
@@ -98,20 +98,18 @@ class _Law:
 
     def _two_moves(self, ramp: int) -> tuple[Matrix, list[Any]]:
         """Sum the cost over both moves as a quadratic form of state and moves, and minimise it."""
-        states = mp.zeros(8, 10)
-        states[:, :8] = mp.eye(8)
-        form, before = mp.zeros(10), states[_COMMAND, :].copy()
-        for move, steps in enumerate((1, ramp)):
-            after = mp.zeros(1, 10)
-            after[8 + move] = mp.mpf(1)
-            change = (after - before) / steps
-            for _ in range(steps):
-                error, velocity = states[0, :], states[1, :]
-                form += (error.T * error) + (self._state_cost[1, 1] * (velocity.T * velocity))
-                form += self._input_cost[0] * (change.T * change)
-                states = (self._transition * states) + (self._input * change)
-            before = after
-        form += states.T * self._to_go * states
+        form = mp.zeros(10)
+        form[:8, :8] = self._to_go
+        first, second = mp.zeros(1, 10), mp.zeros(1, 10)
+        first[8], first[_COMMAND] = mp.mpf(1), mp.mpf(-1)
+        second[9], second[8] = mp.mpf(1) / ramp, mp.mpf(-1) / ramp
+        for change, steps in ((second, ramp), (first, 1)):
+            transition, cost = mp.eye(10), mp.zeros(10)
+            transition[:8, :8] = self._transition
+            transition[:8, :] += self._input * change
+            cost[:8, :8] = self._state_cost
+            cost += self._input_cost[0] * (change.T * change)
+            form = sum_costs(transition, cost, form, steps)
         curvature = form[8:, 8:]
         ratios = [
             curvature[0, 1] / curvature[0, 0],
@@ -162,8 +160,9 @@ def quadratic_refusals(settings: Sections) -> list[Refusal]:
     horizon, model, damping = settings.horizon, settings.model, settings.damping
     for angle in ("roll", "pitch"):
         feedback_s = getattr(damping, f"{angle}_rate_feedback_s")
-        if getattr(model, f"{angle}_lag_s") - feedback_s < SHORTEST_LAG_S:
-            rule = f'must be at least {feedback_s + SHORTEST_LAG_S:g} with cost.norm = "quadratic"'
+        shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
+        if getattr(model, f"{angle}_lag_s") < shortest_s:
+            rule = f'must be at least {shortest_s:g} with cost.norm = "quadratic"'
             if feedback_s:
                 rule += f" and damping.{angle}_rate_feedback_s = {feedback_s:g}"
             refused.append(Refusal("model", f"{angle}_lag_s", rule))
@@ -171,7 +170,7 @@ def quadratic_refusals(settings: Sections) -> list[Refusal]:
         if abs(trim_rad) >= gain * settings.limits.tilt_rad:
             rule = f"must be less than model.{angle}_gain times limits.tilt_rad"
             refused.append(Refusal("model", f"{angle}_trim_rad", rule))
-    if settings.observer.outage_s > MOST_OUTAGE_STEPS * horizon.update_period_s:
+    if round(settings.observer.outage_s / horizon.update_period_s) > MOST_OUTAGE_STEPS:
         rule = f"must be at most {MOST_OUTAGE_STEPS} times horizon.update_period_s"
         refused.append(Refusal("observer", "outage_s", rule))
     if horizon.ramp_s and horizon.ramp_s < 2 * horizon.update_period_s:

@@ -43,7 +43,10 @@ def solve_riccati(transition: Matrix, inputs: Matrix, state_cost: Matrix, input_
     a, g, h = transition, inputs * mp.inverse(input_cost) * inputs.T, state_cost
     identity = mp.eye(a.rows)
     for _ in range(_DOUBLINGS):
-        solved = mp.inverse(identity + (g * h))
+        try:
+            solved = mp.inverse(identity + (g * h))
+        except ZeroDivisionError:
+            break
         grown = a.T * h * solved * a
         a, g, h = a * solved * a, g + (a * solved * g * a.T), h + grown
         if mp.mnorm(inputs.T * grown, "f") <= _CONVERGED * mp.mnorm(inputs.T * h, "f"):
@@ -55,3 +58,18 @@ def feedback_gain(transition: Matrix, inputs: Matrix, input_cost: Matrix, to_go:
     """Return the gain K (m, n) of the optimal feedback u = -K x for the cost to go `to_go`."""
     weighted = inputs.T * to_go
     return mp.inverse(input_cost + (weighted * inputs)) * weighted * transition
+
+
+def sum_costs(transition: Matrix, state_cost: Matrix, to_go: Matrix, steps: int) -> Matrix:
+    """Return M for which x^T M x sums x^T state_cost x over `steps` steps of x+ = transition x, from x on.
+
+    The state behind them costs x^T to_go x. Doubles the number of steps, for there may be thousands.
+    """
+    if steps == 0:
+        return to_go
+    power, total = transition, state_cost
+    for digit in f"{steps:b}"[1:]:
+        total, power = total + (power.T * total * power), power * power
+        if digit == "1":
+            total, power = state_cost + (transition.T * total * transition), transition * power
+    return total + (power.T * to_go * power)

@@ -78,6 +78,51 @@ def valid_values(draw: st.DrawFn) -> Values:
     return {path: drawn[path] for path in KEYS if is_used(Settings(), *path.split("."))}
 
 
+@st.composite
+def quadratic_values(draw: st.DrawFn) -> Values:
+    """Draw settings of a quadratic cost, every key that it uses free within the rules, by their dotted paths.
+
+    The ramp alone may make a loop unstable, which is refused: see `quadratic_settings`.
+    """
+    values: Values = {"cost.norm": "quadratic"}
+    period_s = draw(numbers("horizon.update_period_s"))
+    tilt_rad = draw(numbers("limits.tilt_rad"))
+    thrust_min = draw(numbers("ranges.thrust_acceleration_min_m_s2"))
+    none = st.just(0.0)
+    values |= {
+        "horizon.update_period_s": period_s,
+        "horizon.ramp_s": draw(none | numbers("horizon.ramp_s", low=max(0.02, 2 * period_s))),
+        "limits.tilt_rad": tilt_rad,
+        "observer.outage_s": draw(numbers("observer.outage_s", high=min(2, 250 * period_s))),
+        "ranges.thrust_acceleration_min_m_s2": thrust_min,
+        "ranges.thrust_acceleration_max_m_s2": draw(
+            numbers("ranges.thrust_acceleration_max_m_s2", low=math.nextafter(thrust_min, math.inf))
+        ),
+        "code.scalar": draw(st.sampled_from(["float32", "float64"])),
+        "code.prefix": draw(prefixes()),
+    }
+    for angle in ("roll", "pitch"):
+        feedback_s = draw(none | numbers(f"damping.{angle}_rate_feedback_s"))
+        gain = draw(numbers(f"model.{angle}_gain"))
+        largest = min(0.2, 0.999 * gain * tilt_rad)
+        values |= {
+            f"damping.{angle}_rate_feedback_s": feedback_s,
+            f"model.{angle}_lag_s": draw(numbers(f"model.{angle}_lag_s", low=feedback_s + 0.001001)),
+            f"model.{angle}_delay_s": draw(none | numbers(f"model.{angle}_delay_s", low=0.001)),
+            f"model.{angle}_gain": gain,
+            f"model.{angle}_trim_rad": draw(none | st.floats(-largest, largest)),
+        }
+    for name in ("model.drag_1_s", "observer.age_s", "cost.velocity_weight_s"):
+        values[name] = draw(none | numbers(name))
+    settings = Settings.model_validate(nested(QUADRATIC))
+    for key in KEYS.values():
+        if key.path not in values and is_used(settings, *key.path.split(".")):
+            values[key.path] = draw(
+                st.sampled_from(choices_of(key)) if key.low is None else numbers(key.path)
+            )
+    return {path: values[path] for path in KEYS if path in values}
+
+
 @cache
 def prefixes() -> st.SearchStrategy[str]:
     """Draw a prefix, of up to three words and 24 letters."""
@@ -104,6 +149,22 @@ def settings_in(scalar: str) -> st.SearchStrategy[Settings]:
         return True
 
     drawn = valid_values().map(lambda values: values | {"code.scalar": scalar}).filter(representable)
+    return drawn.map(lambda values: Settings.model_validate(nested(values)))
+
+
+def quadratic_settings(scalar: str) -> st.SearchStrategy[Settings]:
+    """Draw valid settings of a quadratic cost; a ramp with which the loop is unstable is drawn again."""
+
+    def is_stable(values: Values) -> bool:
+        try:
+            Settings.model_validate(nested(values))
+        except ValidationError as error:
+            if any(fault["loc"] != ("horizon", "ramp_s") for fault in error.errors()):
+                raise
+            return False
+        return True
+
+    drawn = quadratic_values().map(lambda values: values | {"code.scalar": scalar}).filter(is_stable)
     return drawn.map(lambda values: Settings.model_validate(nested(values)))
 
 

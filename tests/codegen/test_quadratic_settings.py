@@ -1,0 +1,168 @@
+"""Settings of a quadratic cost: what the rules between keys admit, and what is said of the rest."""
+
+import pytest
+from hypothesis import given
+from hypothesis import settings as profile
+
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.errors import InvalidSettingsError
+from mambo_nmpc.codegen.settings import controller_toml
+from mambo_nmpc.codegen.settings.keys import KEYS, Key, spell
+from mambo_nmpc.codegen.settings.methods import is_used
+from mambo_nmpc.codegen.settings.model import Settings
+from tests.support.strategies import LAGS, QUADRATIC, Values, choices_of, nested, quadratic_settings, toml
+
+USED = {
+    norm: [
+        key for key in KEYS.values() if is_used(Settings.model_validate(nested(values)), *key.path.split("."))
+    ]
+    for norm, values in (("1-norm", LAGS), ("quadratic", QUADRATIC))
+}
+
+
+def faults_of(values: Values) -> list[str]:
+    """Return the lines that `values`, by their dotted paths, get as the file slow.toml."""
+    with pytest.raises(InvalidSettingsError) as caught:
+        controller_toml.parse(toml(values), "slow.toml")
+    return list(caught.value.faults)
+
+
+def other_value(key: Key) -> str | float:
+    """Return a value of a key that is not its default."""
+    section, name = key.path.split(".")
+    default = Settings().model_dump()[section][name]
+    if key.kind == "one of":
+        return next(choice for choice in choices_of(key) if choice != default)
+    return 3 if key.kind == "whole number" else default * 0.9 or 0.1
+
+
+def test_both_norms_use_some_keys_and_no_key_is_of_none() -> None:
+    """Every key is used by one norm at least; some by both."""
+    paths = {norm: {key.path for key in keys} for norm, keys in USED.items()}
+    assert paths["1-norm"] | paths["quadratic"] == set(KEYS)
+    assert {"horizon.update_period_s", "model.roll_lag_s", "limits.tilt_rad", "cost.norm"} <= (
+        paths["1-norm"] & paths["quadratic"]
+    )
+    assert "optimizer" not in {path.split(".")[0] for path in paths["quadratic"]}
+    assert {"observer", "damping"}.isdisjoint(path.split(".")[0] for path in paths["1-norm"])
+
+
+@pytest.mark.parametrize("norm", USED)
+def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -> None:
+    """Each key of the other norm alone, with its value and what to do; its default may stand there."""
+    base = {"1-norm": LAGS, "quadratic": QUADRATIC}[norm]
+    printed = "model.position_update"  # which admits no lag, as a quadratic cost wants one
+    others = [key for key in KEYS.values() if key not in USED[norm] and key.path != printed]
+    for key in others:
+        value = other_value(key)
+        spelling = spell(value) if key.low is None else value
+        fault = f'{key.path} = {spelling} has no effect with cost.norm = "{norm}"; leave it out'
+        assert faults_of({**base, key.path: value}) == [f"slow.toml: {fault}"]
+        section, name = key.path.split(".")
+        default = Settings().model_dump()[section][name]
+        settings = controller_toml.parse(toml({**base, key.path: default}), "with the default")
+        assert settings == controller_toml.parse(toml(base), "without it")
+
+
+def test_keys_without_effect_are_all_named() -> None:
+    """One line for each of them."""
+    lines = faults_of({**QUADRATIC, "horizon.prediction": 5, "optimizer.iterations": 7})
+    assert [line.split()[1] for line in lines] == ["horizon.prediction", "optimizer.iterations"]
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        (
+            {"model.roll_lag_s": 0.0},
+            'model.roll_lag_s = 0.0 must be at least 0.001 with cost.norm = "quadratic"',
+        ),
+        (
+            {"model.roll_lag_s": 0.05, "damping.roll_rate_feedback_s": 0.05},
+            'model.roll_lag_s = 0.05 must be at least 0.051 with cost.norm = "quadratic" and '
+            "damping.roll_rate_feedback_s = 0.05",
+        ),
+        (
+            {"model.pitch_lag_s": 0.1, "damping.pitch_rate_feedback_s": 0.2},
+            'model.pitch_lag_s = 0.1 must be at least 0.201 with cost.norm = "quadratic" and '
+            "damping.pitch_rate_feedback_s = 0.2",
+        ),
+        (
+            {"limits.tilt_rad": 0.1, "model.roll_trim_rad": -0.1},
+            "model.roll_trim_rad = -0.1 must be less than model.roll_gain times limits.tilt_rad",
+        ),
+        (
+            {"limits.tilt_rad": 0.2, "model.pitch_gain": 0.5, "model.pitch_trim_rad": 0.15},
+            "model.pitch_trim_rad = 0.15 must be less than model.pitch_gain times limits.tilt_rad",
+        ),
+        (
+            {"horizon.update_period_s": 0.001},
+            "observer.outage_s = 0.5 (the default) must be at most 250 times horizon.update_period_s",
+        ),
+        (
+            {"horizon.update_period_s": 0.1, "horizon.ramp_s": 0.15},
+            "horizon.ramp_s = 0.15 must be 0 or at least 2 update periods",
+        ),
+        (
+            {"horizon.ramp_s": 0.01},
+            "horizon.ramp_s = 0.01 must be 0 or lie in 0.02..2; 0 means one free move",
+        ),
+    ],
+)
+def test_values_at_odds_are_refused_with_both_keys(values: Values, fault: str) -> None:
+    """The lag exceeds the rate feedback, the trim lies within the limit, outage and ramp suit the period."""
+    lines = faults_of({**QUADRATIC, **values})
+    assert f"slow.toml: {fault}" in lines
+    assert len(lines) == 1
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"model.roll_lag_s": 0.051, "damping.roll_rate_feedback_s": 0.05},
+        {"model.pitch_lag_s": 0.071, "damping.pitch_rate_feedback_s": 0.07},
+        {"limits.tilt_rad": 0.1, "model.roll_trim_rad": -0.0999},
+        {"horizon.update_period_s": 0.002},
+        {"horizon.update_period_s": 0.1, "horizon.ramp_s": 0.2},
+        {"horizon.update_period_s": 0.0011, "observer.outage_s": 0.275},
+        {"horizon.update_period_s": 0.0017, "observer.outage_s": 0.425},
+        {"observer.outage_s": 0.0},
+        {"horizon.ramp_s": 0.02},
+    ],
+)
+def test_values_at_the_rule_are_admitted(values: Values) -> None:
+    """The same rules, at what they admit."""
+    controller_toml.parse(toml({**QUADRATIC, **values}), "at the rule")
+
+
+def test_a_long_ramp_at_a_short_period_is_admitted() -> None:
+    """2000 control steps of ramp, and an integral part that is slow besides: their constants are derived."""
+    values = {
+        "horizon.update_period_s": 0.001,
+        "horizon.ramp_s": 2.0,
+        "cost.response_time_s": 1.0,
+        "observer.outage_s": 0.25,
+        "model.roll_integral_1_s": 0.005,
+    }
+    design = Design(controller_toml.parse(toml({**QUADRATIC, **values}), "slow and quick"))
+    assert design.law.moves == 2
+    assert design.attitude.limit_m_step2 >= 2 * max(design.attitude.command_limit_m_step2)
+
+
+@profile(max_examples=25)
+@given(quadratic_settings("float64"))
+def test_any_valid_settings_have_finite_constants_and_read_back_equal(settings: Settings) -> None:
+    """No rule is missing: whatever is admitted has gains, and a file that holds every bit of it."""
+    read_back = controller_toml.parse(controller_toml.to_toml(settings), "written")
+    assert (read_back, read_back.digest) == (settings, settings.digest)
+    design = Design(settings)
+    for constants in (design.law, design.observer, design.attitude):
+        for name, value in vars(constants).items():
+            assert all(abs(number) < 1e12 for number in list_of(value)), name
+    assert max(design.law.spectral_radius) < 1
+
+
+def list_of(value: object) -> list[float]:
+    """Return the numbers of an array or a single one."""
+    flat: list[float] = value.ravel().tolist() if hasattr(value, "ravel") else [value]  # type: ignore[list-item]
+    return flat

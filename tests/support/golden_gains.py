@@ -1,0 +1,44 @@
+"""The constants of two controllers with a quadratic cost, which must be the same on every processor.
+
+python -m tests.support.golden_gains             print them as JSON, every number with all its digits
+python -m tests.support.golden_gains --write     write them to the golden file; read the diff
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_nmpc.codegen.design import Design
+from tests.support.quadratic import ONE_MOVE, TWO_MOVES, settings_of
+
+GOLDEN: Final = Path(__file__).with_name("golden_gains.json")
+CONTROLLERS: Final = {
+    "one move": ONE_MOVE | {"model.drag_1_s": 0.067, "observer.age_s": 0.013, "model.roll_trim_rad": 0.017},
+    "two moves": TWO_MOVES | {"model.pitch_gain": 0.93, "model.acceleration_per_tilt": 1.07},
+}
+_MACHINES: Final = "spectral_radius"
+"""Of no effect but the refusal of a loop that is unstable: LAPACK rounds it as the processor does."""
+
+
+def constants() -> dict[str, dict[str, Any]]:
+    """Return the constants of each controller by their names."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, values in CONTROLLERS.items():
+        design = Design(settings_of(values))
+        records = (design.law, design.observer, design.attitude)
+        joint = {key: value for record in records for key, value in vars(record).items() if key != _MACHINES}
+        found[name] = {
+            key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in joint.items()
+        }
+    return found
+
+
+if __name__ == "__main__":
+    text = json.dumps(constants(), indent=1)
+    if sys.argv[1:] == ["--write"]:
+        GOLDEN.write_text(text + "\n", "utf-8")
+    else:
+        print(text)

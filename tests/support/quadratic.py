@@ -1,0 +1,170 @@
+"""The quadratic cost's law once more, in NumPy and SciPy: what the generator's constants are compared with.
+
+Along one axis of the heading the state is [e, v, w, j, a, i, c, u], in SI units; i is the integral of u - a.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from mambo_nmpc.codegen.settings.model import Settings
+from tests.support.strategies import Values, nested
+
+Array = NDArray[np.float64]
+
+ANGLES: Final = ("roll", "pitch")
+MAMBO_LOOPS: Final[Values] = {
+    "model.roll_lag_s": 0.28,
+    "model.pitch_lag_s": 0.1 / 0.65,
+    "model.roll_delay_s": 0.045,
+    "model.pitch_delay_s": 0.06,
+    "model.roll_integral_1_s": 1.0,
+    "model.pitch_integral_1_s": 0.5 / 0.65,
+}
+ONE_MOVE: Final[Values] = MAMBO_LOOPS | {
+    "cost.norm": "quadratic",
+    "cost.response_time_s": 0.01 ** (1 / 3),
+    "damping.roll_rate_feedback_s": 0.05,
+    "model.attitude": "predicted",
+    "target.acceleration": "tracked",
+}
+"""One free move, for the Mambo."""
+TWO_MOVES: Final[Values] = {
+    "cost.norm": "quadratic",
+    "cost.response_time_s": 0.003 ** (1 / 3),
+    "horizon.ramp_s": 0.4,
+    "model.roll_lag_s": 0.1347,
+    "model.pitch_lag_s": 0.1347,
+    "model.roll_delay_s": 0.0235,
+    "model.pitch_delay_s": 0.0235,
+    "model.roll_integral_1_s": 0.4616,
+    "model.pitch_integral_1_s": 0.4616,
+    "limits.tilt_rad": 0.5,
+    "observer.disturbance_noise": 3.0,
+    "observer.position_noise": 0.001,
+    "observer.velocity_noise": 0.15,
+}
+"""Two free moves, for the Crazyflie."""
+
+
+def settings_of(values: Values) -> Settings:
+    """Return the settings with `values` by their dotted paths."""
+    return Settings.model_validate(nested(values))
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: x+ = transition x + change (u+ - u), and the costs of e, v and of the change."""
+
+    period_s: float
+    integral_1_s: float
+    ramp: int
+    transition: Array
+    change: Array
+    state_cost: Array
+    change_cost: float
+
+    @property
+    def scale(self) -> Array:
+        """Factors from rows for SI units to those of the C, for steps: the integral part as acceleration."""
+        period_s, share = self.period_s, self.integral_1_s
+        return np.array([period_s**2, period_s, 1, 1 / period_s, 1, 1 / share if share else 0, 1, 1])
+
+    def gain(self, to_go: Array) -> Array:
+        """Return K (8,) of the best change -K x, if the state behind it costs x^T to_go x."""
+        weighted = self.change @ to_go
+        row: Array = (weighted @ self.transition) / (self.change_cost + (weighted @ self.change))
+        return row
+
+
+def attitude_model(settings: Settings, angle: str) -> tuple[Array, Array]:
+    """Return how [a, i, c] goes on over a control step (3, 3), and what the command adds (3,)."""
+    model, period_s = settings.model, settings.horizon.update_period_s
+    lag_s = getattr(model, f"{angle}_lag_s") - getattr(settings.damping, f"{angle}_rate_feedback_s")
+    delay_s, integral = (getattr(model, f"{angle}_{name}") for name in ("delay_s", "integral_1_s"))
+    prompt = delay_s == 0
+    follow = 1 / (period_s if prompt else delay_s)
+    rates = np.array(
+        [
+            [-1 / lag_s, integral / lag_s, 0 if prompt else 1 / lag_s, 1 / lag_s if prompt else 0],
+            [-1, -0.001, 0, 1],
+            [0, 0, -follow, follow],
+            [0, 0, 0, 0],
+        ]
+    )
+    exact = expm(rates * period_s)
+    return exact[:3, :3], exact[:3, 3]
+
+
+def axis_of(settings: Settings, angle: str) -> Axis:
+    """Return the model and the cost along the axis that `angle` tilts to."""
+    model, period_s, cost = settings.model, settings.horizon.update_period_s, settings.cost
+    lag_s = getattr(model, f"{angle}_lag_s") - getattr(settings.damping, f"{angle}_rate_feedback_s")
+    delay_s, integral = (getattr(model, f"{angle}_{name}") for name in ("delay_s", "integral_1_s"))
+    rates = np.zeros((8, 8))
+    rates[0, 1] = rates[1, 2] = rates[1, 4] = 1
+    rates[2, 2], rates[2, 3], rates[3, 3] = -0.001, -1, -1
+    rates[4, 4], rates[4, 5], rates[4, 6 if delay_s else 7] = -1 / lag_s, integral / lag_s, 1 / lag_s
+    rates[5, 4], rates[5, 5], rates[5, 7] = -1, -0.001, 1
+    rates[6, 6], rates[6, 7] = -1 / (delay_s or period_s), 1 / (delay_s or period_s)
+    transition = expm(rates * period_s)
+    state_cost = np.zeros((8, 8))
+    state_cost[0, 0], state_cost[1, 1] = 1, cost.velocity_weight_s**2
+    return Axis(
+        period_s=period_s,
+        integral_1_s=integral,
+        ramp=round(settings.horizon.ramp_s / period_s),
+        transition=transition,
+        change=transition[:, 7].copy(),
+        state_cost=state_cost,
+        change_cost=(cost.response_time_s**3 / period_s) ** 2,
+    )
+
+
+def long_horizon_gain(axis: Axis, steps: int) -> Array:
+    """Return the gain of the first of `steps` moves without limits, by dynamic programming."""
+    to_go = axis.state_cost
+    for _ in range(steps):
+        closed = axis.transition - np.outer(axis.change, gain := axis.gain(to_go))
+        to_go = axis.state_cost + (closed.T @ to_go @ closed) + (axis.change_cost * np.outer(gain, gain))
+    return axis.gain(to_go)
+
+
+def two_move_cost(axis: Axis, steps: int) -> tuple[Array, Array]:
+    """Simulate `steps` control steps; return H (2, 2) and G (2, 8) of the cost by [U1, U2].
+
+    The cost is U^T H U / 2 + U^T G x plus what the moves do not change. The command is U1 behind one step, U2
+    behind the ramp, and then without limits the best over a long horizon.
+    """
+    gain = long_horizon_gain(axis, steps)
+    states = np.zeros((8, 10))
+    states[:, :8] = np.eye(8)
+    moves = np.eye(10)[8:]
+    form = np.zeros((10, 10))
+    for step in range(steps):
+        if step == 0:
+            change = moves[0] - states[7]
+        elif step <= axis.ramp:
+            change = (moves[1] - moves[0]) / axis.ramp
+        else:
+            change = -(gain @ states)
+        form += (states.T @ axis.state_cost @ states) + (axis.change_cost * np.outer(change, change))
+        states = (axis.transition @ states) + np.outer(axis.change, change)
+    return 2 * form[8:, 8:], 2 * form[8:, :8]
+
+
+def settling_steps(settings: Settings) -> int:
+    """Return control steps after which a move no longer changes anything."""
+    slowest_s = max(settings.cost.response_time_s, settings.cost.velocity_weight_s, 0.3)
+    return round((settings.horizon.ramp_s + (40 * slowest_s)) / settings.horizon.update_period_s)
+
+
+def closed_loop(axis: Axis, row: Any) -> Array:
+    """Return the transition of [e, v, a, i, c, u] when u+ = row x, for a row (8,) in SI units."""
+    change = np.asarray(row, np.float64) - np.eye(8)[7]
+    moved = [0, 1, 4, 5, 6, 7]
+    found: Array = (axis.transition + np.outer(axis.change, change))[np.ix_(moved, moved)]
+    return found
