@@ -24,15 +24,27 @@ from mambo_nmpc.sil.files.cache import build_cached
 from tests.support.bundles import place
 from tests.support.tools import require_file, toolchain
 
-_DECLARATIONS: Final = """
+_TYPES: Final = """
 typedef REAL nmpc_real_t;
 typedef SUM nmpc_sum_t;
 typedef int... nmpc_status_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2], roll_rad, pitch_rad, yaw_rad; } nmpc_state_t;
 typedef struct { nmpc_real_t position_m[2], velocity_m_s[2]; } nmpc_target_t;
 typedef struct { nmpc_real_t roll_rad, pitch_rad; } nmpc_command_t;
-typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
 TRACKER_TYPE
+"""
+_FUNCTIONS: Final = """
+void nmpc_init(nmpc_t *);
+nmpc_status_t nmpc_reset(nmpc_t *, const nmpc_command_t *);
+nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_command_t *);
+const char *nmpc_version(void);
+int nmpc_self_test(nmpc_t *);
+unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
+void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
+TRACKER_FUNCTIONS
+"""
+_ONE_NORM: Final = """
+typedef struct { nmpc_real_t tracking, effort; } nmpc_weights_t;
 typedef struct { nmpc_real_t error_m, displacement_m_step, acceleration_m_step2; ...; } nmpc_rollout_t;
 typedef struct {
     nmpc_real_t gain_x_m_step2_rad[2], gain_y_m_step2_rad[2];
@@ -47,22 +59,47 @@ typedef struct {
     nmpc_sum_t gradient[...];
     ...;
 } nmpc_t;
-void nmpc_init(nmpc_t *);
-nmpc_status_t nmpc_reset(nmpc_t *, const nmpc_command_t *);
 nmpc_status_t nmpc_set_weights(nmpc_t *, const nmpc_weights_t *);
-nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, nmpc_real_t, nmpc_command_t *);
-const char *nmpc_version(void);
-int nmpc_self_test(nmpc_t *);
-unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
-
-void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, TRACKER_ARGUMENT nmpc_real_t,
                             nmpc_prediction_t *);
 void nmpc_predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
                                 nmpc_rollout_t *);
 void nmpc_predictor_step(nmpc_rollout_t *);
 nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
-TRACKER_FUNCTIONS
+"""
+_QUADRATIC: Final = """
+typedef struct { nmpc_real_t position_m[2], velocity_m_step[2], disturbance_m_step2[2]; } nmpc_observer_t;
+typedef struct {
+    nmpc_real_t tilt_m_step2[2], integral_m_step2[2], lagged_m_step2[2], command_m_step2[2], sine, cosine;
+} nmpc_attitude_t;
+typedef struct {
+    nmpc_observer_t observer;
+    nmpc_attitude_t attitude;
+    TRACKER_MEMBERS
+    nmpc_real_t command_rad[2];
+    unsigned char missed, saturated;
+    ...;
+} nmpc_t;
+typedef struct {
+    nmpc_real_t position_m[2], velocity_m_s[2], disturbance_m_s2[2];
+    int is_valid;
+} nmpc_estimate_t;
+nmpc_status_t nmpc_set_command(nmpc_t *, const nmpc_command_t *);
+int nmpc_is_saturated(const nmpc_t *);
+nmpc_status_t nmpc_last_estimate(const nmpc_t *, nmpc_estimate_t *);
+void nmpc_observer_clear(nmpc_t *);
+void nmpc_observer_start(nmpc_t *, const nmpc_state_t *);
+void nmpc_observer_correct(nmpc_t *, const nmpc_state_t * AGE_ARGUMENT);
+void nmpc_observer_predict(nmpc_t *, const nmpc_real_t *);
+nmpc_real_t nmpc_observer_disturbance(const nmpc_t *, int);
+void nmpc_attitude_set_command(nmpc_t *, nmpc_real_t, nmpc_real_t);
+void nmpc_attitude_reset(nmpc_t *, nmpc_real_t, nmpc_real_t);
+nmpc_real_t nmpc_attitude_roll(const nmpc_t *);
+nmpc_real_t nmpc_attitude_pitch(const nmpc_t *);
+void nmpc_attitude_measure(const nmpc_state_t *, nmpc_real_t *);
+void nmpc_attitude_advance(nmpc_t *);
+void nmpc_attitude_turn(nmpc_t *, nmpc_real_t, nmpc_real_t);
+nmpc_real_t nmpc_optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
 """
 _TRACKER: Final = {
     "TRACKER_TYPE": "typedef struct { nmpc_real_t velocity_m_s[2], acceleration_m_step2[2], "
@@ -73,7 +110,10 @@ _TRACKER: Final = {
     "void nmpc_tracker_update(nmpc_t *, const nmpc_real_t *);",
 }
 """What the declarations of a bundle with a tracker have besides."""
-_HEADERS: Final = ("cost", "math", "predictor", "self_test")
+_HEADERS: Final = {
+    "1-norm": ("cost", "math", "predictor", "self_test"),
+    "quadratic": ("attitude", "math", "observer", "optimizer", "self_test"),
+}
 
 
 def build_extension(settings: Settings) -> ModuleType:
@@ -84,9 +124,13 @@ def build_extension(settings: Settings) -> ModuleType:
 def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     """Return the extension of a bundle with prefix nmpc; builds it with gcc unless it is cached."""
     tracked = "src/nmpc_tracker.h" in files
-    headers = (*_HEADERS, "tracker") if tracked else _HEADERS
+    norm = "quadratic" if "src/nmpc_observer.h" in files else "1-norm"
+    headers = (*_HEADERS[norm], "tracker") if tracked else _HEADERS[norm]
     includes = "".join(f'#include "nmpc_{name}.h"\n' for name in headers)
-    declarations = _DECLARATIONS.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
+    declarations = _TYPES + {"1-norm": _ONE_NORM, "quadratic": _QUADRATIC}[norm] + _FUNCTIONS
+    declarations = declarations.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
+    aged = norm == "quadratic" and "NMPC_AGE_STEPS" in files["src/nmpc_observer.h"]
+    declarations = declarations.replace("AGE_ARGUMENT", ", const nmpc_real_t *" if aged else "")
     for place_holder, text in _TRACKER.items():
         declarations = declarations.replace(place_holder, text if tracked else "")
     contents = (files, includes, declarations)

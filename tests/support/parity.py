@@ -58,14 +58,15 @@ def run(controller: Controller, inputs: list[StepInputs], seed: int) -> Run:
 def differences(a: Run, b: Run) -> dict[str, int]:
     """Count by field the values that differ in any bit; empty when there are none."""
     counts = {
-        name: _total([getattr(s, name) for s in a.steps], [getattr(s, name) for s in b.steps])
+        name: count_differing([getattr(s, name) for s in a.steps], [getattr(s, name) for s in b.steps])
         for name in FIELDS
     }
-    counts["setters"] = _total(a.setters, b.setters)
+    counts["setters"] = count_differing(a.setters, b.setters)
     return {name: count for name, count in counts.items() if count}
 
 
-def _total(ours: list[NDArray[Any]], theirs: list[NDArray[Any]]) -> int:
+def count_differing(ours: list[NDArray[Any]], theirs: list[NDArray[Any]]) -> int:
+    """Count the values of equally many arrays that differ in any bit."""
     return sum(_differing(a, b) for a, b in zip(ours, theirs, strict=True))
 
 

@@ -168,3 +168,69 @@ def closed_loop(axis: Axis, row: Any) -> Array:
     moved = [0, 1, 4, 5, 6, 7]
     found: Array = (axis.transition + np.outer(axis.change, change))[np.ix_(moved, moved)]
     return found
+
+
+CORNER_SETTINGS: Final[tuple[Values, ...]] = (
+    ONE_MOVE
+    | {"model.attitude": "measured", "target.acceleration": "none", "damping.roll_rate_feedback_s": 0.0},
+    TWO_MOVES | {"observer.outage_s": 0.03},
+    ONE_MOVE
+    | {"horizon.ramp_s": 0.4, "model.drag_1_s": 0.067, "observer.age_s": 0.041, "model.roll_trim_rad": 0.02},
+    TWO_MOVES
+    | {
+        "target.acceleration": "tracked",
+        "limits.tilt_rad": 0.05,
+        "observer.outage_s": 0.0,
+        "model.pitch_trim_rad": -0.03,
+    },
+    TWO_MOVES
+    | {"observer.disturbance_limit_m_s2": 0.0, "ranges.position_m": 5.0, "ranges.velocity_m_s": 2.0},
+)
+"""One move and two, attitude measured and predicted, with tracker, feedback, drag, age, trim and without."""
+
+
+def quadratic_case(index: int, scalar: str) -> Settings:
+    """Make the valid settings number `index`: the corners first, then random ones of a seed."""
+    if index < len(CORNER_SETTINGS):
+        return settings_of(CORNER_SETTINGS[index] | {"code.scalar": scalar})
+    rng = np.random.default_rng(index)
+
+    def some(low: float, high: float) -> float:
+        return float(rng.choice([0.0, 10.0 ** rng.uniform(np.log10(low), np.log10(high))]))
+
+    period_s = float(rng.choice([0.001, 0.0025, 0.01, 0.01, 0.02, 0.1]))
+    tilt_rad = float(rng.choice([0.05, 0.35, 0.5, 1.2]))
+    values: Values = {
+        "horizon.update_period_s": period_s,
+        "horizon.ramp_s": float(rng.choice([0.0, max(0.02, 2 * period_s), 0.4, 1.0])),
+        "limits.tilt_rad": tilt_rad,
+        "target.acceleration": str(rng.choice(["none", "tracked"])),
+        "target.tracker_gain": float(rng.uniform(0.05, 1)),
+        "model.attitude": str(rng.choice(["measured", "predicted"])),
+        "model.acceleration_per_tilt": float(rng.uniform(0.5, 1.5)),
+        "model.drag_1_s": some(0.01, 5),
+        "cost.norm": "quadratic",
+        "cost.response_time_s": float(10.0 ** rng.uniform(-1.5, 0.2)),
+        "cost.velocity_weight_s": some(0.01, 2),
+        "observer.disturbance_limit_m_s2": float(rng.choice([0.0, 3.0, 20.0])),
+        "observer.age_s": some(0.001, 0.2),
+        "observer.outage_s": float(rng.integers(0, 40)) * period_s if period_s < 0.05 else 0.3,
+        "ranges.position_m": float(rng.choice([5.0, 1000.0, 10000.0])),
+        "ranges.velocity_m_s": float(rng.choice([2.0, 100.0])),
+        "code.scalar": scalar,
+    }
+    noises = ("acceleration_noise", "disturbance_noise", "position_noise", "velocity_noise")
+    values |= {f"observer.{name}": float(10.0 ** rng.uniform(-3, 1)) for name in noises}
+    for angle in ANGLES:
+        gain, feedback_s = float(rng.uniform(0.5, 1.5)), some(0.001, 0.2)
+        values |= {
+            f"damping.{angle}_rate_feedback_s": feedback_s,
+            f"model.{angle}_lag_s": feedback_s + float(10.0 ** rng.uniform(-2.9, 0.2)),
+            f"model.{angle}_delay_s": some(0.001, 0.3),
+            f"model.{angle}_integral_1_s": some(0.01, 20),
+            f"model.{angle}_gain": gain,
+            f"model.{angle}_trim_rad": float(rng.choice([0.0, 1.0]))
+            * min(0.2, 0.9 * gain * tilt_rad)
+            * rng.uniform(-1, 1),
+        }
+    return settings_of(values)

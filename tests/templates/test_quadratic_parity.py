@@ -1,0 +1,227 @@
+"""With a quadratic cost the C computes the bits of the reference: per sub-block, then whole steps."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.reference import ExactReferenceController
+from mambo_nmpc.codegen.reference.attitude import AttitudeModel, AttitudeState
+from mambo_nmpc.codegen.reference.exact_arithmetic import exact_arithmetic
+from mambo_nmpc.codegen.reference.exact_optimizer import ExactOptimizer
+from mambo_nmpc.codegen.reference.observer import Estimate, KalmanObserver
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.build import build_library
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from tests.support.extension import build_extension
+from tests.support.quadratic import CORNER_SETTINGS, quadratic_case
+from tests.support.quadratic_parity import differences, inputs_of_steps, run
+from tests.support.tools import toolchain
+
+BUILDS = [("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2")]
+SCALARS = ("float32", "float64")
+FEW_SETTINGS = range(len(CORNER_SETTINGS) + 2)
+MANY_SETTINGS = range(50)
+CASES = 300
+
+
+class SubBlocks:
+    """The C of one set of settings beside the reference's sub-blocks."""
+
+    def __init__(self, settings: Settings, seed: int) -> None:
+        extension = build_extension(settings)
+        self.ffi, self.lib = extension.ffi, extension.lib
+        self.design = Design(settings)
+        self.products = exact_arithmetic(self.design)
+        self.numbers = self.products.numbers
+        self.scalar = self.numbers.scalar
+        self.controller = self.ffi.new("nmpc_t *")
+        self._rng = np.random.default_rng(seed)
+
+    def draw(self, limit: float, count: int = 2) -> NDArray[Any]:
+        """Draw numbers (1, count) of very different sizes: within the limit, at it, 0, or 1.5 times of it."""
+        rng = self._rng
+        sizes = rng.choice([1.0, 1.0, 0.1, 1e-3, 0.0, 1.5], (1, count))
+        drawn = np.where(rng.random((1, count)) < 0.15, np.sign(sizes - 0.5), rng.uniform(-1, 1, (1, count)))
+        values: NDArray[Any] = (limit * sizes * drawn).astype(self.scalar)
+        return values
+
+    def put(self, block: str, **members: NDArray[Any]) -> None:
+        """Set members (1, 2) or (1,) of a part of the controller."""
+        for name, values in members.items():
+            numbers = values.ravel().tolist()
+            setattr(getattr(self.controller, block), name, numbers if len(numbers) > 1 else numbers[0])
+
+    def get(self, block: str, name: str) -> bytes:
+        """Return the bits of a member of a part of the controller."""
+        member = getattr(getattr(self.controller, block), name)
+        values = [member] if isinstance(member, float) else list(member)
+        return np.array(values, self.scalar).tobytes()
+
+    def pointer(self, kind: str, values: NDArray[Any]) -> Any:
+        """Point at numbers, which the caller keeps."""
+        return self.ffi.cast(f"{kind} *", self.ffi.from_buffer(values))
+
+    def reals(self, values: NDArray[Any]) -> Any:
+        """Point at numbers."""
+        return self.pointer("nmpc_real_t", values)
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_observer_equals_the_reference(index: int, scalar: str) -> None:
+    """Start, correction, prediction and disturbance have the same bits, up to and beyond every limit."""
+    blocks = SubBlocks(quadratic_case(index, scalar), index)
+    lib, observer = blocks.lib, KalmanObserver(blocks.design, blocks.products)
+    constants, ranges = blocks.design.observer, blocks.design.settings.ranges
+    limits = {
+        "position_m": ranges.position_m,
+        "velocity_m_step": constants.velocity_limit_m_step,
+        "disturbance_m_step2": constants.disturbance_limit_m_step2,
+    }
+    at_limit: set[str] = set()
+
+    def compare(estimate: Estimate) -> None:
+        for name, limit in limits.items():
+            assert blocks.get("observer", name) == getattr(estimate, name).tobytes(), name
+            at_limit.update(
+                {name} if np.abs(getattr(estimate, name)).max() == blocks.scalar(limit) else set()
+            )
+
+    for _ in range(CASES):
+        estimate = Estimate(**{name: blocks.draw(limit) for name, limit in limits.items()})
+        position, velocity = blocks.draw(ranges.position_m), blocks.draw(ranges.velocity_m_s)
+        state = np.concatenate([position, velocity, blocks.draw(1.0, 3)], axis=1)
+        tilt = blocks.draw(blocks.design.attitude.limit_m_step2)
+        start = blocks.pointer("nmpc_state_t", state), blocks.reals(tilt)
+        arguments = start if constants.age_steps else start[:1]
+
+        blocks.put("observer", **vars(estimate))
+        found = np.array(
+            [lib.nmpc_observer_disturbance(blocks.controller, axis) for axis in (0, 1)], blocks.scalar
+        )
+        assert found.tobytes() == observer.disturbance(estimate).tobytes()
+        lib.nmpc_observer_correct(blocks.controller, *arguments)
+        compare(corrected := observer.correct(estimate, state, tilt))
+        lib.nmpc_observer_predict(blocks.controller, start[1])
+        compare(observer.predict(corrected, tilt))
+        lib.nmpc_observer_start(blocks.controller, start[0])
+        compare(observer.start(corrected, state))
+    assert at_limit >= set(limits)
+    lib.nmpc_observer_clear(blocks.controller)
+    compare(Estimate(*[np.zeros((1, 2), blocks.scalar)] * 3))
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
+    """Its step, its turns, measurement, commands and reset have the same bits, up to and beyond its limit."""
+    blocks = SubBlocks(quadratic_case(index, scalar), index)
+    lib, self, model = blocks.lib, blocks.controller, AttitudeModel(blocks.design, blocks.products)
+    limit, tilt_rad = blocks.design.attitude.limit_m_step2, blocks.design.settings.limits.tilt_rad
+    rng = np.random.default_rng(index)
+    members = {"tilt": "tilt", "integral": "integral", "lagged": "lagged", "command": "command"}
+    names = {name: f"{member}_m_step2" for name, member in members.items()} | {
+        "sine": "sine",
+        "cosine": "cosine",
+    }
+
+    def compare(attitude: AttitudeState) -> None:
+        for name, member in names.items():
+            assert blocks.get("attitude", member) == getattr(attitude, name).tobytes(), name
+
+    lib.nmpc_attitude_reset(self, 0, 0)
+    compare(model.steady(np.zeros((1, 2), blocks.scalar)))
+    for _ in range(CASES):
+        yaws = blocks.scalar(
+            [rng.uniform(-1024, 1024), rng.choice([0.0, np.pi / 2, -np.pi, 1024.0, -1024.0])]
+        )
+        sine, cosine = blocks.products.sine_cosine(yaws)
+        attitude = AttitudeState(*(blocks.draw(limit) for _ in members), sine[:1], cosine[:1])
+        blocks.put("attitude", **{member: getattr(attitude, name) for name, member in names.items()})
+        lib.nmpc_attitude_advance(self)
+        compare(attitude := model.advance(attitude))
+        lib.nmpc_attitude_turn(self, sine[1], cosine[1])
+        compare(attitude := model.turn(attitude, sine[1:], cosine[1:]))
+        found = np.array([[lib.nmpc_attitude_roll(self), lib.nmpc_attitude_pitch(self)]], blocks.scalar)
+        assert found.tobytes() == model.command_rad(attitude).tobytes()
+
+        angles = blocks.draw(tilt_rad)
+        state = np.concatenate([blocks.draw(1.0, 4), angles, blocks.draw(1.0, 1)], axis=1)
+        measured = np.zeros((1, 2), blocks.scalar)
+        lib.nmpc_attitude_measure(blocks.pointer("nmpc_state_t", state), blocks.reals(measured))
+        assert measured.tobytes() == model.measure(angles).tobytes()
+        lib.nmpc_attitude_set_command(self, *angles[0].tolist())
+        compare(model.set_command(attitude, angles))
+        lib.nmpc_attitude_reset(self, *angles[0].tolist())
+        compare(model.steady(angles))
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
+    """The move has the same bits on both axes, with none, one or both of the moves at their limits."""
+    blocks = SubBlocks(quadratic_case(index, scalar), index)
+    attitude, law = blocks.design.attitude, blocks.design.law
+    limits = attitude.command_limit_m_step2.astype(blocks.scalar)
+    optimizer = ExactOptimizer(blocks.design, blocks.products, limits)
+    rng = np.random.default_rng(index)
+    n, kinds = 4 * CASES, set()
+    move = 10.0 ** rng.uniform(-2, 1.5, (n, 1, 1)) * limits[None, :, None]
+    states = rng.normal(0, 1, (n, 2, 8)) * move / (np.abs(law.rows).max(axis=1) + 1e-30)[None]
+    states *= rng.choice([0.0, 1.0, 1.0], states.shape)
+    states[:, :, 7] = np.clip(states[:, :, 7], -limits, limits)
+    states = states.astype(blocks.scalar)
+    expected = optimizer.minimize(states)
+    for state, moves in zip(states, expected, strict=True):
+        for axis in (0, 1):
+            numbers = np.ascontiguousarray(state[axis])
+            found = blocks.lib.nmpc_optimizer_minimize(axis, blocks.reals(numbers), limits[axis])
+            assert blocks.scalar(found).tobytes() == moves[axis].tobytes()
+            free = law.rows[axis] @ state[axis]
+            kinds.add(tuple((np.sign(free) * (np.abs(free) > limits[axis])).tolist()))
+    assert len(kinds) == 3**law.moves
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("index", FEW_SETTINGS)
+def test_steps_equal_the_reference(index: int, scalar: str) -> None:
+    """Over flights, outages, jumps, resets, commands of others and bad values no stored bit differs."""
+    settings = quadratic_case(index, scalar)
+    n = 100
+    inputs = inputs_of_steps(settings, n, steps=60, seed=index)
+    expected = run(ExactReferenceController(Design(settings), n), inputs, index)
+    library = build_library(settings, toolchain("gcc"))
+    assert differences(expected, run(CompiledController(settings, n, library), inputs, index)) == {}
+
+
+def test_the_inputs_reach_what_is_to_be_compared() -> None:
+    """Every status, outages shorter and longer than admitted, commands at the limit and within."""
+    settings = quadratic_case(1, "float64")
+    found = run(ExactReferenceController(Design(settings), 200), inputs_of_steps(settings, 200, 60, 1), 1)
+    most = Design(settings).observer.outage_steps + 1
+    missed = np.array([step.missed for step in found.steps])
+    statuses = np.array([*found.setters, *(step.status for step in found.steps)])
+    assert set(np.unique(statuses)) == {0, 2, 3, 4, 6}
+    assert (missed == most).any()
+    assert ((missed[:-1] > 1) & (missed[:-1] < most) & (missed[1:] == 0)).any()
+    assert ((missed[:-1] == most) & (missed[1:] == 0)).any()
+    share = np.mean([step.saturated for step in found.steps])
+    assert 0.05 < share < 0.95
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("index", MANY_SETTINGS)
+def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int, scalar: str) -> None:
+    """In 100,000 steps with each of 50 settings no bit differs, at every optimisation, with gcc and clang."""
+    settings = quadratic_case(index, scalar)
+    n, steps = 500, 200
+    libraries = [build_library(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
+    inputs = inputs_of_steps(settings, n, steps, seed=index)
+    expected = run(ExactReferenceController(Design(settings), n), inputs, index)
+    for (compiler, level), library in zip(BUILDS, libraries, strict=True):
+        found = run(CompiledController(settings, n, library), inputs, index)
+        assert differences(expected, found) == {}, f"{compiler} {level} for {settings!r}"
