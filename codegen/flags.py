@@ -43,6 +43,23 @@ PROOFS: Final = {
 }
 """Frama-C's options of each proof, by its entry function, in floating point."""
 
+QUADRATIC_PROOFS: Final = {
+    "take_numbers": (*PROOFS["take_numbers"], "-eva-use-spec nmpc_sine_cosine"),
+    "refuse_nan": (
+        *PROOFS["refuse_nan"],
+        # What they require is that they are called without NaN.
+        "-eva-use-spec nmpc_sine_cosine,nmpc_attitude_measure,nmpc_optimizer_minimize",
+    ),
+    "turn_everywhere": (
+        "-warn-special-float nan",
+        "-main turn_everywhere",
+        "-eva",
+        "-eva-precision 0",
+        "-eva-min-loop-unroll 1400",  # more than the quarter turns of all headings
+    ),
+}
+"""The same for a quadratic cost, whose products need bounds of sine and cosine."""
+
 _WHOLE_NUMBERS: Final = (
     "-warn-signed-overflow",
     "-warn-signed-downcast",
@@ -84,6 +101,8 @@ RULE_FLAGS: Final = (
 )
 
 
-def proofs(scalar: str) -> dict[str, tuple[str, ...]]:
-    """Return Frama-C's options of each proof for a scalar type, by entry function."""
-    return FIXED_PROOFS if scalar == "fixed" else PROOFS
+def proofs(scalar: str, norm: str) -> dict[str, tuple[str, ...]]:
+    """Return Frama-C's options of each proof for a scalar type and a norm of the cost, by entry function."""
+    if scalar == "fixed":
+        return FIXED_PROOFS
+    return QUADRATIC_PROOFS if norm == "quadratic" else PROOFS

@@ -203,7 +203,10 @@ def _context(design: Design) -> dict[str, object]:
             "compile_flags": " ".join(COMPILE_FLAGS),
             "warning_flags": " ".join(WARNING_FLAGS),
             "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
-            "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in proofs(scalar).items()},
+            "proofs": {
+                name: " ".join((*PROOF_FLAGS, *flags))
+                for name, flags in proofs(scalar, settings.cost.norm).items()
+            },
             "rule_flags": " ".join(RULE_FLAGS),
         }
     )

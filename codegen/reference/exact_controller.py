@@ -104,7 +104,7 @@ class ExactReferenceController:
             command_rad=self._numbers.to_si(memory.command_rad, *COMMAND),
             missed=memory.missed,
             saturated=memory.saturated,
-            stored=self._numbers.to_si(self._stored(), *self._design.stored),
+            stored=self._numbers.to_si(self.stored, *self._design.stored),
         )
 
     def _restarted(self, command_rad: Real) -> ExactMemory:
@@ -211,7 +211,9 @@ class ExactReferenceController:
             axis=1,
         )
 
-    def _stored(self) -> Real:
+    @property
+    def stored(self) -> Real:
+        """All numbers of nmpc_t (n, k), in their order and in the numbers of the C."""
         memory = self.memory
         estimate, attitude, motion = memory.estimate, memory.attitude, memory.target
         columns = [estimate.position_m, estimate.velocity_m_step, estimate.disturbance_m_step2]

@@ -4,7 +4,7 @@ A call is one byte and twelve numbers of the controller's scalar type, which `fu
 decodes. A tape is a sequence of calls of one controller, which is initialised before the first call.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any, Final
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController, Status, choose
+from mambo_nmpc.codegen.reference import Status, choose, reference_controller
 from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_nmpc.codegen.settings.model import Settings
 
@@ -32,11 +32,15 @@ NULL_COMMAND: Final = 8
 
 
 class ApiFunction(IntEnum):
-    """The function of the C interface that a call calls."""
+    """The function of the C interface that a call calls.
+
+    SET_WEIGHTS is there with a 1-norm, SET_COMMAND with a quadratic cost.
+    """
 
     STEP = 0
     RESET = 1
     SET_WEIGHTS = 2
+    SET_COMMAND = 2
     INIT = 3
 
 
@@ -48,12 +52,14 @@ _POINTERS: Final = {
 }
 
 
-_QUANTITIES: Final = {
-    ApiFunction.STEP: (*STATE, *TARGET, *THRUST),
-    ApiFunction.RESET: COMMAND,
-    ApiFunction.SET_WEIGHTS: WEIGHTS,
-    ApiFunction.INIT: COMMAND,
-}
+def _quantities(design: Design) -> dict[ApiFunction, tuple[str, ...]]:
+    """Return the quantities of the numbers that each function reads."""
+    return {
+        ApiFunction.STEP: (*STATE, *TARGET, *THRUST),
+        ApiFunction.RESET: COMMAND,
+        ApiFunction.SET_WEIGHTS: COMMAND if design.is_quadratic else WEIGHTS,
+        ApiFunction.INIT: COMMAND,
+    }
 
 
 def call_type(settings: Settings) -> np.dtype[Any]:
@@ -63,13 +69,25 @@ def call_type(settings: Settings) -> np.dtype[Any]:
 
 def outcome_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of an outcome, as `replay.c` writes it."""
-    numbers, moves = Design(settings).numbers, 2 * settings.horizon.control
+    design, numbers = Design(settings), Design(settings).numbers
+    command = ("command_rad", numbers.scalar, 2)
+    if design.is_quadratic:
+        return np.dtype(
+            [
+                ("status", np.int32),
+                ("missed", np.int32),
+                ("saturated", np.int32),
+                command,
+                ("stored", numbers.scalar, len(design.stored)),
+            ]
+        )
+    moves = 2 * settings.horizon.control
     return np.dtype(
         [
             ("status", np.int32),
             ("iterations", np.int32),
             ("converged", np.int32),
-            ("command_rad", numbers.scalar, 2),
+            command,
             ("cost", numbers.wide),
             ("gradient", numbers.wide, moves),
             ("plan_rad", numbers.scalar, moves),
@@ -81,8 +99,9 @@ def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls
     """Return a call of `function` for each row of values (n, 1..12); `nulls` is the mask of null pointers."""
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
-    quantities = _QUANTITIES[function][: values.shape[1]]
-    made["values"][:, : values.shape[1]] = Design(settings).numbers.quantize(values, quantities)
+    design = Design(settings)
+    quantities = _quantities(design)[function][: values.shape[1]]
+    made["values"][:, : values.shape[1]] = design.numbers.quantize(values, quantities)
     return made
 
 
@@ -107,45 +126,54 @@ def answers(settings: Settings, tapes: Sequence[Tape]) -> list[Outcomes]:
 class _Runs:
     """n reference controllers; at each call, each of them may have another function called.
 
-    Every function is called for all controllers. Those that it is not meant for get NaN as input, which the
-    reference refuses without changing its memory.
+    Every function is called for all controllers; those that it is not meant for keep their memory.
     """
 
     def __init__(self, settings: Settings, n: int) -> None:
         self._settings = settings
-        design = Design(settings)
-        self._numbers = design.numbers
-        self._controller = ReferenceController(design, n)
+        self._design = Design(settings)
+        self._quantities = _quantities(self._design)
+        self._controller: Any = reference_controller(self._design, n)
         self._fresh = self._controller.memory
 
     def make(self, now: Tape) -> Outcomes:
         """Make one call (n,) on each controller, and return the outcomes (n,)."""
+        controller = self._controller
         function = now["call"] & 3
         nulls = (now["call"] >> 2) & 15
         null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0
-        values = now["values"]
 
-        def given(wanted: ApiFunction) -> NDArray[Any]:
-            quantities = _QUANTITIES[wanted]
-            si = self._numbers.to_si(values[:, : len(quantities)], *quantities)
-            return np.where(((function == wanted) & ~null)[:, None], si, np.nan).astype(si.dtype)
+        def call(wanted: ApiFunction, made: Callable[[NDArray[Any]], NDArray[np.int64]]) -> NDArray[np.int64]:
+            before, quantities = controller.memory, self._quantities[wanted]
+            values = now["values"][:, : len(quantities)]
+            status = made(self._design.numbers.to_si(values, *quantities))
+            controller.memory = choose((function == wanted) & ~null, controller.memory, before)
+            return status
 
+        def step(values: NDArray[Any]) -> NDArray[np.int64]:
+            status: NDArray[np.int64] = controller.step(values[:, 0:7], values[:, 7:11], values[:, 11]).status
+            return status
+
+        set_other = controller.set_command if self._design.is_quadratic else controller.set_weights
         outcome = np.zeros(len(now), outcome_type(self._settings))
         with np.errstate(all="ignore"):
-            resets = self._controller.reset(given(ApiFunction.RESET))
-            weights = self._controller.set_weights(given(ApiFunction.SET_WEIGHTS))
-            step = given(ApiFunction.STEP)
-            steps = self._controller.step(step[:, 0:7], step[:, 7:11], step[:, 11]).status
+            resets = call(ApiFunction.RESET, controller.reset)
+            others = call(ApiFunction.SET_WEIGHTS, set_other)
+            steps = call(ApiFunction.STEP, step)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, weights, np.zeros_like(steps)])
+        status = np.choose(function, [steps, resets, others, np.zeros_like(steps)])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
-        memory = self._controller.memory
+        memory = controller.memory
         writes = (function == ApiFunction.STEP) & ((nulls & NULL_COMMAND) == 0)
         level = ((nulls & NULL_SELF) != 0)[:, None]
         outcome["command_rad"] = np.where(
             writes[:, None], np.where(level, 0, memory.command_rad), UNWRITTEN_RAD
         )
+        if self._design.is_quadratic:
+            outcome["missed"], outcome["saturated"] = memory.missed, memory.saturated
+            outcome["stored"] = controller.stored
+            return outcome
         for name in ("iterations", "converged", "cost"):
             outcome[name] = getattr(memory, name)
         for name in ("gradient", "plan_rad"):

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Final
 
@@ -37,14 +37,15 @@ RANDOM_TAPES: Final = 1000
 @lru_cache(maxsize=2)
 def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
     """Return the tapes of all cases, and the outcomes of the reference for each."""
-    rng = np.random.default_rng(0)
+    rng, is_quadratic = np.random.default_rng(0), Design(settings).is_quadratic
     tapes = (
         *random_tapes(settings, RANDOM_TAPES),
         *_limits(settings, rng),
         *_nulls(settings, rng),
         *_quadrants(settings, rng),
-        *_convergence(settings),
-        *_zero_errors(settings),
+        *([] if is_quadratic else _convergence(settings)),
+        *([] if is_quadratic else _zero_errors(settings)),
+        *(_outages(settings, rng) if is_quadratic else []),
         *_largest_inputs(settings, rng),
         *_target_motion(settings),
     )
@@ -52,7 +53,7 @@ def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
 
 
 def random_tapes(settings: Settings, n: int) -> list[Tape]:
-    """Return `n` tapes of eight steps with random inputs, a reset and a change of weights.
+    """Return `n` tapes of eight steps with random inputs, a reset, and a change of weights or of the command.
 
     Every fourth tape holds each input for two steps. In every fifth tape the drone is so close to the target
     that the last bits of the prediction constants matter.
@@ -72,11 +73,14 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     weights = 10.0 ** rng.uniform(-3, 6, (n, 2))
     weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
     weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
+    quadratic = Design(settings).is_quadratic
     columns = [
         *(calls(settings, ApiFunction.STEP, rows) for rows in steps[:3]),
         calls(settings, ApiFunction.RESET, command),
         *(calls(settings, ApiFunction.STEP, rows) for rows in steps[3:5]),
-        calls(settings, ApiFunction.SET_WEIGHTS, weights),
+        calls(settings, ApiFunction.SET_COMMAND, command[::-1])
+        if quadratic
+        else calls(settings, ApiFunction.SET_WEIGHTS, weights),
         *(calls(settings, ApiFunction.STEP, rows) for rows in steps[5:]),
     ]
     return list(np.stack(columns, axis=1))
@@ -104,11 +108,18 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
             good[1, index] = value
             yield calls(settings, ApiFunction.STEP, good)
     numbers = Design(settings).numbers
-    for function, quantities, lows, highs in (
-        (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit)),
-        (ApiFunction.RESET, COMMAND, (-ATTITUDE_LIMIT_RAD,) * 2, (ATTITUDE_LIMIT_RAD,) * 2),
-        (ApiFunction.RESET, COMMAND, (-tilt,) * 2, (tilt,) * 2),
-    ):
+    pairs: list[tuple[ApiFunction, Sequence[str], Sequence[float], Sequence[float]]] = [
+        (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit))
+    ]
+    if Design(settings).is_quadratic:
+        pairs = [
+            (ApiFunction.SET_COMMAND, COMMAND, (-limit,) * 2, (limit,) * 2)
+            for limit in (ATTITUDE_LIMIT_RAD, tilt)
+        ]
+    pairs += [
+        (ApiFunction.RESET, COMMAND, (-limit,) * 2, (limit,) * 2) for limit in (ATTITUDE_LIMIT_RAD, tilt)
+    ]
+    for function, quantities, lows, highs in pairs:
         for index in range(2):
             for value in _around(settings, quantities[index], lows[index], highs[index]):
                 pair = np.full((1, 2), 0.1 * tilt)
@@ -198,6 +209,21 @@ def _zero_errors(settings: Settings) -> Iterator[Tape]:
             steps = np.zeros((1, 12))
             steps[0, axis], steps[0, 2 + axis] = -way * advance_m, way
             steps[0, 11] = hover_thrust(settings)
+            yield calls(settings, ApiFunction.STEP, steps)
+
+
+def _outages(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Refuse states for as long as the estimate lasts, and a step less or more; then come good steps again.
+
+    The targets are good in one tape and refused in another, so that both kinds of step are repeated.
+    """
+    limit = Design(settings).observer.outage_steps
+    for refused in (1, max(1, limit - 1), limit, limit + 1, limit + 3):
+        for target in (0.0, np.nan):
+            steps = _good_steps(settings, rng, refused + 6)
+            steps[:, 7:11] = steps[0, 7:11]
+            steps[2 : 2 + refused, 0] = np.nan
+            steps[2 : 2 + refused, 7] += target
             yield calls(settings, ApiFunction.STEP, steps)
 
 

@@ -38,7 +38,7 @@ def check(subject: Subject) -> Result:
     properties: list[Property] = []
     statements = 0
     fixed = subject.settings.code.scalar == "fixed"
-    for name in proofs(subject.settings.code.scalar):
+    for name in _proofs(subject):
         report = subject.folder.resolve() / f"{name}.csv"
         try:
             done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
@@ -76,7 +76,7 @@ def command(subject: Subject, name: str) -> list[str]:
     sources = sorted(
         path for path in subject.bundle.glob("src/*.c") if not path.name.endswith("_self_test.c")
     )
-    flags = proofs(subject.settings.code.scalar)[name]
+    flags = _proofs(subject)[name]
     return [
         "frama-c",
         f"-cpp-extra-args={shlex.join(('-Iinclude', *PROOF_PREPROCESSING))}",
@@ -120,6 +120,10 @@ def read_properties(report: Path) -> list[Property]:
 def _is_promise(one: Property) -> bool:
     """Whether the driver states it: an assertion of the driver, or a precondition of a function it calls."""
     return one.kind == _PROMISE or one.kind.startswith("precondition of ")
+
+
+def _proofs(subject: Subject) -> dict[str, tuple[str, ...]]:
+    return proofs(subject.settings.code.scalar, subject.settings.cost.norm)
 
 
 def _driver(subject: Subject) -> Path:

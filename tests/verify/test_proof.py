@@ -63,7 +63,7 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     result = check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     assert result.figures["promises"] == result.figures["promises_proven"] == (4 if scalar == "fixed" else 6)
-    for proof in proofs(scalar):
+    for proof in proofs(scalar, its.settings.cost.norm):
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
 
