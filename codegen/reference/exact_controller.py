@@ -170,20 +170,20 @@ class ExactReferenceController:
         self, attitude: AttitudeState, estimate: Estimate, motion: TargetMotion, target: Real, tilt: Real
     ) -> Real:
         """Return the first free moves (n, 2), right and forward."""
-        disturbance = self._observer.disturbance(estimate)
-        jerk = np.zeros_like(disturbance)
+        disturbance, jerk = self._observer.disturbance(estimate), np.zeros_like(tilt)
         if self._tracker is not None:
-            disturbance, jerk = disturbance - motion.acceleration_m_step2, motion.jerk_m_step2_update
+            disturbance = disturbance - motion.acceleration_m_step2
+            jerk = self._to_heading(attitude, motion.jerk_m_step2_update)
         errors = (
             estimate.position_m - target[:, 0:2],
             estimate.velocity_m_step - self._products.speed_product(target[:, 2:4]),
             disturbance,
-            jerk,
         )
         if self.settings.model.attitude == "predicted":
             tilt = attitude.tilt
         state = [
             *(self._to_heading(attitude, error) for error in errors),
+            jerk,
             tilt,
             attitude.integral,
             attitude.lagged,

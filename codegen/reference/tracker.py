@@ -50,9 +50,8 @@ class Tracker:
         """Take the target's velocity (n, 2) of a control step into the estimates."""
         product = self._arithmetic.tracker_product
         change = velocity_m_s - motion.velocity_m_s
-        limited = clamp(change, self._change_limit)
-        steady = motion.is_known[:, None] & (limited == change)
-        measured = self._arithmetic.change_product(self._step_squared_per_update, limited)
+        steady = motion.is_known[:, None] & (np.abs(change) <= self._change_limit)
+        measured = self._arithmetic.change_product(self._step_squared_per_update, change)
         predicted = motion.acceleration_m_step2 + motion.jerk_m_step2_update
         difference = measured - predicted
         acceleration = clamp(predicted + product(self._gain, difference), self._acceleration_limit)
