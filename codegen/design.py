@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from mambo_nmpc.codegen.attitude import AttitudeConstants, attitude_constants
 from mambo_nmpc.codegen.exact_fixed_point import exact_formats
 from mambo_nmpc.codegen.fixed_point import formats
@@ -88,6 +90,11 @@ class Design:
     def limits(self) -> InputLimits:
         """The limits of inputs and commands, rounded to the numbers of the C."""
         return self.numbers.limits(self.settings)
+
+    @property
+    def tilt_limit_rad(self) -> float:
+        """The tilt limit in rad, as the C has it."""
+        return float(self.numbers.to_si(np.array([self.limits.tilt]), "angle")[0])
 
     @cached_property
     def trigonometry(self) -> Any:

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.reference import reference_controller
 from mambo_nmpc.sil.cli.flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_nmpc.sil.cli.options import FlyOptions
 from mambo_nmpc.sil.cli.progress import progress_bar
@@ -10,10 +12,10 @@ from mambo_nmpc.sil.controllers.inner_steps import WatchedController, write_inne
 from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.files.folders import new_results
-from mambo_nmpc.sil.flight.loop import PositionController
+from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.loop import fly as simulate
 from mambo_nmpc.sil.flight.report import ReplaySummary, judge
-from mambo_nmpc.sil.flight.scenario import flight_of, read_record
+from mambo_nmpc.sil.flight.scenario import Record, flight_of, read_record
 
 INNER_STEPS = "inner-steps.npz"
 ALLOWED = frozenset({"replay", "output", "pictures", "as_json"})
@@ -35,12 +37,7 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             raise FlightError(f"--replay {echo(str(file))} contains the whole flight: leave out {option}")
     record = read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
-    watched: WatchedController | None = None
-    match record.controller:
-        case "pd" | "pd-feedforward":
-            controller: PositionController = pd_controller(record.controller, flight)
-        case _:
-            controller = watched = WatchedController(record.settings)
+    watched, controller = _controllers(record, flight)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(options.output, ReplaySummary.command, files) as folder:
         with progress_bar("replaying") as progress:
@@ -63,3 +60,15 @@ def fly_again(options: FlyOptions, file: Path) -> None:
         summary.write(folder)
     written = FLIGHT_FILES if options.pictures else TRACE_FILES
     finish(summary, options, written if watched is None else (*written, INNER_STEPS))
+
+
+def _controllers(record: Record, flight: Flight) -> tuple[WatchedController | None, PositionController]:
+    """Return the one that records its iterations, None if it has none, and the one that flies."""
+    match record.controller:
+        case "pd" | "pd-feedforward":
+            return None, pd_controller(record.controller, flight)
+        case _ if record.settings.cost.norm == "quadratic":
+            return None, reference_controller(Design(record.settings))
+        case _:
+            watched = WatchedController(record.settings)
+            return watched, watched

@@ -47,6 +47,13 @@ def sweep(
     )
 
     settings = load(source, scalar)
+    if settings.cost.norm == "quadratic":
+        raise InvalidSettingsError(
+            (
+                f'{echo(source)}: cost.norm = "quadratic" must be "1-norm" for a sweep: with a quadratic '
+                "cost there are no horizons and iterations to vary; `mambo-nmpc tune` searches its settings",
+            )
+        )
     chosen = boards.load(board)
     grid = Grid(
         _numbers("--prediction", prediction, 50),

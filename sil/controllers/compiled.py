@@ -110,6 +110,12 @@ class CompiledController:
         """The function `nmpc_host_step`, the address of the first controller, and the bytes to the next."""
         return ffi.addressof(self._library, "nmpc_host_step"), self._controllers, self._instance_bytes
 
+    @property
+    def instances(self) -> NDArray[np.uint8]:
+        """The memory (n, bytes) of the controllers, itself and no copy."""
+        whole = np.frombuffer(memoryview(ffi.buffer(self._controllers)), np.uint8)
+        return whole[: self._n * self._instance_bytes].reshape(self._n, -1)
+
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
         return self._set_each(self._library.nmpc_host_reset, command_rad, COMMAND)

@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
@@ -27,7 +28,7 @@ from mambo_nmpc.sil.faults.scenarios import TO_THE_END, FaultScenario, scenarios
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.crashes import CRASH_TILT_RAD
 from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, horizontal_error_m
+from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, horizontal_error_m, saturated_share
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover, Trajectories, Trajectory
 from mambo_nmpc.sil.paper.table2 import CASES
@@ -80,6 +81,7 @@ class Verdict:
     expected:    whether these are exactly the statuses that the fault must cause.
     largest_...: largest value since the onset; the error is the horizontal distance to the true target.
     band_m:      largest error of a flight that has recovered.
+    saturated_share: share of the time since the onset with a command at the tilt limit.
     recovery_s:  time from the end of the fault (from its onset if it has no end) to recovery; NaN if never.
     """
 
@@ -92,6 +94,7 @@ class Verdict:
     largest_tilt_rad: Number
     largest_error_m: Number
     band_m: Number
+    saturated_share: Number
     recovery_s: Number
     end: End
 
@@ -142,14 +145,14 @@ def fly_faults(
     faults = [
         Fault(s.begin, s.end, s.scenario.alter, s.scenario.drop, s.scenario.late_updates) for s in sorties
     ]
-    trace = fly(flight, FaultyController(caller, faults), progress)
+    trace = fly(flight, FaultyController(caller, faults, compiled.instances), progress)
     healthy = [not sortie.end for sortie in sorties]
     if (trace.status[:, healthy] == Status.BAD_TARGET).any():
         raise FlightError(
             f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
             f"{settings.ranges.velocity_m_s:g}: must include the figure of eight of Table II, 2 m and 1 m/s"
         )
-    return _judge_faults(trace, sorties, reweighted.answers)
+    return _judge_faults(trace, sorties, reweighted.answers, Design(settings).tilt_limit_rad)
 
 
 def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
@@ -193,7 +196,7 @@ def _weight_changes(sorties: Sequence[_Sortie], settings: Settings) -> list[Weig
 
 
 def _judge_faults(
-    trace: Trace, sorties: Sequence[_Sortie], answers: Sequence[tuple[int, int]]
+    trace: Trace, sorties: Sequence[_Sortie], answers: Sequence[tuple[int, int]], limit_rad: float
 ) -> tuple[Verdict, ...]:
     """Return the verdict of every fault on every course."""
     target = trace.target.copy()
@@ -209,16 +212,32 @@ def _judge_faults(
             bands_m[kind] = BAND_FACTOR * float(error_m[settled, row].max())
             continue
         refused = {status for answered, status in answers if answered == row and status != Status.OK}
+        share = float(saturated_share(trace.command_rad[sortie.begin :, [row]], limit_rad)[0])
         flown.setdefault((sortie.course, sortie.scenario.name), []).append(
-            _judge_flight(trace, row, sortie, error_m=error_m[:, row], band_m=bands_m[kind], refused=refused)
+            _judge_flight(
+                trace,
+                row,
+                sortie,
+                error_m=error_m[:, row],
+                band_m=bands_m[kind],
+                refused=refused,
+                saturated=share,
+            )
         )
     return tuple(_worst(verdicts) for verdicts in flown.values())
 
 
 def _judge_flight(
-    trace: Trace, row: int, sortie: _Sortie, *, error_m: FloatArray, band_m: float, refused: set[int]
+    trace: Trace,
+    row: int,
+    sortie: _Sortie,
+    *,
+    error_m: FloatArray,
+    band_m: float,
+    refused: set[int],
+    saturated: float,
 ) -> Verdict:
-    """Judge flight `row`; `refused` holds the statuses of rejected weights."""
+    """Judge flight `row`; `refused` holds the statuses of rejected weights, `saturated` is a share."""
     scenario = sortie.scenario
     flown = slice(sortie.begin, None)
     seen = refused | set(trace.status[sortie.begin : sortie.end, row].tolist())
@@ -239,6 +258,7 @@ def _judge_flight(
         largest_tilt_rad=float(tilt_rad.max()),
         largest_error_m=float(error_m[flown].max()),
         band_m=band_m,
+        saturated_share=saturated,
         recovery_s=max(0, late) * float(trace.time_s[1] - trace.time_s[0]) if back else math.nan,
         end=End.CRASHED if crashed else End.BACK if back else End.AWAY,
     )
@@ -246,7 +266,7 @@ def _judge_flight(
 
 def _worst(verdicts: Sequence[Verdict]) -> Verdict:
     """Return the worst value of every field."""
-    names = ("largest_command_rad", "largest_tilt_rad", "largest_error_m", "recovery_s")
+    names = ("largest_command_rad", "largest_tilt_rad", "largest_error_m", "saturated_share", "recovery_s")
     largest: Any = {name: float(np.max([getattr(verdict, name) for verdict in verdicts])) for name in names}
     return replace(
         verdicts[0],

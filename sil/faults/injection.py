@@ -127,12 +127,19 @@ class Applied:
 class FaultyController:
     """n controllers with faults at their inputs and outputs; flight `row` has `faults[row]`.
 
-    To drop an update of one controller in the batch, its state is NaN: the controller rejects it and keeps
-    its internal state. A controller that does not reject NaN must have no internal state, as the PD.
+    To drop an update of one controller in the batch, its state is NaN, and its row of `instances` (n, bytes),
+    the controllers' memory, is restored. Without `instances` a controller must reject NaN and keep its
+    memory, or have none, as the PD.
     """
 
-    def __init__(self, controller: PositionController, faults: Sequence[Fault | None]) -> None:
+    def __init__(
+        self,
+        controller: PositionController,
+        faults: Sequence[Fault | None],
+        instances: NDArray[np.uint8] | None = None,
+    ) -> None:
         self._controller = controller
+        self._instances = instances
         self._faults = [(row, fault) for row, fault in enumerate(faults) if fault is not None]
         self._began: dict[int, ControllerInput] = {}
         self._update = 0
@@ -152,7 +159,10 @@ class FaultyController:
             state[row], target[row], thrust[row] = given.state, given.target, given.thrust_acceleration_m_s2
             called[row] = not fault.drop(since)
         state[~called] = np.nan
+        before = None if self._instances is None else self._instances.copy()
         outcome = self._controller.step(state, target, thrust)
+        if self._instances is not None and before is not None:
+            self._instances[~called] = before[~called]
         self._computed.append(np.where(called[:, np.newaxis], outcome.command_rad, self._computed[-1]))
         command_rad = self._computed[-1].copy()
         for row, fault in active:

@@ -12,13 +12,14 @@ from mambo_nmpc.sil.faults.flights import COURSES, ORDER, Verdict, all_statuses
 
 def table(verdicts: Sequence[Verdict]) -> str:
     """Return the verdicts as a Markdown table with one row per fault and both courses side by side."""
-    head = ["fault", "status", "command, rad", "tilt, rad"]
+    head = ["fault", "status", "command, rad", "tilt, rad", "at limit, %"]
     head += [f"{course}: {what}" for course in COURSES for what in ("error, m", "back after, s")]
     rows = [[*head, "end"], ["---"] * (len(head) + 1)]
     for fault in dict.fromkeys(verdict.fault for verdict in verdicts):
         pair = [verdict for verdict in verdicts if verdict.fault == fault]
         row = [fault, ", ".join(all_statuses(pair))]
         row += [f"{max(getattr(verdict, key) for verdict in pair):.2f}" for key in _LARGEST]
+        row.append(f"{100 * max(verdict.saturated_share for verdict in pair):.1f}")
         for verdict in pair:
             never = math.isnan(verdict.recovery_s)
             row += [f"{verdict.largest_error_m:.2f}", "-" if never else f"{verdict.recovery_s:.1f}"]

@@ -55,15 +55,17 @@ _DEGREES_PER_RAD: Final = 180.0 / math.pi
 
 
 def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
-    """Return the faults; their magnitudes depend on the input ranges of `settings`."""
+    """Return the faults; their magnitudes depend on the input ranges of `settings`.
+
+    Faults of the weights are there with a 1-norm only.
+    """
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
-    right = settings.cost
     outage = set_state(slice(0, 7), _NAN)
     bursts = set_state(slice(0, 7), _NAN, on=3, of=10)
     jump = move_target(jump_m)
     bad_state, bad_target = _only(Status.BAD_STATE), _only(Status.BAD_TARGET)
-    bad_thrust, bad_weight = _only(Status.BAD_THRUST), _only(Status.OK, Status.BAD_WEIGHT)
+    bad_thrust = _only(Status.BAD_THRUST)
     levels_out = "caller levels out"
     return (
         FaultScenario(
@@ -101,6 +103,13 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
+        *(() if settings.cost.norm == "quadratic" else _wrong_weights(settings)),
+    )
+
+
+def _wrong_weights(settings: Settings) -> tuple[FaultScenario, ...]:
+    right, bad_weight = settings.cost, _only(Status.OK, Status.BAD_WEIGHT)
+    return (
         FaultScenario("weights NaN, 5 s", 5.0, weights=(_NAN, _NAN), answers=bad_weight),
         FaultScenario(
             "tracking weight -1, 5 s", 5.0, weights=(-1.0, right.effort_weight), answers=bad_weight

@@ -51,6 +51,11 @@ def horizontal_error_m(trace: Trace) -> FloatArray:
     return hypotenuse(offset_m[..., 0], offset_m[..., 1])
 
 
+def saturated_share(command_rad: FloatArray, limit_rad: float) -> FloatArray:
+    """Return the share (n,) of the commands (k, n, 2) with roll or pitch at the limit."""
+    return np.asarray(np.mean((np.abs(command_rad) >= limit_rad).any(axis=-1), axis=0))
+
+
 def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
     """Return the metrics from `start_s` to the end: 0 for the whole flight, or `TRANSIENT_S`.
 

@@ -27,6 +27,7 @@ HARNESS: Final = (
     "nmpc_last_cost",
     "nmpc_last_iterations",
     "nmpc_has_converged",
+    "nmpc_is_saturated",
 )
 """Functions of the test harness, which are not part of a step."""
 

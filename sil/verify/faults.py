@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-import numpy as np
-
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
@@ -48,8 +46,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 
     It is INCOMPLETE if the drone strays without any fault, because then no recovery can be judged.
     """
-    design = Design(settings)
-    limit = float(design.numbers.to_si(np.array([design.limits.tilt]), "angle")[0])
+    limit = Design(settings).tilt_limit_rad
     ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
     strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
     wrong = []

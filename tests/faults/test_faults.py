@@ -216,6 +216,7 @@ def test_verdicts_match_known_outcomes() -> None:
     assert outage.largest_error_m > outage.band_m
     assert 2.9 < moved.largest_error_m < 3.1  # the error at the jump
     assert moved.end is End.BACK
+    assert moved.saturated_share > outage.saturated_share
     assert wrapped.recovery_s == 0.0  # the heading is the same
     assert not wrong.expected
 
@@ -230,6 +231,7 @@ VERDICT = Verdict(
     largest_tilt_rad=0.4,
     largest_error_m=1.0,
     band_m=0.1,
+    saturated_share=0.25,
     recovery_s=2.0,
     end=End.BACK,
 )

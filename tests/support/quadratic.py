@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.strategies import Values, nested
 
@@ -234,3 +235,10 @@ def quadratic_case(index: int, scalar: str) -> Settings:
             * rng.uniform(-1, 1),
         }
     return settings_of(values)
+
+
+def quadratic_settings(scalar: str = "float32", **horizon: Any) -> Settings:
+    """Return preset mambo of a scalar type, with other values of the horizon's keys."""
+    document = presets.preset("mambo").model_dump()
+    changed = {"code": document["code"] | {"scalar": scalar}, "horizon": document["horizon"] | horizon}
+    return Settings.model_validate(document | changed)

@@ -148,7 +148,7 @@ def sweep_folder(folder: Path) -> None:
 def faults_folder(folder: Path) -> None:
     """Write two faults on two courses, one of which crashes."""
     verdicts = [
-        Verdict(course, fault, False, ("OK", "BAD_STATE"), True, 0.35, 0.3, error, 0.07, back, end)
+        Verdict(course, fault, False, ("OK", "BAD_STATE"), True, 0.35, 0.3, error, 0.07, 0.25, back, end)
         for course in ("eight", "hover")
         for fault, error, back, end in (
             (HOSTILE, 0.06, 0.0, End.BACK),

@@ -124,6 +124,10 @@ nmpc_sum_t nmpc_last_cost(const nmpc_t *self);
 int nmpc_last_iterations(const nmpc_t *self);
 int nmpc_has_converged(const nmpc_t *self);
 
+/* 1 if the last command lies at the tilt limit, in roll or in pitch: the target may ask for more than the limit gives;
+ * else 0. `self` must not be null. */
+int nmpc_is_saturated(const nmpc_t *self);
+
 /* Version of the generator and digest of the settings, to identify what a binary was built from. */
 const char *nmpc_version(void);
 

@@ -119,6 +119,7 @@ static void read_results(const nmpc_t *self)
     (void)nmpc_last_cost(self);
     (void)nmpc_last_iterations(self);
     (void)nmpc_has_converged(self);
+    (void)nmpc_is_saturated(self);
     (void)nmpc_version();
 }
 

@@ -182,6 +182,12 @@ int nmpc_has_converged(const nmpc_t *self)
     return (int)self->converged;
 }
 
+int nmpc_is_saturated(const nmpc_t *self)
+{
+    return (nmpc_reaches(self->command_rad[0], NMPC_TILT_LIMIT_RAD) != 0)
+           || (nmpc_reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
+}
+
 const char *nmpc_version(void)
 {
     return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;

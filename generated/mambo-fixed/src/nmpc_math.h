@@ -57,12 +57,6 @@ static inline nmpc_real_t nmpc_larger(nmpc_real_t a, nmpc_real_t b)
     return (a > b) ? a : b;
 }
 
-/* Saturate `value` at +/- `limit`. */
-static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
-{
-    return nmpc_smaller(nmpc_larger(value, -limit), limit);
-}
-
 /* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
 static inline int nmpc_between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
@@ -77,6 +71,18 @@ static inline int nmpc_between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real
 static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
 {
     return nmpc_between(value, -limit, limit);
+}
+
+/* 1 if |`value`| >= `limit`, else 0. */
+static inline int nmpc_reaches(nmpc_real_t value, nmpc_real_t limit)
+{
+    return (value >= limit) || (value <= -limit);
+}
+
+/* Saturate `value` at +/- `limit`. */
+static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
+{
+    return nmpc_smaller(nmpc_larger(value, -limit), limit);
 }
 
 /* Shift a sum right by `bits`, rounded to nearest, ties up. */

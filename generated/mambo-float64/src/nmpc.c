@@ -274,6 +274,12 @@ nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)
     return NMPC_OK;
 }
 
+int nmpc_is_saturated(const nmpc_t *self)
+{
+    return (nmpc_reaches(self->command_rad[0], NMPC_TILT_LIMIT_RAD) != 0)
+           || (nmpc_reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
+}
+
 const char *nmpc_version(void)
 {
     return NMPC_VERSION " settings " NMPC_SETTINGS_DIGEST;

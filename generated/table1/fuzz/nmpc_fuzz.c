@@ -242,6 +242,9 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     NMPC_FUZZ_REQUIRE((nmpc_last_iterations(self) >= 0) && (nmpc_last_iterations(self) <= NMPC_ITERATIONS));
     NMPC_FUZZ_REQUIRE((nmpc_has_converged(self) == 0) || (nmpc_has_converged(self) == 1));
     NMPC_FUZZ_REQUIRE(nmpc_last_cost(self) >= (nmpc_sum_t)0);
+    NMPC_FUZZ_REQUIRE(nmpc_is_saturated(self)
+                      == ((last->roll_rad == NMPC_TILT_LIMIT_RAD) || (last->roll_rad == -NMPC_TILT_LIMIT_RAD)
+                          || (last->pitch_rad == NMPC_TILT_LIMIT_RAD) || (last->pitch_rad == -NMPC_TILT_LIMIT_RAD)));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);

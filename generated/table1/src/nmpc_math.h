@@ -113,12 +113,6 @@ static inline nmpc_real_t nmpc_larger(nmpc_real_t a, nmpc_real_t b)
     return (a > b) ? a : b;
 }
 
-/* Saturate `value` at +/- `limit`. */
-static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
-{
-    return nmpc_smaller(nmpc_larger(value, -limit), limit);
-}
-
 /* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
 static inline int nmpc_between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
@@ -129,11 +123,52 @@ static inline int nmpc_between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real
     return (is_at_least != 0) && (is_at_most != 0);
 }
 
+#if defined(__GNUC__)
+/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
+ * numbers takes the place of two of floats. */
+#define NMPC_MAGNITUDE_BITS ((nmpc_bits_t)0x7FFFFFFFUL)
+
+/* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
+static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
+{
+    return (nmpc_bits(value) & NMPC_MAGNITUDE_BITS) <= nmpc_bits(limit);
+}
+
+/* 1 if |`value`| >= `limit`, else 0. */
+static inline int nmpc_reaches(nmpc_real_t value, nmpc_real_t limit)
+{
+    return (nmpc_bits(value) & NMPC_MAGNITUDE_BITS) >= nmpc_bits(limit);
+}
+
+/* Saturate `value` at +/- `limit`. */
+static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
+{
+    nmpc_real_t clamped = value;
+
+    if (nmpc_within(value, limit) == 0) {
+        clamped = (value < (nmpc_real_t)0) ? -limit : limit;
+    }
+    return clamped;
+}
+#else
 /* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
 static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
 {
     return nmpc_between(value, -limit, limit);
 }
+
+/* 1 if |`value`| >= `limit`, else 0. */
+static inline int nmpc_reaches(nmpc_real_t value, nmpc_real_t limit)
+{
+    return (value >= limit) || (value <= -limit);
+}
+
+/* Saturate `value` at +/- `limit`. */
+static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
+{
+    return nmpc_smaller(nmpc_larger(value, -limit), limit);
+}
+#endif
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, with absolute errors of at most 1.2e-07. */
 void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine);
