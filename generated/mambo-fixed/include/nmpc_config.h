@@ -60,7 +60,6 @@ typedef long long nmpc_sum_t;
 #define NMPC_SETTINGS_ID 0x00BB556DUL
 
 #define NMPC_ANGLES 2 /* roll phi, pitch theta */
-#define NMPC_WORLD_STATES 4 /* of the states that the cost depends on, those that turn with the heading */
 #define NMPC_STORED_NUMBERS 26 /* numbers in nmpc_t, which come before its single bytes */
 #define NMPC_ONE 1073741824
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * Optimizer: the exact minimum of the quadratic cost (not in the paper).
+ * MISRA C:2012: departs from rule 8.9, for the reason in deviations.txt.
  */
 #include "nmpc_optimizer.h"
 
@@ -55,15 +56,14 @@ nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATE
     const nmpc_real_t first = row_product(rows[axis][0], state);
     const nmpc_real_t second = row_product(rows[axis][1], state);
     const nmpc_real_t first_limited = nmpc_clamp(first, limit_m_step2);
-    const nmpc_real_t second_limited = nmpc_clamp(second, limit_m_step2);
     nmpc_real_t move = first_limited;
 
-    if (second_limited != second) {
+    if (nmpc_within(second, limit_m_step2) == 0) {
         /* The second move is at its limit: the best first one beside it. */
-        const nmpc_real_t second_change = second_limited - second;
+        const nmpc_real_t second_change = nmpc_clamp(second, limit_m_step2) - second;
 
         move = nmpc_clamp(first - nmpc_ratio_product(ratio[0], second_change), limit_m_step2);
-        if (first_limited != first) {
+        if (nmpc_within(first, limit_m_step2) == 0) {
             /* Or the first one is: the best second one beside it. */
             const nmpc_real_t first_change = first_limited - first;
             const nmpc_real_t other =

@@ -109,10 +109,6 @@ int nmpc_is_saturated(const nmpc_t *self);
 /* Set `estimate`. Returns NMPC_NULL_POINTER if an argument is null. */
 nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate);
 
-/* 1 if the last command lies at the tilt limit, in roll or in pitch: the target may ask for more than the limit gives;
- * else 0. `self` must not be null. */
-int nmpc_is_saturated(const nmpc_t *self);
-
 /* Version of the generator and digest of the settings, to identify what a binary was built from. */
 const char *nmpc_version(void);
 

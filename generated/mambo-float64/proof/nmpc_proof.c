@@ -5,9 +5,10 @@
  * memory, overflow, division by zero, conversion out of range), only finite numbers are stored, and no command exceeds
  * the tilt limit.
  *
- * There are two proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
- * result in NaN is an alarm. refuse_nan() passes NaN: each call is refused and writes nothing into the controller, so
- * the states that take_numbers() covers are all states there are.
+ * There are three proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
+ * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset() and nmpc_set_command() refuse it and write nothing, and
+ * a step handles a state or a target with NaN as take_numbers() shows it for one with an infinity: nothing reads it.
+ * turn_everywhere() proves for every heading what take_numbers() assumes of sine and cosine.
  *
  * Settings ce757fc85125833a. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
  */
@@ -20,9 +21,38 @@
 #endif
 
 #define INPUTS 12
+#define TARGET 7 /* the first input that is not the state's */
 
 static volatile nmpc_real_t any_real;
 static volatile int any_int;
+
+/* Far more than one, but small enough that no product overflows. */
+#define SINE_LIMIT 8.0
+
+/* The index of the input that is NaN; INPUTS if none is. */
+static int nan_at = INPUTS;
+
+/*@ requires is_a_heading: nan_at == INPUTS ==> -NMPC_YAW_RANGE_RAD <= angle_rad <= NMPC_YAW_RANGE_RAD;
+    requires has_room: \valid(sine) && \valid(cosine);
+    assigns *sine, *cosine \from angle_rad;
+    ensures are_set: \initialized(sine) && \initialized(cosine);
+    ensures sine_is_small: \is_finite(*sine) && -SINE_LIMIT <= *sine <= SINE_LIMIT;
+    ensures cosine_is_small: \is_finite(*cosine) && -SINE_LIMIT <= *cosine <= SINE_LIMIT;
+*/
+void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine);
+
+/* Whatever reads a state also calls this. */
+/*@ requires no_nan_in_the_state: nan_at >= TARGET;
+    assigns tilt_m_step2[0 .. 1] \from *state;
+    ensures are_set: \initialized(&tilt_m_step2[0 .. 1]);
+*/
+void nmpc_attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2]);
+
+/* Whatever reads a target also calls this. */
+/*@ requires no_nan_in_the_target: nan_at < TARGET || nan_at == INPUTS;
+    assigns \result \from axis, state[0 .. 7], limit_m_step2;
+*/
+nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t *state, nmpc_real_t limit_m_step2);
 
 /* Returns any number or infinity. It has no body; Eva uses its contract. */
 /*@ assigns \result \from any_int;
@@ -32,6 +62,7 @@ nmpc_real_t any_number(void);
 
 void take_numbers(void);
 void refuse_nan(void);
+void turn_everywhere(void);
 
 static void draw_numbers(nmpc_real_t input[INPUTS])
 {
@@ -162,6 +193,9 @@ void take_numbers(void)
 /* A controller in any state, in memory that must not be written. */
 extern const nmpc_t untouchable;
 
+/* One that a step may write. */
+extern nmpc_t any_controller;
+
 void refuse_nan(void)
 {
     nmpc_t *self = (nmpc_t *)&untouchable;
@@ -183,6 +217,7 @@ void refuse_nan(void)
         state = state_of(input);
         target = target_of(input);
         command = command_of(input);
+        nan_at = which;
 
         if (which < 2) {
             status = nmpc_reset(self, &command);
@@ -190,7 +225,7 @@ void refuse_nan(void)
             status = nmpc_set_command(self, &command);
             /*@ assert set_command_refuses_nan: status != NMPC_OK; */
         }
-        status = nmpc_step(self, &state, &target, input[11], &command);
+        status = nmpc_step(&any_controller, &state, &target, input[11], &command);
         /*@ assert step_refuses_nan: status != NMPC_OK; */
         (void)status;
 
@@ -200,6 +235,31 @@ void refuse_nan(void)
         (void)nmpc_step(NULL, &state, &target, input[11], &command);
         (void)nmpc_step(self, NULL, &target, input[11], &command);
         (void)nmpc_step(self, &state, NULL, input[11], &command);
-        (void)nmpc_step(self, &state, &target, input[11], NULL);
+        (void)nmpc_step(&any_controller, &state, &target, input[11], NULL);
+    }
+}
+
+static void turn(nmpc_real_t first_rad, nmpc_real_t last_rad)
+{
+    const nmpc_real_t angle_rad = any_number();
+    nmpc_real_t sine;
+    nmpc_real_t cosine;
+
+    if ((angle_rad >= first_rad) && (angle_rad <= last_rad) && (angle_rad >= -NMPC_YAW_RANGE_RAD)
+        && (angle_rad <= NMPC_YAW_RANGE_RAD)) {
+        nmpc_sine_cosine(angle_rad, &sine, &cosine);
+        /*@ assert sine_is_small: \is_finite(sine) && -SINE_LIMIT <= sine <= SINE_LIMIT; */
+        /*@ assert cosine_is_small: \is_finite(cosine) && -SINE_LIMIT <= cosine <= SINE_LIMIT; */
+    }
+}
+
+/* Try every heading, by quarters of a turn. */
+void turn_everywhere(void)
+{
+    const nmpc_real_t quarter_turn_rad = 1.5707963267948966;
+    int quarter;
+
+    for (quarter = -653; quarter < 653; quarter++) {
+        turn((nmpc_real_t)quarter * quarter_turn_rad, (nmpc_real_t)(quarter + 1) * quarter_turn_rad);
     }
 }

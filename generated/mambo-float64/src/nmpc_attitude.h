@@ -20,6 +20,8 @@
 
 #include "nmpc.h"
 
+#include "nmpc_math.h"
+
 #if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF1B3B6C8UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
@@ -47,7 +49,7 @@ extern "C" {
 /* The largest |u| that a move may have, and the largest |a|, |i| and |c|, and |u| when it turns. */
 #define NMPC_RIGHT_LIMIT_M_STEP2 0.00034335
 #define NMPC_FORWARD_LIMIT_M_STEP2 0.00034335
-#define NMPC_ATTITUDE_LIMIT_M_STEP2 0.0009053067149917564
+#define NMPC_ATTITUDE_LIMIT_M_STEP2 0.0009053067591001804
 
 /* Set the model to the steady attitude of a command. */
 void nmpc_attitude_reset(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad);
@@ -56,8 +58,17 @@ void nmpc_attitude_reset(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_r
 void nmpc_attitude_set_command(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad);
 
 /* The command, in rad, that stands for u; beyond the tilt limit by rounding at most. */
-nmpc_real_t nmpc_attitude_roll(const nmpc_t *self);
-nmpc_real_t nmpc_attitude_pitch(const nmpc_t *self);
+static inline nmpc_real_t nmpc_attitude_roll(const nmpc_t *self)
+{
+    return (NMPC_ROLL_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_RIGHT])
+           + NMPC_ROLL_TRIM_COMMAND_RAD;
+}
+
+static inline nmpc_real_t nmpc_attitude_pitch(const nmpc_t *self)
+{
+    return NMPC_PITCH_TRIM_COMMAND_RAD
+           - (NMPC_PITCH_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_FORWARD]);
+}
 
 /* Set `tilt_m_step2` to the accelerations, right and forward, of a measured attitude. */
 void nmpc_attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2]);

@@ -2,7 +2,7 @@
  *
  * Self-test: 24 consecutive control steps with the results of the reference, and 100000 control steps with
  * pseudo-random inputs, of whose results there is a digest.
- * MISRA C:2012: departs from rule 8.9, for the reason in deviations.txt.
+ * MISRA C:2012: departs from rules 8.9 and 11.5, for the reasons in deviations.txt.
  */
 #include "nmpc_self_test.h"
 

@@ -56,7 +56,6 @@ typedef float nmpc_sum_t;
 #define NMPC_SETTINGS_ID 0x80B9AE27UL
 
 #define NMPC_ANGLES 2 /* roll phi, pitch theta */
-#define NMPC_WORLD_STATES 4 /* of the states that the cost depends on, those that turn with the heading */
 #define NMPC_STORED_NUMBERS 26 /* numbers in nmpc_t, which come before its single bytes */
 #define NMPC_ONE 1.0f
 

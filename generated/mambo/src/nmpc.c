@@ -30,6 +30,11 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 /* `missed` before the first good state, and after an outage. */
 #define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)
 
+static int has_estimate(const nmpc_t *self)
+{
+    return self->missed != NMPC_NO_ESTIMATE;
+}
+
 static int is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velocity_m_s[2])
 {
     return nmpc_within(position_m[0], NMPC_POSITION_RANGE_M)
@@ -111,9 +116,16 @@ static void turn_to_heading(const nmpc_t *self, nmpc_real_t x, nmpc_real_t y, nm
     *forward = (x * self->attitude.cosine) + (y * self->attitude.sine);
 }
 
-static int is_at_limit(nmpc_real_t value, nmpc_real_t limit)
+/* The error of the estimated velocity along `axis`. */
+static nmpc_real_t velocity_error(const nmpc_t *self, const nmpc_target_t *target, int axis)
 {
-    return (value >= limit) || (value <= -limit);
+    return self->observer.velocity_m_step[axis] - (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis]);
+}
+
+/* The disturbance less the target's acceleration along `axis`. */
+static nmpc_real_t acceleration_error(const nmpc_t *self, int axis)
+{
+    return nmpc_observer_disturbance(self, axis) - self->tracker.acceleration_m_step2[axis];
 }
 
 /* Minimise the cost along both axes, which gives the model's next command; `tilt_m_step2` is the acceleration of the
@@ -121,24 +133,20 @@ static int is_at_limit(nmpc_real_t value, nmpc_real_t limit)
 static void minimize(nmpc_t *self, const nmpc_target_t *target, const nmpc_real_t tilt_m_step2[2])
 {
     nmpc_attitude_t *const attitude = &self->attitude;
-    nmpc_real_t error[2][NMPC_STATES];
     nmpc_real_t state[2][NMPC_STATES];
     nmpc_real_t right_m_step2;
     nmpc_real_t forward_m_step2;
     int axis;
-    int k;
 
-    for (axis = 0; axis < 2; axis++) {
-        error[axis][0] = self->observer.position_m[axis] - target->position_m[axis];
-        error[axis][1] = self->observer.velocity_m_step[axis]
-                         - (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis]);
-        error[axis][2] = nmpc_observer_disturbance(self, axis) - self->tracker.acceleration_m_step2[axis];
-        error[axis][3] = self->tracker.jerk_m_step2_update[axis];
-    }
-    NMPC_UNROLL
-    for (k = 0; k < NMPC_WORLD_STATES; k++) {
-        turn_to_heading(self, error[0][k], error[1][k], &state[NMPC_RIGHT][k], &state[NMPC_FORWARD][k]);
-    }
+    turn_to_heading(self, self->observer.position_m[0] - target->position_m[0],
+                    self->observer.position_m[1] - target->position_m[1], &state[NMPC_RIGHT][0],
+                    &state[NMPC_FORWARD][0]);
+    turn_to_heading(self, velocity_error(self, target, 0), velocity_error(self, target, 1), &state[NMPC_RIGHT][1],
+                    &state[NMPC_FORWARD][1]);
+    turn_to_heading(self, acceleration_error(self, 0), acceleration_error(self, 1), &state[NMPC_RIGHT][2],
+                    &state[NMPC_FORWARD][2]);
+    turn_to_heading(self, self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[1],
+                    &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
     for (axis = 0; axis < 2; axis++) {
         state[axis][4] = tilt_m_step2[axis];
         state[axis][5] = attitude->integral_m_step2[axis];
@@ -149,8 +157,10 @@ static void minimize(nmpc_t *self, const nmpc_target_t *target, const nmpc_real_
     forward_m_step2 = nmpc_optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], NMPC_FORWARD_LIMIT_M_STEP2);
     attitude->command_m_step2[NMPC_RIGHT] = right_m_step2;
     attitude->command_m_step2[NMPC_FORWARD] = forward_m_step2;
-    self->saturated = (unsigned char)(is_at_limit(right_m_step2, NMPC_RIGHT_LIMIT_M_STEP2)
-                                      || is_at_limit(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2));
+    self->saturated = ((nmpc_reaches(right_m_step2, NMPC_RIGHT_LIMIT_M_STEP2) != 0)
+                       || (nmpc_reaches(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2) != 0))
+                          ? 1U
+                          : 0U;
 }
 
 /* Set `tilt_m_step2` to the accelerations, right and forward, of the measured attitude, and `feedback_rad` to what its
@@ -162,7 +172,7 @@ static void measure(nmpc_t *self, const nmpc_state_t *state, nmpc_real_t tilt_m_
     nmpc_real_t cosine;
 
     nmpc_sine_cosine(state->yaw_rad, &sine, &cosine);
-    if (self->missed == NMPC_NO_ESTIMATE) {
+    if (has_estimate(self) == 0) {
         self->attitude.sine = sine;
         self->attitude.cosine = cosine;
     } else {
@@ -199,14 +209,14 @@ static void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t
     if (state == NULL) {
         self->missed = (unsigned char)((self->missed < NMPC_NO_ESTIMATE) ? (self->missed + 1U) : NMPC_NO_ESTIMATE);
     } else {
-        if (self->missed == NMPC_NO_ESTIMATE) {
+        if (has_estimate(self) == 0) {
             nmpc_observer_start(self, state);
         } else {
             nmpc_observer_correct(self, state);
         }
         self->missed = 0U;
     }
-    if ((target != NULL) && (self->missed != NMPC_NO_ESTIMATE)) {
+    if ((target != NULL) && (has_estimate(self) != 0)) {
         nmpc_tracker_update(self, target->velocity_m_s);
         minimize(self, target, self->attitude.tilt_m_step2);
         self->command_rad[0] = nmpc_clamp(nmpc_attitude_roll(self) + feedback_rad[0], NMPC_TILT_LIMIT_RAD);
@@ -270,14 +280,8 @@ nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)
         estimate->disturbance_m_s2[axis] =
             NMPC_STEPS2_PER_S2 * self->observer.disturbance_m_step2[axis];
     }
-    estimate->is_valid = (self->missed != NMPC_NO_ESTIMATE) ? 1 : 0;
+    estimate->is_valid = has_estimate(self);
     return NMPC_OK;
-}
-
-int nmpc_is_saturated(const nmpc_t *self)
-{
-    return (nmpc_reaches(self->command_rad[0], NMPC_TILT_LIMIT_RAD) != 0)
-           || (nmpc_reaches(self->command_rad[1], NMPC_TILT_LIMIT_RAD) != 0);
 }
 
 const char *nmpc_version(void)

@@ -4,8 +4,6 @@
  */
 #include "nmpc_observer.h"
 
-#include "nmpc_math.h"
-
 #if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x80B9AE27UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
@@ -29,12 +27,6 @@ void nmpc_observer_start(nmpc_t *self, const nmpc_state_t *state)
         self->observer.position_m[axis] = state->position_m[axis];
         self->observer.velocity_m_step[axis] = NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];
     }
-}
-
-nmpc_real_t nmpc_observer_disturbance(const nmpc_t *self, int axis)
-{
-    return self->observer.disturbance_m_step2[axis]
-           - (NMPC_DRAG_1_STEP * self->observer.velocity_m_step[axis]);
 }
 
 void nmpc_observer_correct(nmpc_t *self, const nmpc_state_t *state)

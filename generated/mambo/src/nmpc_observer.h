@@ -22,6 +22,8 @@
 
 #include "nmpc.h"
 
+#include "nmpc_math.h"
+
 #if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x80B9AE27UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
@@ -54,7 +56,11 @@ void nmpc_observer_correct(nmpc_t *self, const nmpc_state_t *state);
 void nmpc_observer_predict(nmpc_t *self, const nmpc_real_t tilt_m_step2[2]);
 
 /* The acceleration along `axis` that the tilt does not explain: d - drag v. */
-nmpc_real_t nmpc_observer_disturbance(const nmpc_t *self, int axis);
+static inline nmpc_real_t nmpc_observer_disturbance(const nmpc_t *self, int axis)
+{
+    return self->observer.disturbance_m_step2[axis]
+           - (NMPC_DRAG_1_STEP * self->observer.velocity_m_step[axis]);
+}
 
 #ifdef __cplusplus
 }

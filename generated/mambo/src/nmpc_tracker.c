@@ -29,11 +29,10 @@ void nmpc_tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
 
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t change_m_s = velocity_m_s[axis] - tracker->velocity_m_s[axis];
-        const nmpc_real_t limited_m_s = nmpc_clamp(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
+        const int is_steady = nmpc_within(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
 
-        /* A jump is what the limit cuts. */
-        if ((self->has_target != 0U) && (limited_m_s == change_m_s)) {
-            const nmpc_real_t measured_m_step2 = NMPC_STEP_SQUARED_PER_UPDATE_S * limited_m_s;
+        if ((self->has_target != 0U) && (is_steady != 0)) {
+            const nmpc_real_t measured_m_step2 = NMPC_STEP_SQUARED_PER_UPDATE_S * change_m_s;
             const nmpc_real_t predicted_m_step2 =
                 tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
             const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
