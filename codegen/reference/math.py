@@ -69,8 +69,7 @@ def rounded(product: Real, bits: int) -> Real:
 
 def clamp(values: Real, limit: Any) -> Real:
     """Saturate `values` at plus or minus `limit`, with the comparisons of the C."""
-    above: Real = np.where(values > -limit, values, -limit)
-    clamped: Real = np.where(above < limit, above, limit)
+    clamped: Real = np.where(values > limit, limit, np.where(values < -limit, -limit, values))
     return clamped
 
 

@@ -139,7 +139,7 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
             [rng.uniform(-1024, 1024), rng.choice([0.0, np.pi / 2, -np.pi, 1024.0, -1024.0])]
         )
         sine, cosine = blocks.products.sine_cosine(yaws)
-        drawn = {name: blocks.draw(limit) for name in names}
+        drawn = {name: blocks.draw(limit) for name in members}
         attitude = AttitudeState(**drawn, sine=sine[:1], cosine=cosine[:1])
         blocks.put("attitude", **{member: getattr(attitude, name) for name, member in names.items()})
         lib.nmpc_attitude_advance(self)

@@ -166,7 +166,7 @@ static inline int nmpc_reaches(nmpc_real_t value, nmpc_real_t limit)
 /* Saturate `value` at +/- `limit`. */
 static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
 {
-    return nmpc_smaller(nmpc_larger(value, -limit), limit);
+    return (value > limit) ? limit : ((value < -limit) ? -limit : value);
 }
 #endif
 
