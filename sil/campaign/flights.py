@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, Final
 
 from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.sil.campaign.executors import report_share
 from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
@@ -19,7 +20,7 @@ from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
-from mambo_nmpc.sil.flight.metrics import Metrics, measure
+from mambo_nmpc.sil.flight.metrics import Metrics, measure, saturated_share
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.plant.link import NOT_CALLED
@@ -32,6 +33,8 @@ SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
 """Metrics of the error that are also computed from the estimates."""
 
 CRASHED, REFUSED, DIGEST = "crashed", "refused_updates", "trace_sha256"
+SATURATED: Final = "saturated_share"
+"""Share of the commands with roll or pitch at the tilt limit of the settings; not a column of a campaign."""
 
 Row = dict[str, float | str]
 """Results of one flight by `<controller>_<index>`."""
@@ -72,7 +75,7 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     for number, entrant in enumerate(entrants):
         flight = flight_of(scenarios, entrant.settings.horizon.update_period_s)
         trace = fly(flight, _controller(entrant, flight), partial(_report_part, number, len(entrants)))
-        for key, values in _evaluate(trace).items():
+        for key, values in _evaluate(trace, Design(entrant.settings).tilt_limit_rad).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
     report_share(0.0)
@@ -91,12 +94,13 @@ def _controller(entrant: Entrant, flight: Flight) -> PositionController:
         return CompiledController(entrant.settings, flight.flights)
 
 
-def _evaluate(trace: Trace) -> dict[str, list[Any]]:
+def _evaluate(trace: Trace, limit_rad: float) -> dict[str, list[Any]]:
     """Return the results of n flights by key, each a list of n."""
     refused = (trace.status != 0) & (trace.status != NOT_CALLED)
     found: dict[str, list[Any]] = {
         CRASHED: detect_crashes(trace).astype(int).tolist(),
         REFUSED: refused.sum(axis=0).tolist(),
+        SATURATED: saturated_share(trace.command_rad, limit_rad).tolist(),
     }
     views = [("", INDICES, trace)]
     if isinstance(trace, SensedTrace):

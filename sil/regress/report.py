@@ -11,7 +11,7 @@ from pydantic import Field
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.campaign.file import Entrant
-from mambo_nmpc.sil.campaign.flights import CRASHED, DIGEST, INDICES, REFUSED, Row
+from mambo_nmpc.sil.campaign.flights import CRASHED, DIGEST, INDICES, REFUSED, SATURATED, Row
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.scenario import Record, write_record
 from mambo_nmpc.sil.regress.baseline import Baseline, Recorded
@@ -104,7 +104,7 @@ def _result(suite: FlightSuite, number: int, row: Row, held: Recorded) -> Flight
     """Return the result of flight `number` with its recorded values `held`, if it has any."""
     flight = suite.flights[number]
     counts: dict[str, Number] = {name: int(row[name]) for name in (CRASHED, REFUSED)}
-    metrics = counts | {name: float(row[name]) for name in INDICES}
+    metrics = counts | {name: float(row[name]) for name in (*INDICES, SATURATED)}
     checks = [
         _check(name, now, flight.bounds.get(name), suite.tolerances.get(name), held.get(name))
         for name, now in metrics.items()
@@ -167,7 +167,11 @@ def write_records(
 
 @dataclass(frozen=True)
 class GroupRow:
-    """One metric over the flights of a group; `over_recorded` is the largest ratio to the recorded value."""
+    """One metric over the flights of a group.
+
+    `over_recorded` is the largest ratio to the recorded value, `saturated_share` the largest share of a
+    flight's commands at the tilt limit.
+    """
 
     group: str
     metric: str
@@ -175,6 +179,7 @@ class GroupRow:
     middle: float
     worst: float
     over_recorded: float | None
+    saturated_share: float
     failed: int
     flights: int
 
@@ -197,6 +202,7 @@ def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
                 median(values),
                 max(values),
                 max(ratios, default=None),
+                max(flight.metrics[SATURATED] for flight in flights),
                 failed,
                 len(checks),
             )
@@ -225,11 +231,12 @@ def remarks(summary: RegressSummary) -> list[str]:
 
 def regress_text(summary: RegressSummary, folder: str) -> str:
     """Return a summary as text: a row per group and metric, then the failed flights."""
-    heads = ("bound", "median", "worst", "ratio")
+    heads = ("bound", "median", "worst", "ratio", "at limit")
     lines = [f"{'group':21}{'metric':21}" + "".join(f"{head:>11}" for head in heads) + f"{'failed':>12}"]
     for row in group_rows(summary):
         numbers = (row.bound, row.middle, row.worst, row.over_recorded)
         cells = "".join(f"{'-' if number is None else digits(number):>11}" for number in numbers)
+        cells += f"{f'{row.saturated_share:.1%}':>11}"
         lines.append(f"{row.group:20} {row.metric:21}{cells}{f'{row.failed} of {row.flights}':>12}")
     lines.append("")
     for flight in summary.failed[:MOST_SHOWN]:

@@ -115,4 +115,6 @@ def test_an_update_is_refused_when_the_controller_was_called_and_did_not_accept(
     trace = flown()
     trace.status[:, 1] = NOT_CALLED
     trace.status[[1, 2, 9], 1] = [Status.OK, Status.BAD_STATE, Status.BAD_TARGET]
-    assert _evaluate(trace)["refused_updates"] == [0, 2]
+    found = _evaluate(trace, float(np.abs(trace.command_rad).max()))
+    assert found["refused_updates"] == [0, 2]
+    assert 0 < max(found["saturated_share"]) < 1

@@ -17,6 +17,7 @@ from mambo_nmpc.codegen import bundle
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.render import render
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.faults.flights import End, Verdict, fly_faults
@@ -48,6 +49,7 @@ from mambo_nmpc.sil.plant.link import NOT_CALLED
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.faults import check, judge
 from tests.support.one_norm import ONE_NORM
+from tests.support.quadratic import quadratic_settings
 from tests.support.subjects import subject
 from tests.support.tools import require
 
@@ -120,8 +122,8 @@ def test_a_frozen_state_is_the_state_at_the_onset() -> None:
 class Recorder:
     """The compiled C, which records states and commands and is not called at updates of `skipped`."""
 
-    def __init__(self, skipped: Sequence[int] = ()) -> None:
-        self.controller, self.skipped = CompiledController(MAMBO), skipped
+    def __init__(self, skipped: Sequence[int] = (), settings: Settings = MAMBO) -> None:
+        self.controller, self.skipped = CompiledController(settings), skipped
         self.states: list[NDArray[np.float64]] = []
         self.commands: list[NDArray[Any]] = []
 
@@ -144,6 +146,24 @@ class Recorder:
 def test_a_dropped_update_equals_a_controller_that_is_not_called(drop: Any, skipped: range) -> None:
     """Passing NaN gives the same trace, bit for bit, as not calling the controller."""
     assert fly_with(Fault(20, 60, drop=drop)).same_bits(fly_start(Recorder(skipped)))
+
+
+def test_a_dropped_update_leaves_a_quadratic_cost_as_it_is() -> None:
+    """There a refused state changes the memory, which is restored."""
+    settings = quadratic_settings()
+    controller = CompiledController(settings)
+    fault = Fault(20, 60, drop=drop_every(3))
+    found = fly_start(FaultyController(controller, [fault], controller.instances))
+    assert found.same_bits(fly_start(Recorder(range(20, 60, 3), settings)))
+    assert not found.same_bits(fly_start(FaultyController(CompiledController(settings), [fault])))
+
+
+def test_faults_of_weights_need_weights() -> None:
+    """A quadratic cost has the others."""
+    names = {one.name for one in scenarios(MAMBO)}
+    assert {name for name in names if "weight" in name} == names - {
+        one.name for one in scenarios(quadratic_settings())
+    }
 
 
 def test_late_commands_are_those_computed_earlier() -> None:
@@ -336,8 +356,9 @@ LINES
 
 def test_the_table_has_one_row_per_fault() -> None:
     """Both courses are side by side; a column for both shows the worse."""
-    text = table([VERDICT, replace(VERDICT, course="hover", largest_command_rad=0.35, end=End.AWAY)])
-    assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
+    worse = {"largest_command_rad": 0.35, "saturated_share": 0.5, "end": End.AWAY}
+    text = table([VERDICT, replace(VERDICT, course="hover", **worse)])
+    assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 50.0 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
     assert "eight 0.100 m, hover 0.100 m" in text
 
 

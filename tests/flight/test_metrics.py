@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, measure
+from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, measure, saturated_share
 from mambo_nmpc.sil.flight.traces import Trace
 
 FloatArray = NDArray[np.float64]
@@ -137,3 +137,10 @@ def test_a_flight_among_many_has_the_metrics_of_the_flight_alone() -> None:
         alone = measure(trace_of(time_s, error_m[:, one], command_rad[:, one]))
         for name, values in vars(together).items():
             np.testing.assert_array_equal(getattr(alone, name), values[one], err_msg=name)
+
+
+def test_the_saturated_share_counts_commands_at_the_limit() -> None:
+    """Roll or pitch, either way; a command just below the limit does not count."""
+    command_rad = np.array([[0.35, 0.0], [0.0, -0.35], [0.349, -0.349], [0.0, 0.0]])
+    shares = saturated_share(np.stack([command_rad, 0.5 * command_rad], axis=1), 0.35)
+    assert shares.tolist() == [0.5, 0.0]

@@ -11,12 +11,14 @@ import pytest
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.boards import Board
+from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.executors import processes
 from mambo_nmpc.sil.footprint.plots import draw_sweep
 from mambo_nmpc.sil.footprint.sweep import Grid, Point, closest_fit, measure_grid, write_points
 from tests.support.command import run
 from tests.support.one_norm import ONE_NORM
+from tests.support.quadratic import quadratic_settings
 from tests.support.tools import board_builder
 
 POINT = Point(
@@ -144,6 +146,15 @@ def test_a_bad_grid_gets_a_message_and_exit_2(options: list[str], message: str, 
 
 
 @pytest.mark.long
+def test_a_quadratic_cost_has_nothing_to_sweep(tmp_path: Path) -> None:
+    """The message names file, key, rule and the command to use instead."""
+    (tmp_path / "quadratic.toml").write_text(to_toml(quadratic_settings()), "utf-8")
+    said = run("sweep", "quadratic.toml", code=2)[1]
+    assert 'quadratic.toml: cost.norm = "quadratic" must be "1-norm"' in said
+    assert "mambo-nmpc tune" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["quadratic.toml"]
+
+
 def test_a_sweep_yields_the_points_in_order() -> None:
     """A longer horizon takes more flash and instructions, and no less RAM."""
     board_builder("crazyflie")

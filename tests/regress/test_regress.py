@@ -56,7 +56,7 @@ def mambo() -> Entrant:
 
 def row(iae_m_s: float, **others: float | str) -> Row:
     """Return the results of a flight."""
-    plain: Row = {"crashed": 0, "refused_updates": 0, "trace_sha256": "ab"}
+    plain: Row = {"crashed": 0, "refused_updates": 0, "saturated_share": 0.125, "trace_sha256": "ab"}
     return plain | dict.fromkeys(INDICES, 1.0) | {"iae_m_s": iae_m_s} | others
 
 
@@ -165,14 +165,14 @@ bounds = { ise_m2_s = 2.0, refused_updates = 4 }
 """Groups that may crash, have other bounds, or none."""
 
 TEXT = """\
-group                metric                     bound     median      worst      ratio      failed
-eight                iae_m_s                        3        2.5        2.9       1.25      1 of 3
-fall                 iae_m_s                        -        inf        inf        inf      1 of 2
-calm                 crashed                        0        0.5          1          -      1 of 2
-calm                 refused_updates                4        2.5          5          -      1 of 2
-calm                 iae_m_s                        -          1          1          1      0 of 1
-calm                 ise_m2_s                       2       1.75        2.5          -      1 of 2
-still                crashed                        0          0          0          -      0 of 1
+group                metric                     bound     median      worst      ratio   at limit      failed
+eight                iae_m_s                        3        2.5        2.9       1.25      50.0%      1 of 3
+fall                 iae_m_s                        -        inf        inf        inf      12.5%      1 of 2
+calm                 crashed                        0        0.5          1          -      12.5%      1 of 2
+calm                 refused_updates                4        2.5          5          -      12.5%      1 of 2
+calm                 iae_m_s                        -          1          1          1      12.5%      0 of 1
+calm                 ise_m2_s                       2       1.75        2.5          -      12.5%      1 of 2
+still                crashed                        0          0          0          -      12.5%      0 of 1
 
 eight/yaw_rad=0: iae_m_s = 2.5 (bound 3; recorded 2, so at most 2.2)
     mambo-nmpc fly --replay out/flights/0000-eight.json
@@ -190,7 +190,7 @@ def test_the_text_has_a_row_for_each_group_and_metric_and_then_what_failed(tmp_p
     """Median, worst value, worst ratio; a lost flight is infinite; crashes where nothing else is judged."""
     found = suite(tmp_path, more=MIXED)
     path = record_baseline(found, mambo(), [*map(row, (2.0, 1.0, 2.8, 1.0, 1.0, 1.0, math.nan, math.nan))])
-    rows = [row(2.5), row(1.05), row(2.9), row(1.05), row(math.nan, crashed=1)]
+    rows = [row(2.5), row(1.05), row(2.9, saturated_share=0.5), row(1.05), row(math.nan, crashed=1)]
     rows += [row(1.0, ise_m2_s=2.5, crashed=1), row(0.9, refused_updates=5), row(9.0)]
     assert path == baseline_path(found, "mambo")
     summary = judge(found, mambo(), rows, read_baseline(found, "mambo"), Path("here.json"))

@@ -206,9 +206,16 @@ def regress_folder(folder: Path) -> None:
     def check(now: float, then: float | None) -> Check:
         return Check("iae_m_s", now, 5.0, then, 5.0 if then is None else 2.2, now <= 2.2)
 
-    good = FlightResult("eight", "eight/yaw_rad=0", {"iae_m_s": 1.5}, [check(1.5, 2.0)], True, None)
+    good = FlightResult(
+        "eight", "eight/yaw_rad=0", {"iae_m_s": 1.5, "saturated_share": 0.01}, [check(1.5, 2.0)], True, None
+    )
     lost = FlightResult(
-        "circle", HOSTILE, {"iae_m_s": np.nan}, [check(np.nan, None)], False, f"flights/{HOSTILE}"
+        "circle",
+        HOSTILE,
+        {"iae_m_s": np.nan, "saturated_share": 0.5},
+        [check(np.nan, None)],
+        False,
+        f"flights/{HOSTILE}",
     )
     RegressSummary(
         suite=HOSTILE,

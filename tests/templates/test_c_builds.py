@@ -22,6 +22,7 @@ from mambo_nmpc.sil.verify.dialects import DIALECTS
 from tests.support.bundles import place
 from tests.support.cases import SCALARS, settings_case
 from tests.support.one_norm import ONE_NORM
+from tests.support.quadratic import quadratic_settings
 from tests.support.tools import require
 
 STRICT = [*WARNING_FLAGS, "-Werror"]
@@ -173,11 +174,20 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     assert not (tmp_path / "build").exists()
 
 
-@pytest.mark.parametrize("scalar", SCALARS)
-def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(scalar: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "settings",
+    [
+        *(with_option(ONE_NORM, "code.scalar", scalar, "test") for scalar in SCALARS),
+        quadratic_settings("float32"),
+        quadratic_settings("float64"),
+    ],
+    ids=[*SCALARS, "quadratic", "quadratic float64"],
+)
+def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(
+    settings: Settings, tmp_path: Path
+) -> None:
     """They lack operations that gcc and clang have, and loops written out."""
     require("gcc", "gcc")
-    settings = with_option(ONE_NORM, "code.scalar", scalar, "test")
     sources = sorted(placed(settings, tmp_path).glob("src/*.c"))
     gcc = ("gcc", *COMPILE_FLAGS, "-Iinclude")
     shell(*gcc, "-U__GNUC__", "-c", *sources, folder=tmp_path)
