@@ -13,6 +13,7 @@ LONGEST_MODULE = 500
 # A wing of sil imports only wings above it in this list.
 WINGS = [
     "errors",
+    "vehicles",
     "plant",
     "sensors",
     "firmware",
@@ -34,7 +35,7 @@ WINGS = [
     "package",
 ]
 # Wings whose results must have the same bits on every processor, and what of them only draws or prints.
-EXACT_WINGS = {"plant", "sensors", "flight", "controllers", "paper", "faults", "campaign"}
+EXACT_WINGS = {"vehicles", "plant", "sensors", "flight", "controllers", "paper", "faults", "campaign"}
 ROUNDED = {"sil.flight.animation", "sil.faults.section"}
 # NumPy and math have these with other bits on other processors.
 INEXACT = {

@@ -1,7 +1,8 @@
 """The keys of controller.toml, from the JSON schema of the settings; messages and comments use them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from mambo_nmpc.codegen.settings.model import Settings
 
@@ -30,11 +31,23 @@ def spell(value: object) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value)
 
 
-def _key(path: str, schema: dict[str, Any]) -> Key:
+@dataclass(frozen=True)
+class Form:
+    """A kind of file with sections: descriptions of sections, and keys, both by dotted path.
+
+    `kinds` are the sections whose key `kind` decides which others they have.
+    """
+
+    sections: Mapping[str, str]
+    keys: Mapping[str, Key]
+    kinds: frozenset[str] = frozenset()
+
+
+def key_of(path: str, schema: dict[str, Any]) -> Key:
     """Return the key at `path` from its JSON schema."""
     description = schema["description"]
-    if "enum" in schema:
-        choices = " or ".join(spell(choice) for choice in schema["enum"])
+    if "enum" in schema or "const" in schema:
+        choices = " or ".join(spell(choice) for choice in schema.get("enum") or [schema["const"]])
         return Key(path, description, "one of", choices, f"be {choices}")
     if "pattern" in schema:
         words = f"lower-case letters, digits and single inner underscores, at most {schema['maxLength']}"
@@ -52,8 +65,11 @@ SECTIONS: dict[str, str] = {name: field.description or "" for name, field in Set
 """The description of each section, in the order of the file."""
 
 KEYS: dict[str, Key] = {
-    f"{section}.{name}": _key(f"{section}.{name}", schema)
+    f"{section}.{name}": key_of(f"{section}.{name}", schema)
     for section, field in Settings.model_fields.items()
     for name, schema in field.default.model_json_schema()["properties"].items()
 }
 """Every setting by its dotted path, in the order of the file."""
+
+SETTINGS: Final = Form(SECTIONS, KEYS)
+"""What messages on a controller.toml need."""

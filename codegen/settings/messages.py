@@ -4,35 +4,54 @@ import difflib
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from mambo_nmpc.codegen.errors import echo, echo_value
-from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key
+from mambo_nmpc.codegen.settings.keys import SETTINGS, Form, Key
 
 
-def faults(error: ValidationError, document: Mapping[str, object]) -> tuple[str, ...]:
+def faults(error: ValidationError, document: Mapping[str, object], form: Form = SETTINGS) -> tuple[str, ...]:
     """Return one sentence for each fault of `document`, without the name of its source."""
     return tuple(
-        _fault(details, document) for details in error.errors(include_url=False, include_context=False)
+        _fault(details, document, form) for details in error.errors(include_url=False, include_context=False)
     )
 
 
-def _fault(details: ErrorDetails, document: Mapping[str, object]) -> str:
+def _fault(details: ErrorDetails, document: Mapping[str, object], form: Form) -> str:
     """Name the wrong key and its value, and say what to write instead."""
     names = [str(part) for part in details["loc"]]
+    if names[0] in form.kinds:
+        del names[1:2]  # pydantic adds the kind
     dotted = ".".join(_spell_name(name) for name in names)
-    if details["type"] == "extra_forbidden":
-        return _unknown(names, dotted)
     value = details["input"]
-    if len(names) == 1:
+    match details["type"]:
+        case "extra_forbidden":
+            return _unknown(names, dotted, form)
+        case "missing" if dotted in form.sections:
+            return f"{dotted} is missing; write [{dotted}] and its keys below: {form.sections[dotted]}"
+        case "missing" | "union_tag_not_found" if isinstance(value, Mapping):
+            key = form.keys[dotted if details["type"] == "missing" else f"{dotted}.kind"]
+            return f"{key.path} is missing; add it, it must {key.rule}: {key.description}"
+        case "union_tag_invalid":
+            key = form.keys[f"{dotted}.kind"]
+            return f"{key.path} = {_spell_value(value['kind'])} must {key.rule}"
+    if dotted in form.sections:
         return f"{dotted} = {_spell_value(value)} must be a section; write [{dotted}] and its keys below"
-    key = KEYS[dotted]
-    section = document.get(names[0])
-    default = "" if isinstance(section, Mapping) and names[1] in section else " (the default)"
+    key = form.keys[dotted]
+    default = "" if _is_given(names, document) else " (the default)"
     return f"{dotted} = {_spell_value(value)}{default} {_rule(details, key)}"
+
+
+def _is_given(names: list[str], document: object) -> bool:
+    """Return whether `document` itself has a value at the path `names`."""
+    for name in names:
+        if not isinstance(document, Mapping) or name not in document:
+            return False
+        document = document[name]
+    return True
 
 
 def _rule(details: ErrorDetails, key: Key) -> str:
@@ -62,17 +81,24 @@ def _unit_hint(value: float, key: Key) -> str:
     return ""
 
 
-def _unknown(names: list[str], dotted: str) -> str:
+def _unknown(names: list[str], dotted: str, form: Form) -> str:
     """Say that a section or key does not exist, and name the most similar one."""
-    if len(names) == 1:
-        return f"{dotted} is not a section{_suggestion(names[0], list(SECTIONS))}"
-    siblings = [path.removeprefix(f"{names[0]}.") for path in KEYS if path.startswith(f"{names[0]}.")]
-    return f"{dotted} is not a setting{_suggestion(names[1], siblings)}"
+    parent = ".".join(names[:-1])
+    if parent not in form.sections:
+        return f"{dotted} is not a section{_suggestion(names[0], _children('', form.sections), form)}"
+    siblings = _children(f"{parent}.", [*form.keys, *form.sections])
+    return f"{dotted} is not a setting{_suggestion(names[-1], siblings, form)}"
 
 
-def _suggestion(name: str, siblings: list[str]) -> str:
+def _children(prefix: str, paths: Iterable[str]) -> list[str]:
+    """Return the names that follow `prefix` in `paths`, without what is below them."""
+    found = (path.removeprefix(prefix) for path in paths if path.startswith(prefix))
+    return [name for name in found if "." not in name]
+
+
+def _suggestion(name: str, siblings: list[str], form: Form) -> str:
     """Suggest a similar sibling of `name`, else the same key of another section, else list the siblings."""
-    elsewhere = [path for path in KEYS if path.endswith(f".{name}")]
+    elsewhere = [path for path in form.keys if path.endswith(f".{name}")]
     near = difflib.get_close_matches(name, siblings, n=1) or elsewhere[:1]
     return f"; did you mean {near[0]}?" if near else f"; there are {', '.join(siblings)}"
 

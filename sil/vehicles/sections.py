@@ -1,0 +1,180 @@
+"""The sections of vehicle.toml: every key of a drone, its bounds, unit and meaning.
+
+The attribute path is the TOML path (`vehicle.body.mass_kg` is `mass_kg` under `[body]`). The descriptions are
+part of the JSON schema and of the messages.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+LONGEST_DELAY_S = 0.2
+"""Longest dead time of an attitude loop and longest delay of a sensor."""
+
+
+class VehicleSection(BaseModel):
+    """The rules of all sections: read-only, no unknown keys, no conversion of types, finite numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+Mass = Annotated[float, Field(ge=0.001, le=100)]
+Inertia = Annotated[float, Field(ge=1e-9, le=100)]
+Gain = Annotated[float, Field(ge=0, le=1e9)]
+Limit = Annotated[float, Field(ge=0, le=1e9)]
+Positive = Annotated[float, Field(ge=1e-15, le=1e9)]
+Rate = Annotated[int, Field(ge=50, le=2000)]
+Lag = Annotated[float, Field(ge=0.001, le=2)]
+Delay = Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)]
+Noise = Annotated[float, Field(ge=0, le=1e6)]
+
+
+class Body(VehicleSection):
+    """Mass, inertia and drag."""
+
+    mass_kg: Mass = Field(description="Mass in flight, with battery.")
+    drag_1_s: Annotated[float, Field(ge=0, le=100)] = Field(
+        description="Drag in the plane of the rotors, as deceleration over speed."
+    )
+    inertia_x_kg_m2: Inertia | None = Field(None, description="Moment of inertia about the forward axis.")
+    inertia_y_kg_m2: Inertia | None = Field(None, description="Moment of inertia about the right axis.")
+    inertia_z_kg_m2: Inertia | None = Field(None, description="Moment of inertia about the down axis.")
+
+
+class RotorFigures(VehicleSection):
+    """Four equal rotors in X configuration: thrust = b w^2, torque = k w^2, w^2 in proportion to the command.
+
+    Who knows the thrust per command, but no speeds, writes 1 for `speed_squared_per_command_rad2_s2`: b is
+    then the thrust per command, k the torque per command.
+    """
+
+    arm_m: Annotated[float, Field(ge=0.001, le=10)] = Field(
+        description="Distance from the centre to a rotor axis."
+    )
+    thrust_factor_n_s2: Positive = Field(description="b in thrust = b w^2, w the rotor speed in rad/s.")
+    torque_factor_n_m_s2: Positive = Field(description="k in torque = k w^2.")
+    speed_squared_per_command_rad2_s2: Positive = Field(
+        description="Increase of w^2 per unit of motor command, in steady state."
+    )
+    command_min: Annotated[float, Field(ge=0, le=1e9)] = Field(description="Smallest motor command.")
+    command_max: Positive = Field(description="Largest motor command.")
+    lag_s: Annotated[float, Field(ge=0, le=1)] = Field(
+        description="Time constant from commanded to actual rotor speed; 0 for none."
+    )
+
+
+class TorqueGains(VehicleSection):
+    """Gains of an axis whose loop demands a torque: P angle error + I its integral - D rate."""
+
+    p_n_m: Gain = Field(description="Torque per rad of angle error.")
+    i_n_m_s: Gain = Field(0.0, description="Torque per rad s of the error's integral.")
+    d_n_m_s: Gain = Field(description="Torque per rad/s of body rate, against it.")
+
+
+class YawGains(VehicleSection):
+    """Gains of a yaw loop that demands a torque: P angle error - D rate."""
+
+    p_n_m: Gain = Field(description="Torque per rad of angle error.")
+    d_n_m_s: Gain = Field(description="Torque per rad/s of body rate, against it.")
+
+
+class MamboAttitude(VehicleSection):
+    """The stock loop of the Mambo: PID of each angle to a torque, and a mixer to motor commands."""
+
+    kind: Literal["mambo"] = Field(description="PID of each angle to a torque, as in the stock code.")
+    rate_hz: Rate = Field(200, description="Rate of all inner loops and of the simulation.")
+    roll: TorqueGains = Field(description="Gains of roll.")
+    pitch: TorqueGains = Field(description="Gains of pitch.")
+    yaw: YawGains = Field(description="Gains of yaw.")
+    integral_limit_rad_s: Limit = Field(description="Largest integral of the error of roll and pitch.")
+    integral_leak_1_s: Gain = Field(0.0, description="Share of the integral that leaks per second.")
+
+
+class CascadeGains(VehicleSection):
+    """Gains of an axis: PID of the angle demands a body rate, PID of the rate adds to the motor commands."""
+
+    p_1_s: Gain = Field(description="Demanded rate per angle error.")
+    i_1_s2: Gain = Field(0.0, description="Demanded rate per rad s of the angle error's integral.")
+    d: Gain = Field(0.0, description="Demanded rate per body rate, against it.")
+    integral_limit_rad_s: Limit = Field(0.0, description="Largest integral of the angle error.")
+    rate_p_s_rad: Gain = Field(description="Motor command per rad/s of rate error.")
+    rate_i_1_rad: Gain = Field(0.0, description="Motor command per rad of the rate error's integral.")
+    rate_d_s2_rad: Gain = Field(0.0, description="Motor command per rad/s^2 of rate change, against it.")
+    rate_integral_limit_rad: Limit = Field(0.0, description="Largest integral of the rate error.")
+
+
+class CascadeAttitude(VehicleSection):
+    """A PID of each angle around a PID of each body rate, whose output is added to the motor commands."""
+
+    kind: Literal["cascade"] = Field(description="PID of each angle around a PID of each body rate.")
+    rate_hz: Rate = Field(description="Rate of all inner loops and of the simulation.")
+    roll: CascadeGains = Field(description="Gains of roll.")
+    pitch: CascadeGains = Field(description="Gains of pitch.")
+    yaw: CascadeGains = Field(description="Gains of yaw.")
+    rate_max_rad_s: Positive = Field(description="Largest demanded body rate.")
+    output_max: Positive = Field(description="Largest motor command of one axis.")
+
+
+class Response(VehicleSection):
+    """The response of an angle to its command: angle = gain x command, late and with a lag."""
+
+    gain: Annotated[float, Field(ge=0.1, le=3)] = Field(description="Steady angle over command.")
+    lag_s: Lag = Field(description="Time constant of the first-order lag.")
+    dead_time_s: Delay = Field(0.0, description="Time before a new command has any effect.")
+
+
+class FirstOrderAttitude(VehicleSection):
+    """A drone of whose code nothing is known: the response of its angles to commands, as a log shows it."""
+
+    kind: Literal["first_order"] = Field(description="Gain, lag and dead time of each angle.")
+    rate_hz: Rate = Field(200, description="Rate of the altitude loop and of the simulation.")
+    roll: Response = Field(description="Response of roll.")
+    pitch: Response = Field(description="Response of pitch.")
+    yaw_lag_s: Lag = Field(0.2, description="Time constant of yaw, which follows its reference.")
+    acceleration_per_tilt_g: Annotated[float, Field(ge=0.1, le=3)] = Field(
+        1.0, description="Horizontal acceleration over that which the tilt of the log would give."
+    )
+
+
+class AltitudeGains(VehicleSection):
+    """The altitude loop: thrust = weight + P height error - D vertical speed, within limits."""
+
+    p_n_m: Gain = Field(description="Thrust per metre of height error.")
+    d_n_s_m: Gain = Field(description="Thrust per m/s of vertical speed, against it.")
+    thrust_max_n: Positive = Field(description="Largest total thrust; more than the weight.")
+
+
+class NoSensors(VehicleSection):
+    """Controller and loops get the true state."""
+
+    kind: Literal["none"] = Field("none", description="No sensors: the true state.")
+
+
+class MamboSensors(VehicleSection):
+    """IMU, sonar, barometer and optical flow with the Mambo's stock estimators; variances of their noise."""
+
+    kind: Literal["mambo"] = Field(description="IMU, sonar, barometer, optical flow, stock estimators.")
+    accelerometer_xy_m2_s4: Noise = Field(description="Variance of the accelerometer along x and y.")
+    accelerometer_z_m2_s4: Noise = Field(description="Variance of the accelerometer along z.")
+    gyro_rad2_s2: Noise = Field(description="Variance of the gyro.")
+    sonar_m2: Noise = Field(description="Variance of the sonar.")
+    pressure_pa2: Noise = Field(description="Variance of the pressure.")
+
+
+class MocapSensors(VehicleSection):
+    """Motion capture of the position, a filter for the velocity, and the drone's own attitude."""
+
+    kind: Literal["mocap"] = Field(description="Position by motion capture, attitude by the drone.")
+    position_rate_hz: Annotated[int, Field(ge=10, le=2000)] = Field(
+        100, description="Positions per second; a divisor of attitude.rate_hz."
+    )
+    position_noise_m: Noise = Field(description="Standard deviation of a position along each axis.")
+    position_delay_s: Delay = Field(0.0, description="Age of a position when it arrives.")
+    velocity_filter_s: Annotated[float, Field(ge=0, le=1)] = Field(
+        description="Time constant of the low-pass on the difference quotient of positions; 0 for none."
+    )
+    attitude_noise_rad: Noise = Field(description="Standard deviation of roll, pitch and yaw.")
+
+
+AnyAttitude = Annotated[MamboAttitude | CascadeAttitude | FirstOrderAttitude, Field(discriminator="kind")]
+AnySensors = Annotated[NoSensors | MamboSensors | MocapSensors, Field(discriminator="kind")]
