@@ -14,8 +14,11 @@ from mambo_nmpc.sil.plant import elementary
 
 SOURCES: Final = ("loop.c", "pd.c")
 HEADERS: Final = (
+    "cascade.h",
     "elementary.h",
     "engine.h",
+    "first_order.h",
+    "mocap.h",
     "records.h",
     "rigid_body.h",
     "sensors.h",
@@ -73,8 +76,11 @@ def record_type(name: str) -> np.dtype[Any]:
     members = ffi.typeof(name).fields
     formats = []
     for _, member in members:
-        kind = member.type
-        formats.append((kinds[kind.item.cname], kind.length) if kind.kind == "array" else kinds[kind.cname])
+        kind, shape = member.type, []
+        while kind.kind == "array":
+            shape.append(kind.length)
+            kind = kind.item
+        formats.append((kinds[kind.cname], tuple(shape)))
     return np.dtype(
         {
             "names": [name for name, _ in members],

@@ -2,6 +2,9 @@
  *
  * The closed loop: sil/flight/loop.py for one flight.
  */
+#include "cascade.h"
+#include "first_order.h"
+#include "mocap.h"
 #include "sensors.h"
 #include "world.h"
 
@@ -79,6 +82,8 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
 {
     vehicle_state_t state;
     suite_t suite;
+    mocap_t mocap;
+    late_t late = { { { 0.0, 0.0 } } };
     gusts_t gusts = { 0.0, 0.0, 0.0 };
     wire_t wire = { { { 0.0, 0.0 } } };
     double command_rad[2] = { 0.0, 0.0 };
@@ -92,13 +97,18 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
     for (i = 0; i < 4; i++) {
         state.rotor_speed_rad_s[i] = flight->rotor_start_rad_s[i];
     }
-    state.attitude_integral_rad_s[0] = 0.0;
-    state.attitude_integral_rad_s[1] = 0.0;
+    for (i = 0; i < 9; i++) {
+        state.memory[i] = 0.0;
+    }
     if (simulation->sensed) {
         const rotation_t r = rotation(state.body + EULER);
         const seen_t start = truth(&state, &r);
 
-        suite_start(simulation, &start, &r, &suite);
+        if (simulation->captured) {
+            mocap_start(simulation, &start, &mocap);
+        } else {
+            suite_start(simulation, &start, &r, &suite);
+        }
     }
     if (simulation->windy) {
         gusts = gusts_start(draws->gusts);
@@ -115,7 +125,7 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
             surroundings_t around = { flight->mass_kg, { 0.0, 0.0 } };
             double thrust_share = 1.0;
             double thrust_n;
-            double wrench[4];
+            double shares[4];
             double steady_rad_s[4];
             double arriving_rad[2];
             seen_t truth_now;
@@ -134,9 +144,12 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
                 }
             }
             truth_now = truth(&state, &r);
-            seen = simulation->sensed
-                       ? estimate(simulation, flight, &truth_now, &r, draws->sensors + (8 * ticks), &suite)
-                       : truth_now;
+            seen = truth_now;
+            if (simulation->captured) {
+                seen = capture(simulation, flight, &truth_now, draws->sensors + (6 * ticks), &mocap);
+            } else if (simulation->sensed) {
+                seen = estimate(simulation, flight, &truth_now, &r, draws->sensors + (8 * ticks), &suite);
+            }
             thrust_n = (update < simulation->lifting_updates) ? simulation->take_off_thrust_n
                                                               : altitude_thrust_n(simulation, &seen);
             if (tick == 0) {
@@ -144,10 +157,18 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
                      command_rad, trace);
             }
             carry(flight, ticks, command_rad, &wire, arriving_rad);
-            demand_wrench(simulation, &seen, arriving_rad, thrust_n, heading_rad, state.attitude_integral_rad_s,
-                          wrench);
-            commanded_speeds(simulation, wrench, steady_rad_s);
-            integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, &state);
+            if (simulation->attitude == FIRST_ORDER) {
+                advance(simulation, flight, &around, thrust_share, thrust_n, heading_rad, ticks, arriving_rad, &r,
+                        &late, state.body);
+            } else {
+                if (simulation->attitude == CASCADE) {
+                    cascade_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state.memory, shares);
+                } else {
+                    stock_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state.memory, shares);
+                }
+                commanded_speeds(simulation, shares, steady_rad_s);
+                integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, &state);
+            }
             ticks++;
         }
     }

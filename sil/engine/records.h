@@ -16,6 +16,7 @@ typedef struct {
     int64_t windy;            /* whether any flight has gusts */
     int64_t dropping;         /* whether any flight drops updates */
     int64_t sensed;           /* whether controllers receive estimates */
+    int64_t captured;         /* whether these come from motion capture */
     int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
 
     double step_s;            /* a tick */
@@ -25,14 +26,33 @@ typedef struct {
 
     double gust_across[2];    /* gains of the states a and b of the gust across the wind */
 
-    /* Stock loops. */
+    int64_t attitude;         /* the kind of attitude loop, see vehicle.h; only its members are in use */
+
+    /* Stock loop. */
     double attitude_p_n_m[2];
-    double attitude_i_n_m_s;
+    double attitude_i_n_m_s[2];
     double attitude_d_n_m_s[2];
     double integral_limit_rad_s;
     double integral_leak_1_s;
     double yaw_p_n_m;
     double yaw_d_n_m_s;
+
+    /* Cascade: of roll, pitch and yaw P, I, D and limit of the angle, then of the rate. */
+    double cascade[3][8];
+    double rate_max_rad_s;
+    double output_max;
+
+    /* First order: shares that remain at the later nodes and at the end of a tick, see first_order.py. */
+    double response_gain[2];
+    double response_lag_s[2];
+    int64_t late_ticks[2];
+    double decay_before[2][3];
+    double decay_after[2][3];
+    double yaw_lag_s;
+    double yaw_decay[3];
+    double acceleration_per_tilt_g;
+
+    /* Altitude loop. */
     double altitude_p_n_m;
     double altitude_d_n_s_m;
     double weight_n;
@@ -74,6 +94,12 @@ typedef struct {
     double flow_slow_rad_s;
     double flow_jump_m_s;
     double flow_min_height_m;
+
+    /* Motion capture. */
+    int64_t mocap_period_ticks;
+    int64_t mocap_delay_ticks;
+    double mocap_period_s;
+    double mocap_share;
 } engine_simulation_t;
 
 /* One flight. Rows of body_start are those of a state of the rigid body. */
@@ -107,11 +133,11 @@ typedef struct {
     int64_t delay_ticks;
     double dropped_share;
 
-    double noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure */
+    double noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; or position, angles */
     double bias[6];           /* accelerometer, gyro */
 } engine_flight_t;
 
-/* Random numbers of one flight, a row for each tick: sensors 8, gusts 3 and a first row for their start. One number
+/* Random numbers of one flight, a row for each tick: sensors 8 or 6, gusts 3 and a first row for their start. One number
  * for each update: dropped. NULL where the simulation needs none. */
 typedef struct {
     const double *sensors;

@@ -1,7 +1,8 @@
 """Fill the engine's records from the parameters of a simulation."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import astuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,57 +10,69 @@ from numpy.typing import NDArray
 from mambo_nmpc.sil.engine.build import record_type
 from mambo_nmpc.sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
 from mambo_nmpc.sil.plant import gusts, loops
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, airframe_of
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.first_order import FirstOrderDrone
 from mambo_nmpc.sil.plant.rotors import wrench_per_command
 from mambo_nmpc.sil.plant.vehicle import STEP_S
-from mambo_nmpc.sil.sensors import estimators, instruments
+from mambo_nmpc.sil.sensors import estimators, instruments, mocap
+from mambo_nmpc.sil.sensors.mocap import MotionCapture
+from mambo_nmpc.sil.vehicles.model import VehicleFile
+from mambo_nmpc.sil.vehicles.sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
 
 Record = NDArray[Any]
+
+_STOCK: Final = (
+    *("attitude_p_n_m", "attitude_i_n_m_s", "attitude_d_n_m_s", "integral_limit_rad_s"),
+    *("integral_leak_1_s", "yaw_p_n_m", "yaw_d_n_m_s"),
+)
+_CASCADE: Final = ("cascade", "rate_max_rad_s", "output_max")
+_FIRST_ORDER: Final = (
+    *("response_gain", "response_lag_s", "late_ticks", "decay_before", "decay_after"),
+    *("yaw_lag_s", "yaw_decay", "acceleration_per_tilt_g"),
+)
+_MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
 def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
     """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,)."""
-    sensors = flight.sensors
+    sensors, drone = flight.sensors, flight.vehicle.drone
+    nominal, step_s = airframe_of(drone), drone.step_s
     transition, input_gain = instruments.discretize_imu(STEP_S)
     images, ticks = instruments.FLOW_IMAGES_PER_TICKS
     return _record(
         "engine_simulation_t",
         1,
-        {
+        _attitude(drone)
+        | _mocap(sensors, step_s)
+        | {
             "flights": flight.flights,
             "updates": len(times_s),
             "ticks_per_update": flight.ticks_per_update,
-            "first_tick": round(times_s[0] / STEP_S),
+            "first_tick": round(times_s[0] / step_s),
             "lifting_updates": lifting_updates(flight, times_s),
             "disturbed": flight.disturbances.any,
             "windy": flight.disturbances.windy,
             "dropping": bool(np.any(flight.link.dropped_share)),
             "sensed": sensors is not None,
-            "derotated": sensors is not None and sensors.derotated,
-            "step_s": STEP_S,
+            "captured": isinstance(sensors, MotionCapture),
+            "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
+            "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,
             "height_reference_m": HEIGHT_REFERENCE_M,
             "gust_across": gusts.ACROSS_GAINS,
-            "attitude_p_n_m": loops.ATTITUDE_P_N_M[:, 0],
-            "attitude_i_n_m_s": loops.ATTITUDE_I_N_M_S,
-            "attitude_d_n_m_s": loops.ATTITUDE_D_N_M_S[:, 0],
-            "integral_limit_rad_s": loops.INTEGRAL_LIMIT_RAD_S,
-            "integral_leak_1_s": loops.INTEGRAL_LEAK_1_S,
-            "yaw_p_n_m": loops.YAW_P_N_M,
-            "yaw_d_n_m_s": loops.YAW_D_N_M_S,
-            "altitude_p_n_m": loops.ALTITUDE_P_N_M,
-            "altitude_d_n_s_m": loops.ALTITUDE_D_N_S_M,
-            "weight_n": loops.WEIGHT_N,
-            "thrust_limit_n": loops.THRUST_LIMIT_N,
-            "take_off_thrust_n": loops.TAKE_OFF_THRUST_N,
-            "wrench_per_command": wrench_per_command(MAMBO)[:, 0],
-            "nominal_mass_kg": MAMBO.mass_kg,
+            "altitude_p_n_m": drone.altitude.p_n_m,
+            "altitude_d_n_s_m": drone.altitude.d_n_s_m,
+            "weight_n": drone.weight_n,
+            "thrust_limit_n": drone.altitude.thrust_max_n,
+            "take_off_thrust_n": loops.take_off_thrust_n(drone),
+            "wrench_per_command": wrench_per_command(nominal)[:, 0],
+            "nominal_mass_kg": nominal.mass_kg,
             "rotor_offset_m": flight.vehicle.airframe.rotor_offset_m,
             "speed_squared_per_command_rad2_s2": flight.vehicle.airframe.speed_squared_per_command_rad2_s2,
-            "command_min": MAMBO.command_min,
-            "command_max": MAMBO.command_max,
+            "command_min": nominal.command_min,
+            "command_max": nominal.command_max,
             "imu_transition": np.ravel(transition),
             "imu_input_gain": input_gain,
             "imu_limits": instruments.IMU_LIMITS[:, 0],
@@ -91,14 +104,14 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
 def flight_records(flight: Flight, first_target: FloatArray) -> Record:
     """Return one engine_flight_t for each of n flights, whose first targets are (n, 4)."""
     n, vehicle, disturbances = flight.flights, flight.vehicle, flight.disturbances
-    airframe, sensors = vehicle.airframe, flight.sensors or instruments.Sensors()
-    start = start_state(flight, first_target)
+    airframe = vehicle.airframe
+    start, step_s = start_state(flight, first_target), vehicle.drone.step_s
     gust = gusts.coefficients(
         disturbances.wind_speed_m_s,
         disturbances.wind_direction_rad,
         n,
         height_m=-HEIGHT_REFERENCE_M,
-        step_s=STEP_S,
+        step_s=step_s,
     )
     return _record(
         "engine_flight_t",
@@ -123,15 +136,63 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
             "gust_roots": _columns((gust.root_aa, gust.root_ab, gust.root_bb), n),
             "battery_sag_1_s": disturbances.battery_sag_1_s,
             "payload_kg": disturbances.payload_kg,
-            "payload_tick": np.rint(np.asarray(disturbances.payload_time_s) / STEP_S),
+            "payload_tick": np.rint(np.asarray(disturbances.payload_time_s) / step_s),
             "push_n_s": _columns(disturbances.push_n_s, n),
-            "push_tick": np.rint(np.asarray(disturbances.push_time_s) / STEP_S),
+            "push_tick": np.rint(np.asarray(disturbances.push_time_s) / step_s),
             "delay_ticks": flight.link.delay_ticks,
             "dropped_share": flight.link.dropped_share,
-            "noise": instruments.noise_deviations(sensors, n).T,
-            "bias": _columns((*sensors.accelerometer_bias_m_s2, *sensors.gyro_bias_rad_s), n),
+            **_noise(flight),
         },
     )
+
+
+def _attitude(drone: VehicleFile) -> dict[str, Any]:
+    """Return the members of the attitude loops; those of other kinds than the drone's are 0."""
+    values: dict[str, Any] = dict.fromkeys((*_STOCK, *_CASCADE, *_FIRST_ORDER), 0)
+    match drone.attitude:
+        case MamboAttitude() as stock:
+            axes = stock.roll, stock.pitch
+            found = (
+                [axis.p_n_m for axis in axes],
+                [axis.i_n_m_s for axis in axes],
+                [axis.d_n_m_s for axis in axes],
+                *(stock.integral_limit_rad_s, stock.integral_leak_1_s, stock.yaw.p_n_m, stock.yaw.d_n_m_s),
+            )
+            return values | {"attitude": 0} | dict(zip(_STOCK, found, strict=True))
+        case CascadeAttitude() as cascade:
+            gains = [list(axis.model_dump().values()) for axis in (cascade.roll, cascade.pitch, cascade.yaw)]
+            limits = cascade.rate_max_rad_s, cascade.output_max
+            return values | {"attitude": 1} | dict(zip(_CASCADE, (gains, *limits), strict=True))
+        case FirstOrderAttitude() as first_order:
+            whole, responses = FirstOrderDrone(drone, first_order), (first_order.roll, first_order.pitch)
+            follows: tuple[Any, ...] = (
+                [response.gain for response in responses],
+                [response.lag_s for response in responses],
+                [decay.late_ticks for decay in whole.decays],
+                [decay.before for decay in whole.decays],
+                [decay.after for decay in whole.decays],
+                *(first_order.yaw_lag_s, whole.yaw_decay, first_order.acceleration_per_tilt_g),
+            )
+            return values | {"attitude": 2} | dict(zip(_FIRST_ORDER, follows, strict=True))
+
+
+def _mocap(sensors: instruments.Sensors | MotionCapture | None, step_s: float) -> dict[str, Any]:
+    """Return the members of the motion capture, 0 without."""
+    if not isinstance(sensors, MotionCapture):
+        return dict.fromkeys(_MOCAP, 0)
+    return dict(zip(_MOCAP, astuple(mocap.sampling(sensors.figures, step_s)), strict=True))
+
+
+def _noise(flight: Flight) -> dict[str, Any]:
+    """Return noise and biases of the sensors, 0 without."""
+    sensors, n = flight.sensors, flight.flights
+    noise, bias = np.zeros((n, instruments.NOISES)), np.zeros((n, 6))
+    if isinstance(sensors, MotionCapture):
+        noise[:, : mocap.NOISES] = mocap.mocap_deviations(sensors, n).T
+    elif sensors is not None:
+        noise = instruments.noise_deviations(sensors, n).T
+        bias = _columns((*sensors.accelerometer_bias_m_s2, *sensors.gyro_bias_rad_s), n)
+    return {"noise": noise, "bias": bias}
 
 
 def _columns(values: Sequence[Any], n: int) -> FloatArray:

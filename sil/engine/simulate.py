@@ -25,7 +25,8 @@ from mambo_nmpc.sil.flight.loop import Flight, PositionController, allocate_trac
 from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.plant.randomness import Purpose, generators
-from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES
+from mambo_nmpc.sil.sensors import instruments, mocap
+from mambo_nmpc.sil.sensors.mocap import MotionCapture
 
 DELAY_TICKS_MAX: Final = 200
 """Longest delay of a command that the engine can hold."""
@@ -103,7 +104,8 @@ class _Buffers:
     """Random numbers of one flight at a time, from the same streams as in NumPy."""
 
     def __init__(self, flight: Flight, updates: int, ticks: int) -> None:
-        self.sensors = np.empty((ticks, len(NOISE_VARIANCES))) if flight.sensors is not None else None
+        width = mocap.NOISES if isinstance(flight.sensors, MotionCapture) else instruments.NOISES
+        self.sensors = np.empty((ticks, width)) if flight.sensors is not None else None
         self.gusts = np.empty((ticks + 1, 3)) if flight.disturbances.windy else None
         self.drops = np.empty(updates) if np.any(flight.link.dropped_share) else None
         self._record = ffi.new(

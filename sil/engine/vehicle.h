@@ -1,16 +1,20 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Stock loops, mixer, rotors and integration step: sil/plant/{loops,rotors,integrator,vehicle}.py.
+ * Altitude and stock loop, mixer, rotors and integration step: sil/plant/{loops,rotors,integrator,vehicle}.py.
  */
 #ifndef ENGINE_VEHICLE_H
 #define ENGINE_VEHICLE_H
 
 #include "rigid_body.h"
 
+/* Kinds of attitude loops; any other is the stock loop. */
+#define CASCADE 1
+#define FIRST_ORDER 2
+
 typedef struct {
     double body[STATE_ROWS];
     double rotor_speed_rad_s[4];
-    double attitude_integral_rad_s[2];
+    double memory[9]; /* of the attitude loop; the stock loop: its integrals, 2 */
 } vehicle_state_t;
 
 /* The state as controllers receive it, true or estimated. */
@@ -44,11 +48,11 @@ static inline double altitude_thrust_n(const engine_simulation_t *simulation, co
     return clip(thrust_n, -simulation->thrust_limit_n, simulation->thrust_limit_n);
 }
 
-/* The wrench that the stock loops demand; the integrals grow by a period. */
-static inline void demand_wrench(const engine_simulation_t *simulation, const seen_t *seen,
-                                 const double *command_rad, double thrust_n, double heading_rad,
-                                 double *integral_rad_s, double *wrench)
+/* Shares of thrust, roll, pitch and yaw in the motor commands, by the stock loop; the integrals grow by a period. */
+static inline void stock_shares(const engine_simulation_t *simulation, const seen_t *seen, const double *command_rad,
+                                double thrust_n, double heading_rad, double *integral_rad_s, double *shares)
 {
+    double wrench[4];
     int i;
 
     wrench[0] = thrust_n;
@@ -57,25 +61,24 @@ static inline void demand_wrench(const engine_simulation_t *simulation, const se
         const double growth = error_rad - (simulation->integral_leak_1_s * integral_rad_s[i]);
 
         wrench[1 + i] = ((simulation->attitude_p_n_m[i] * error_rad)
-                         + (simulation->attitude_i_n_m_s * integral_rad_s[i]))
+                         + (simulation->attitude_i_n_m_s[i] * integral_rad_s[i]))
                         - (simulation->attitude_d_n_m_s[i] * seen->rates_rad_s[i]);
         integral_rad_s[i] = clip(integral_rad_s[i] + (simulation->step_s * growth),
                                  -simulation->integral_limit_rad_s, simulation->integral_limit_rad_s);
     }
     wrench[3] = (simulation->yaw_p_n_m * (heading_rad - seen->euler_rad[2]))
                 - (simulation->yaw_d_n_m_s * seen->rates_rad_s[2]);
+    for (i = 0; i < 4; i++) {
+        shares[i] = wrench[i] / simulation->wrench_per_command[i];
+    }
 }
 
-/* Steady rotor speeds of the commands that produce a wrench. */
-static inline void commanded_speeds(const engine_simulation_t *simulation, const double *wrench, double *speeds)
+/* Steady rotor speeds of the commands that sum up shares of thrust, roll, pitch and yaw. */
+static inline void commanded_speeds(const engine_simulation_t *simulation, const double *share, double *speeds)
 {
-    double share[4];
     double command[4];
     int i;
 
-    for (i = 0; i < 4; i++) {
-        share[i] = wrench[i] / simulation->wrench_per_command[i];
-    }
     command[0] = ((share[0] + share[1]) + share[2]) - share[3];
     command[1] = ((share[0] - share[1]) + share[2]) + share[3];
     command[2] = ((share[0] - share[1]) - share[2]) - share[3];

@@ -26,12 +26,13 @@ from mambo_nmpc.sil.faults.injection import (
 )
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, FaultScenario, scenarios
 from mambo_nmpc.sil.files.summary import Number, Summary
-from mambo_nmpc.sil.flight.crashes import CRASH_TILT_RAD
+from mambo_nmpc.sil.flight.crashes import crash_tilt_rad
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, horizontal_error_m, saturated_share
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover, Trajectories, Trajectory
 from mambo_nmpc.sil.paper.table2 import CASES
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import arc_cosine, sine_cosine
 from mambo_nmpc.sil.plant.link import NOT_CALLED
@@ -66,7 +67,7 @@ class End(StrEnum):
     AWAY = "away"
     """Not recovered by the end, but in the air."""
     CRASHED = "crashed"
-    """Tilted beyond `CRASH_TILT_RAD`, or on the ground."""
+    """Tilted beyond `crash_tilt_rad`, or on the ground."""
 
 
 ORDER: Final = (End.BACK, End.AWAY, End.CRASHED)
@@ -247,7 +248,7 @@ def _judge_flight(
     late = int(outside[-1]) + 1 - lasts if len(outside) else 0
     _, (cos_roll, cos_pitch) = sine_cosine(trace.euler_rad[flown, row, :2].T)
     tilt_rad = arc_cosine(cos_roll * cos_pitch)
-    crashed = not (tilt_rad.max() < CRASH_TILT_RAD and trace.position_m[flown, row, 2].max() < 0.0)
+    crashed = not (tilt_rad.max() < crash_tilt_rad(NOMINAL) and trace.position_m[flown, row, 2].max() < 0.0)
     return Verdict(
         course=sortie.course,
         fault=scenario.name,

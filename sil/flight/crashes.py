@@ -1,20 +1,24 @@
 """Crashes: a drone tilted too far or on the ground, which the simulation lets fly on."""
 
 import math
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from mambo_nmpc.sil.flight.traces import Trace
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import arc_cosine, sine_cosine
-from mambo_nmpc.sil.plant.loops import THRUST_LIMIT_N, WEIGHT_N
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
-CRASH_TILT_RAD: Final = float(arc_cosine(WEIGHT_N / THRUST_LIMIT_N))
-"""Tilt beyond which the altitude loop's thrust limit no longer carries the weight: 59 degrees."""
 
-_LEAST_LEVEL: Final = sine_cosine(CRASH_TILT_RAD)[1]
+def crash_tilt_rad(drone: VehicleFile) -> float:
+    """Return the tilt beyond which the altitude loop's thrust limit does not carry the weight.
+
+    That of the Mambo is 59 degrees.
+    """
+    return float(arc_cosine(drone.weight_n / drone.altitude.thrust_max_n))
 
 
 class Crash(BaseModel):
@@ -26,17 +30,17 @@ class Crash(BaseModel):
     how: str
 
 
-def detect_crashes(trace: Trace) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return which flights (n,) were lost, tilted beyond `CRASH_TILT_RAD` or on the ground after t = 0."""
+def detect_crashes(trace: Trace, drone: VehicleFile = NOMINAL) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Return which flights (n,) were lost, tilted beyond `crash_tilt_rad` or on the ground after t = 0."""
     level, height_m = _level_and_height(trace)
-    aloft = (level > _LEAST_LEVEL) & (height_m > 0.0)
+    aloft = (level > _least_level(drone)) & (height_m > 0.0)
     return np.asarray(~aloft.all(axis=0))
 
 
-def first_crash(trace: Trace, flight: int = 0) -> Crash | None:
+def first_crash(trace: Trace, flight: int = 0, drone: VehicleFile = NOMINAL) -> Crash | None:
     """Return when and how a flight first crashed after t = 0; None if it did not, or was lost without."""
     level, height_m = (values[:, flight] for values in _level_and_height(trace))
-    tilted, grounded = level <= _LEAST_LEVEL, height_m <= 0.0
+    tilted, grounded = level <= _least_level(drone), height_m <= 0.0
     crashed = tilted | grounded
     if not crashed.any():
         return None
@@ -45,9 +49,14 @@ def first_crash(trace: Trace, flight: int = 0) -> Crash | None:
         "on the ground"
         if grounded[first]
         else f"tilted {math.degrees(arc_cosine(level[first])):.1f} degrees; beyond "
-        f"{math.degrees(CRASH_TILT_RAD):.1f} the thrust limit no longer carries the weight"
+        f"{math.degrees(crash_tilt_rad(drone)):.1f} the thrust limit no longer carries the weight"
     )
     return Crash(time_s=float(trace.time_s[trace.time_s >= 0.0][first]), how=how)
+
+
+def _least_level(drone: VehicleFile) -> float:
+    """Return the cosine of the tilt beyond which a drone crashes."""
+    return float(sine_cosine(crash_tilt_rad(drone))[1])
 
 
 def _level_and_height(trace: Trace) -> tuple[FloatArray, FloatArray]:

@@ -1,7 +1,7 @@
 """The closed loop: trajectory, position controller and drone, for n flights at once.
 
-    target -> position controller --roll, pitch--> link -> stock loops -> rotors -> rigid body <- disturbances
-              every update period                          every 5 ms                    |
+    target -> position controller --roll, pitch--> link -> inner loops -> rotors -> rigid body <- disturbances
+              every update period                          every tick                    |
                       ^------------------------------------------^-- sensors (optional) -'
 
 The simulation is deterministic: the same flight with the same controller gives the same trace, and a flight
@@ -9,7 +9,7 @@ gives the same bits alone and in a batch.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
@@ -21,7 +21,7 @@ from mambo_nmpc.sil.flight.names import Start
 from mambo_nmpc.sil.flight.traces import AXES, SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Trajectory
 from mambo_nmpc.sil.plant import loops
-from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.airframe import airframe_of
 from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray, PerFlight
 from mambo_nmpc.sil.plant.disturbances import Disturbances, World
 from mambo_nmpc.sil.plant.link import NOT_CALLED, Drops, Link, Wire
@@ -29,6 +29,8 @@ from mambo_nmpc.sil.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
 from mambo_nmpc.sil.sensors.estimators import Suite
 from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.sensors.mocap import MocapSuite, MotionCapture
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 HEIGHT_REFERENCE_M = -1.1
 """Altitude reference of every flight: z points down."""
@@ -97,32 +99,35 @@ class Flight:
     """Rate of the yaw reference from t = 0 on."""
     vehicle: Vehicle = field(default_factory=Vehicle)
     update_period_s: float = 0.01
-    """Period of the position controller: a whole multiple of the tick of 5 ms."""
+    """Period of the position controller: a whole multiple of the tick."""
     seeds: tuple[int, ...] | None = None
     """Random seed of each flight; None is 0 for all."""
     offset: Offset | None = None
     disturbances: Disturbances = field(default_factory=Disturbances)
     link: Link = field(default_factory=Link)
-    sensors: Sensors | None = None
+    sensors: Sensors | MotionCapture | None = None
     """Sensors behind the estimates that position controller and stock loops receive; None: the true state."""
 
     def __post_init__(self) -> None:
+        step_s = self.vehicle.drone.step_s
         if not self.update_period_s <= self.duration_s < math.inf:
             raise FlightError(
                 f"duration_s = {self.duration_s:g} must be finite and at least "
                 f"update_period_s = {self.update_period_s:g}"
             )
-        if self.update_period_s <= 0.0 or abs(math.remainder(self.update_period_s, STEP_S)) > 1e-9:
+        if self.update_period_s <= 0.0 or abs(math.remainder(self.update_period_s, step_s)) > 1e-9:
             raise FlightError(
-                f"update_period_s = {self.update_period_s:g} must be a whole multiple of {STEP_S:g}"
+                f"update_period_s = {self.update_period_s:g} must be a whole multiple of {step_s:g}"
             )
+        if isinstance(self.sensors, Sensors) and step_s != STEP_S:
+            raise FlightError(f"sensors of kind mambo run at {1.0 / STEP_S:g} Hz, not {1.0 / step_s:g}")
         if self.seeds is not None and len(self.seeds) != self.flights:
             raise FlightError(f"seeds: there are {len(self.seeds)} for {self.flights} flights")
 
     @property
     def ticks_per_update(self) -> int:
-        """Ticks of the stock loops for each step of the position controller."""
-        return round(self.update_period_s / STEP_S)
+        """Ticks of the inner loops for each step of the position controller."""
+        return round(self.update_period_s / self.vehicle.drone.step_s)
 
     def times_s(self) -> FloatArray:
         """Return the times (k,) of the position controller's updates; t = 0 is one of them."""
@@ -164,11 +169,15 @@ def fly(
     lifting_until = lifting_updates(flight, times_s)
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
+    drone, step_s = vehicle.drone, vehicle.drone.step_s
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
-    suite = None if flight.sensors is None else Suite(flight.sensors, seeds, truth(state))
+    suite = _suite(flight, seeds, truth(state))
     wire = Wire(flight.link, flight.flights)
     caller = _Caller(
-        controller, Drops(flight.link, seeds), allocate_trace(times_s, targets, sensed=suite is not None)
+        controller,
+        Drops(flight.link, seeds),
+        allocate_trace(times_s, targets, sensed=suite is not None),
+        drone.body.mass_kg,
     )
     for update, time_s in enumerate(times_s):
         state = _mark_lost(state)
@@ -176,10 +185,10 @@ def fly(
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
         for tick in range(flight.ticks_per_update):
             with np.errstate(all="ignore"):
-                state, moment = world.tick(state, time_s + STEP_S * tick)
+                state, moment = world.tick(state, time_s + step_s * tick)
                 true = truth(state)
                 seen = true if suite is None else suite.estimate(true)
-                thrust_n = _thrust_n(seen, lifting)
+                thrust_n = _thrust_n(drone, seen, lifting)
             if tick == 0:
                 caller.call(update, true, seen, thrust_n)
             command_rad = wire.carry(caller.command_rad)
@@ -191,20 +200,32 @@ def fly(
     return caller.trace
 
 
+def _suite(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
+    """Return the sensors of n flights; None: the true state."""
+    match flight.sensors:
+        case MotionCapture() as capture:
+            return MocapSuite(capture, seeds, start, flight.vehicle.drone.step_s)
+        case Sensors() as sensors:
+            return Suite(sensors, seeds, start)
+        case None:
+            return None
+
+
 def lifting_updates(flight: Flight, times_s: FloatArray) -> int:
     """Return how many of the updates at `times_s` (k,) fall into the open-loop beginning of a take-off."""
     open_loop_s = loops.TAKE_OFF_S if flight.start == "take-off" else 0.0
-    return int((times_s < times_s[0] + open_loop_s - STEP_S / 2.0).sum())
+    return int((times_s < times_s[0] + open_loop_s - flight.vehicle.drone.step_s / 2.0).sum())
 
 
 def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     """Return the initial state of n flights, above their first targets (n, 4) or on the ground below."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
-    command: PerFlight = MAMBO.command_min
+    nominal = airframe_of(flight.vehicle.drone)
+    command: PerFlight = nominal.command_min
     if flight.start == "hover":
         position_m[2] = HEIGHT_REFERENCE_M
-        command = MAMBO.hover_command
+        command = nominal.hover_command
     state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
     if flight.offset is None:
         return state
@@ -218,11 +239,11 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     return state
 
 
-def _thrust_n(seen: Seen, lifting: bool) -> FloatArray:
+def _thrust_n(drone: VehicleFile, seen: Seen, lifting: bool) -> FloatArray:
     """Return the demanded total thrust (n,) in N: constant while lifting, then from the altitude loop."""
     if lifting:
-        return np.full(seen.position_m.shape[1], loops.TAKE_OFF_THRUST_N)
-    return loops.altitude_thrust(HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
+        return np.full(seen.position_m.shape[1], loops.take_off_thrust_n(drone))
+    return loops.altitude_thrust(drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
 
 
 def _mark_lost(state: VehicleState) -> VehicleState:
@@ -230,9 +251,7 @@ def _mark_lost(state: VehicleState) -> VehicleState:
     lost = ~(np.abs(state.body[POSITION]).max(axis=0) < LOST_M) | ~np.isfinite(state.body).all(axis=0)
     if not lost.any():
         return state
-    return VehicleState(
-        np.where(lost, np.nan, state.body), state.rotor_speed_rad_s, state.attitude_integral_rad_s
-    )
+    return VehicleState(np.where(lost, np.nan, state.body), state.rotor_speed_rad_s, state.memory)
 
 
 def _unify_nan(trace: Trace) -> None:
@@ -258,8 +277,8 @@ def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) ->
 class _Caller:
     """Calls the position controller of n flights, records the trace and holds the command (2, n)."""
 
-    def __init__(self, controller: PositionController, drops: Drops, trace: Trace) -> None:
-        self._controller, self._drops = controller, drops
+    def __init__(self, controller: PositionController, drops: Drops, trace: Trace, mass_kg: float) -> None:
+        self._controller, self._drops, self._mass_kg = controller, drops, mass_kg
         self.trace = trace
         self.command_rad: FloatArray = np.zeros((2, trace.flights))
 
@@ -275,7 +294,7 @@ class _Caller:
         dropped = self._drops.next()
         if dropped is not None:
             measured[dropped] = np.nan
-        thrust_acceleration_m_s2 = thrust_n / MAMBO.mass_kg
+        thrust_acceleration_m_s2 = thrust_n / self._mass_kg
         outcome = self._controller.step(
             measured, np.ascontiguousarray(trace.target[update]), thrust_acceleration_m_s2
         )

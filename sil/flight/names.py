@@ -5,8 +5,14 @@ from typing import Final, Literal, get_args
 CurveName = Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"]
 Start = Literal["hover", "take-off"]
 """In the air, or on the ground 5 s before the trajectory begins."""
-SensorsName = Literal["none", "mambo", "mambo-derotated"]
+SensorsName = Literal["none", "mambo", "mambo-derotated", "mocap"]
 """`mambo-derotated` subtracts the rotation of the camera from the optical flow."""
+SENSORS_OF: Final[dict[str, tuple[SensorsName, ...]]] = {
+    "none": ("none",),
+    "mambo": ("none", "mambo", "mambo-derotated"),
+    "mocap": ("none", "mocap"),
+}
+"""Names of the sensors a drone can fly with, by the kind in its file; the last is a campaign's default."""
 PdName = Literal["pd", "pd-feedforward"]
 """The stock PD of the paper, or the PD with feed-forward of the target's velocity and acceleration."""
 ControllerName = Literal["nmpc", PdName, "reference"]

@@ -8,23 +8,35 @@ import json
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Self, cast
+from typing import Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.plain_file import read_plain_file
+from mambo_nmpc.codegen.settings.keys import spell
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.errors import FlightError, ScenarioError
 from mambo_nmpc.sil.flight.loop import Flight, Offset
-from mambo_nmpc.sil.flight.names import ControllerName, CurveName, SensorsName, Start
+from mambo_nmpc.sil.flight.names import SENSORS_OF, ControllerName, CurveName, SensorsName, Start
 from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectories
-from mambo_nmpc.sil.plant.airframe import MAMBO, Airframe
+from mambo_nmpc.sil.plant.airframe import NOMINAL, Airframe, airframe_of
 from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.plant.link import Link
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.sensors.mocap import MotionCapture
+from mambo_nmpc.sil.vehicles.model import VehicleFile
+from mambo_nmpc.sil.vehicles.sections import MamboSensors, MocapSensors
 
 FORMAT: Final = 1
 LARGEST_FILE_BYTES: Final = 1_000_000
@@ -39,8 +51,22 @@ class _Record(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
 
 
+OF_THE_VEHICLE: Final = (
+    *("mass_kg", "inertia_kg_m2", "thrust_factor_n_s2", "torque_factor_n_m_s2"),
+    *("motor_lag_s", "drag_1_s"),
+)
+"""Keys of a scenario whose defaults are those of its vehicle."""
+_AS_THE_VEHICLE: Final[Any] = None
+
+
 class Scenario(_Record):
-    """Parameters of one flight; default: Table II's, with a nominal, undisturbed Mambo without sensors."""
+    """Parameters of one flight; default: Table II's, with a nominal, undisturbed Mambo without sensors.
+
+    Mass, inertia, rotors and drag are those of `vehicle` unless they are given.
+    """
+
+    vehicle: VehicleFile = NOMINAL
+    """The drone: its inner loops and mixer are always those of its file."""
 
     seed: int = Field(0, ge=0, lt=2**63)
     """Seed of sensor noise, gusts and dropped updates."""
@@ -60,12 +86,12 @@ class Scenario(_Record):
     yaw_rad: float = Field(0.0, ge=-1000.0, le=1000.0)
     yaw_rate_rad_s: float = 0.0
 
-    mass_kg: float = Field(float(MAMBO.mass_kg), gt=0.0)
-    inertia_kg_m2: Three = cast(Three, MAMBO.inertia_kg_m2)
-    thrust_factor_n_s2: float = Field(float(MAMBO.thrust_factor_n_s2), gt=0.0)
-    torque_factor_n_m_s2: float = Field(float(MAMBO.torque_factor_n_m_s2), gt=0.0)
-    motor_lag_s: float = Field(0.0, ge=0.0, le=1.0)
-    drag_1_s: float = Field(float(Vehicle.drag_1_s), ge=0.0)
+    mass_kg: float = Field(_AS_THE_VEHICLE, gt=0.0)
+    inertia_kg_m2: Three = _AS_THE_VEHICLE
+    thrust_factor_n_s2: float = Field(_AS_THE_VEHICLE, gt=0.0)
+    torque_factor_n_m_s2: float = Field(_AS_THE_VEHICLE, gt=0.0)
+    motor_lag_s: float = Field(_AS_THE_VEHICLE, ge=0.0, le=1.0)
+    drag_1_s: float = Field(_AS_THE_VEHICLE, ge=0.0)
 
     wind_m_s2: Two = (0.0, 0.0)
     """Steady disturbance acceleration along x and y of the world."""
@@ -80,7 +106,7 @@ class Scenario(_Record):
     push_time_s: float = 0.0
 
     command_delay_ticks: int = Field(0, ge=0, le=200)
-    """Delay of the roll and pitch commands in ticks of 5 ms."""
+    """Delay of the roll and pitch commands in ticks of the vehicle."""
     dropped_share: float = Field(0.0, ge=0.0, le=1.0)
     """Probability that an update of the position controller is dropped; its last command is held."""
 
@@ -91,6 +117,16 @@ class Scenario(_Record):
     """Bias that remains after the calibration before take-off."""
     gyro_bias_rad_s: Three = (0.0, 0.0, 0.0)
 
+    @field_validator(*OF_THE_VEHICLE, mode="before")
+    @classmethod
+    def _as_the_vehicle(cls, value: Any, info: ValidationInfo) -> Any:
+        drone = info.data.get("vehicle")
+        if value is not _AS_THE_VEHICLE or drone is None:
+            return value
+        vehicle = Vehicle.of(drone)
+        key = str(info.field_name)
+        return getattr(vehicle if hasattr(vehicle, key) else vehicle.airframe, key)
+
     @model_validator(mode="after")
     def _can_fly(self) -> Self:
         if min(self.inertia_kg_m2) <= 0.0:
@@ -100,7 +136,7 @@ class Scenario(_Record):
         return self
 
 
-SHARED_KEYS: Final = ("duration_s", "start", "sensors")
+SHARED_KEYS: Final = ("vehicle", "duration_s", "start", "sensors")
 """Keys that must be equal in all flights of one simulation."""
 
 
@@ -125,7 +161,7 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         """Return the fields that a record has in common with a scenario."""
         return {field.name: each(field.name) for field in fields(kind) if field.name in Scenario.model_fields}
 
-    n, derotated = len(scenarios), first.sensors == "mambo-derotated"
+    n, drone = len(scenarios), first.vehicle
     delays = np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64)
     return Flight(
         Trajectories(tuple(CURVES[s.trajectory](s.size_m, s.rate_rad_s) for s in scenarios)),
@@ -134,13 +170,33 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         start=first.start,
         yaw_rad=each("yaw_rad"),
         yaw_rate_rad_s=each("yaw_rate_rad_s"),
-        vehicle=Vehicle(replace(MAMBO, **common(Airframe)), **common(Vehicle)),
+        vehicle=Vehicle(replace(airframe_of(drone), **common(Airframe)), **common(Vehicle), drone=drone),
         update_period_s=update_period_s,
         seeds=tuple(scenario.seed for scenario in scenarios),
         offset=Offset(each("start_offset_m"), each("start_velocity_m_s"), each("start_tilt_rad")),
         disturbances=Disturbances(**common(Disturbances)),
         link=Link(delay_ticks=delays, **common(Link)),
-        sensors=None if first.sensors == "none" else Sensors(derotated=derotated, **common(Sensors)),
+        sensors=choose_sensors(first.sensors, drone, **common(Sensors)),
+    )
+
+
+def choose_sensors(
+    name: SensorsName, drone: VehicleFile, **parameters: Any
+) -> Sensors | MotionCapture | None:
+    """Return the sensors called `name` of a drone; `parameters` are those of `Sensors`.
+
+    Raises FlightError if it has others.
+    """
+    if name == "none":
+        return None
+    match drone.sensors:
+        case MocapSensors() as figures if name == "mocap":
+            return MotionCapture(figures, parameters.get("noise_scale", 1.0))
+        case MamboSensors() as figures if name != "mocap":
+            return Sensors(figures=figures, derotated=name == "mambo-derotated", **parameters)
+    raise FlightError(
+        f"sensors {name}: vehicle {echo(drone.name)} has sensors.kind = {spell(drone.sensors.kind)}; "
+        f"use {' or '.join(SENSORS_OF[drone.sensors.kind])}, or a vehicle.toml with others"
     )
 
 

@@ -1,11 +1,14 @@
-"""Constants of the airframe, each with its source."""
+"""The airframe of a drone: mass, inertia and rotors, which may differ from flight to flight."""
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from mambo_nmpc.sil.plant.arrays import PerFlight
+from mambo_nmpc.sil.vehicles import model, presets
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
-GRAVITY_M_S2 = 9.81
+GRAVITY_M_S2: Final = model.GRAVITY_M_S2
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +53,26 @@ class Airframe:
         return self.mass_kg * GRAVITY_M_S2 / (4.0 * self.thrust_per_command_n)
 
 
-MAMBO = Airframe(
-    mass_kg=0.063,
-    inertia_kg_m2=(5.82857e-5, 7.16914e-5, 1.0e-4),
-    arm_m=0.0624,
-    thrust_factor_n_s2=4.71999e-8,
-    torque_factor_n_m_s2=1.139284e-10,
-    speed_squared_per_command_rad2_s2=13840.8,
-    command_min=10.0,
-    command_max=500.0,
-)
-"""Parrot Mambo: `vehicleVars` (mass, inertia, arm, rotor) and `controllerVars` (motor command) of the
-MathWorks asbQuadcopter example, R2018b to R2020a."""
+def airframe_of(drone: VehicleFile) -> Airframe:
+    """Return the airframe of a drone.
+
+    A drone without rotors has ones in their place: its thrust is the demanded one times the thrust factor.
+    """
+    body, rotors = drone.body, drone.rotors
+    if rotors is None:
+        return Airframe(body.mass_kg, (1.0, 1.0, 1.0), 1.0, 1.0, 1.0, 1.0, 0.0, math.inf)
+    return Airframe(
+        mass_kg=body.mass_kg,
+        inertia_kg_m2=drone.inertia_kg_m2,
+        arm_m=rotors.arm_m,
+        thrust_factor_n_s2=rotors.thrust_factor_n_s2,
+        torque_factor_n_m_s2=rotors.torque_factor_n_m_s2,
+        speed_squared_per_command_rad2_s2=rotors.speed_squared_per_command_rad2_s2,
+        command_min=rotors.command_min,
+        command_max=rotors.command_max,
+    )
+
+
+NOMINAL: Final = presets.preset(presets.DEFAULT)
+"""The drone that flies where none is named."""
+MAMBO: Final = airframe_of(NOMINAL)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.gusts import Gusts
-from mambo_nmpc.sil.plant.vehicle import STEP_S, Moment, Vehicle, VehicleState
+from mambo_nmpc.sil.plant.vehicle import Moment, Vehicle, VehicleState
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,12 +50,13 @@ class Disturbances:
 
 
 class World:
-    """Evaluates the disturbances of n flights, one tick of 5 ms after the other."""
+    """Evaluates the disturbances of n flights, one tick after the other."""
 
     def __init__(
         self, disturbances: Disturbances, vehicle: Vehicle, seeds: Sequence[int], height_m: float
     ) -> None:
         self._disturbances, self._vehicle = disturbances, vehicle
+        self._step_s = vehicle.drone.step_s
         self._ticks = 0
         self._gusts = None
         if disturbances.windy:
@@ -64,7 +65,7 @@ class World:
                 disturbances.wind_direction_rad,
                 seeds,
                 height_m=height_m,
-                step_s=STEP_S,
+                step_s=self._step_s,
             )
 
     def tick(self, state: VehicleState, time_s: float) -> tuple[VehicleState, Moment | None]:
@@ -75,11 +76,12 @@ class World:
         disturbances = self._disturbances
         if not disturbances.any:
             return state, None
-        flown_s, now = STEP_S * self._ticks, round(time_s / STEP_S)
+        step_s = self._step_s
+        flown_s, now = step_s * self._ticks, round(time_s / step_s)
         self._ticks += 1
-        loaded = np.rint(np.asarray(disturbances.payload_time_s) / STEP_S) <= now
+        loaded = np.rint(np.asarray(disturbances.payload_time_s) / step_s) <= now
         payload_kg: FloatArray = np.asarray(disturbances.payload_kg, np.float64) * loaded
-        due = np.rint(np.asarray(disturbances.push_time_s) / STEP_S) == now
+        due = np.rint(np.asarray(disturbances.push_time_s) / step_s) == now
         if disturbances.pushing and due.any():
             flights = state.body.shape[1]
             impulse_n_s = np.stack(

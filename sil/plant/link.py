@@ -1,4 +1,4 @@
-"""The link between position controller and stock loops: dropped updates and delayed commands."""
+"""The link between position controller and inner loops: dropped updates and delayed commands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class Link:
     """Delay and losses, one value for all flights or an array (n,); by default there are none."""
 
     delay_ticks: int | IntArray = 0
-    """Delay of every command in ticks of 5 ms; before the first one arrives, the command is zero tilt."""
+    """Delay of every command in ticks; before the first one arrives, the command is zero tilt."""
     dropped_share: PerFlight = 0.0
     """Probability that an update is dropped: the controller is not called, and its last command is held."""
 

@@ -36,7 +36,11 @@ def wrench_per_command(nominal: Airframe) -> FloatArray:
 
 def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
     """Return the motor commands (4, n) that produce a wrench (4, n), clipped to the command limits."""
-    shares = wrench / wrench_per_command(nominal)
+    return distribute(nominal, wrench / wrench_per_command(nominal))
+
+
+def distribute(nominal: Airframe, shares: FloatArray) -> FloatArray:
+    """Return the motor commands (4, n) that sum up shares (4, n) of thrust, roll, pitch and yaw, clipped."""
     commands = np.add.reduce(WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :], axis=0)
     return np.asarray(np.clip(commands, nominal.command_min, nominal.command_max))
 

@@ -1,15 +1,18 @@
-"""The drone: stock loops, mixer, rotors and rigid body, advanced by one tick of 5 ms at a time."""
+"""The drone: inner loops, rotors and rigid body, advanced by one tick at a time."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.sil.plant import loops
-from mambo_nmpc.sil.plant.airframe import MAMBO, Airframe
+from mambo_nmpc.sil.plant.airframe import MAMBO, NOMINAL, Airframe, airframe_of
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
+from mambo_nmpc.sil.plant.cascade import CascadeLoop
 from mambo_nmpc.sil.plant.elementary import sine_cosine
+from mambo_nmpc.sil.plant.first_order import FirstOrderDrone, Surroundings
 from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
+from mambo_nmpc.sil.plant.loops import Demand, MotorLoop, StockLoop
 from mambo_nmpc.sil.plant.rigid_body import (
     EULER,
     POSITION,
@@ -21,10 +24,12 @@ from mambo_nmpc.sil.plant.rigid_body import (
     to_body,
     to_world,
 )
-from mambo_nmpc.sil.plant.rotors import Rotors, mix
+from mambo_nmpc.sil.plant.rotors import Rotors
+from mambo_nmpc.sil.vehicles.model import VehicleFile
+from mambo_nmpc.sil.vehicles.sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
 
-STEP_S = loops.PERIOD_S
-"""Integration step and period of the stock loops, called a tick; motor commands are held over it."""
+STEP_S: Final = NOMINAL.step_s
+"""The Mambo's tick: integration step and period of its inner loops; motor commands are held over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +40,8 @@ class VehicleState:
     """State of the rigid body (12, n), rows as in `rigid_body`."""
     rotor_speed_rad_s: FloatArray
     """(4, n)."""
-    attitude_integral_rad_s: FloatArray
-    """Integral states of the attitude loop (2, n), roll then pitch."""
+    memory: FloatArray
+    """What the attitude loop keeps from tick to tick (its rows, n); the stock loop: its integrals (2, n)."""
 
     @cached_property
     def sine_cosine(self) -> SineCosine:
@@ -77,13 +82,29 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """The simulated drone. Its stock loops and mixer always use the constants of the nominal Mambo."""
+    """The simulated drone: what differs between flights, and the drone whose inner loops and mixer it has."""
 
     airframe: Airframe = MAMBO
-    motor_lag_s: PerFlight = 0.0
-    drag_1_s: PerFlight = 0.067
-    """Drag by blade flapping; the default is that of the Mambo at hover, from asbQuadcopter's rotor model."""
+    motor_lag_s: PerFlight = NOMINAL.motor_lag_s
+    drag_1_s: PerFlight = NOMINAL.body.drag_1_s
     wind_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    drone: VehicleFile = NOMINAL
+
+    @classmethod
+    def of(cls, drone: VehicleFile) -> "Vehicle":
+        """Return a drone as it is described."""
+        return cls(airframe_of(drone), drone.motor_lag_s, drone.body.drag_1_s, drone=drone)
+
+    @cached_property
+    def loop(self) -> MotorLoop | FirstOrderDrone:
+        """The attitude loop, or the whole drone if its loop is not known."""
+        match self.drone.attitude:
+            case MamboAttitude() as attitude:
+                return StockLoop(self.drone, attitude)
+            case CascadeAttitude() as attitude:
+                return CascadeLoop(self.drone, attitude)
+            case FirstOrderAttitude() as attitude:
+                return FirstOrderDrone(self.drone, attitude)
 
     @cached_property
     def rotors(self) -> Rotors:
@@ -98,7 +119,7 @@ class Vehicle:
     @cached_property
     def rotor_decay(self) -> FloatArray:
         """Share of a rotor speed error that remains at the nodes and at the end of a step (4, 1, n or 1)."""
-        return self.rotors.decay(STEP_S * np.append(NODES, 1.0))
+        return self.rotors.decay(self.drone.step_s * np.append(NODES, 1.0))
 
     def at_rest(self, position_m: FloatArray, yaw_rad: PerFlight, motor_command: PerFlight) -> VehicleState:
         """Return n drones level and at rest at positions (3, n), their rotors steady at a motor command."""
@@ -107,7 +128,8 @@ class Vehicle:
         body[POSITION] = position_m
         body[8] = yaw_rad
         commands = np.broadcast_to(motor_command, (4, flights))
-        return VehicleState(body, self.rotors.commanded_speed_rad_s(commands), np.zeros((2, flights)))
+        speed = self.rotors.commanded_speed_rad_s(commands)
+        return VehicleState(body, speed, np.zeros((self.loop.rows, flights)))
 
     def apply_push(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
         """Return the state right after an impulse (3, n) in the world frame."""
@@ -128,19 +150,27 @@ class Vehicle:
     ) -> VehicleState:
         """Return the state one tick later.
 
-        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the demanded total thrust. The stock loops
+        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the demanded total thrust. The inner loops
         receive `seen`.
         """
-        angles_rad, rates_rad_s = seen.euler_rad, seen.rates_rad_s
-        wrench = np.empty((4, state.body.shape[1]))
-        wrench[0] = thrust_n
-        wrench[1:3] = loops.attitude_torque(
-            command_rad, angles_rad[:2], rates_rad_s[:2], state.attitude_integral_rad_s
-        )
-        wrench[3] = loops.yaw_torque(yaw_reference_rad, angles_rad[2], rates_rad_s[2])
-        return VehicleState(
-            *self.integrate(state, mix(MAMBO, wrench), moment),
-            loops.attitude_integral(command_rad, angles_rad[:2], state.attitude_integral_rad_s),
+        loop = self.loop
+        if isinstance(loop, FirstOrderDrone):
+            around = self._surroundings(thrust_n, moment or Moment())
+            body, memory = loop.advance(state.body, state.memory, command_rad, yaw_reference_rad, around)
+            return VehicleState(body, state.rotor_speed_rad_s, memory)
+        demand = Demand(command_rad, yaw_reference_rad, thrust_n, seen.euler_rad, seen.rates_rad_s)
+        motor_command, memory = loop.command_motors(demand, state.memory)
+        return VehicleState(*self.integrate(state, motor_command, moment), memory)
+
+    def _surroundings(self, thrust_n: FloatArray, moment: Moment) -> Surroundings:
+        """Return the forces on drones whose thrust is the demanded one (n,)."""
+        share = moment.thrust_share * self.airframe.thrust_factor_n_s2
+        mass_kg = self.airframe.mass_kg + moment.payload_kg
+        return Surroundings(
+            share * np.maximum(thrust_n, 0.0) / mass_kg,
+            self.drag_1_s,
+            self.wind_m_s2,
+            moment.air_m_s or (0.0, 0.0),
         )
 
     def integrate(
@@ -160,4 +190,4 @@ class Vehicle:
         def derivative(stage: FloatArray, wrench: FloatArray) -> FloatArray:
             return body.derivative(stage, wrench, state.sine_cosine if stage is state.body else None)
 
-        return bogacki_shampine(derivative, state.body, inputs, STEP_S), speeds[3]
+        return bogacki_shampine(derivative, state.body, inputs, self.drone.step_s), speeds[3]

@@ -7,16 +7,17 @@ RollingSpiderEdu toolbox. IMU readings are in the body frame: at rest the accele
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, NOMINAL
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.elementary import exponential, sine_cosine
 from mambo_nmpc.sil.plant.randomness import Draws, Purpose
 from mambo_nmpc.sil.plant.rigid_body import to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
+from mambo_nmpc.sil.vehicles.sections import MamboSensors
 
 Three = tuple[PerFlight, PerFlight, PerFlight]
 
@@ -25,8 +26,8 @@ IMU_DAMPING: Final = 0.707
 ACCELEROMETER_LIMIT_M_S2: Final = 50.0
 GYRO_LIMIT_RAD_S: Final = 10.0
 
-NOISE_VARIANCES: Final = (0.3, 0.3, 0.5, 0.002, 0.002, 0.002, 0.001, 50.0)
-"""Accelerometer x, y, z in m^2/s^4, gyro x, y, z in rad^2/s^2, sonar in m^2, pressure in Pa^2."""
+NOISES: Final = 8
+"""Random numbers of a tick: accelerometer x, y, z, gyro x, y, z, sonar, pressure."""
 
 SONAR_MIN_M: Final = 0.44
 """Lower end of the sonar's range."""
@@ -40,6 +41,9 @@ FLOW_IMAGES_PER_TICKS: Final = (3, 10)
 
 DELAY_TICKS: Final = 1
 """Delay of all readings."""
+
+
+_NOMINAL: Final = cast(MamboSensors, NOMINAL.sensors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +60,8 @@ class Sensors:
     gyro_bias_rad_s: Three = (0.0, 0.0, 0.0)
     derotated: bool = False
     """Whether the estimator subtracts the rotation from the optical flow; the same for all flights."""
+    figures: MamboSensors = _NOMINAL
+    """Variances of the noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +79,11 @@ class Readings:
 
 
 def noise_deviations(sensors: Sensors, flights: int) -> FloatArray:
-    """Return the standard deviations of the noise (8, n), in the order of `NOISE_VARIANCES`."""
-    deviations = np.sqrt(np.array(NOISE_VARIANCES))[:, np.newaxis]
+    """Return the standard deviations of the noise (8, n), in the order of `NOISES`."""
+    figures = sensors.figures
+    xy, gyro = figures.accelerometer_xy_m2_s4, figures.gyro_rad2_s2
+    imu = (xy, xy, figures.accelerometer_z_m2_s4, gyro, gyro, gyro)
+    deviations = np.sqrt(np.array([*imu, figures.sonar_m2, figures.pressure_pa2]))[:, np.newaxis]
     return np.asarray(deviations * np.broadcast_to(np.asarray(sensors.noise_scale, np.float64), flights))
 
 
@@ -83,7 +92,7 @@ class Instruments:
 
     def __init__(self, sensors: Sensors, seeds: Sequence[int], start: Seen) -> None:
         flights = len(seeds)
-        self._draws = Draws(seeds, Purpose.SENSORS, len(NOISE_VARIANCES))
+        self._draws = Draws(seeds, Purpose.SENSORS, NOISES)
         self._noise = noise_deviations(sensors, flights)
         biases = (*sensors.accelerometer_bias_m_s2, *sensors.gyro_bias_rad_s)
         self._bias = np.stack([np.broadcast_to(np.asarray(bias, np.float64), flights) for bias in biases])

@@ -109,6 +109,17 @@ class VehicleFile(VehicleSection):
         return float(self.body.mass_kg * GRAVITY_M_S2)
 
     @property
+    def inertia_kg_m2(self) -> tuple[float, float, float]:
+        """Moments of inertia about the body axes; ones for a drone without torques."""
+        x, y, z = (getattr(self.body, key) for key in _INERTIA)
+        return (1.0, 1.0, 1.0) if x is None else (x, y, z)
+
+    @property
+    def motor_lag_s(self) -> float:
+        """Time constant of the rotors; 0 for a drone without."""
+        return 0.0 if self.rotors is None else self.rotors.lag_s
+
+    @property
     def step_s(self) -> float:
         """Period of the inner loops and of the simulation: a tick."""
         return 1.0 / self.attitude.rate_hz

@@ -20,11 +20,10 @@ from mambo_nmpc.sil.flight.names import PD_NAMES, PdName
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, NOMINAL
 from mambo_nmpc.sil.plant.link import NOT_CALLED
-from mambo_nmpc.sil.plant.loops import THRUST_LIMIT_N
 
-TILT_RAD = math.acos(0.063 * GRAVITY_M_S2 / THRUST_LIMIT_N)
+TILT_RAD = math.acos(0.063 * GRAVITY_M_S2 / NOMINAL.altitude.thrust_max_n)
 """Tilt at which the largest thrust just carries the weight: 59 degrees."""
 
 

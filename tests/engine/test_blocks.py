@@ -14,7 +14,7 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.randomness import Purpose, generators
 from mambo_nmpc.sil.plant.vehicle import Seen
 from mambo_nmpc.sil.sensors.estimators import Suite
-from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Sensors
+from mambo_nmpc.sil.sensors.instruments import NOISES, Sensors
 from tests.support.engines import NUMBERS, TICKS, build, estimates, tabulate, truths
 
 
@@ -51,6 +51,6 @@ def test_sensors_and_estimators(
         suite = Suite(sensors, (5,), Seen(*rows[0]))
         seen = [suite.estimate(Seen(*row)) for row in rows]
     expected = np.array([[one.position_m, one.velocity_m_s, one.euler_rad, one.rates_rad_s] for one in seen])
-    draws = generators((5,), Purpose.SENSORS)[0].standard_normal((TICKS, len(NOISE_VARIANCES)))
+    draws = generators((5,), Purpose.SENSORS)[0].standard_normal((TICKS, NOISES))
     found = estimates(engine, Flight(Hover(), duration_s=1.0, sensors=sensors), given, draws)
     assert unified(found) == unified(expected.reshape(TICKS, 12))

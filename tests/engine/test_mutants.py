@@ -25,7 +25,7 @@ from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.names import PD_NAMES
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.trajectories import Hover
-from mambo_nmpc.sil.sensors.instruments import NOISE_VARIANCES, Sensors
+from mambo_nmpc.sil.sensors.instruments import NOISES, Sensors
 from tests.support.engine_reasons import reason
 from tests.support.engines import TICKS, build, estimates, tabulate, truths
 from tests.support.mutants import Mutant, mutants
@@ -59,7 +59,7 @@ def digests(path: Path) -> list[str]:
     ]
     found = [trace.digest(index) for trace in traces for index in range(trace.flights)]
     sensed = Flight(Hover(), duration_s=1.0, sensors=Sensors(derotated=True))
-    draws = np.random.default_rng(1).standard_normal((TICKS, len(NOISE_VARIANCES)))
+    draws = np.random.default_rng(1).standard_normal((TICKS, NOISES))
     blocks = [tabulate(path), *(estimates(path, sensed, truths(kind), draws) for kind in ("gates", "wild"))]
     return [*found, *(hashlib.sha256(block.tobytes()).hexdigest() for block in blocks)]
 

@@ -7,10 +7,13 @@ import pytest
 
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.crashes import CRASH_TILT_RAD, Crash, detect_crashes, first_crash
+from mambo_nmpc.sil.flight.crashes import Crash, crash_tilt_rad, detect_crashes, first_crash
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
+from mambo_nmpc.sil.plant.airframe import NOMINAL
+
+CRASH_TILT_RAD = crash_tilt_rad(NOMINAL)
 
 
 @pytest.fixture

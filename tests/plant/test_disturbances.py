@@ -10,7 +10,7 @@ from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli, Hover
-from mambo_nmpc.sil.plant import loops
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.disturbances import Disturbances, World
 from mambo_nmpc.sil.plant.gusts import (
     ACROSS_GAINS,
@@ -161,7 +161,7 @@ def test_battery_sag_leaves_an_altitude_error() -> None:
     trace = hover(10.0, disturbances=Disturbances(battery_sag_1_s=0.004))
     share = 1.0 - 0.004 * 10.0
     assert trace.position_m[-1, 0, 2] + 1.1 == pytest.approx(
-        loops.WEIGHT_N * (1.0 / share - 1.0) / loops.ALTITUDE_P_N_M, rel=0.05
+        NOMINAL.weight_n * (1.0 / share - 1.0) / NOMINAL.altitude.p_n_m, rel=0.05
     )
 
 

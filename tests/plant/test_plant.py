@@ -7,13 +7,17 @@ import pytest
 from numpy.typing import NDArray
 
 from mambo_nmpc.sil.plant import loops
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO
+from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO, NOMINAL
 from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
 from mambo_nmpc.sil.plant.rigid_body import RigidBody
 from mambo_nmpc.sil.plant.rotors import Rotors, mix
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Vehicle, VehicleState, truth
+from mambo_nmpc.sil.vehicles.sections import MamboAttitude
 
 FloatArray = NDArray[np.float64]
+
+assert isinstance(NOMINAL.attitude, MamboAttitude)
+LOOP = loops.StockLoop(NOMINAL, NOMINAL.attitude)
 
 STOCK_MIXER = np.array(
     [
@@ -107,7 +111,7 @@ def fly_attitude(
     states = []
     for _ in range(ticks):
         seen = truth(state)
-        thrust_n = loops.altitude_thrust(-1.1, seen.position_m[2], seen.velocity_m_s[2])
+        thrust_n = loops.altitude_thrust(NOMINAL, -1.1, seen.position_m[2], seen.velocity_m_s[2])
         state = vehicle.step(state, command_rad[:, np.newaxis], thrust_n, yaw_reference_rad, seen=seen)
         states.append(state)
     return states
@@ -221,7 +225,7 @@ def test_rotors_lag_and_their_thrust_is_integrated_within_the_step() -> None:
     for _ in range(ticks):
         body, speed = vehicle.integrate(state, np.full((4, 2), 300.0))
         np.testing.assert_allclose(speed[:, 1], goal, rtol=1e-15)
-        state = VehicleState(body, speed, state.attitude_integral_rad_s)
+        state = VehicleState(body, speed, state.memory)
     time_s = ticks * STEP_S
     gap, left = start - goal, np.exp(-time_s / lag_s)
     np.testing.assert_allclose(speed[:, 0], goal + gap * left, rtol=1e-12)
@@ -253,17 +257,21 @@ def test_attitude_reaches_its_command_with_the_stock_lag(axis: int, lag_s: float
 def test_stock_loops_have_the_stock_gains() -> None:
     """Unit errors, rates and integrals return the stock gains, roll before pitch; the thrust is limited."""
     none, one = np.zeros((2, 1)), np.ones((2, 1))
-    np.testing.assert_array_equal(loops.attitude_torque(one, none, none, none), [[0.010], [0.013]])
-    np.testing.assert_array_equal(loops.attitude_torque(none, one, none, none), [[-0.010], [-0.013]])
-    np.testing.assert_array_equal(loops.attitude_torque(none, none, one, none), [[-0.0028], [-0.0020]])
-    np.testing.assert_array_equal(loops.attitude_torque(none, none, none, one), [[0.010], [0.010]])
-    np.testing.assert_array_equal(loops.yaw_torque(1.0, none[0], none[0]), 0.004)
-    np.testing.assert_array_equal(loops.yaw_torque(0.0, none[0], one[0]), -0.0012)
+    np.testing.assert_array_equal(LOOP.attitude_torque(one, none, none, none), [[0.010], [0.013]])
+    np.testing.assert_array_equal(LOOP.attitude_torque(none, one, none, none), [[-0.010], [-0.013]])
+    np.testing.assert_array_equal(LOOP.attitude_torque(none, none, one, none), [[-0.0028], [-0.0020]])
+    np.testing.assert_array_equal(LOOP.attitude_torque(none, none, none, one), [[0.010], [0.010]])
+    np.testing.assert_array_equal(LOOP.yaw_torque(1.0, none[0], none[0]), 0.004)
+    np.testing.assert_array_equal(LOOP.yaw_torque(0.0, none[0], one[0]), -0.0012)
     weight_n = 0.063 * 9.81
-    np.testing.assert_allclose(loops.altitude_thrust(-0.1, none[0], none[0]), weight_n + 0.08, rtol=1e-14)
-    np.testing.assert_allclose(loops.altitude_thrust(0.0, none[0], 0.1 * one[0]), weight_n + 0.03, rtol=1e-14)
-    np.testing.assert_array_equal(loops.altitude_thrust(100.0, none[0], none[0]), -1.20204)
-    np.testing.assert_array_equal(loops.altitude_thrust(-100.0, none[0], none[0]), 1.20204)
+    np.testing.assert_allclose(
+        loops.altitude_thrust(NOMINAL, -0.1, none[0], none[0]), weight_n + 0.08, rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        loops.altitude_thrust(NOMINAL, 0.0, none[0], 0.1 * one[0]), weight_n + 0.03, rtol=1e-14
+    )
+    np.testing.assert_array_equal(loops.altitude_thrust(NOMINAL, 100.0, none[0], none[0]), -1.20204)
+    np.testing.assert_array_equal(loops.altitude_thrust(NOMINAL, -100.0, none[0], none[0]), 1.20204)
 
 
 def test_altitude_and_heading_reach_their_references() -> None:
@@ -275,8 +283,8 @@ def test_altitude_and_heading_reach_their_references() -> None:
 def test_attitude_integral_leaks_and_is_limited() -> None:
     """It grows by error times period, leaks a thousandth per second and saturates at 2 rad s."""
     error, none = np.array([[0.2], [-0.4]]), np.zeros((2, 1))
-    np.testing.assert_allclose(loops.attitude_integral(error, none, none), 0.005 * error, rtol=1e-15)
+    np.testing.assert_allclose(LOOP.attitude_integral(error, none, none), 0.005 * error, rtol=1e-15)
     held = np.array([[1.0], [-1.0]])
-    np.testing.assert_allclose(loops.attitude_integral(none, none, held), held * (1.0 - 5e-6), rtol=1e-15)
-    limited = loops.attitude_integral(3e3 * error, none, none)
+    np.testing.assert_allclose(LOOP.attitude_integral(none, none, held), held * (1.0 - 5e-6), rtol=1e-15)
+    limited = LOOP.attitude_integral(3e3 * error, none, none)
     np.testing.assert_array_equal(limited, [[2.0], [-2.0]])

@@ -132,7 +132,7 @@ def test_every_loop_turns_its_own_axis(name: str) -> None:
     rates = np.array([[values[f"{what} rate"]] for what in ("roll", "pitch", "yaw")])
     integral = np.array([[values["roll integral"]], [values["pitch integral"]]])
     after = Vehicle().step(
-        replace(hovering(), attitude_integral_rad_s=integral),
+        replace(hovering(), memory=integral),
         np.array([[values["roll command"]], [values["pitch command"]]]),
         np.array([MAMBO.mass_kg * 9.81]),
         values["yaw reference"],
@@ -143,9 +143,9 @@ def test_every_loop_turns_its_own_axis(name: str) -> None:
     np.testing.assert_allclose(after.body[9:, 0], expected, rtol=1e-9, atol=1e-13)
     error = [values[f"{what} command"] - values[what] for what in ("roll", "pitch")]
     grown = integral[:, 0] * (1.0 - 5e-6) + STEP_S * np.array(error)
-    np.testing.assert_allclose(after.attitude_integral_rad_s[:, 0], grown, rtol=1e-12)
+    np.testing.assert_allclose(after.memory[:, 0], grown, rtol=1e-12)
 
 
 def test_a_drone_at_rest_has_no_integral() -> None:
     """Both integral states (2, n) are zero at the start."""
-    np.testing.assert_array_equal(hovering(3).attitude_integral_rad_s, np.zeros((2, 3)), strict=True)
+    np.testing.assert_array_equal(hovering(3).memory, np.zeros((2, 3)), strict=True)
