@@ -21,18 +21,39 @@ from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
 from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.names import PD_NAMES
+from mambo_nmpc.sil.flight.names import PD_NAMES, SENSORS_OF
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.link import Link
 from tests.support.one_norm import ONE_NORM
-from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH, scenarios
+from tests.support.scenarios import (
+    COUPLED,
+    CRAZYFLIE,
+    FLOWN,
+    LATE,
+    LIMITED,
+    SENSED,
+    TAKE_OFF,
+    TRUTH,
+    captured,
+    drones,
+    scenarios,
+)
 from tests.support.tools import require, toolchain
 
 MAMBO = ONE_NORM
 PERIOD_S = MAMBO.horizon.update_period_s
 SCALARS = ("float32", "float64", "fixed")
-BATCHES = {"truth": TRUTH, "sensed": SENSED, "coupled": COUPLED, "take-off": TAKE_OFF}
+BATCHES = {
+    "truth": TRUTH,
+    "sensed": SENSED,
+    "coupled": COUPLED,
+    "take-off": TAKE_OFF,
+    "cascade": captured(CRAZYFLIE),
+    "limited": captured(LIMITED),
+    "flown": captured(FLOWN),
+    "late": captured(LATE),
+}
 BUILDS = [
     Toolchain(("gcc",), "-O0"),
     Toolchain(("gcc",), "-O3"),
@@ -67,13 +88,15 @@ def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...]
     assert_same_bits(flight_of(batch, PERIOD_S), kind)
 
 
-@settings(max_examples=25)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
-    """One or two drawn flights, without sensors or through them."""
+    """One or two drawn flights of any drone, without sensors or through them."""
+    drone = data.draw(drones())
     shared = {
         "duration_s": 0.5,
-        "sensors": data.draw(st.sampled_from(["none", "mambo", "mambo-derotated"])),
+        "vehicle": drone,
+        "sensors": data.draw(st.sampled_from(SENSORS_OF[drone.sensors.kind])),
         "start": "take-off" if data.draw(st.integers(0, 9)) == 0 else "hover",
     }
     batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=2))

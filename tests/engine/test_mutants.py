@@ -30,7 +30,17 @@ from tests.support.engine_reasons import reason
 from tests.support.engines import TICKS, build, estimates, tabulate, truths
 from tests.support.mutants import Mutant, mutants
 from tests.support.one_norm import ONE_NORM
-from tests.support.scenarios import COUPLED, SENSED, TAKE_OFF, TRUTH
+from tests.support.scenarios import (
+    COUPLED,
+    CRAZYFLIE,
+    FLOWN,
+    LATE,
+    LIMITED,
+    SENSED,
+    TAKE_OFF,
+    TRUTH,
+    captured,
+)
 
 PERIOD_S: Final = 0.01
 STRIDE: Final = 8
@@ -42,7 +52,10 @@ FLAGS: Final = (
     *("-fsanitize=bounds", "-fsanitize-undefined-trap-on-error"),
 )
 """A variable without a value is not 0, and a read beside an array is a crash."""
-BATCHES: Final = (TRUTH, SENSED, COUPLED, TAKE_OFF)
+BATCHES: Final = (
+    *(TRUTH, SENSED, COUPLED, TAKE_OFF),
+    *(captured(drone) for drone in (CRAZYFLIE, LIMITED, FLOWN, LATE)),
+)
 FILES: Final = sorted({*SOURCES, *HEADERS} - {"engine.h", "records.h"})
 
 

@@ -5,7 +5,9 @@ from typing import Any, Final
 from hypothesis import strategies as st
 
 from mambo_nmpc.sil.flight.names import CURVE_NAMES
-from mambo_nmpc.sil.flight.scenario import Scenario
+from mambo_nmpc.sil.flight.scenario import OF_THE_VEHICLE, Scenario
+from mambo_nmpc.sil.vehicles import presets
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 TRUTH: Final = (
     Scenario(
@@ -63,8 +65,98 @@ COUPLED: Final = (Scenario(duration_s=4.0, seed=9, sensors="mambo", dropped_shar
 TAKE_OFF: Final = (Scenario(duration_s=1.0, seed=1, sensors="mambo-derotated", start="take-off"),)
 
 
+CRAZYFLIE: Final = presets.load("crazyflie")
+FLOWN: Final = presets.load("crazyflie-flown")
+
+
+def changed(drone: VehicleFile, **sections: Any) -> VehicleFile:
+    """Return a drone with other values in some sections, which may be nested."""
+
+    def merge(old: Any, new: Any) -> Any:
+        return (
+            old | {key: merge(old[key], value) for key, value in new.items()}
+            if isinstance(new, dict)
+            else new
+        )
+
+    return VehicleFile.model_validate(merge(drone.model_dump(exclude_none=True), sections))
+
+
+LIMITED: Final = changed(
+    CRAZYFLIE,
+    attitude={
+        "rate_hz": 200,
+        "rate_max_rad_s": 1.5,
+        "output_max": 9000.0,
+        "roll": {"d": 0.02, "integral_limit_rad_s": 0.02, "rate_integral_limit_rad": 0.01},
+        "pitch": {"p_1_s": 5.0, "d": 0.01, "integral_limit_rad_s": 0.03, "rate_integral_limit_rad": 0.02},
+        "yaw": {"integral_limit_rad_s": 0.01, "rate_d_s2_rad": 3.0, "rate_integral_limit_rad": 0.03},
+    },
+    sensors={"position_rate_hz": 40, "position_delay_s": 0.02, "velocity_filter_s": 0.0},
+)
+"""A cascade at all its limits; motion capture without a filter."""
+LATE: Final = changed(
+    FLOWN,
+    body={"drag_1_s": 0.4},
+    attitude={
+        "rate_hz": 500,
+        "roll": {"gain": 0.9, "lag_s": 0.03, "dead_time_s": 0.0613},
+        "pitch": {"gain": 1.1, "lag_s": 0.07, "dead_time_s": 0.1005},
+        "yaw_lag_s": 0.3,
+    },
+    sensors={"position_rate_hz": 50, "position_delay_s": 0.006},
+)
+"""Two different angles, whose dead times are no multiples of a tick."""
+
+
+def captured(drone: VehicleFile) -> tuple[Scenario, ...]:
+    """Return flights with motion capture: all disturbances; a calm one; one upside down."""
+    common: dict[str, Any] = {"vehicle": drone, "duration_s": 2.0, "sensors": "mocap"}
+    return (
+        TRUTH[0].model_copy(
+            update=common | {key: getattr(Scenario(vehicle=drone), key) for key in OF_THE_VEHICLE}
+        ),
+        Scenario(
+            **common, seed=4, yaw_rad=0.4, thrust_factor_n_s2=0.9 * Scenario(vehicle=drone).thrust_factor_n_s2
+        ),
+        Scenario(**common, seed=5, start_tilt_rad=(1.4, 1.1), yaw_rate_rad_s=5.0, noise_scale=0.5),
+    )
+
+
 def _within(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high, allow_nan=False)
+
+
+def drones() -> st.SearchStrategy[VehicleFile]:
+    """Draw a drone of any kind: a shipped one, or one with other figures."""
+    gain, tick = _within(0.0, 20.0), st.sampled_from([100, 200, 500, 1000])
+    response = st.fixed_dictionaries(
+        {"gain": _within(0.1, 3.0), "lag_s": _within(0.001, 0.5), "dead_time_s": _within(0.0, 0.2)}
+    )
+    axis = st.fixed_dictionaries(
+        {
+            "p_1_s": gain,
+            "d": _within(0.0, 0.5),
+            "integral_limit_rad_s": _within(0.0, 0.1),
+            "rate_p_s_rad": _within(0.0, 1e4),
+            "rate_d_s2_rad": _within(0.0, 100.0),
+            "rate_integral_limit_rad": _within(0.0, 1.0),
+        }
+    )
+    sensors = st.fixed_dictionaries(
+        {
+            "position_rate_hz": st.sampled_from([20, 50, 100]),
+            "position_delay_s": _within(0.0, 0.2),
+            "velocity_filter_s": st.one_of(st.just(0.0), _within(0.001, 1.0)),
+        }
+    )
+    cascades = st.fixed_dictionaries({"rate_hz": tick, "roll": axis, "pitch": axis, "yaw": axis})
+    firsts = st.fixed_dictionaries({"rate_hz": tick, "roll": response, "pitch": response})
+    return st.one_of(
+        st.sampled_from([presets.load(name) for name in presets.names()]),
+        st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors),
+        st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors),
+    )
 
 
 def scenarios(**fixed: Any) -> st.SearchStrategy[Scenario]:
