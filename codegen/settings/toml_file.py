@@ -11,8 +11,8 @@ from mambo_nmpc.codegen.errors import UnreadableFileError, echo
 from mambo_nmpc.codegen.plain_file import read_plain_file
 
 LARGEST_FILE_BYTES = 64_000
-BOARDS, PRESETS = "boards", "presets"
-"""The kinds of TOML files that `codegen` holds."""
+BOARDS, PRESETS, VEHICLES = "boards", "presets", "vehicles"
+"""The kinds of TOML files that the package holds."""
 
 _PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>line (?P<line>\d+), column \d+)\)", re.DOTALL)
 

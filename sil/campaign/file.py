@@ -27,10 +27,19 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import parse_document, read_text
 from mambo_nmpc.sil.campaign.distributions import Distribution, parse
-from mambo_nmpc.sil.campaign.parameters import OF_THE_CURVE, PARAMETERS, Draw, draw, scenario_values
+from mambo_nmpc.sil.campaign.parameters import (
+    OF_THE_CURVE,
+    PARAMETERS,
+    Draw,
+    defaults_of,
+    draw,
+    scenario_values,
+)
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.names import PD_NAMES, PdName, SensorsName, Start
-from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
+from mambo_nmpc.sil.flight.names import PD_NAMES, SENSORS_OF, PdName, SensorsName, Start
+from mambo_nmpc.sil.flight.scenario import Scenario, choose_sensors, flight_of
+from mambo_nmpc.sil.vehicles import presets as vehicles
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _LONGEST_LIST: Final = 10
@@ -68,7 +77,10 @@ class FlightSection(FileSection):
     rate_rad_s: Annotated[Distribution, _checked("rate_rad_s"), _WRITTEN] = PARAMETERS["rate_rad_s"]
     duration_s: float = Field(100.0, ge=1, le=3600)
     start: Start = "hover"
-    sensors: SensorsName = "mambo-derotated"
+    vehicle: str = vehicles.DEFAULT
+    """A shipped drone, or its vehicle.toml."""
+    sensors: SensorsName | None = None
+    """None: the vehicle's own."""
 
 
 _DRAWN: Final[dict[str, Any]] = {
@@ -127,6 +139,12 @@ class Campaign:
 
     file: CampaignFile
     entrants: tuple[Entrant, ...]
+    drone: VehicleFile
+
+    @property
+    def flight(self) -> dict[str, Any]:
+        """The section [flight] as plain values, with all of the drone."""
+        return self.file.flight.model_dump() | {"vehicle": self.drone.model_dump()}
 
     def draw(self, flight: int) -> Draw:
         """Return seed and parameters of flight number `flight`."""
@@ -135,27 +153,31 @@ class Campaign:
     def document(self) -> dict[str, Any]:
         """Return everything that determines the result, as plain values."""
         document: dict[str, Any] = self.file.model_dump(mode="json")
-        return document | {"controllers": [entrant.document() for entrant in self.entrants]}
+        controllers = [entrant.document() for entrant in self.entrants]
+        return document | {"controllers": controllers, "vehicle": self.drone.model_dump()}
 
 
 def scenario(flight: dict[str, Any], drawn: Draw) -> Scenario:
-    """Return one flight from the section [flight] as plain values and from its draws."""
-    return Scenario.model_validate(flight | scenario_values(drawn))
+    """Return one flight from `Campaign.flight` and from its draws."""
+    drone = VehicleFile.model_validate(flight["vehicle"])
+    return Scenario.model_validate(flight | scenario_values(drawn, drone) | {"vehicle": drone})
 
 
-def default() -> Campaign:
-    """Return the default campaign."""
-    return _campaign(CampaignFile(), Path(), "the default campaign")
+def default(vehicle: str | None = None) -> Campaign:
+    """Return the default campaign, with another drone if one is named."""
+    return _campaign(CampaignFile(), Path(), "the default campaign", vehicle)
 
 
-def read(path: Path) -> Campaign:
-    """Read a campaign.toml; paths of controllers are relative to its folder.
+def read(path: Path, vehicle: str | None = None) -> Campaign:
+    """Read a campaign.toml; paths of controllers and drone are relative to its folder.
+
+    `vehicle` replaces the drone and, where it has not the sensors of the file, these by its own.
 
     Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors of
     the file and of its controllers' files.
     """
     source = echo(str(path))
-    return _campaign(read_as(CampaignFile, path), path.parent, source)
+    return _campaign(read_as(CampaignFile, path), path.parent, source, vehicle)
 
 
 def read_as(model: type[File], path: Path) -> File:
@@ -172,8 +194,15 @@ def read_as(model: type[File], path: Path) -> File:
         raise InvalidSettingsError(tuple(f"{source}: {_explain(one, model)}" for one in details)) from None
 
 
-def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
-    """Load the controllers and check that each can be simulated."""
+def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None) -> Campaign:
+    """Load drone and controllers and check that each can be simulated."""
+    drone = choose_drone(file.flight, folder, source, vehicle)
+    file = file.model_copy(
+        update={
+            "flight": with_drone(file.flight, drone, source, replaced=vehicle is not None),
+            "draws": with_defaults(file.draws, drone),
+        }
+    )
     entrants = tuple(load_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
     names = [entrant.name for entrant in entrants]
     for name in names:
@@ -181,20 +210,61 @@ def _campaign(file: CampaignFile, folder: Path, source: str) -> Campaign:
             raise InvalidSettingsError(
                 (f"{source}: controllers: two are called {name}; give their files different names",)
             )
-    campaign = Campaign(file, entrants)
+    campaign = Campaign(file, entrants, drone)
     for entrant, named in zip(entrants, file.controllers, strict=True):
         demand_flyable(
-            entrant.settings, file.flight, campaign.draw(0), f"{source}: controllers: {echo(named)}"
+            entrant.settings, campaign.flight, campaign.draw(0), f"{source}: controllers: {echo(named)}"
         )
     return campaign
 
 
-def demand_flyable(settings: Settings, flight: FlightSection, drawn: Draw, place: str) -> None:
+def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, place: str) -> None:
     """Raise InvalidSettingsError, which begins with `place`, if a drawn flight cannot be simulated."""
     try:
-        flight_of([scenario(flight.model_dump(), drawn)], settings.horizon.update_period_s)
+        flight_of([scenario(flight, drawn)], settings.horizon.update_period_s)
     except FlightError as error:
-        raise InvalidSettingsError((f"{place}: horizon.{error}; stock loops run at 200 Hz",)) from None
+        raise InvalidSettingsError((f"{place}: horizon.{error}",)) from None
+
+
+def load_drone(named: str, folder: Path, place: str) -> VehicleFile:
+    """Load a shipped drone or a file in `folder`; raises InvalidSettingsError, which begins with `place`."""
+    path = folder / named
+    try:
+        return vehicles.load(named if named in vehicles.names() or not path.exists() else str(path))
+    except MamboNmpcError as error:
+        raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
+
+
+Flown = TypeVar("Flown", bound=FlightSection)
+
+
+def with_drone(flight: Flown, drone: VehicleFile, source: str, *, replaced: bool) -> Flown:
+    """Return the section [flight] with the drone's name and with sensors that it has.
+
+    If the drone is `replaced`, its own sensors replace those that it has not. Raises InvalidSettingsError.
+    """
+    possible = SENSORS_OF[drone.sensors.kind]
+    sensors = flight.sensors
+    if sensors is None or (replaced and sensors not in possible):
+        sensors = possible[-1]
+    try:
+        choose_sensors(sensors, drone)
+    except FlightError as error:
+        raise InvalidSettingsError((f"{source}: flight.{error}",)) from None
+    return flight.model_copy(update={"vehicle": drone.name, "sensors": sensors})
+
+
+def with_defaults(draws: FileSection, drone: VehicleFile) -> FileSection:
+    """Return the section [draws] with the drone's default for each parameter that the file does not name."""
+    own = {name: found for name, found in defaults_of(drone).items() if name not in draws.model_fields_set}
+    return draws.model_copy(update=own)
+
+
+def choose_drone(flight: FlightSection, folder: Path, source: str, vehicle: str | None) -> VehicleFile:
+    """Return the drone that `vehicle` names, or else that of the section [flight] of a file in `folder`."""
+    if vehicle is not None:
+        return vehicles.load(vehicle)
+    return load_drone(flight.vehicle, folder, f"{source}: flight.vehicle")
 
 
 def load_settings(named: str, folder: Path, place: str) -> Settings:

@@ -24,6 +24,7 @@ from mambo_nmpc.sil.flight.metrics import Metrics, measure, saturated_share
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.plant.link import NOT_CALLED
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
 """Metrics of the true flight."""
@@ -54,7 +55,7 @@ def fly_batch(
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
-    `flight` is the section [flight], `version` that of the calling program. Raises WorkerError if the worker
+    `flight` is that of the campaign, `version` that of the calling program. Raises WorkerError if the worker
     has another version, BuildError if it has no compiler.
     """
     if version != __version__:
@@ -75,7 +76,9 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     for number, entrant in enumerate(entrants):
         flight = flight_of(scenarios, entrant.settings.horizon.update_period_s)
         trace = fly(flight, _controller(entrant, flight), partial(_report_part, number, len(entrants)))
-        for key, values in _evaluate(trace, Design(entrant.settings).tilt_limit_rad).items():
+        for key, values in _evaluate(
+            trace, Design(entrant.settings).tilt_limit_rad, scenarios[0].vehicle
+        ).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
     report_share(0.0)
@@ -94,11 +97,11 @@ def _controller(entrant: Entrant, flight: Flight) -> PositionController:
         return CompiledController(entrant.settings, flight.flights)
 
 
-def _evaluate(trace: Trace, limit_rad: float) -> dict[str, list[Any]]:
-    """Return the results of n flights by key, each a list of n."""
+def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> dict[str, list[Any]]:
+    """Return the results of n flights of a drone by key, each a list of n."""
     refused = (trace.status != 0) & (trace.status != NOT_CALLED)
     found: dict[str, list[Any]] = {
-        CRASHED: detect_crashes(trace).astype(int).tolist(),
+        CRASHED: detect_crashes(trace, drone).astype(int).tolist(),
         REFUSED: refused.sum(axis=0).tolist(),
         SATURATED: saturated_share(trace.command_rad, limit_rad).tolist(),
     }

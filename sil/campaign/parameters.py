@@ -5,6 +5,7 @@ docs/campaign.md gives the sources of the default ranges.
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -12,7 +13,8 @@ import numpy as np
 from mambo_nmpc.sil.campaign.distributions import Distribution, Domain, parse
 from mambo_nmpc.sil.flight.names import CURVE_NAMES
 from mambo_nmpc.sil.flight.scenario import Scenario
-from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.plant.airframe import NOMINAL, airframe_of
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 
 def _axes(
@@ -60,7 +62,7 @@ PARAMETERS: Final[dict[str, Distribution]] = {
     "size_m": _parameter(-1000.0, 1000.0, 2.0),
     "rate_rad_s": _parameter(-100.0, 100.0, 0.5),
 }
-"""Domain and default distribution by name, in the order in which they use the
+"""Domain and default distribution by name, with the Mambo, in the order in which they use the
 random stream of a flight: a new parameter must be appended."""
 
 TRAJECTORY: Final = "trajectory"
@@ -81,17 +83,39 @@ def draw(seed: int, flight: int, distributions: Mapping[str, Distribution]) -> D
     return drawn
 
 
-def scenario_values(drawn: Draw) -> dict[str, Any]:
-    """Return the draws as keys of a `Scenario`; rotor thrust and torque have the same scale."""
+def defaults_of(drone: VehicleFile) -> dict[str, Distribution]:
+    """Return the defaults that depend on the drone: of its values the same shares as with the Mambo.
+
+    The lag of its motors, if it has one, varies by a fifth.
+    """
+    found = {
+        "mass_kg": _scaled("mass_kg", drone.body.mass_kg / NOMINAL.body.mass_kg),
+        "drag_1_s": _scaled("drag_1_s", drone.body.drag_1_s / NOMINAL.body.drag_1_s),
+    }
+    if drone.motor_lag_s > 0.0:
+        lag_s = _uniform(0.8 * drone.motor_lag_s, min(1.2 * drone.motor_lag_s, 1.0))
+        found["motor_lag_s"] = parse(lag_s, PARAMETERS["motor_lag_s"].domain)
+    return found
+
+
+def _scaled(name: str, factor: float) -> Distribution:
+    """Return the default distribution of a parameter with all its numbers times `factor`."""
+    default = PARAMETERS[name]
+    return replace(default, numbers=tuple(factor * one for one in default.numbers))
+
+
+def scenario_values(drawn: Draw, drone: VehicleFile) -> dict[str, Any]:
+    """Return the draws as keys of a `Scenario` of a drone; rotor thrust and torque have the same scale."""
+    airframe = airframe_of(drone)
 
     def parts(stem: str, unit: str, axes: str = "xyz") -> tuple[float, ...]:
         return tuple(drawn[f"{stem}_{axis}{unit}"] for axis in axes)
 
     scale, factors = drawn["thrust_scale"], parts("inertia_scale", "")
     return {name: value for name, value in drawn.items() if name in Scenario.model_fields} | {
-        "inertia_kg_m2": tuple(f * j for f, j in zip(factors, MAMBO.inertia_kg_m2, strict=True)),
-        "thrust_factor_n_s2": scale * MAMBO.thrust_factor_n_s2,
-        "torque_factor_n_m_s2": scale * MAMBO.torque_factor_n_m_s2,
+        "inertia_kg_m2": tuple(f * j for f, j in zip(factors, airframe.inertia_kg_m2, strict=True)),
+        "thrust_factor_n_s2": scale * airframe.thrust_factor_n_s2,
+        "torque_factor_n_m_s2": scale * airframe.torque_factor_n_m_s2,
         "accelerometer_bias_m_s2": parts("accelerometer_bias", "_m_s2"),
         "gyro_bias_rad_s": parts("gyro_bias", "_rad_s"),
         "wind_m_s2": parts("wind", "_m_s2", "xy"),

@@ -110,7 +110,7 @@ def _record_name(flight: int, name: str) -> str:
 def write_records(campaign: Campaign, store: FlightStore) -> None:
     """Write the missing records of all flights for `fly --replay`; raises UnwritableError."""
     values = store.values()
-    section = campaign.file.flight.model_dump()
+    section = campaign.flight
     with convert_os_errors(store.folder):
         (store.folder / RECORDS).mkdir(exist_ok=True)
         for row, flight in enumerate(map(int, values[FLIGHT])):

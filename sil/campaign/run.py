@@ -61,7 +61,7 @@ def fly_missing(
     size = max(1, min(batch, -(-len(left) // pool.workers)))
     batches = [left[first : first + size] for first in range(0, len(left), size)]
     entrants = [entrant.document() for entrant in campaign.entrants]
-    section = campaign.file.flight.model_dump()
+    section = campaign.flight
     drawn: dict[int, list[Draw]] = {}
 
     def tasks() -> Iterator[tuple[Any, ...]]:

@@ -22,6 +22,7 @@ from mambo_nmpc.sil.cli.same_bits import same_bits
 from mambo_nmpc.sil.cli.sweep import sweep
 from mambo_nmpc.sil.cli.table2 import table2
 from mambo_nmpc.sil.cli.tune import tune
+from mambo_nmpc.sil.cli.vehicles import vehicles
 from mambo_nmpc.sil.cli.verify import EXIT_CODES, verify
 
 COMMANDS: Final[dict[str, Callable[..., None]]] = {
@@ -31,6 +32,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "same-bits": same_bits,
     "sweep": sweep,
     "doctor": doctor,
+    "vehicles": vehicles,
     "faults": faults,
     "verify": verify,
     "regress": regress,
@@ -47,6 +49,8 @@ mambo-nmpc fly --controller pd --wind 0.5,0 -o pd-in-wind
 mambo-nmpc fly --on crazyflie -o on-crazyflie
 mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30
 mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
+mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
+mambo-nmpc fly --vehicle my-drone.toml -o my-drone
 mambo-nmpc fly --replay worst.json -o again
 mambo-nmpc table2 -o table2
 mambo-nmpc table2 --scalar fixed -o fixed
@@ -57,6 +61,9 @@ mambo-nmpc footprint --board my-board.toml --json
 mambo-nmpc same-bits mambo --boards mambo,crazyflie
 mambo-nmpc sweep --prediction 5:30:5 --control 1:3 --iterations 3,5,10 -o sweep
 mambo-nmpc sweep --board rp2040 --fit
+mambo-nmpc vehicles
+mambo-nmpc vehicles generic > my-drone.toml
+mambo-nmpc vehicles --schema > vehicle.schema.json
 mambo-nmpc faults mambo -o faults
 mambo-nmpc faults --scalar fixed
 mambo-nmpc verify
@@ -68,9 +75,11 @@ mambo-nmpc regress my-suite.toml --controller controller.toml -o regress
 mambo-nmpc regress my-suite.toml --controller controller.toml --update
 mambo-nmpc campaign -o campaign
 mambo-nmpc campaign campaign.toml --flights 200 -o campaign
+mambo-nmpc campaign --vehicle crazyflie -o crazyflie
 mambo-nmpc campaign --scheduler tcp://10.0.0.1:8786 -o campaign
 mambo-nmpc tune -o tuned
 mambo-nmpc tune tune.toml --trials 300 -o tuned
+mambo-nmpc tune --vehicle my-drone.toml -o tuned-for-mine
 mambo-nmpc tune --storage postgresql://db/studies -o tuned
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, Workers, output_option, show
+from mambo_nmpc.sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
     from mambo_nmpc.sil.campaign.report import CampaignSummary
@@ -24,6 +24,7 @@ def campaign(
         Path,
         output_option("Folder for the results; a campaign started there is continued."),
     ] = Path("campaign"),
+    vehicle: OtherDrone = None,
     flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=100_000)] = 1000,
     workers: Workers = None,
     scheduler: Annotated[
@@ -38,7 +39,7 @@ def campaign(
     from mambo_nmpc.sil.cli.progress import counting_bar
 
     with counting_bar("starting", "flights", flights) as bar:
-        summary = _run(source, output, flights, bar, workers=workers, scheduler=scheduler)
+        summary = _run(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
     from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text
     from mambo_nmpc.sil.campaign.store import TABLE
     from mambo_nmpc.sil.files.folders import SUMMARY
@@ -48,7 +49,14 @@ def campaign(
 
 
 def _run(
-    source: Path | None, output: Path, flights: int, bar: "Bar", *, workers: int | None, scheduler: str | None
+    source: Path | None,
+    vehicle: str | None,
+    output: Path,
+    flights: int,
+    bar: "Bar",
+    *,
+    workers: int | None,
+    scheduler: str | None,
 ) -> "CampaignSummary":
     """Fly the missing flights and write the results; if interrupted print how many are finished."""
     from mambo_nmpc.sil.campaign import file
@@ -56,7 +64,7 @@ def _run(
     from mambo_nmpc.sil.campaign.report import finish
     from mambo_nmpc.sil.campaign.run import fly_missing, missing_flights, open_campaign
 
-    chosen = file.default() if source is None else file.read(source)
+    chosen = file.default(vehicle) if source is None else file.read(source, vehicle)
     with open_campaign(chosen, output) as store:
         bar(len(store.lines))
         try:

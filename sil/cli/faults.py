@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, Source, load, show
+from mambo_nmpc.sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, show
 
 FILES = ("faults.csv", "faults.png", "faults.svg")
 
@@ -14,6 +14,7 @@ def faults(
     source: Source = "mambo",
     *,
     output: Results = Path("faults"),
+    vehicle: Drone = "mambo",
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
@@ -24,12 +25,13 @@ def faults(
     from mambo_nmpc.sil.faults.flights import End, FaultsSummary, fly_faults
     from mambo_nmpc.sil.faults.report import table, write_csv
     from mambo_nmpc.sil.files.folders import new_results
+    from mambo_nmpc.sil.vehicles import presets
 
-    settings = load(source, scalar)
+    settings, drone = load(source, scalar), presets.load(vehicle)
     with new_results(output, FaultsSummary.command, FILES) as folder:
         with progress_bar("flying with faults") as bar:
             try:
-                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), bar)
+                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), bar, drone=drone)
             except FlightError as error:
                 raise FlightError(f"{echo(source)}: {error}") from error
             bar.stage("drawing pictures")
@@ -37,7 +39,9 @@ def faults(
 
             draw_faults(verdicts, folder / "faults")
         write_csv(verdicts, folder / "faults.csv")
-        summary = FaultsSummary(source=source, settings=settings.digest, flights=list(verdicts))
+        summary = FaultsSummary(
+            source=source, settings=settings.digest, vehicle=drone, flights=list(verdicts)
+        )
         summary.write(folder)
     show(summary, table(verdicts), as_json=as_json)
     if any(verdict.end is End.CRASHED for verdict in verdicts):

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,12 +25,13 @@ from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.names import PD_TITLES
 from mambo_nmpc.sil.flight.report import FlightSummary, FlySummary, flight_text, judge
+from mambo_nmpc.sil.flight.scenario import choose_sensors
 from mambo_nmpc.sil.flight.traces import Trace, write_csv, write_npz
 from mambo_nmpc.sil.flight.trajectories import CURVES, Trajectory, Waypoints
 from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
 from mambo_nmpc.sil.plant.vehicle import Vehicle
-from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_nmpc.sil.vehicles import presets as vehicles
 
 GUSTS = "gusts"
 LONGEST_FLIGHT_S = 3600.0
@@ -49,7 +51,13 @@ def fly_once(options: FlyOptions) -> None:
     wind_m_s2 = (0.0, 0.0) if options.wind == GUSTS else _wind(options.wind)
     wind_speed_m_s = LIGHT_M_S if options.wind == GUSTS else 0.0
     _within("--yaw-rad", options.yaw_rad, -1000.0, 1000.0)
-    _within("--motor-lag-s", options.motor_lag_s, 0.0, 1.0)
+    drone = vehicles.load(options.vehicle)
+    motor_lag_s = drone.motor_lag_s if options.motor_lag_s is None else options.motor_lag_s
+    _within("--motor-lag-s", motor_lag_s, 0.0, 1.0)
+    try:
+        sensors = choose_sensors(options.sensors, drone)
+    except FlightError as error:
+        raise FlightError(f"--{error}") from error
     _within("--duration-s", options.duration_s, period_s, LONGEST_FLIGHT_S)
     _within("--seed", options.seed, 0, LARGEST_SEED)
     try:
@@ -58,19 +66,14 @@ def fly_once(options: FlyOptions) -> None:
             duration_s=options.duration_s,
             start=options.start,
             yaw_rad=options.yaw_rad,
-            vehicle=Vehicle(motor_lag_s=options.motor_lag_s, wind_m_s2=wind_m_s2),
+            vehicle=replace(Vehicle.of(drone), motor_lag_s=motor_lag_s, wind_m_s2=wind_m_s2),
             update_period_s=period_s,
             seeds=(options.seed,),
             disturbances=Disturbances(wind_speed_m_s=wind_speed_m_s),
-            sensors=None
-            if options.sensors == "none"
-            else Sensors(derotated=options.sensors == "mambo-derotated"),
+            sensors=sensors,
         )
     except FlightError as error:
-        raise FlightError(
-            f"{name}: horizon.{error}; only the simulation requires this, because its stock loops run at "
-            "200 Hz"
-        ) from error
+        raise FlightError(f"{name}: horizon.{error}; only the simulation requires this") from error
     if options.controller not in PD_TITLES:
         _check_ranges(flight, settings, options.trajectory)
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
@@ -92,11 +95,13 @@ def fly_once(options: FlyOptions) -> None:
                 "board": options.on,
                 "same_bits_as_host": same_bits,
                 "settings": settings.digest,
+                "vehicle": drone,
+                "motor_lag_s": motor_lag_s,
                 "update_period_s": period_s,
                 "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
                 "wind_m_s2": wind_m_s2,
                 "wind_speed_m_s": wind_speed_m_s,
-                **judge(trace, settings),
+                **judge(trace, settings, drone),
             }
         )
         summary.write(folder)

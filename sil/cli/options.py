@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 import typer
 
 from mambo_nmpc.codegen.command import AsJson, Scalar, Source, load, output_option
-from mambo_nmpc.codegen.settings.toml_file import BOARDS, shipped
+from mambo_nmpc.codegen.settings.toml_file import BOARDS, VEHICLES, shipped
 from mambo_nmpc.sil.flight.names import CURVE_NAMES, ControllerName, EngineName, SensorsName, Start
 
 if TYPE_CHECKING:
@@ -27,12 +27,31 @@ Workers = Annotated[
 ]
 
 BOARD_NAMES: Final = tuple(shipped(BOARDS))
+VEHICLE_NAMES: Final = tuple(shipped(VEHICLES, "mambo_nmpc.sil.vehicles"))
 
 
 def complete_boards(incomplete: str) -> list[str]:
     """Return the boards that begin with `incomplete`, for the shell."""
     return [name for name in BOARD_NAMES if name.startswith(incomplete)]
 
+
+def complete_vehicles(incomplete: str) -> list[str]:
+    """Return the shipped vehicles that begin with `incomplete`, for the shell."""
+    return [name for name in VEHICLE_NAMES if name.startswith(incomplete)]
+
+
+def _vehicle_option(about: str) -> Any:
+    """Return the option --vehicle; `about` ends its help."""
+    return typer.Option(
+        "--vehicle",
+        help=f"The drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml{about}.",
+        metavar="NAME|FILE",
+        autocompletion=complete_vehicles,
+    )
+
+
+Drone = Annotated[str, _vehicle_option("")]
+OtherDrone = Annotated[str | None, _vehicle_option("; by default that of the file, or mambo")]
 
 Options = TypeVar("Options")
 
@@ -44,6 +63,7 @@ class FlyOptions:
     context: typer.Context
     source: Source = "mambo"
     output: Results = Path("flight")
+    vehicle: Drone = "mambo"
     controller: Annotated[
         ControllerName,
         typer.Option(
@@ -69,12 +89,15 @@ class FlyOptions:
     sensors: Annotated[
         SensorsName,
         typer.Option(
-            help="State that controller and stock loops get: the true one, or that of the Mambo's sensors "
-            "and estimators, without or with compensation of the rotation in the optical flow."
+            help="State that controller and inner loops get: the true one, or that of the vehicle's sensors, "
+            "which are the Mambo's, without or with compensation of the rotation in the optical flow, or "
+            "motion capture."
         ),
     ] = "none"
     seed: Annotated[int, typer.Option(help="Seed of gusts and sensor noise, 0 or more.")] = 0
-    motor_lag_s: Annotated[float, typer.Option(help="Time constant of the motors, in s.")] = 0.0
+    motor_lag_s: Annotated[
+        float | None, typer.Option(help="Time constant of the motors, in s; by default the vehicle's.")
+    ] = None
     start: Annotated[Start, typer.Option(help="Start hovering in the air, or 5 s earlier on the ground.")] = (
         "hover"
     )

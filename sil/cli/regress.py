@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, Results, show
+from mambo_nmpc.sil.cli.options import AsJson, OtherDrone, Results, show
 
 if TYPE_CHECKING:
     from mambo_nmpc.sil.campaign.file import Entrant
@@ -21,6 +21,7 @@ def regress(
     controller: Annotated[
         str, typer.Option(help="A preset, a controller.toml, pd, or pd-feedforward.", metavar="SOURCE")
     ] = "mambo",
+    vehicle: OtherDrone = None,
     output: Results = Path("regress"),
     update: Annotated[
         bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.", metavar="")
@@ -50,7 +51,7 @@ def regress(
     )
     from mambo_nmpc.sil.regress.run import demand_flyable
 
-    chosen, place = load_suite(suite), f"--controller {echo(controller)}"
+    chosen, place = load_suite(suite, vehicle), f"--controller {echo(controller)}"
     entrant = load_entrant(controller, Path(), place)
     demand_flyable(chosen, entrant, place)
     path = baseline_path(chosen, entrant.name)

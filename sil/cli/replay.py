@@ -55,7 +55,7 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             controller=record.controller,
             scenario=record.scenario,
             settings=record.settings.digest,
-            **judge(trace, record.settings),
+            **judge(trace, record.settings, record.scenario.vehicle),
         )
         summary.write(folder)
     written = FLIGHT_FILES if options.pictures else TRACE_FILES

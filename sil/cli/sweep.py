@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
-from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, Source, complete_boards, load, show
+from mambo_nmpc.sil.cli.options import AsJson, Drone, Results, Scalar, Source, complete_boards, load, show
 
 FILES = ("sweep.csv", "sweep.png", "sweep.svg")
 
@@ -28,6 +28,7 @@ def sweep(
         bool,
         typer.Option("--fit", help="Print only the closest-tracking one within the budget.", metavar=""),
     ] = False,
+    vehicle: Drone = "mambo",
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
@@ -45,6 +46,7 @@ def sweep(
         point_text,
         write_points,
     )
+    from mambo_nmpc.sil.vehicles import presets
 
     settings = load(source, scalar)
     if settings.cost.norm == "quadratic":
@@ -54,7 +56,7 @@ def sweep(
                 "cost there are no horizons and iterations to vary; `mambo-nmpc tune` searches its settings",
             )
         )
-    chosen = boards.load(board)
+    chosen, drone = boards.load(board), presets.load(vehicle)
     grid = Grid(
         _numbers("--prediction", prediction, 50),
         _numbers("--control", control, 50),
@@ -70,7 +72,7 @@ def sweep(
         counting_bar("sweeping", "controllers", total) as bar,
     ):
         with processes(os.cpu_count() or 1) as pool:
-            points = measure_grid(settings, chosen, grid, pool.run, bar)
+            points = measure_grid(settings, chosen, grid, pool.run, bar, drone=drone)
         bar.stage("drawing pictures")
         from mambo_nmpc.sil.footprint.plots import draw_sweep
 
@@ -81,6 +83,7 @@ def sweep(
             source=source,
             settings=settings.digest,
             board=chosen.name,
+            vehicle=drone,
             budget=budgets(chosen, settings.horizon.update_period_s),
             points=points,
             closest_fit=best,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, Workers, output_option, show
+from mambo_nmpc.sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
     from optuna import Study
@@ -27,6 +27,7 @@ def tune(
         Path,
         output_option("Folder for the results; a study started there is continued."),
     ] = Path("tune"),
+    vehicle: OtherDrone = None,
     trials: Annotated[int, typer.Option(help="Total number of trials.", min=1, max=100_000)] = 100,
     workers: Workers = None,
     storage: Annotated[
@@ -39,7 +40,9 @@ def tune(
     from mambo_nmpc.sil.cli.progress import counting_bar
 
     with counting_bar("starting", "trials", trials) as bar:
-        summary = _run(source, output, trials, bar, workers=workers or os.cpu_count() or 1, storage=storage)
+        summary = _run(
+            source, vehicle, output, trials, bar, workers=workers or os.cpu_count() or 1, storage=storage
+        )
     from mambo_nmpc.sil.files.folders import SUMMARY
     from mambo_nmpc.sil.tuning.report import CONTROLLER, FRONT, tune_text
 
@@ -49,7 +52,14 @@ def tune(
 
 
 def _run(
-    source: Path | None, output: Path, trials: int, bar: "Bar", *, workers: int, storage: str | None
+    source: Path | None,
+    vehicle: str | None,
+    output: Path,
+    trials: int,
+    bar: "Bar",
+    *,
+    workers: int,
+    storage: str | None,
 ) -> "TuneSummary":
     """Run the missing trials and write the results."""
     from mambo_nmpc.sil.campaign.store import claim, convert_os_errors
@@ -59,7 +69,7 @@ def _run(
     from mambo_nmpc.sil.tuning.report import finish
     from mambo_nmpc.sil.tuning.study import demand_optuna, finished_trials, open_study, owner_of
 
-    tuning = file.default() if source is None else file.read(source)
+    tuning = file.default(vehicle) if source is None else file.read(source, vehicle)
     demand_optuna()
     with convert_os_errors(output), create_folder(output), lock(output):
         new = not any(output.iterdir())

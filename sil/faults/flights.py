@@ -37,6 +37,7 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import arc_cosine, sine_cosine
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 DURATION_S: Final = 100.0
 ONSETS_S: Final = (20.0, 23.1, 26.3, 29.4)
@@ -107,6 +108,7 @@ class FaultsSummary(Summary):
 
     source: str
     settings: str
+    vehicle: VehicleFile = NOMINAL
     flights: list[Verdict]
 
 
@@ -130,6 +132,8 @@ def fly_faults(
     controller: Callable[[int], CompiledController],
     progress: Callable[[float], None] | None = None,
     chosen: Sequence[FaultScenario] | None = None,
+    *,
+    drone: VehicleFile = NOMINAL,
 ) -> tuple[Verdict, ...]:
     """Fly every fault, or those `chosen`, on every course with every onset; return verdicts course by course.
 
@@ -138,7 +142,7 @@ def fly_faults(
     """
     period_s = settings.horizon.update_period_s
     sorties = _sorties(scenarios(settings) if chosen is None else chosen, period_s)
-    flight = _flight(sorties, period_s)
+    flight = _flight(sorties, period_s, drone)
     compiled = controller(len(sorties))
     reweighted = ReweightedController(compiled, len(sorties), _weight_changes(sorties, settings))
     patience = np.array([PATIENCE if sortie.scenario.levelled else NEVER for sortie in sorties])
@@ -153,10 +157,11 @@ def fly_faults(
             f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
             f"{settings.ranges.velocity_m_s:g}: must include the figure of eight of Table II, 2 m and 1 m/s"
         )
-    return _judge_faults(trace, sorties, reweighted.answers, Design(settings).tilt_limit_rad)
+    limits_rad = Design(settings).tilt_limit_rad, crash_tilt_rad(drone)
+    return _judge_faults(trace, sorties, reweighted.answers, *limits_rad)
 
 
-def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
+def _flight(sorties: Sequence[_Sortie], period_s: float, drone: VehicleFile) -> Flight:
     hovering = np.array([sortie.course == HOVER for sortie in sorties], np.float64)
     try:
         return Flight(
@@ -164,7 +169,10 @@ def _flight(sorties: Sequence[_Sortie], period_s: float) -> Flight:
             duration_s=DURATION_S,
             flights=len(sorties),
             yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.scenario.turning for sortie in sorties]),
-            vehicle=Vehicle(wind_m_s2=(HOVER_WIND_M_S2[0] * hovering, HOVER_WIND_M_S2[1] * hovering)),
+            vehicle=replace(
+                Vehicle.of(drone),
+                wind_m_s2=(HOVER_WIND_M_S2[0] * hovering, HOVER_WIND_M_S2[1] * hovering),
+            ),
             update_period_s=period_s,
         )
     except FlightError as error:
@@ -197,9 +205,13 @@ def _weight_changes(sorties: Sequence[_Sortie], settings: Settings) -> list[Weig
 
 
 def _judge_faults(
-    trace: Trace, sorties: Sequence[_Sortie], answers: Sequence[tuple[int, int]], limit_rad: float
+    trace: Trace,
+    sorties: Sequence[_Sortie],
+    answers: Sequence[tuple[int, int]],
+    limit_rad: float,
+    crash_rad: float,
 ) -> tuple[Verdict, ...]:
-    """Return the verdict of every fault on every course."""
+    """Return the verdict of every fault on every course; a drone crashes at the tilt `crash_rad`."""
     target = trace.target.copy()
     for row, sortie in enumerate(sorties):
         target[sortie.begin :, row, 0] += sortie.scenario.moved_m
@@ -223,6 +235,7 @@ def _judge_faults(
                 band_m=bands_m[kind],
                 refused=refused,
                 saturated=share,
+                crash_rad=crash_rad,
             )
         )
     return tuple(_worst(verdicts) for verdicts in flown.values())
@@ -237,6 +250,7 @@ def _judge_flight(
     band_m: float,
     refused: set[int],
     saturated: float,
+    crash_rad: float,
 ) -> Verdict:
     """Judge flight `row`; `refused` holds the statuses of rejected weights, `saturated` is a share."""
     scenario = sortie.scenario
@@ -248,7 +262,7 @@ def _judge_flight(
     late = int(outside[-1]) + 1 - lasts if len(outside) else 0
     _, (cos_roll, cos_pitch) = sine_cosine(trace.euler_rad[flown, row, :2].T)
     tilt_rad = arc_cosine(cos_roll * cos_pitch)
-    crashed = not (tilt_rad.max() < crash_tilt_rad(NOMINAL) and trace.position_m[flown, row, 2].max() < 0.0)
+    crashed = not (tilt_rad.max() < crash_rad and trace.position_m[flown, row, 2].max() < 0.0)
     return Verdict(
         course=sortie.course,
         fault=scenario.name,

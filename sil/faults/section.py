@@ -22,7 +22,11 @@ def faults_section(_folder: Path, summary: FaultsSummary) -> Section:
     counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
     finding = f"{len(ends)} flights with {len(rows)} faults: {counts}"
     content = {"summary": summary, "courses": courses, "rows": list(rows.items())}
-    return Section("faults", f"Faults in flight, {summary.source}", End.CRASHED not in ends, finding, content)
+    return Section("faults", _title(summary), End.CRASHED not in ends, finding, content)
+
+
+def _title(summary: FaultsSummary) -> str:
+    return f"Faults in flight, {summary.source}, vehicle {summary.vehicle.name}"
 
 
 def _bar_percent(error_m: float, largest_m: float) -> float:

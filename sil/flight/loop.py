@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.names import Start
 from mambo_nmpc.sil.flight.traces import AXES, SensedTrace, Trace
@@ -117,10 +118,11 @@ class Flight:
             )
         if self.update_period_s <= 0.0 or abs(math.remainder(self.update_period_s, step_s)) > 1e-9:
             raise FlightError(
-                f"update_period_s = {self.update_period_s:g} must be a whole multiple of {step_s:g}"
+                f"update_period_s = {self.update_period_s:g} must be a whole multiple of {step_s:g}; "
+                f"the inner loops of vehicle {echo(self.vehicle.drone.name)} run at {1.0 / step_s:g} Hz"
             )
         if isinstance(self.sensors, Sensors) and step_s != STEP_S:
-            raise FlightError(f"sensors of kind mambo run at {1.0 / STEP_S:g} Hz, not {1.0 / step_s:g}")
+            raise FlightError(f"sensors: those of the Mambo run at {1.0 / STEP_S:g} Hz, not {1.0 / step_s:g}")
         if self.seeds is not None and len(self.seeds) != self.flights:
             raise FlightError(f"seeds: there are {len(self.seeds)} for {self.flights} flights")
 

@@ -13,7 +13,9 @@ from mambo_nmpc.sil.flight.crashes import Crash, first_crash
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, Metrics, measure
 from mambo_nmpc.sil.flight.scenario import Scenario
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.link import NOT_CALLED
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
 _UNITS |= {"_rad": "rad", "_m": "m"}
@@ -64,6 +66,7 @@ class FlySummary(FlightSummary):
 
     board: str | None
     source: str
+    vehicle: VehicleFile = NOMINAL
     update_period_s: float
     trajectory: str
     trajectory_sha256: str | None
@@ -129,7 +132,7 @@ def refusals(trace: Trace, settings: Settings) -> list[str]:
     return [f"{sentence}; the drone kept the last command" for sentence in sentences]
 
 
-def judge(trace: Trace, settings: Settings) -> dict[str, Any]:
+def judge(trace: Trace, settings: Settings, drone: VehicleFile) -> dict[str, Any]:
     """Return the fields of a `FlightSummary` that follow from the trace."""
     status = trace.status[:, 0]
     names = {NOT_CALLED: "NOT_CALLED", **{int(each): each.name for each in Status}}
@@ -138,7 +141,7 @@ def judge(trace: Trace, settings: Settings) -> dict[str, Any]:
     long = trace.time_s[-2] >= TRANSIENT_S
     return {
         "lost": bool(trace.diverged[0]),
-        "crash": first_crash(trace),
+        "crash": first_crash(trace, drone=drone),
         "mostly_refused": bool(np.mean(refused) > 0.5),
         "statuses": {name: count for name, count in counts.items() if count},
         "refusals": refusals(trace, settings),

@@ -195,8 +195,8 @@ def choose_sensors(
         case MamboSensors() as figures if name != "mocap":
             return Sensors(figures=figures, derotated=name == "mambo-derotated", **parameters)
     raise FlightError(
-        f"sensors {name}: vehicle {echo(drone.name)} has sensors.kind = {spell(drone.sensors.kind)}; "
-        f"use {' or '.join(SENSORS_OF[drone.sensors.kind])}, or a vehicle.toml with others"
+        f"sensors = {spell(name)} must be {' or '.join(map(spell, SENSORS_OF[drone.sensors.kind]))}: "
+        f"vehicle {echo(drone.name)} has sensors.kind = {spell(drone.sensors.kind)}"
     )
 
 

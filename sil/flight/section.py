@@ -63,6 +63,7 @@ def pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
 def _course(flown: FlySummary | Scenario) -> dict[str, str]:
     shape = "" if flown.trajectory.endswith(".csv") else f", {flown.size_m:g} m, {flown.rate_rad_s:g} rad/s"
     return {
+        "vehicle": flown.vehicle.name,
         "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",
         "state": "true" if flown.sensors == "none" else f"estimated, sensors {flown.sensors}",
     }

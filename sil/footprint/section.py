@@ -26,5 +26,5 @@ def sweep_section(_folder: Path, summary: SweepSummary) -> Section:
         f"{best.iterations} iterations"
     )
     pictures = sweep_panels(summary.points, summary.budget) if summary.points else []
-    title = f"Sweep of {summary.source} on {summary.board}"
+    title = f"Sweep of {summary.source} on {summary.board}, vehicle {summary.vehicle.name}"
     return Section("sweep", title, best is not None, finding, {"summary": summary, "pictures": pictures})

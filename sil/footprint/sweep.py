@@ -18,6 +18,9 @@ from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.paper.table2 import CASES
+from mambo_nmpc.sil.plant.airframe import NOMINAL
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 COUNTED_TICKS: Final = 60
 
@@ -66,19 +69,27 @@ class SweepSummary(Summary):
     source: str
     settings: str
     board: str
+    vehicle: VehicleFile = NOMINAL
     budget: dict[str, Number]
     points: list[Point]
     closest_fit: Point | None
 
 
 def measure_grid(
-    settings: Settings, board: Board, grid: Grid, run: Run, progress: Callable[[int], None]
+    settings: Settings,
+    board: Board,
+    grid: Grid,
+    run: Run,
+    progress: Callable[[int], None],
+    *,
+    drone: VehicleFile = NOMINAL,
 ) -> list[Point]:
     """Return the points of the grid in order; `run` measures them, in any order.
 
     Calls `progress` with the number of measured points. Raises WorkerError if a worker fails.
     """
-    jobs = [((settings.model_dump(), board.model_dump(), *point),) for point in grid.points()]
+    documents = settings.model_dump(), board.model_dump(), drone.model_dump()
+    jobs = [((*documents, *point),) for point in grid.points()]
     found: dict[int, Point] = {}
     progress(0)
     try:
@@ -114,16 +125,17 @@ def write_points(points: Sequence[Point], path: Path) -> None:
         writer.writerows(asdict(point) for point in points)
 
 
-def _measure_point(job: tuple[dict[str, Any], dict[str, Any], int, int, int]) -> Point:
+def _measure_point(job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int]) -> Point:
     """Measure one point in a worker process; `job` is plain data, since generic models do not pickle."""
-    document, board_document, prediction, control, iterations = job
+    document, board_document, drone, prediction, control, iterations = job
     board = Board.model_validate(board_document)
     document["horizon"] |= {"prediction": prediction, "control": control}
     document["optimizer"] |= {"iterations": iterations}
     chosen = Settings.model_validate(document)
     footprint = measure_footprint(chosen, board, counted_ticks=COUNTED_TICKS)
     case = next(iter(CASES.values()))
-    flight = Flight(case, update_period_s=chosen.horizon.update_period_s)
+    vehicle = Vehicle.of(VehicleFile.model_validate(drone))
+    flight = Flight(case, vehicle=vehicle, update_period_s=chosen.horizon.update_period_s)
     metrics = measure(fly(flight, CompiledController(chosen)))
     return Point(
         prediction=prediction,

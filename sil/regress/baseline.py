@@ -21,6 +21,7 @@ from mambo_nmpc.sil.campaign.flights import DIGEST, INDICES, Row
 from mambo_nmpc.sil.campaign.store import convert_os_errors
 from mambo_nmpc.sil.files.folders import GENERATOR
 from mambo_nmpc.sil.flight.scenario import Scenario
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.regress.file import FlightSuite
 
 SCENARIO: Final = "scenario"
@@ -146,5 +147,9 @@ def _record(scenario: Scenario, row: Row, *, same_bits: bool) -> Recorded:
 
 
 def _scenario_digest(scenario: Scenario) -> str:
-    """Return a digest of the keys of a flight that differ from their defaults."""
-    return hashlib.sha256(scenario.model_dump_json(exclude_defaults=True).encode()).hexdigest()[:16]
+    """Return a digest of the keys of a flight that differ from the defaults, which are those of its drone."""
+    defaults = Scenario(vehicle=scenario.vehicle)
+    same = {key for key in Scenario.model_fields if getattr(scenario, key) == getattr(defaults, key)}
+    if scenario.vehicle != NOMINAL:
+        same.remove("vehicle")
+    return hashlib.sha256(scenario.model_dump_json(exclude=same).encode()).hexdigest()[:16]

@@ -19,9 +19,13 @@ from pydantic_core import PydanticCustomError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo, echo_value
 from mambo_nmpc.codegen.settings.toml_file import existing_path, shipped
-from mambo_nmpc.sil.campaign.file import FileSection, read_as
+from mambo_nmpc.sil.campaign.file import FileSection, load_drone, read_as
 from mambo_nmpc.sil.campaign.flights import INDICES
+from mambo_nmpc.sil.flight.names import SENSORS_OF
 from mambo_nmpc.sil.flight.scenario import Scenario
+from mambo_nmpc.sil.plant.airframe import NOMINAL
+from mambo_nmpc.sil.vehicles import presets as vehicles
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 SUITES: Final = "suites"
 MOST_FLIGHTS: Final = 2000
@@ -32,13 +36,16 @@ DEFAULT_TOLERANCE: Final = 0.05
 _GROUP_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _RANGE: Final = "{ from = first, to = last, count = number }"
 
+VEHICLE: Final = "vehicle"
+_DEFAULTS: Final = Scenario()
+
 Values = tuple[Any, ...]
 """The values of a key, one flight each."""
 
 
 def _values_of(key: str, written: Any) -> Values:
     """Return the values of a key of a flight from its TOML value; raises ValueError, "must ..."."""
-    vector = isinstance(Scenario.model_fields[key].default, tuple)
+    vector = isinstance(getattr(_DEFAULTS, key), tuple)
     if isinstance(written, dict):
         items = _spread(written)
     elif isinstance(written, list) and (not vector or any(isinstance(one, list) for one in written)):
@@ -55,10 +62,14 @@ def _values_of(key: str, written: Any) -> Values:
 
 def _value_of(key: str, item: Any, *, alone: bool) -> Any:
     """Return one value of a key, checked as in a record of a flight; raises ValueError, "must ..."."""
+    if key == VEHICLE:
+        if not isinstance(item, str):
+            raise ValueError(f"must be the name of a vehicle or its file; {echo_value(item)} is not")
+        return item
     try:
         return getattr(_OneKey.model_validate_json(json.dumps({key: item}, default=str), strict=True), key)
     except ValidationError as error:
-        default = Scenario.model_fields[key].default
+        default = getattr(_DEFAULTS, key)
         rule = error.errors()[0]["msg"].replace("Input should", "must")
         if isinstance(default, tuple):
             rule = f"must be a vector of {len(default)} finite numbers, or a list of such vectors"
@@ -100,7 +111,11 @@ def _metric_field(largest: int) -> Any:
 
 
 _PLAIN: Final[dict[str, Any]] = {
-    key: (field.annotation, field) for key, field in Scenario.model_fields.items()
+    key: (
+        Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation,
+        getattr(_DEFAULTS, key),
+    )
+    for key, field in Scenario.model_fields.items()
 }
 _OneKey: Any = create_model("OneKey", __config__=Scenario.model_config, **_PLAIN)
 """A flight without the rules between keys, to check one key."""
@@ -171,16 +186,18 @@ class FlightSuite:
     same_bits: bool
 
 
-def load_suite(named: str) -> FlightSuite:
+def load_suite(named: str, vehicle: str | None = None) -> FlightSuite:
     """Load a shipped suite or a file; `envelope` is the suite, `./envelope` a file.
 
-    The baselines of a shipped suite are in the working directory. Raises SourceNotFoundError if there is
-    neither, UnreadableFileError for a file that is not TOML, InvalidSettingsError with all its errors.
+    `vehicle` replaces the drone of all flights and, where it has not the sensors of a flight, these by its
+    own; another one than the Mambo is part of the suite's name. The baselines of a shipped suite are in the
+    working directory. Raises SourceNotFoundError if there is neither, UnreadableFileError for a file that is
+    not TOML, InvalidSettingsError with all its errors.
     """
     ours = shipped(SUITES, __package__)
     if named in ours:
         with as_file(ours[named]) as path:
-            return _suite(read_as(SuiteFile, path), named, Path(), f"suite {named}")
+            return _suite(read_as(SuiteFile, path), named, Path(), f"suite {named}", vehicle)
     found = existing_path(named)
     if found is None:
         near = difflib.get_close_matches(named, ours, n=1)
@@ -189,19 +206,25 @@ def load_suite(named: str) -> FlightSuite:
             f"{echo(named)} is neither a shipped suite nor a file{guess}; shipped suites are "
             f"{', '.join(ours)}, and docs/regress.md shows how to write one"
         )
-    return _suite(read_as(SuiteFile, found), found.stem, found.parent, echo(named))
+    return _suite(read_as(SuiteFile, found), found.stem, found.parent, echo(named), vehicle)
 
 
-def _suite(file: SuiteFile, name: str, folder: Path, source: str) -> FlightSuite:
+def _suite(file: SuiteFile, name: str, folder: Path, source: str, vehicle: str | None) -> FlightSuite:
     """Return the suite with all its flights; raises InvalidSettingsError with all errors."""
     flights: list[SuiteFlight] = []
     faults: list[str] = []
     count = 0
+    drone = None if vehicle is None else vehicles.load(vehicle)
     for group, section in file.flights.items():
         if not _GROUP_NAME.fullmatch(group):
             faults.append(f"flights.{echo(group)} must have a name of at most 40 letters, digits, - and _")
         values = {key: getattr(section, key) or getattr(file.flight, key) for key in Scenario.model_fields}
         values = {key: found for key, found in values.items() if found is not None}
+        if drone is not None:
+            values = _replace_drone(values, drone)
+        elif VEHICLE in values:
+            place = f"{source}: flights.{group}.{VEHICLE}"
+            values[VEHICLE] = tuple(load_drone(named, folder, place) for named in values[VEHICLE])
         count += math.prod(map(len, values.values()))
         if count <= MOST_FLIGHTS:
             try:
@@ -215,8 +238,17 @@ def _suite(file: SuiteFile, name: str, folder: Path, source: str) -> FlightSuite
         )
     if faults:
         raise InvalidSettingsError(tuple(f"{source}: {fault}" for fault in faults))
+    if drone is not None and drone != NOMINAL:
+        name = f"{name}.{drone.name}"
     tolerances = file.baseline.model_dump(exclude={"same_bits"}, exclude_none=True)
     return FlightSuite(name, folder, tuple(flights), tolerances, file.baseline.same_bits)
+
+
+def _replace_drone(values: Mapping[str, Values], drone: VehicleFile) -> dict[str, Values]:
+    """Return the values of a group's keys with another drone, and its own sensors for those it has not."""
+    possible = SENSORS_OF[drone.sensors.kind]
+    sensors = (one if one in possible else possible[-1] for one in values.get("sensors", ("none",)))
+    return {VEHICLE: (drone,), **values} | {VEHICLE: (drone,), "sensors": tuple(dict.fromkeys(sensors))}
 
 
 def _bounds(common: FileSection, own: FileSection) -> dict[str, float]:
@@ -244,6 +276,8 @@ def _flights(group: str, values: Mapping[str, Values], bounds: Mapping[str, floa
 def _spell(value: Any) -> str:
     """Spell a value in the name of a flight: shortest form that no other value has."""
     match value:
+        case VehicleFile():
+            return value.name
         case tuple():
             return ";".join(map(_spell, value))
         case float() if float(f"{value:g}") == value:

@@ -14,6 +14,7 @@ from mambo_nmpc.sil.campaign.file import Entrant
 from mambo_nmpc.sil.campaign.flights import CRASHED, DIGEST, INDICES, REFUSED, SATURATED, Row
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.scenario import Record, write_record
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.regress.baseline import Baseline, Recorded
 from mambo_nmpc.sil.regress.file import FlightSuite
 from mambo_nmpc.sil.show.numbers import digits
@@ -63,6 +64,8 @@ class RegressSummary(Summary):
     command = "regress"
 
     suite: str
+    vehicles: list[str] = Field(default_factory=lambda: [NOMINAL.name])
+    """The drones of its flights."""
     controller: str
     settings: str
     baseline: str | None
@@ -91,6 +94,7 @@ def judge(
     ]
     return RegressSummary(
         suite=suite.name,
+        vehicles=list(dict.fromkeys(flight.scenario.vehicle.name for flight in suite.flights)),
         controller=entrant.name,
         settings=entrant.settings.digest,
         baseline=str(path) if baseline is not None else None,

@@ -17,13 +17,12 @@ _LONGEST_BATCH_S = 10_000.0
 
 def demand_flyable(suite: FlightSuite, entrant: Entrant, place: str) -> None:
     """Raise InvalidSettingsError, which begins with `place`, if a flight cannot be simulated."""
-    for one in {flight.scenario.duration_s: flight for flight in suite.flights}.values():
+    kinds = {tuple(getattr(flight.scenario, key) for key in SHARED_KEYS): flight for flight in suite.flights}
+    for one in kinds.values():
         try:
             flight_of([one.scenario], entrant.settings.horizon.update_period_s)
         except FlightError as error:
-            raise InvalidSettingsError(
-                (f"{place}: flights.{one.group}: {error}; stock loops run at 200 Hz",)
-            ) from None
+            raise InvalidSettingsError((f"{place}: flights.{one.group}: {error}",)) from None
 
 
 def fly_suite(suite: FlightSuite, entrant: Entrant, pool: Pool, progress: Callable[[int], None]) -> list[Row]:

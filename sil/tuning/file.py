@@ -18,13 +18,17 @@ from mambo_nmpc.sil.campaign.file import (
     Draws,
     FileSection,
     FlightSection,
+    choose_drone,
     demand_flyable,
     distributions,
     format_value,
     load_settings,
     read_as,
+    with_defaults,
+    with_drone,
 )
 from mambo_nmpc.sil.campaign.parameters import Draw, draw
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 DEFAULT_SEARCH: Final[dict[str, dict[str, dict[str, Any]]]] = {
     "1-norm": {
@@ -87,6 +91,12 @@ class Tuning:
     file: TuneFile
     base: Settings
     search: Mapping[str, Distribution]
+    drone: VehicleFile
+
+    @property
+    def flight(self) -> dict[str, Any]:
+        """The section [flight] as plain values, with all of the drone."""
+        return self.file.flight.model_dump() | {"vehicle": self.drone.model_dump()}
 
     @property
     def start(self) -> dict[str, float]:
@@ -114,7 +124,11 @@ class Tuning:
         """Return everything that determines the trials, as plain values."""
         document: dict[str, Any] = self.file.model_dump(mode="json")
         search = {path: distribution.document() for path, distribution in self.search.items()}
-        return document | {"base": self.base.model_dump(), "search": search}
+        return document | {
+            "base": self.base.model_dump(),
+            "search": search,
+            "vehicle": self.drone.model_dump(),
+        }
 
 
 def round_value(value: float) -> float:
@@ -122,27 +136,36 @@ def round_value(value: float) -> float:
     return float(f"{value:.4g}")
 
 
-def default() -> Tuning:
-    """Return the default study."""
-    return _tuning(TuneFile(), Path(), "the default study")
+def default(vehicle: str | None = None) -> Tuning:
+    """Return the default study, with another drone if one is named."""
+    return _tuning(TuneFile(), Path(), "the default study", vehicle)
 
 
-def read(path: Path) -> Tuning:
-    """Read a tune.toml; the path of the base is relative to its folder.
+def read(path: Path, vehicle: str | None = None) -> Tuning:
+    """Read a tune.toml; the paths of base and drone are relative to its folder.
+
+    `vehicle` replaces the drone and, where it has not the sensors of the file, these by its own.
 
     Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with the errors of
     the file and of the base's file.
     """
-    return _tuning(read_as(TuneFile, path), path.parent, echo(str(path)))
+    return _tuning(read_as(TuneFile, path), path.parent, echo(str(path)), vehicle)
 
 
-def _tuning(file: TuneFile, folder: Path, source: str) -> Tuning:
-    """Load the base and check that every combination of the ranges' ends is valid and can be simulated."""
+def _tuning(file: TuneFile, folder: Path, source: str, vehicle: str | None) -> Tuning:
+    """Load drone and base; check that every combination of the ranges' ends is valid and can be simulated."""
+    drone = choose_drone(file.flight, folder, source, vehicle)
+    file = file.model_copy(
+        update={
+            "flight": with_drone(file.flight, drone, source, replaced=vehicle is not None),
+            "draws": with_defaults(file.draws, drone),
+        }
+    )
     base = load_settings(file.base, folder, f"{source}: base")
     search = DEFAULT_SEARCH[base.cost.norm] if file.search is None else file.search
-    file = TuneFile.model_validate(file.model_dump() | {"search": search})
-    tuning = Tuning(file, base, _search(search, base, source))
-    demand_flyable(base, file.flight, tuning.draw_flights()[0], f"{source}: base")
+    file = file.model_copy(update={"search": search})
+    tuning = Tuning(file, base, _search(search, base, source), drone)
+    demand_flyable(base, tuning.flight, tuning.draw_flights()[0], f"{source}: base")
     _demand_valid_corners(tuning, source)
     return tuning
 

@@ -9,9 +9,11 @@ from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.sil.campaign.store import convert_os_errors
 from mambo_nmpc.sil.files.folders import SUMMARY
 from mambo_nmpc.sil.files.summary import Summary
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.tuning.file import Tuning, round_value
 from mambo_nmpc.sil.tuning.front import RULE, choose, controller_text, front_csv, pareto_front
 from mambo_nmpc.sil.tuning.study import FinishedTrial, study_name
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 CONTROLLER: Final = "controller.toml"
 FRONT: Final = "front"
@@ -27,6 +29,7 @@ class TuneSummary(Summary):
     seed: int
     flights: int
     """Flights of each trial."""
+    vehicle: VehicleFile = NOMINAL
     trials: int
     base: FinishedTrial | None
     chosen: FinishedTrial
@@ -42,6 +45,7 @@ def summarise(tuning: Tuning, trials: Sequence[FinishedTrial]) -> TuneSummary:
         study=study_name(tuning),
         seed=tuning.file.seed,
         flights=tuning.file.flights,
+        vehicle=tuning.drone,
         trials=len(trials),
         base=_rounded(base[0]) if base else None,
         chosen=_rounded(choose(front)),

@@ -130,7 +130,7 @@ def search(
     WorkerError.
     """
     drawn = tuning.draw_flights()
-    flight = tuning.file.flight.model_dump()
+    flight = tuning.flight
     progress(len(finished_trials(study)))
     while (finished := len(finished_trials(study))) < trials:
         waiting, proposed = _find_unfinished(study, owner), len(study.get_trials(deepcopy=False))

@@ -10,23 +10,29 @@ from pydantic import ValidationError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
 from mambo_nmpc.codegen.settings.messages import faults
-from mambo_nmpc.codegen.settings.toml_file import existing_path, parse_document, read_text, shipped
+from mambo_nmpc.codegen.settings.toml_file import (
+    VEHICLES,
+    existing_path,
+    parse_document,
+    read_text,
+    shipped,
+)
 from mambo_nmpc.sil.vehicles.model import VehicleFile, form
 
 DEFAULT: Final = "mambo"
 """The drone that flies where none is named."""
 
-_KIND, _PACKAGE = "vehicles", "mambo_nmpc.sil.vehicles"
+_PACKAGE: Final = "mambo_nmpc.sil.vehicles"
 
 
 def names() -> tuple[str, ...]:
     """Return the names of the shipped drones, sorted."""
-    return tuple(shipped(_KIND, _PACKAGE))
+    return tuple(shipped(VEHICLES, _PACKAGE))
 
 
 def text_of(name: str) -> str:
     """Return the vehicle.toml of a shipped drone; raises SourceNotFoundError."""
-    ours = shipped(_KIND, _PACKAGE).get(name)
+    ours = shipped(VEHICLES, _PACKAGE).get(name)
     if ours is None:
         raise _not_found(name, "no shipped vehicle")
     return ours.read_text("utf-8")

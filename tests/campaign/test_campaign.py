@@ -103,7 +103,7 @@ def test_curves_are_drawn(tmp_path: Path) -> None:
     for flight, one in enumerate(drawn):
         others = {"trajectory": "bernoulli", "size_m": 2.0, "rate_rad_s": 0.5}
         assert one | others == plain.draw(flight)
-        flown = file.scenario(curves.file.flight.model_dump(), one)
+        flown = file.scenario(curves.flight, one)
         assert (flown.trajectory, flown.size_m, flown.rate_rad_s) == tuple(one[name] for name in others)
     assert 70 < sum(one["trajectory"] == "circle" for one in drawn) < 130
     assert 1.0 <= min(one["size_m"] for one in drawn) < 1.1
@@ -179,7 +179,7 @@ def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
 
 def test_every_parameter_changes_the_scenario() -> None:
     """Each parameter at a limit of its domain gives a valid scenario that differs from the nominal one."""
-    section = file.FlightSection().model_dump()
+    section = file.default().flight
     plain = file.scenario(section, draw(0, 0, CONSTANT))
     for name, parameter in PARAMETERS.items():
         for limit in (parameter.domain.low, parameter.domain.high):
@@ -191,7 +191,7 @@ def test_every_parameter_changes_the_scenario() -> None:
 def test_scales_apply_to_the_nominal_mambo() -> None:
     """The thrust scale applies to rotor thrust and torque, the inertia scale to one axis."""
     drawn = draw(0, 0, PARAMETERS) | {"thrust_scale": 0.5, "inertia_scale_y": 2.0}
-    flown = file.scenario(file.FlightSection().model_dump(), drawn)
+    flown = file.scenario(file.default().flight, drawn)
     assert flown.thrust_factor_n_s2 == 0.5 * MAMBO.thrust_factor_n_s2
     assert flown.torque_factor_n_m_s2 == 0.5 * MAMBO.torque_factor_n_m_s2
     assert flown.inertia_kg_m2[1] == 2.0 * MAMBO.inertia_kg_m2[1]

@@ -8,7 +8,7 @@ import pytest
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.campaign.file import Entrant, FlightSection, scenario
+from mambo_nmpc.sil.campaign.file import Entrant, default, scenario
 from mambo_nmpc.sil.campaign.flights import _evaluate, columns, fly_batch
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
 from mambo_nmpc.sil.controllers.pd import PdController, pd_controller
@@ -87,7 +87,7 @@ def expected_row(trace: Trace, pd: str) -> dict[str, object]:
 @pytest.mark.parametrize("sensors", ["none", "mambo-derotated"])
 def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -> None:
     """Metrics of the true flight, with sensors also of the estimated error, and digest are those of `fly`."""
-    flight = FlightSection(duration_s=1.0).model_dump() | {"sensors": sensors}
+    flight = default().flight | {"duration_s": 1.0, "sensors": sensors}
     drawn = [draw(3, number, PARAMETERS) | {"dropped_share": 0.3} for number in range(2)]
     document = Entrant(pd, pd, Settings()).document()
     for row, one in zip(fly_batch(__version__, [document], flight, drawn), drawn, strict=True):
@@ -114,6 +114,6 @@ def test_an_update_is_refused_when_the_controller_was_called_and_did_not_accept(
     trace = flown()
     trace.status[:, 1] = NOT_CALLED
     trace.status[[1, 2, 9], 1] = [Status.OK, Status.BAD_STATE, Status.BAD_TARGET]
-    found = _evaluate(trace, float(np.abs(trace.command_rad).max()))
+    found = _evaluate(trace, float(np.abs(trace.command_rad).max()), NOMINAL)
     assert found["refused_updates"] == [0, 2]
     assert 0 < max(found["saturated_share"]) < 1

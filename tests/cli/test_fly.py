@@ -124,7 +124,10 @@ def test_waypoints_fly(tmp_path: Path) -> None:
         (["--duration-s", "0"], "--duration-s = 0.0 must lie in 0.01..3600"),
         (["--duration-s", "1e9"], "--duration-s = 1000000000.0 must lie in 0.01..3600"),
         (["--size-m", "900"], "the target's speed along an axis, up to 450 m/s, exceeds ranges.velocity_m_s"),
-        (["odd.toml"], "odd.toml: horizon.update_period_s = 0.012 must be a whole multiple of 0.005; only"),
+        (
+            ["odd.toml"],
+            "odd.toml: horizon.update_period_s = 0.012 must be a whole multiple of 0.005; the inner",
+        ),
         (["-o", "taken"], "taken: holds files that are not results of mambo-nmpc"),
         (["-o", "a-file"], "a-file: cannot be written"),
     ],

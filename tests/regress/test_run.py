@@ -77,6 +77,7 @@ def test_a_flight_that_cannot_be_simulated_is_named(tmp_path: Path) -> None:
     found = suite(tmp_path, "[flights.eight]\nduration_s = 1.0\n[flights.brief]\nduration_s = 0.01")
     demand_flyable(found, controller(tmp_path, 0.01), "here")
     with pytest.raises(
-        InvalidSettingsError, match=r"^here: flights\.brief: duration_s = 0\.01 must be .*200"
+        InvalidSettingsError,
+        match=r"^here: flights\.brief: duration_s = 0\.01 must be .*update_period_s = 0\.02",
     ):
         demand_flyable(found, controller(tmp_path, 0.02), "here")

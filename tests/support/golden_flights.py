@@ -38,9 +38,7 @@ SCENARIOS: Final = {
         dropped_share=0.1,
     ),
     "take-off": Scenario(duration_s=5.0, start="take-off"),
-    "drawn by the default campaign": scenario(
-        default().file.flight.model_dump() | {"duration_s": 10.0}, default().draw(0)
-    ),
+    "drawn by the default campaign": scenario(default().flight | {"duration_s": 10.0}, default().draw(0)),
 }
 
 

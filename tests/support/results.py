@@ -28,6 +28,7 @@ from mambo_nmpc.sil.footprint.measure import Footprint
 from mambo_nmpc.sil.footprint.sweep import Point, SweepSummary, budgets
 from mambo_nmpc.sil.paper.sensed import SensedRow, SensedSummary
 from mambo_nmpc.sil.paper.table2 import CASES, Claim, Table2Row, Table2Summary
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.regress.report import Check, FlightResult, RegressSummary
 from mambo_nmpc.sil.verify import report as verify_report
 from mambo_nmpc.sil.verify.check import CheckOutcome
@@ -67,7 +68,7 @@ def fly_folder(folder: Path, *, lost: bool = False) -> None:
         update_period_s=0.01,
         trajectory_sha256=None,
         **scenario.model_dump(include=set(FlySummary.model_fields)) | {"trajectory": HOSTILE},
-        **report.judge(flown, Settings()) | {"refusals": [HOSTILE]},
+        **report.judge(flown, Settings(), NOMINAL) | {"refusals": [HOSTILE]},
     ).write(folder)
 
 
@@ -82,7 +83,7 @@ def replay_folder(folder: Path) -> None:
         controller="pd",
         scenario=Scenario(),
         settings=Settings().digest,
-        **report.judge(flown, Settings()),
+        **report.judge(flown, Settings(), NOMINAL),
     ).write(folder)
 
 
