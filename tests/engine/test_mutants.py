@@ -34,6 +34,7 @@ from tests.support.scenarios import (
     COUPLED,
     CRAZYFLIE,
     FLOWN,
+    INSTRUMENTS,
     LATE,
     LIMITED,
     SENSED,
@@ -53,7 +54,7 @@ FLAGS: Final = (
 )
 """A variable without a value is not 0, and a read beside an array is a crash."""
 BATCHES: Final = (
-    *(TRUTH, SENSED, COUPLED, TAKE_OFF),
+    *(TRUTH, SENSED, COUPLED, TAKE_OFF, INSTRUMENTS),
     *(captured(drone) for drone in (CRAZYFLIE, LIMITED, FLOWN, LATE)),
 )
 FILES: Final = sorted({*SOURCES, *HEADERS} - {"engine.h", "records.h"})

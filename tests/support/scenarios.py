@@ -109,6 +109,28 @@ LATE: Final = changed(
 """Two different angles, whose dead times are no multiples of a tick."""
 
 
+FELT: Final = VehicleFile.model_validate(
+    LATE.model_dump(exclude_none=True)
+    | {
+        "attitude": LATE.attitude.model_dump() | {"rate_hz": 200},
+        "sensors": presets.load("mambo").sensors.model_dump(),
+    }
+)
+"""The same with the instruments of the Mambo, which feel the body's rates."""
+INSTRUMENTS: Final = tuple(
+    Scenario(
+        vehicle=FELT,
+        duration_s=2.0,
+        sensors="mambo-derotated",
+        seed=seed,
+        start_tilt_rad=(0.2, -0.3),
+        yaw_rate_rad_s=2.0,
+        noise_scale=0.1,
+    )
+    for seed in (6, 7)
+)
+
+
 def captured(drone: VehicleFile) -> tuple[Scenario, ...]:
     """Return flights with motion capture: all disturbances; a calm one; one upside down."""
     common: dict[str, Any] = {"vehicle": drone, "duration_s": 2.0, "sensors": "mocap"}
