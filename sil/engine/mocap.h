@@ -17,16 +17,16 @@ typedef struct {
     int64_t tick;
 } mocap_t;
 
+/* The first tick sets the position, and the latest of the late ones. */
 static void mocap_start(const engine_simulation_t *simulation, const seen_t *start, mocap_t *mocap)
 {
     int64_t k;
     int i;
 
     for (i = 0; i < 3; i++) {
-        for (k = 0; k <= simulation->mocap_delay_ticks; k++) {
+        for (k = 1; k <= simulation->mocap_delay_ticks; k++) {
             mocap->late_m[k][i] = start->position_m[i];
         }
-        mocap->position_m[i] = start->position_m[i];
         mocap->velocity_m_s[i] = start->velocity_m_s[i];
     }
     mocap->tick = 0;

@@ -30,6 +30,7 @@ from tests.support.scenarios import (
     COUPLED,
     CRAZYFLIE,
     FLOWN,
+    INSTRUMENTS,
     LATE,
     LIMITED,
     SENSED,
@@ -45,14 +46,9 @@ MAMBO = ONE_NORM
 PERIOD_S = MAMBO.horizon.update_period_s
 SCALARS = ("float32", "float64", "fixed")
 BATCHES = {
-    "truth": TRUTH,
-    "sensed": SENSED,
-    "coupled": COUPLED,
-    "take-off": TAKE_OFF,
-    "cascade": captured(CRAZYFLIE),
-    "limited": captured(LIMITED),
-    "flown": captured(FLOWN),
-    "late": captured(LATE),
+    **{"truth": TRUTH, "sensed": SENSED, "coupled": COUPLED, "take-off": TAKE_OFF},
+    **{"cascade": captured(CRAZYFLIE), "limited": captured(LIMITED)},
+    **{"flown": captured(FLOWN), "late": captured(LATE), "instruments": INSTRUMENTS},
 }
 BUILDS = [
     Toolchain(("gcc",), "-O0"),

@@ -61,6 +61,20 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("negative", "next number")
     },
     **{
+        (name, f"#define {constant} <number>", change): _LONGER
+        for name, constant in (("first_order.h", "LATE_TICKS_MAX"), ("mocap.h", "MOCAP_DELAY_MAX"))
+        for change in ("one less", "one more")
+    },
+    ("first_order.h", "double nodes_rad[3][3];", "3 -> 4"): _LONGER,
+    **{
+        ("first_order.h", "for (i = 0; i < 3; i++) {", change): _BESIDE
+        for change in ("< -> <= #1", "3 -> 4 #1")
+    },
+    **{
+        ("first_order.h", "for (i = 0; i < 6; i++) {", change): "the derivative does not read position x"
+        for change in ("0 -> 1", "0 -> 1 #1")
+    },
+    **{
         ("pd.c", "(void)thrust_acceleration_m_s2;", change): "only silences a warning"
         for change in ("left out", "left out #1")
     },
