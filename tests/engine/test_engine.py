@@ -46,9 +46,15 @@ MAMBO = ONE_NORM
 PERIOD_S = MAMBO.horizon.update_period_s
 SCALARS = ("float32", "float64", "fixed")
 BATCHES = {
-    **{"truth": TRUTH, "sensed": SENSED, "coupled": COUPLED, "take-off": TAKE_OFF},
-    **{"cascade": captured(CRAZYFLIE), "limited": captured(LIMITED)},
-    **{"flown": captured(FLOWN), "late": captured(LATE), "instruments": INSTRUMENTS},
+    "truth": TRUTH,
+    "sensed": SENSED,
+    "coupled": COUPLED,
+    "take-off": TAKE_OFF,
+    "cascade": captured(CRAZYFLIE),
+    "limited": captured(LIMITED),
+    "flown": captured(FLOWN),
+    "late": captured(LATE),
+    "instruments": INSTRUMENTS,
 }
 BUILDS = [
     Toolchain(("gcc",), "-O0"),
