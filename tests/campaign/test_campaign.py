@@ -17,6 +17,7 @@ from mambo_nmpc.sil.campaign.flights import INDICES
 from mambo_nmpc.sil.campaign.parameters import PARAMETERS, draw
 from mambo_nmpc.sil.campaign.statistics import improvement, improvements, proportion, quantiles, worst_flights
 from mambo_nmpc.sil.plant.airframe import MAMBO
+from mambo_nmpc.sil.vehicles import presets
 
 ROOT = Path(__file__).parents[2]
 WIDE = Domain(-1e3, 1e3)
@@ -442,3 +443,40 @@ def test_the_documented_defaults_are_those_of_the_default_campaign() -> None:
     assert list(known) == [name for name in PARAMETERS if name not in file.FlightSection.model_fields]
     for name, (kind, numbers) in known.items():
         assert (PARAMETERS[name].kind, list(PARAMETERS[name].numbers)) == (kind, numbers), name
+
+
+def numbers(campaign: file.Campaign, name: str) -> tuple[float, ...]:
+    """Return the numbers of the distribution of a parameter."""
+    return file.distributions(campaign.file.flight, campaign.file.draws)[name].numbers
+
+
+def test_draws_of_mass_drag_and_motor_lag_are_relative_to_the_drone() -> None:
+    """The same shares of its values as of the Mambo's; all others are the same."""
+    mambo, other = file.default(), file.default("crazyflie")
+    assert numbers(mambo, "mass_kg") == (0.063, 0.08)
+    np.testing.assert_allclose(numbers(other, "mass_kg"), [0.03, 0.03 * 0.08 / 0.063], rtol=1e-12)
+    np.testing.assert_allclose(numbers(other, "drag_1_s"), [0.5 * 0.244, 1.5 * 0.244], rtol=1e-12)
+    assert numbers(mambo, "motor_lag_s") == (0.0, 0.05)
+    np.testing.assert_allclose(numbers(other, "motor_lag_s"), [0.8 * 0.072, 1.2 * 0.072], rtol=1e-12)
+    changed = {name for name in PARAMETERS if numbers(mambo, name) != numbers(other, name)}
+    assert changed == {"mass_kg", "drag_1_s", "motor_lag_s"}
+
+
+def test_a_file_names_its_drone(tmp_path: Path) -> None:
+    """A shipped one, or a file beside it; its draws are absolute, and its sensors must be the drone's."""
+    path = written(tmp_path, '[flight]\nvehicle = "crazyflie"\n[draws]\nmass_kg = 0.05\n')
+    named = file.read(path)
+    assert (named.drone.name, named.file.flight.sensors) == ("crazyflie", "mocap")
+    assert numbers(named, "mass_kg") == (0.05,)
+    (tmp_path / "my.toml").write_text(presets.text_of("generic"))
+    assert file.read(written(tmp_path, '[flight]\nvehicle = "my.toml"\n')).drone.name == "my"
+    assert faults(tmp_path, '[flight]\nvehicle = "my"\n') == [
+        "flight.vehicle: my is neither a shipped vehicle nor a file; vehicles are "
+        f"{', '.join(presets.names())}, and `mambo-nmpc vehicles NAME` prints one to start from"
+    ]
+    assert faults(tmp_path, '[flight]\nvehicle = "crazyflie"\nsensors = "mambo"\n') == [
+        'flight.sensors = "mambo" must be "none" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'
+    ]
+    both = written(tmp_path, '[flight]\nvehicle = "mambo"\nsensors = "mambo"\n')
+    assert file.read(both, "crazyflie").file.flight.sensors == "mocap"
+    assert file.read(both, "mambo").file.flight.sensors == "mambo"

@@ -12,8 +12,9 @@ from mambo_nmpc.codegen.errors import FileExistsRefusedError, InvalidSettingsErr
 from mambo_nmpc.sil.campaign.file import Entrant, load_entrant
 from mambo_nmpc.sil.campaign.flights import INDICES, Row
 from mambo_nmpc.sil.flight.names import PD_NAMES
-from mambo_nmpc.sil.flight.scenario import read_record
+from mambo_nmpc.sil.flight.scenario import Scenario, read_record
 from mambo_nmpc.sil.regress.baseline import (
+    _scenario_digest,
     baseline_path,
     demand_replaceable,
     read_baseline,
@@ -31,6 +32,7 @@ from mambo_nmpc.sil.regress.report import (
     regress_text,
     write_records,
 )
+from tests.support.scenarios import CRAZYFLIE
 
 SUITE = """
 [baseline]
@@ -445,3 +447,13 @@ def test_the_summary_is_read_back(tmp_path: Path) -> None:
     """As the record that was written."""
     summary = judged(suite(tmp_path), [row(4.0), row(1.0), row(1.0)])
     assert RegressSummary.model_validate(json.loads(summary.text())) == summary
+
+
+def test_a_digest_holds_what_differs_from_the_drone() -> None:
+    """Not what a drone's file says of its mass, so a baseline of the Mambo needs no vehicle."""
+    plain = _scenario_digest(Scenario(yaw_rad=0.5))
+    assert plain == sha256(b'{"yaw_rad":0.5}').hexdigest()[:16]
+    assert _scenario_digest(Scenario(yaw_rad=0.5, mass_kg=0.063)) == plain
+    other = _scenario_digest(Scenario(vehicle=CRAZYFLIE, yaw_rad=0.5))
+    assert other == _scenario_digest(Scenario(vehicle=CRAZYFLIE, yaw_rad=0.5, mass_kg=0.03))
+    assert len({plain, other, _scenario_digest(Scenario(yaw_rad=0.5, mass_kg=0.07))}) == 3
