@@ -31,6 +31,9 @@ velocity_filter_s = 0.03
 attitude_noise_rad = 0.003
 """
 
+GROUP = "[flight]\nduration_s = 1.0\n[flights.eight]\nbounds = { iae_m_s = 9.0 }\n"
+"""The beginning of a suite."""
+
 
 @pytest.fixture(autouse=True)
 def _drone(_in_an_empty_folder: None) -> None:
@@ -134,7 +137,7 @@ def test_a_study_states_its_drone() -> None:
 
 def test_a_suite_flies_any_drone() -> None:
     """Those that its groups name, or the one of the option, which has a baseline of its own."""
-    text = '[flight]\nduration_s = 1.0\n[flights.eight]\nbounds = { iae_m_s = 9.0 }\nvehicle = ["mambo", "mine.toml"]\n'
+    text = GROUP + 'vehicle = ["mambo", "mine.toml"]\n'
     Path("suite.toml").write_text(text, "utf-8")
     run("regress", "suite.toml", "--controller", "pd", "-o", "out")
     assert [flight["name"] for flight in summary("out")["flights"]] == [
@@ -145,7 +148,7 @@ def test_a_suite_flies_any_drone() -> None:
     Path("suite.toml").write_text(text.replace('["mambo", "mine.toml"]', '"gone"'), "utf-8")
     _, said = run("regress", "suite.toml", code=2)
     assert said.startswith("suite.toml: flights.eight.vehicle: gone is neither a shipped vehicle nor a file")
-    sensed = '[flight]\nduration_s = 1.0\n[flights.eight]\nbounds = { iae_m_s = 9.0 }\nsensors = ["none", "mambo"]\n'
+    sensed = GROUP + 'sensors = ["none", "mambo"]\n'
     Path("suite.toml").write_text(sensed, "utf-8")
     run("regress", "suite.toml", "--controller", "pd", "--vehicle", "mine.toml", "--update", "-o", "other")
     assert Path("suite.mine.pd.baseline.json").exists()
