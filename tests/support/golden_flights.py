@@ -18,6 +18,7 @@ from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES, EngineName
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
+from mambo_nmpc.sil.vehicles import presets as vehicles
 
 GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
 PRESETS: Final = ("mambo", "mambo-1norm")
@@ -38,6 +39,13 @@ SCENARIOS: Final = {
         dropped_share=0.1,
     ),
     "take-off": Scenario(duration_s=5.0, start="take-off"),
+    "Crazyflie": Scenario(vehicle=vehicles.load("crazyflie"), duration_s=10.0, yaw_rad=0.8),
+    "Crazyflie, motion capture, gusts": Scenario(
+        vehicle=vehicles.load("crazyflie"), duration_s=10.0, seed=2, sensors="mocap", wind_speed_m_s=3.0
+    ),
+    "first order, motion capture, gusts": Scenario(
+        vehicle=vehicles.load("crazyflie-flown"), duration_s=10.0, seed=3, sensors="mocap", wind_speed_m_s=3.0
+    ),
     "drawn by the default campaign": scenario(default().flight | {"duration_s": 10.0}, default().draw(0)),
 }
 
