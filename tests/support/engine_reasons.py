@@ -66,6 +66,11 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("one less", "one more")
     },
     ("first_order.h", "double nodes_rad[3][3];", "3 -> 4"): _LONGER,
+    (
+        "mocap.h",
+        "for (k = 1; k <= simulation->mocap_delay_ticks; k++) {",
+        "1 -> 0",
+    ): "the first tick writes that entry",
     **{
         ("first_order.h", "for (i = 0; i < 3; i++) {", change): _BESIDE
         for change in ("< -> <= #1", "3 -> 4 #1")
