@@ -49,3 +49,11 @@ class WorkerError(MamboNmpcError):
 
 class StudyError(MamboNmpcError):
     """A study cannot be opened: Optuna is missing, or its storage fails."""
+
+
+class LogError(MamboNmpcError):
+    """Flight logs cannot be read, or contradict themselves; `faults` holds one line per fault."""
+
+    def __init__(self, faults: tuple[str, ...]) -> None:
+        super().__init__("\n".join(faults))
+        self.faults = faults

@@ -30,6 +30,7 @@ WINGS = [
     "regress",
     "verify",
     "tuning",
+    "identify",
     "report",
     "cli",
     "package",

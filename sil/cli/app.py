@@ -15,6 +15,7 @@ from mambo_nmpc.sil.cli.doctor import doctor
 from mambo_nmpc.sil.cli.faults import faults
 from mambo_nmpc.sil.cli.fly import fly
 from mambo_nmpc.sil.cli.footprint import footprint
+from mambo_nmpc.sil.cli.identify import identify
 from mambo_nmpc.sil.cli.options import FlyOptions, command_of
 from mambo_nmpc.sil.cli.regress import regress
 from mambo_nmpc.sil.cli.report import report
@@ -38,6 +39,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "regress": regress,
     "campaign": campaign,
     "tune": tune,
+    "identify": identify,
     "report": report,
 }
 """Commands by name, in the order of the help."""
@@ -81,6 +83,11 @@ mambo-nmpc tune -o tuned
 mambo-nmpc tune tune.toml --trials 300 -o tuned
 mambo-nmpc tune --vehicle my-drone.toml -o tuned-for-mine
 mambo-nmpc tune --storage postgresql://db/studies -o tuned
+mambo-nmpc identify --manoeuvre eight.py
+mambo-nmpc identify flight.csv -o identified
+mambo-nmpc identify monday.csv tuesday.csv -o identified
+mambo-nmpc identify flight.csv --columns roll_rad=deg*att.roll,pitch_rad=-deg*att.pitch
+mambo-nmpc identify flight.ulg -o identified
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html
 """

@@ -20,6 +20,8 @@ from mambo_nmpc.sil.flight.section import fly_section, replay_section
 from mambo_nmpc.sil.footprint.report import FootprintSummary
 from mambo_nmpc.sil.footprint.section import footprint_section, sweep_section
 from mambo_nmpc.sil.footprint.sweep import SweepSummary
+from mambo_nmpc.sil.identify.record import IdentifySummary
+from mambo_nmpc.sil.identify.section import identify_section
 from mambo_nmpc.sil.paper.section import sensed_section, table2_section
 from mambo_nmpc.sil.paper.sensed import SensedSummary
 from mambo_nmpc.sil.paper.table2 import Table2Summary
@@ -40,6 +42,7 @@ _FINISHED: Final[dict[type[Summary], Callable[[Path, Any], Section]]] = {
     VerifySummary: verify_section,
     RegressSummary: regress_section,
     CampaignSummary: campaign_section,
+    IdentifySummary: identify_section,
 }
 _SECTIONS: Final = _FINISHED | {UnfinishedCampaign: campaign_section}
 

@@ -1,0 +1,1 @@
+"""Identification: a model of the drone from flight logs."""

@@ -1,0 +1,220 @@
+"""The response of measured to commanded tilt: gain, lag, dead time and, if it pays, an integrator.
+
+    measured = gain * G(command delayed by the dead time) + offset
+    G(s) = 1 / (lag s + 1), with the integrator (s + k) / (lag s^2 + s + k)
+
+Output error: the model is driven by the commands alone. Gain and offsets are solved linearly inside the
+search for the other parameters, of which it takes the logarithms.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.signal import cont2discrete, lfilter, lfilter_zi
+
+from mambo_nmpc.sil.identify.segments import PERIOD_S, Segment
+from mambo_nmpc.sil.plant.arrays import FloatArray
+
+_LOW: Final = np.log([0.005, 0.001, 0.02])
+_HIGH: Final = np.log([2.0, 0.3, 10.0])
+"""Bounds on lag, dead time (s) and integrator (1/s)."""
+
+_STARTS: Final = ((0.1, 0.03, 0.7), (0.05, 0.1, 0.7))
+_STEP: Final = 1e-3
+CORRELATION_S: Final = 1.0
+"""Time over which residuals are taken as correlated (Newey and West 1987)."""
+
+NORMAL_95: Final = 1.96
+WIDENING: Final = 2.0
+DEAD_TIME_WIDENING: Final = 3.0
+SURPLUS_S: Final = 0.005
+"""Factors on the 95 % intervals, and what is added to those of times. Residuals of real logs are correlated
+for longer than the window; with these factors the intervals hold from flight to flight."""
+
+Masks = Sequence[NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and the half-width of its 95 % interval."""
+
+    value: float
+    within: float
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Parameters of one axis; `integral_1_s` is 0 without an integrator."""
+
+    gain: float
+    lag_s: float
+    delay_s: float
+    integral_1_s: float
+    offset_rad: tuple[float, ...]
+    """Measured tilt at no command, one value a segment."""
+
+    def predict(self, segment: Segment, axis: int, offset_rad: float) -> FloatArray:
+        """Return the modelled tilt (m,) of a segment."""
+        return self.gain * _unit_response(self.logs, segment, axis) + offset_rad
+
+    @property
+    def lag_at_bound(self) -> bool:
+        """Whether the lag ended at a bound of its search."""
+        return not _LOW[0] + 0.02 < np.log(self.lag_s) < _HIGH[0] - 0.02
+
+    @property
+    def logs(self) -> FloatArray:
+        """The logarithms of lag, dead time and, if there is one, integrator."""
+        values = [self.lag_s, self.delay_s] + ([self.integral_1_s] if self.integral_1_s else [])
+        return np.log(values)
+
+
+def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool) -> Response:
+    """Fit one axis of all segments at once, on the samples of `masks`."""
+    order = 3 if integrator else 2
+    low, high = _LOW[:order], _HIGH[:order]
+
+    def residual(logs: FloatArray) -> FloatArray:
+        gain, parts = _project(logs, segments, axis, masks)
+        return np.concatenate([tilt - gain * unit for unit, tilt, _, _ in parts])
+
+    found = [
+        least_squares(residual, np.log(start[:order]), bounds=(low, high), x_scale=0.3, diff_step=_STEP)
+        for start in _STARTS
+    ]
+    logs = min(found, key=lambda one: float(one.cost)).x
+    gain, parts = _project(logs, segments, axis, masks)
+    offsets = tuple(tilt_mean - gain * unit_mean for _, _, unit_mean, tilt_mean in parts)
+    values = np.exp(logs).tolist()
+    return Response(gain, values[0], values[1], values[2] if integrator else 0.0, offsets)
+
+
+def residuals(response: Response, segments: Sequence[Segment], axis: int, masks: Masks) -> list[FloatArray]:
+    """Return measured less modelled tilt of each segment on the samples of `masks`, offsets as fitted."""
+    return [
+        (segment.tilt_rad[axis] - response.predict(segment, axis, offset))[mask]
+        for segment, offset, mask in zip(segments, response.offset_rad, masks, strict=True)
+    ]
+
+
+def root_mean_square(parts: Sequence[FloatArray]) -> float:
+    """Return the rms of all samples."""
+    return float(np.sqrt(np.mean(np.square(np.concatenate(list(parts))))))
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """The best model of an axis without an integrator."""
+
+    gain: float
+    lag_s: float
+    delay_s: float
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Parameters with their 95 % intervals; `sum_s` is lag plus dead time, known better than either."""
+
+    gain: Estimate
+    sum_s: Estimate
+    lag_s: Estimate
+    delay_s: Estimate
+    integral_1_s: Estimate | None
+
+
+def intervals(response: Response, segments: Sequence[Segment], axis: int, masks: Masks) -> Intervals:
+    """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened."""
+    logs = response.logs
+    slopes = _slopes(response, logs, segments, axis, masks)
+    errors = residuals(response, segments, axis, masks)
+    covariance = newey_west(slopes, errors, round(CORRELATION_S / PERIOD_S))
+
+    def half_width(weights: Sequence[float], widening: float) -> float:
+        along = np.zeros(len(covariance))
+        along[: len(weights)] = weights
+        return NORMAL_95 * widening * math.sqrt(max(float(along @ covariance @ along), 0.0))
+
+    lag, delay = response.lag_s, response.delay_s
+    order = len(logs)
+    return Intervals(
+        gain=Estimate(response.gain, half_width([0.0] * order + [1.0], WIDENING)),
+        sum_s=Estimate(lag + delay, half_width([lag, delay], WIDENING) + SURPLUS_S),
+        lag_s=Estimate(lag, half_width([lag], WIDENING) + SURPLUS_S),
+        delay_s=Estimate(delay, half_width([0.0, delay], DEAD_TIME_WIDENING) + SURPLUS_S),
+        integral_1_s=Estimate(response.integral_1_s, half_width([0.0, 0.0, response.integral_1_s], WIDENING))
+        if order == 3
+        else None,
+    )
+
+
+def newey_west(slopes: Sequence[FloatArray], errors: Sequence[FloatArray], window: int) -> FloatArray:
+    """Return the covariance (p, p) of least-squares parameters whose residuals are correlated.
+
+    `slopes` (m, p) and `errors` (m,) are those of each segment; correlations beyond `window` samples, and
+    between segments, are taken as 0 (Newey and West 1987).
+    """
+    whole = np.concatenate(list(slopes))
+    bread = np.linalg.pinv(whole.T @ whole)
+    meat = np.zeros_like(bread)
+    for slope, error in zip(slopes, errors, strict=True):
+        scores = slope * error[:, np.newaxis]
+        meat += scores.T @ scores
+        for lag in range(1, min(window, len(scores) - 1) + 1):
+            cross = scores[lag:].T @ scores[:-lag]
+            meat += (1.0 - lag / (window + 1.0)) * (cross + cross.T)
+    samples, parameters = whole.shape
+    return np.asarray(bread @ meat @ bread * (samples / max(samples - parameters, 1)))
+
+
+def _unit_response(logs: FloatArray, segment: Segment, axis: int) -> FloatArray:
+    """Return G of the command (m,), which the beginning of the segment finds in steady state."""
+    lag, delay, *rest = np.exp(logs).tolist()
+    command = segment.command_means(axis, delay)
+    if not rest:
+        keep = float(np.exp(-PERIOD_S / lag))
+        top, bottom = np.array([1.0 - keep]), np.array([1.0, -keep])
+    else:
+        (integral,) = rest
+        system = ([1.0, integral], [lag, 1.0, integral])
+        tops, bottom, _ = cont2discrete(system, PERIOD_S, "zoh")
+        top = np.atleast_2d(tops)[0][1:]  # the mean of a period acts in that period
+    state = lfilter_zi(top, bottom) * command[0]
+    return np.asarray(lfilter(top, bottom, command, zi=state)[0])
+
+
+def _project(
+    logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
+) -> tuple[float, list[tuple[FloatArray, FloatArray, float, float]]]:
+    """Return the best gain, and of each segment unit response and tilt without their means, and the means."""
+    parts = []
+    for segment, mask in zip(segments, masks, strict=True):
+        unit, tilt = _unit_response(logs, segment, axis)[mask], segment.tilt_rad[axis][mask]
+        unit_mean, tilt_mean = (float(each.mean()) for each in (unit, tilt))
+        parts.append((unit - unit_mean, tilt - tilt_mean, unit_mean, tilt_mean))
+    power = sum(float(unit @ unit) for unit, _, _, _ in parts)
+    gain = sum(float(unit @ tilt) for unit, tilt, _, _ in parts) / max(power, 1e-300)
+    return gain, parts
+
+
+def _slopes(
+    response: Response, logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
+) -> list[FloatArray]:
+    """Return the derivatives (m, p) of the modelled tilt of each segment: logarithms, gain, each offset."""
+    found = []
+    for number, (segment, mask) in enumerate(zip(segments, masks, strict=True)):
+        columns = []
+        for index in range(len(logs)):
+            step = np.zeros(len(logs))
+            step[index] = 10.0 * _STEP
+            above, below = (_unit_response(logs + sign * step, segment, axis) for sign in (1.0, -1.0))
+            columns.append(response.gain * (above - below)[mask] / (20.0 * _STEP))
+        columns.append(_unit_response(logs, segment, axis)[mask])
+        offsets = np.zeros((int(mask.sum()), len(segments)))
+        offsets[:, number] = 1.0
+        found.append(np.column_stack([*columns, offsets]))
+    return found
