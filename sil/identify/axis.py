@@ -86,7 +86,7 @@ def judge_axis(
         return AxisResult("refused", [why], *nothing)
     refused = _refusals(command_rad, duration_s(segments), fit)
     weak = _weaknesses(command_rad, duration_s(segments), fit)
-    weak += [] if refused else _disagreement(pieces, axis)
+    weak += [] if refused else _disagreement(pieces, axis, fit.whole)
     verdict: Verdict = "refused" if refused else "weak" if weak else "good"
     return AxisResult(
         verdict=verdict,
@@ -136,7 +136,7 @@ def _weaknesses(command_rad: float, flown_s: float, fit: AxisFit) -> list[str]:
     return [words for words, holds in found.items() if holds]
 
 
-def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int) -> list[str]:
+def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int, whole: Response) -> list[str]:
     """Return the remark that the logs, each fitted alone, have different sums of lag and dead time."""
     useful = [
         each
@@ -145,8 +145,10 @@ def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int) -> list[str]:
     ]
     if len(useful) < 2:
         return []
+    integrator = whole.integral_1_s > 0.0
     fits = [
-        fit_response(each, axis, [segment.counted for segment in each], integrator=False) for each in useful
+        fit_response(each, axis, [segment.counted for segment in each], integrator=integrator)
+        for each in useful
     ]
     sums = [fit.lag_s + fit.delay_s for fit in fits]
     if max(sums) - min(sums) <= LARGEST_SPREAD_S:

@@ -69,13 +69,14 @@ def check_log(log: FlightLog, segments: Sequence[Segment]) -> Checked:
     """Check signs, axes, units and clocks of the stretches of a log."""
     longest = max(segments, key=lambda each: len(each.time_s))
     reading, why = _read_motion(segments)
+    remarks = []
     if reading is None:
-        remarks = [f"{log.name}: signs not checked against the motion: {why}"]
-        shift_s = 0.0
-    else:
-        remarks = [f"{log.name}: units, signs and axes agree with the motion"] if reading == AS_LOGGED else []
+        remarks.append(f"{log.name}: signs not checked against the motion: {why}")
+    elif reading == AS_LOGGED:
+        remarks.append(f"{log.name}: units, signs and axes agree with the motion")
+    if longest.velocity_m_s is not None:
         remarks += _yaw_remarks(log, segments)
-        shift_s = _clock_shift_s(segments) if reading == AS_LOGGED else 0.0
+    shift_s = _clock_shift_s(segments) if reading == AS_LOGGED else 0.0
     faults = []
     swapped = _swapped(longest)
     if swapped or (reading and reading.swapped):

@@ -19,8 +19,10 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 LARGEST_FILE_BYTES: Final = 100_000_000
 LARGEST_VALUE: Final = 1e15
 _MOST_FAULTS: Final = 5
-SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.0002, 0.05
-"""Bounds on the median time between two samples: 5 kHz to 20 Hz."""
+_FASTER: Final = "log at 50 to 100 Hz; for a clock in ms write --columns time_s=0.001*COLUMN"
+SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.0002, 0.025
+"""Bounds on the median time between two samples: 5 kHz to 40 Hz. A command that is logged rarely
+would be read as a late one."""
 
 
 def read_csv(path: Path, chosen: Mapping[str, Column]) -> FlightLog:
@@ -119,11 +121,14 @@ def _log(name: str, columns: Mapping[str, Column], values: Mapping[str, FloatArr
         signals[signal] = Signal(time_s[there], column.factor * values[signal][there], column.text)
     if faults:
         raise LogError(tuple(faults))
-    return demand_one_clock(FlightLog(name, signals, tuple(remarks)), columns[TIME].text)
+    return demand_one_clock(FlightLog(name, signals, tuple(remarks)), columns[TIME].text, _FASTER)
 
 
-def demand_one_clock(log: FlightLog, clock: str) -> FlightLog:
-    """Return the log without repeated times; raises LogError if times fall, or are in another unit."""
+def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
+    """Return the log without repeated times; raises LogError if times fall, or are in another unit.
+
+    `fix` says how to log faster.
+    """
     signals, faults = {}, []
     for name, signal in log.signals.items():
         step_s = np.diff(signal.time_s)
@@ -141,8 +146,7 @@ def demand_one_clock(log: FlightLog, clock: str) -> FlightLog:
         if name in REQUIRED and not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
             faults.append(
                 f"{log.name}: {echo(signal.column)} has a sample every {period_s:.3g} s by the time "
-                f"{echo(clock)}; that must be {SHORTEST_PERIOD_S:g}..{LONGEST_PERIOD_S:g} s: log at 50 to "
-                "100 Hz; for a clock in ms write --columns time_s=0.001*COLUMN"
+                f"{echo(clock)}; that must be {SHORTEST_PERIOD_S:g}..{LONGEST_PERIOD_S:g} s: {fix}"
             )
             break
     if faults:

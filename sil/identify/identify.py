@@ -13,7 +13,7 @@ from mambo_nmpc.sil.identify.axis import AxisFit, fit_axis, judge_axis
 from mambo_nmpc.sil.identify.checks import EXCITED_RAD, NAMES, check_log, check_units
 from mambo_nmpc.sil.identify.columns import Column
 from mambo_nmpc.sil.identify.csv_log import read_csv
-from mambo_nmpc.sil.identify.motion import Motion, fit_motion
+from mambo_nmpc.sil.identify.motion import Motion, explained, fit_motion
 from mambo_nmpc.sil.identify.record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_nmpc.sil.identify.segments import SHORTEST_S, Segment, cut, duration_s
 from mambo_nmpc.sil.identify.signals import POSITION, TILTS, VELOCITY, FlightLog
@@ -133,29 +133,29 @@ def _check(logs: Sequence[FlightLog]) -> tuple[list[list[Segment]], list[str], b
 
 
 def _fit_motion(segments: Sequence[Segment], *, shared_clock: bool) -> tuple[Motion | None, str]:
-    """Return the motion, or None and why there is none."""
+    """Return the motion, or None; and what a reader must know of it."""
     moved = [each for each in segments if each.velocity_m_s is not None]
-    absent = "acceleration per tilt, drag and trim are not fitted: "
+    why = "tilt and velocity do not share a clock" if not shared_clock else _why_no_motion(moved)
+    motion = None if why else fit_motion(moved)
+    if motion is not None:
+        share = motion.acceleration_per_tilt.value
+        if SHARES[0] <= share <= SHARES[1]:
+            biased = f"tilt explains only {motion.r2:.2f} of the motion: acceleration and drag may be biased"
+            return motion, biased if motion.r2 < GOOD_EXPLAINED else ""
+        why = f"{share:.2f} g per radian; plausible are {SHARES[0]}..{SHARES[1]}"
+    return None, f"acceleration per tilt, drag and trim are not fitted: {why}"
+
+
+def _why_no_motion(moved: Sequence[Segment]) -> str:
+    """Return why stretches that have velocities do not show the motion, or nothing."""
     if not moved:
-        return None, absent + "no log has velocity or position"
-    if not shared_clock:
-        return None, absent + "tilt and velocity do not share a clock"
+        return "no log has velocity or position"
     tilt = np.concatenate([each.tilt_rad for each in moved], axis=1)
     if (tilt.std(axis=1) < EXCITED_RAD).any():
-        return None, absent + "roll or pitch moves by less than 1 degree"
-    motion = fit_motion(moved)
-    share = motion.acceleration_per_tilt.value
-    if motion.r2 < LEAST_EXPLAINED or not SHARES[0] <= share <= SHARES[1]:
-        return None, (
-            f"{absent}tilt explains {max(motion.r2, 0.0):.2f} of the motion, with {share:.2f} g per radian; "
-            f"needed are {LEAST_EXPLAINED} and {SHARES[0]}..{SHARES[1]}"
-        )
-    if motion.r2 < GOOD_EXPLAINED:
-        return (
-            motion,
-            f"tilt explains only {motion.r2:.2f} of the motion: acceleration and drag may be biased",
-        )
-    return motion, ""
+        return "roll or pitch moves by less than 1 degree"
+    if (share := explained(moved)) < LEAST_EXPLAINED:
+        return f"tilt explains only {share:.2f} of the motion; {LEAST_EXPLAINED} is needed"
+    return ""
 
 
 def _white_noise(logs: Sequence[FlightLog], names: Sequence[str]) -> float:

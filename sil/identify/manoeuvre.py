@@ -19,8 +19,9 @@ from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 SIZE_M: Final = 0.8
-"""Half-width of the figure along x; it is half as large along y."""
-RATE_RAD_S: Final = 1.0
+HEIGHT_M: Final = 0.28
+"""Half-widths of the figure along x and along y, which the drone follows twice as often."""
+RATE_RAD_S: Final = 1.2
 DURATION_S: Final = 44.0
 RAMP_S: Final = 4.0
 """Time over which the figure grows from a point, and shrinks to one at the end."""
@@ -54,7 +55,7 @@ def reference_m(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     share = np.clip(np.minimum(time_s, DURATION_S - time_s) / RAMP_S, 0.0, 1.0)
     grown = share * share * (3.0 - 2.0 * share)
     x = SIZE_M * np.sin(RATE_RAD_S * time_s)
-    y = 0.5 * SIZE_M * np.sin(2.0 * RATE_RAD_S * time_s)
+    y = HEIGHT_M * np.sin(2.0 * RATE_RAD_S * time_s)
     for hz, amplitude_m, phase_x, phase_y in sines():
         x = x + amplitude_m * np.sin(2.0 * math.pi * hz * time_s + phase_x)
         y = y + amplitude_m * np.sin(2.0 * math.pi * hz * time_s + phase_y)
@@ -77,7 +78,7 @@ def write_manoeuvre(path: Path) -> str:
         put(path, form().encode())
     except OSError as error:
         raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}") from error
-    room = f"{2.0 * SIZE_M + 1.0:g} m by {SIZE_M + 1.0:g} m"
+    room = f"{2.0 * SIZE_M + 1.0:.1f} m by {2.0 * HEIGHT_M + 1.0:.1f} m"
     if form is waypoints_csv:
         return (
             f"{name}: {DURATION_S:g} s of waypoints (time_s, x_m, y_m) in {room}; fly them, and log the "
@@ -104,5 +105,11 @@ def crazyflie_script() -> str:
         autoescape=False,
         keep_trailing_newline=True,
     )
-    numbers = {"size_m": SIZE_M, "rate_rad_s": RATE_RAD_S, "duration_s": DURATION_S, "ramp_s": RAMP_S}
+    numbers = {
+        "size_m": SIZE_M,
+        "height_m": HEIGHT_M,
+        "rate_rad_s": RATE_RAD_S,
+        "duration_s": DURATION_S,
+        "ramp_s": RAMP_S,
+    }
     return environment.get_template(_SCRIPT).render(**numbers, sines=sines())

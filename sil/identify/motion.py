@@ -4,8 +4,8 @@ Increments of velocity over half a second are regressed on integrals over the sa
 
     change of v = share * integral(T tilt) - drag * integral(v) + constants, turned by yaw
 
-T tilt is the horizontal part of the thrust over mass T; where T is not logged, its vertical part is taken as g.
-The constants, in axes ahead and right, are the trim.
+T tilt is the horizontal part of the thrust over mass T; where T is not logged, its vertical part is taken as
+g. The constants, in axes ahead and right, are the trim.
 """
 
 from collections.abc import Sequence
@@ -20,6 +20,8 @@ from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 SPAN_S: Final = 0.5
+_LEAST_POWER: Final = 1e-6
+"""Mean square of the velocity increments, in m^2/s^2, below which the drone does not move."""
 _STRIDE: Final = 5
 _CORRELATION: Final = 20
 """Spans that overlap or follow within 1 s, in strides."""
@@ -61,8 +63,11 @@ def explained(segments: Sequence[Segment], hypothesis: Hypothesis = AS_LOGGED) -
     rest = np.column_stack([*others])
     change = changes - rest @ np.linalg.lstsq(rest, changes, rcond=None)[0]
     tilt = free - rest @ np.linalg.lstsq(rest, free, rcond=None)[0]
+    power = float(change @ change)
+    if power < _LEAST_POWER * len(change):
+        return 0.0
     share = max(float(tilt @ change) / max(float(tilt @ tilt), 1e-300), 0.0)
-    return 1.0 - float(np.sum((change - share * tilt) ** 2)) / max(float(change @ change), 1e-300)
+    return 1.0 - float(np.sum((change - share * tilt) ** 2)) / power
 
 
 def fit_motion(segments: Sequence[Segment]) -> Motion:
@@ -74,7 +79,7 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     covariance = newey_west([slope for slope, _ in parts], errors, _CORRELATION)
     within = NORMAL_95 * WIDENING * np.sqrt(np.maximum(np.diag(covariance), 0.0))
     share, drag, ahead, right = found.tolist()
-    weight = share * GRAVITY_M_S2
+    weight = GRAVITY_M_S2 * share
     error = np.concatenate(errors)
     return Motion(
         Estimate(share, float(within[0])),

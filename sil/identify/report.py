@@ -12,6 +12,10 @@ ADVICE: Final = (
     "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
     "eight on a Crazyflie; --manoeuvre eight.csv writes its waypoints for another drone"
 )
+AXIS_ROWS: Final = (
+    *("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s"),
+    *("held-out R2", "verdict"),
+)
 CURVE_COLUMNS: Final = (
     *("time_s", "roll_command_rad", "roll_rad", "roll_model_rad"),
     *("pitch_command_rad", "pitch_rad", "pitch_model_rad"),
@@ -20,15 +24,14 @@ CURVE_COLUMNS: Final = (
 
 def identify_text(summary: IdentifySummary) -> str:
     """Return an identification as text: the model with its 95 % intervals, then what the logs showed."""
-    heads = ("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s", "held-out R2")
-    lines = [f"{'':7}" + "".join(f"{head:>22}" for head in heads) + "  verdict"]
+    lines = [f"{'':28}" + "".join(f"{name:20}" for name in summary.axes)]
+    cells = zip(*(axis_cells(axis) for axis in summary.axes.values()), strict=True)
+    rows = zip(AXIS_ROWS, cells, strict=True)
+    lines += [f"{words:28}" + "".join(f"{cell:20}" for cell in row) for words, row in rows]
+    facts = [*motion_rows(summary), *noise_rows(summary)]
+    lines += [f"{words:28}{value}" for words, value in facts]
     for name, axis in summary.axes.items():
-        cells = "".join(f"{cell:>22}" for cell in axis_cells(axis))
-        lines.append(
-            f"{name:7}{cells}  {axis.verdict}{': ' if axis.reasons else ''}{'; '.join(axis.reasons)}"
-        )
-    lines += [f"{words:28}{value}" for words, value in motion_rows(summary)]
-    lines += [f"{words:28}{value}" for words, value in noise_rows(summary)]
+        lines += [f"{name} is {axis.verdict}: {reason}" for reason in axis.reasons]
     for log in summary.logs:
         renamed = [f"{signal} = {column}" for signal, column in log.columns.items() if column != signal]
         lines.append(
@@ -37,18 +40,18 @@ def identify_text(summary: IdentifySummary) -> str:
     lines += summary.remarks
     if any(axis.verdict != "good" for axis in summary.axes.values()):
         lines.append(ADVICE)
-    return "\n".join(lines)
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def axis_cells(axis: AxisResult) -> list[str]:
-    """Return gain, lag + dead time, lag, dead time, integrator and held-out R2 of an axis in words."""
+    """Return the values of `AXIS_ROWS` of an axis in words."""
     fit = axis.fitted
     r2 = "-" if axis.held_out_r2 != axis.held_out_r2 else f"{axis.held_out_r2:.3f}"
     if fit is None:
-        return ["-"] * 5 + [r2]
+        return ["-"] * 5 + [r2, axis.verdict]
     times = [_plus_minus(each, 1e3, 0) for each in (fit.sum_s, fit.lag_s, fit.delay_s)]
     integral = "-" if fit.integral_1_s is None else _plus_minus(fit.integral_1_s, 1.0, 2)
-    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, r2]
+    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, r2, axis.verdict]
 
 
 def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:

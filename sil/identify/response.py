@@ -7,6 +7,7 @@ Output error: the model is driven by the commands alone. Gain and offsets are so
 search for the other parameters, of which it takes the logarithms.
 """
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.signal import cont2discrete, lfilter, lfilter_zi
+from scipy.signal import lfilter, lfilter_zi
 
 from mambo_nmpc.sil.identify.segments import PERIOD_S, Segment
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -180,11 +181,27 @@ def _unit_response(logs: FloatArray, segment: Segment, axis: int) -> FloatArray:
         top, bottom = np.array([1.0 - keep]), np.array([1.0, -keep])
     else:
         (integral,) = rest
-        system = ([1.0, integral], [lag, 1.0, integral])
-        tops, bottom, _ = cont2discrete(system, PERIOD_S, "zoh")
-        top = np.atleast_2d(tops)[0][1:]  # the mean of a period acts in that period
+        top, bottom = _integrating_filter(lag, integral)
     state = lfilter_zi(top, bottom) * command[0]
     return np.asarray(lfilter(top, bottom, command, zi=state)[0])
+
+
+def _integrating_filter(lag_s: float, integral_1_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return numerator (2,) and denominator (3,) of the response with an integrator to period means.
+
+    The exponential of a 2 x 2 matrix with trace 2 m and the eigenvalues m +- q is
+    e^m (cosh q + sinh q / q (A - m)).
+    """
+    system = PERIOD_S * np.array([[0.0, 1.0], [-integral_1_s / lag_s, -1.0 / lag_s]])
+    middle = -0.5 * PERIOD_S / lag_s
+    q = cmath.sqrt(middle * middle - PERIOD_S * PERIOD_S * integral_1_s / lag_s)
+    ratio = (cmath.sinh(q) / q).real if abs(q) > 1e-9 else 1.0
+    step = math.exp(middle) * (cmath.cosh(q).real * np.eye(2) + ratio * (system - middle * np.eye(2)))
+    drive = np.linalg.solve(system, step - np.eye(2)) @ [0.0, PERIOD_S]
+    read = np.array([integral_1_s, 1.0]) / lag_s
+    trace = step[0, 0] + step[1, 1]
+    top = np.array([read @ drive, read @ (step - trace * np.eye(2)) @ drive])
+    return top, np.array([1.0, -trace, math.exp(2.0 * middle)])
 
 
 def _project(

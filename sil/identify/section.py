@@ -4,7 +4,7 @@ from pathlib import Path
 
 from mambo_nmpc.sil.identify.plots import fit_panel
 from mambo_nmpc.sil.identify.record import CURVES, IdentifySummary
-from mambo_nmpc.sil.identify.report import axis_cells, finding, motion_rows, noise_rows
+from mambo_nmpc.sil.identify.report import AXIS_ROWS, axis_cells, finding, motion_rows, noise_rows
 from mambo_nmpc.sil.show.section import Section
 
 
@@ -13,6 +13,7 @@ def identify_section(folder: Path, summary: IdentifySummary) -> Section:
     curves = folder / CURVES
     there = curves.is_file()
     content = {
+        "heads": AXIS_ROWS,
         "axes": [(name, axis, axis_cells(axis)) for name, axis in summary.axes.items()],
         "facts": dict([*motion_rows(summary), *noise_rows(summary)]),
         "logs": summary.logs,

@@ -21,6 +21,7 @@ SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "v
 _MOTION: Final = {"x_m": "x", "y_m": "y", "z_m": "z", "vx_m_s": "vx", "vy_m_s": "vy"}
 _ANGLES: Final = ("roll", "pitch", "yaw")
 _CLOCK: Final = "timestamp"
+_FASTER: Final = "log at 50 Hz or more (SDLOG_PROFILE, high rate)"
 
 
 def read_ulog(path: Path) -> FlightLog:
@@ -51,7 +52,7 @@ def read_ulog(path: Path) -> FlightLog:
     empty = [signal for signal, each in signals.items() if not len(each.time_s)]
     if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
         raise LogError(tuple(faults))
-    return demand_one_clock(FlightLog(name, signals), _CLOCK)
+    return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
 
 
 def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:

@@ -51,7 +51,9 @@ class Flown:
     duration_s: float = 30.0
     size_m: float = 0.8
     """Half-width of the figure of eight; 0 is hover."""
-    rate_rad_s: float = 1.0
+    height: float = 0.35
+    """Its height over its width."""
+    rate_rad_s: float = 1.2
     sines_rad: float = 0.0175
     """Rms of the sum of sines on each command."""
     yaw_rad: float = 0.0
@@ -61,6 +63,8 @@ class Flown:
     slow_rad: float = 0.007
     """Noise of the measured tilt with a correlation time of 0.3 s."""
     gusts_m_s2: float = 0.08
+    estimate_noise: float = 1.0
+    """Factor on the noise of estimated position and velocity."""
 
 
 def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str, Array]]:
@@ -80,7 +84,7 @@ def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str,
         time_s = row * TICKS * TICK_S
         yaw = flown.yaw_rad + flown.yaw_rate_rad_s * time_s
         sine, cosine = np.sin(yaw), np.cos(yaw)
-        seen_error = 0.9 * seen_error + 0.44 * random.normal(size=(4, n)) * NOISE
+        seen_error = 0.9 * seen_error + 0.44 * random.normal(size=(4, n)) * flown.estimate_noise * NOISE
         target, speed, pull = _eight(time_s, flown)
         wanted = 2.0 * (target - position - seen_error[:2]) + 1.8 * (speed - velocity - seen_error[2:]) + pull
         ahead, right = cosine * wanted[0] + sine * wanted[1], cosine * wanted[1] - sine * wanted[0]
@@ -115,9 +119,9 @@ def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str,
 
 def _eight(time_s: float, flown: Flown) -> tuple[Array, Array, Array]:
     """Return position, velocity and acceleration (2, 1) on the figure of eight."""
-    a, w = flown.size_m, flown.rate_rad_s
+    a, b, w = flown.size_m, flown.height * flown.size_m, flown.rate_rad_s
     s, c, s2, c2 = np.sin(w * time_s), np.cos(w * time_s), np.sin(2.0 * w * time_s), np.cos(2.0 * w * time_s)
-    rows = ((a * s, 0.5 * a * s2), (a * w * c, a * w * c2), (-a * w * w * s, -2.0 * a * w * w * s2))
+    rows = ((a * s, b * s2), (a * w * c, 2.0 * b * w * c2), (-a * w * w * s, -4.0 * b * w * w * s2))
     found = [np.array(row)[:, np.newaxis] for row in rows]
     return found[0], found[1], found[2]
 
