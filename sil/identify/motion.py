@@ -23,8 +23,8 @@ SPAN_S: Final = 0.5
 _LEAST_POWER: Final = 1e-6
 """Mean square of the velocity increments, in m^2/s^2, below which the drone does not move."""
 _STRIDE: Final = 5
-_CORRELATION: Final = 20
-"""Spans that overlap or follow within 1 s, in strides."""
+_CORRELATION: Final = 80
+"""Strides over which what is left is taken as correlated: 4 s, because gusts last for seconds."""
 
 
 @dataclass(frozen=True)
@@ -71,24 +71,29 @@ def explained(segments: Sequence[Segment], hypothesis: Hypothesis = AS_LOGGED) -
 
 
 def fit_motion(segments: Sequence[Segment]) -> Motion:
-    """Fit the parameters on all stretches that have velocities; raises ValueError if there is none."""
+    """Fit the parameters on all stretches that have velocities; raises ValueError if there is none.
+
+    A controller tilts against gusts, which biases the share of g by up to about what the fit leaves
+    unexplained; its interval is widened by that.
+    """
     parts = [_regression(each, AS_LOGGED) for each in segments if each.velocity_m_s is not None]
     slopes, changes = _stack(segments, AS_LOGGED)
     found = np.linalg.lstsq(slopes, changes, rcond=None)[0]
     errors = [change - slope @ found for slope, change in parts]
     covariance = newey_west([slope for slope, _ in parts], errors, _CORRELATION)
-    within = NORMAL_95 * WIDENING * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    within = (NORMAL_95 * WIDENING * np.sqrt(np.maximum(np.diag(covariance), 0.0))).tolist()
     share, drag, ahead, right = found.tolist()
     weight = GRAVITY_M_S2 * share
     error = np.concatenate(errors)
+    left = float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2))
     return Motion(
-        Estimate(share, float(within[0])),
-        Estimate(drag, float(within[1])),
+        Estimate(share, within[0] + left * abs(share)),
+        Estimate(drag, within[1]),
         (
             Estimate(-right / weight, abs(within[3] / weight)),
             Estimate(ahead / weight, abs(within[2] / weight)),
         ),
-        1.0 - float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2)),
+        1.0 - left,
         float(np.sqrt(np.mean(error**2))) / SPAN_S,
     )
 

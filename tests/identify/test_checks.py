@@ -136,9 +136,8 @@ def test_yaw_that_turns_the_wrong_way_is_told() -> None:
 
 def test_small_angles_in_degrees_are_told_by_the_motion() -> None:
     """Where none is beyond 0.79."""
-    gentle = fly(
-        Truth(), Flown(size_m=0.02, sines_rad=0.0, gusts_m_s2=0.002, slow_rad=1e-4, estimate_noise=0.1), 1
-    )[0]
+    calm = Flown(size_m=0.03, sines_rad=0.0, gusts_m_s2=0.002, slow_rad=1e-4, estimate_noise=0.1)
+    gentle = fly(Truth(trim_rad=(0.0, 0.0)), calm, 1)[0]
     with pytest.raises(LogError, match="g per radian; are the angles in degrees"):
         identify([log_of(scale(57.3, *ANGLES)(gentle))])
 
