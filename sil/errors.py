@@ -55,5 +55,8 @@ class LogError(MamboNmpcError):
     """Flight logs cannot be read, or contradict themselves; `faults` holds one line per fault."""
 
     def __init__(self, faults: tuple[str, ...]) -> None:
-        super().__init__("\n".join(faults))
+        super().__init__(faults)
         self.faults = faults
+
+    def __str__(self) -> str:
+        return "\n".join(self.faults)

@@ -69,9 +69,13 @@ def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
 
 
 def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
-    """Return name and value of each noise."""
+    """Return name and value of the measured tilts' offset and of each noise."""
     tilts = ", ".join(f"{axis.tilt_noise_rad / DEGREE:.2f}" for axis in summary.axes.values())
-    rows = [("white noise of roll, pitch", f"{tilts} degrees")]
+    offsets = ", ".join(f"{axis.offset_rad / DEGREE:.2f}" for axis in summary.axes.values())
+    rows = [
+        ("roll, pitch at no command", f"{offsets} degrees"),
+        ("white noise of roll, pitch", f"{tilts} degrees"),
+    ]
     for words, value, unit in (
         ("white noise of position", summary.noise.position_m, "m"),
         ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),
