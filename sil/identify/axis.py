@@ -8,8 +8,8 @@ from typing import Final
 from mambo_nmpc.sil.identify.checks import EXCITED_RAD, NO_COMMAND_RAD
 from mambo_nmpc.sil.identify.record import AxisResult, Verdict
 from mambo_nmpc.sil.identify.response import (
+    AxisParameters,
     FirstOrder,
-    Intervals,
     Response,
     fit_response,
     intervals,
@@ -40,7 +40,7 @@ class AxisFit:
     """The fits of one axis: on all samples, and on the first halves, with errors in the second halves."""
 
     whole: Response
-    intervals: Intervals
+    intervals: AxisParameters
     first_order: FirstOrder
     half: Response
     r2: float

@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.sil.identify.response import NORMAL_95, WIDENING, Estimate, newey_west
+from mambo_nmpc.sil.identify.response import NORMAL_95, WIDENING, Interval, newey_west
 from mambo_nmpc.sil.identify.segments import PERIOD_S, Segment
 from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -46,10 +46,10 @@ AS_LOGGED: Final = Hypothesis()
 class Motion:
     """Parameters of the motion; pairs are roll, pitch."""
 
-    acceleration_per_tilt: Estimate
+    acceleration_per_tilt: Interval
     """Acceleration over g per radian of measured tilt."""
-    drag_1_s: Estimate
-    trim_rad: tuple[Estimate, Estimate]
+    drag_1_s: Interval
+    trim_rad: tuple[Interval, Interval]
     """Measured tilt at which the drone does not accelerate."""
     r2: float
     disturbance_m_s2: float
@@ -87,11 +87,11 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     error = np.concatenate(errors)
     left = float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2))
     return Motion(
-        Estimate(share, within[0] + left * abs(share)),
-        Estimate(drag, within[1]),
+        Interval(share, within[0] + left * abs(share)),
+        Interval(drag, within[1]),
         (
-            Estimate(-right / weight, abs(within[3] / weight)),
-            Estimate(ahead / weight, abs(within[2] / weight)),
+            Interval(-right / weight, abs(within[3] / weight)),
+            Interval(ahead / weight, abs(within[2] / weight)),
         ),
         1.0 - left,
         float(np.sqrt(np.mean(error**2))) / SPAN_S,

@@ -5,7 +5,7 @@ from typing import Final, Literal
 
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.identify.motion import Motion
-from mambo_nmpc.sil.identify.response import FirstOrder, Intervals
+from mambo_nmpc.sil.identify.response import AxisParameters, FirstOrder
 
 Verdict = Literal["good", "weak", "refused"]
 
@@ -29,7 +29,7 @@ class AxisResult:
     """Rms error of the model that is fitted to the first half of each stretch, in the second half."""
     other_error_rad: Number
     """The same with an integrator if `fitted` has none, and without if it has one."""
-    fitted: Intervals | None
+    fitted: AxisParameters | None
     first_order: FirstOrder | None
     """The model without an integrator, whether or not `fitted` has one."""
     offset_rad: Number

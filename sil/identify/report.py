@@ -4,7 +4,7 @@ from typing import Final
 
 from mambo_nmpc.sil.identify.identify import Curves
 from mambo_nmpc.sil.identify.record import AxisResult, IdentifySummary
-from mambo_nmpc.sil.identify.response import Estimate
+from mambo_nmpc.sil.identify.response import Interval
 from mambo_nmpc.sil.identify.signals import DEGREE
 from mambo_nmpc.sil.show.numbers import digits
 
@@ -85,9 +85,17 @@ def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
 
 
 def model_text(summary: IdentifySummary) -> str:
-    """Return section [model] for a controller.toml."""
+    """Return a controller.toml with section [model] and the cost that uses all its keys."""
     within = _half_widths(summary)
-    lines = [*_heading(summary), "# Copy these keys into section [model] of a controller.toml.", "[model]"]
+    lines = [
+        *_heading(summary),
+        '# A controller.toml; or copy section [model] into one that has cost.norm = "quadratic".',
+        "",
+        "[cost]",
+        'norm = "quadratic"',
+        "",
+        "[model]",
+    ]
     for key, value in summary.model.items():
         lines.append(f"{key} = {value!r}" + (f"  # +- {within[key]:.2g}" if key in within else ""))
     return "\n".join(lines) + "\n"
@@ -156,7 +164,7 @@ def _heading(summary: IdentifySummary) -> list[str]:
 
 def _half_widths(summary: IdentifySummary) -> dict[str, float]:
     """Return the half-width of the 95 % interval of each key of the model."""
-    found: dict[str, Estimate | None] = {}
+    found: dict[str, Interval | None] = {}
     for name, axis in summary.axes.items():
         if (fit := axis.fitted) is not None:
             found |= {f"{name}_gain": fit.gain, f"{name}_lag_s": fit.lag_s, f"{name}_delay_s": fit.delay_s}
@@ -172,5 +180,5 @@ def _round(value: float) -> str:
     return repr(float(f"{value:.4g}"))
 
 
-def _plus_minus(estimate: Estimate, factor: float, decimals: int) -> str:
+def _plus_minus(estimate: Interval, factor: float, decimals: int) -> str:
     return f"{factor * estimate.value:.{decimals}f} +- {factor * estimate.within:.{decimals}f}"

@@ -41,7 +41,7 @@ Masks = Sequence[NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Interval:
     """A value and the half-width of its 95 % interval."""
 
     value: float
@@ -118,17 +118,17 @@ class FirstOrder:
 
 
 @dataclass(frozen=True)
-class Intervals:
+class AxisParameters:
     """Parameters with their 95 % intervals; `sum_s` is lag plus dead time, known better than either."""
 
-    gain: Estimate
-    sum_s: Estimate
-    lag_s: Estimate
-    delay_s: Estimate
-    integral_1_s: Estimate | None
+    gain: Interval
+    sum_s: Interval
+    lag_s: Interval
+    delay_s: Interval
+    integral_1_s: Interval | None
 
 
-def intervals(response: Response, segments: Sequence[Segment], axis: int, masks: Masks) -> Intervals:
+def intervals(response: Response, segments: Sequence[Segment], axis: int, masks: Masks) -> AxisParameters:
     """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened."""
     logs = response.logs
     slopes = _slopes(response, logs, segments, axis, masks)
@@ -142,12 +142,12 @@ def intervals(response: Response, segments: Sequence[Segment], axis: int, masks:
 
     lag, delay = response.lag_s, response.delay_s
     order = len(logs)
-    return Intervals(
-        gain=Estimate(response.gain, half_width([0.0] * order + [1.0], WIDENING)),
-        sum_s=Estimate(lag + delay, half_width([lag, delay], WIDENING) + SURPLUS_S),
-        lag_s=Estimate(lag, half_width([lag], WIDENING) + SURPLUS_S),
-        delay_s=Estimate(delay, half_width([0.0, delay], DEAD_TIME_WIDENING) + SURPLUS_S),
-        integral_1_s=Estimate(response.integral_1_s, half_width([0.0, 0.0, response.integral_1_s], WIDENING))
+    return AxisParameters(
+        gain=Interval(response.gain, half_width([0.0] * order + [1.0], WIDENING)),
+        sum_s=Interval(lag + delay, half_width([lag, delay], WIDENING) + SURPLUS_S),
+        lag_s=Interval(lag, half_width([lag], WIDENING) + SURPLUS_S),
+        delay_s=Interval(delay, half_width([0.0, delay], DEAD_TIME_WIDENING) + SURPLUS_S),
+        integral_1_s=Interval(response.integral_1_s, half_width([0.0, 0.0, response.integral_1_s], WIDENING))
         if order == 3
         else None,
     )

@@ -10,15 +10,18 @@ import pytest
 from mambo_nmpc.codegen.errors import ForeignFilesError, InvalidSettingsError, MamboNmpcError
 from mambo_nmpc.codegen.settings.controller_toml import parse
 from mambo_nmpc.sil.campaign.executors import processes
+from mambo_nmpc.sil.errors import LogError
 
 ROOT = Path(__file__).parents[2]
 ARGUMENTS: dict[type[MamboNmpcError], tuple[object, ...]] = {
     InvalidSettingsError: (("first", "second"),),
     ForeignFilesError: ("what to do", ("a.c", "b.c")),
+    LogError: (("first", "second"),),
 }
 TEXTS: dict[type[MamboNmpcError], str] = {
     InvalidSettingsError: "first\nsecond",
     ForeignFilesError: "what to do",
+    LogError: "first\nsecond",
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from mambo_nmpc.sil.identify.identify import identify
 from mambo_nmpc.sil.identify.record import IdentifySummary
-from mambo_nmpc.sil.identify.response import Estimate, Intervals
+from mambo_nmpc.sil.identify.response import AxisParameters, Interval
 from tests.support.logs import Array, Flown, Truth, drop_and_jitter, fly, log_of
 
 TRUTH = Truth()
@@ -18,7 +18,7 @@ def found(*logs: dict[str, Array]) -> IdentifySummary:
     return identify([log_of(each, f"log{number}.csv") for number, each in enumerate(logs)])[0]
 
 
-def fits(summary: IdentifySummary) -> list[Intervals]:
+def fits(summary: IdentifySummary) -> list[AxisParameters]:
     """Return the fits of roll and pitch."""
     return [fit for axis in summary.axes.values() if (fit := axis.fitted)]
 
@@ -122,7 +122,7 @@ def test_stretches_without_flight_are_left_out() -> None:
     assert 34.0 < summary.duration_s < 38.0
 
 
-def demand_cover(estimates: list[Estimate], truths: list[float], least: float) -> None:
+def demand_cover(estimates: list[Interval], truths: list[float], least: float) -> None:
     """Demand that a share of the intervals covers the truth, and that they are not wide without need."""
     inside = [abs(one.value - truth) <= one.within for one, truth in zip(estimates, truths, strict=True)]
     assert np.mean(inside) >= least

@@ -41,6 +41,14 @@ SEEN = {
     "faults": ("state NaN to the end", "crashed", "2376.50", "OK, BAD_STATE"),
     "verify": ("incomplete: 1 of 2 checks passed", "cppcheck is missing", "update_period_s"),
     "regress": ("1 of 2 flights passed, 1 failed", "the trace differs", "fly --replay", ">1.5<", "0.750"),
+    "identify": (
+        "roll good: gain 0.83",
+        "pitch refused",
+        "held-out R²",
+        "±",
+        "is refused: too calm",
+        "<svg role",
+    ),
     "campaign": ("crashed: 0 with pd, 1 with mambo", "3 of 4 flights, 75.0 %", "fly --replay", "IAE, m s"),
 }
 

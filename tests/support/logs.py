@@ -4,6 +4,7 @@ The commands come from a PD controller that tracks a figure of eight through noi
 sines on top. All arrays are (k,) or (k, n) for n flights at once.
 """
 
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,3 +147,62 @@ def write_log(columns: Mapping[str, Array], path: Path) -> Path:
     rows = np.column_stack(list(columns.values()))
     np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
     return path
+
+
+def crazyflie_columns(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return a log as the Crazyflie's client writes it: ms, degrees, y and z up, yaw to the left."""
+    degrees = 180.0 / np.pi
+    names = {
+        "roll_command_rad": ("controller.roll", degrees),
+        "pitch_command_rad": ("controller.pitch", degrees),
+        "roll_rad": ("stateEstimate.roll", degrees),
+        "pitch_rad": ("stateEstimate.pitch", degrees),
+        "yaw_rad": ("stateEstimate.yaw", -degrees),
+        "x_m": ("stateEstimate.x", 1.0),
+        "y_m": ("stateEstimate.y", -1.0),
+        "vx_m_s": ("stateEstimate.vx", 1.0),
+        "vy_m_s": ("stateEstimate.vy", -1.0),
+    }
+    found = {"Timestamp": np.round(1e3 * columns["time_s"]) + 4711.0}
+    return found | {name: factor * columns[key] for key, (name, factor) in names.items()}
+
+
+def ulog(columns: Mapping[str, Array], *, quaternion: bool) -> bytes:
+    """Return a log in PX4's format ULog; `quaternion` is for a set-point without roll_body and pitch_body."""
+    setpoint = "float[4] q_d" if quaternion else "float roll_body;float pitch_body"
+    formats = {
+        "vehicle_attitude_setpoint": f"uint64_t timestamp;{setpoint};",
+        "vehicle_attitude": "uint64_t timestamp;float[4] q;",
+        "vehicle_local_position": "uint64_t timestamp;float x;float y;float z;float vx;float vy;",
+    }
+    roll, pitch, yaw = (columns[f"{name}_rad"] for name in ("roll", "pitch", "yaw"))
+    commands = [columns["roll_command_rad"], columns["pitch_command_rad"]]
+    motion = [columns[name] for name in ("x_m", "y_m")] + [0.0 * roll - 1.0]
+    motion += [columns[name] for name in ("vx_m_s", "vy_m_s")]
+    topics = [_quaternion(*commands, yaw) if quaternion else commands, _quaternion(roll, pitch, yaw), motion]
+
+    def message(kind: bytes, content: bytes) -> bytes:
+        return struct.pack("<Hc", len(content), kind) + content
+
+    parts = [b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 0)]
+    parts += [message(b"F", f"{name}:{fields}".encode()) for name, fields in formats.items()]
+    parts += [message(b"A", struct.pack("<BH", 0, n) + name.encode()) for n, name in enumerate(formats)]
+    for row, time_s in enumerate(columns["time_s"].tolist()):
+        for number, values in enumerate(topics):
+            numbers = [float(value[row]) for value in values]
+            data = struct.pack(f"<HQ{len(numbers)}f", number, round(1e6 * time_s) + 10**7, *numbers)
+            parts.append(message(b"D", data))
+    return b"".join(parts)
+
+
+def _quaternion(roll: Array, pitch: Array, yaw: Array) -> list[Array]:
+    """Return w, x, y, z of 3-2-1 Euler angles."""
+    (cr, cp, cy), (sr, sp, sy) = (
+        [function(0.5 * angle) for angle in (roll, pitch, yaw)] for function in (np.cos, np.sin)
+    )
+    return [
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ]

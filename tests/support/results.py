@@ -26,6 +26,11 @@ from mambo_nmpc.sil.flight.traces import Trace, write_npz
 from mambo_nmpc.sil.footprint import report as footprint_report
 from mambo_nmpc.sil.footprint.measure import Footprint
 from mambo_nmpc.sil.footprint.sweep import Point, SweepSummary, budgets
+from mambo_nmpc.sil.identify.identify import Curves
+from mambo_nmpc.sil.identify.motion import Motion
+from mambo_nmpc.sil.identify.record import AxisResult, IdentifySummary, LogResult, Noise
+from mambo_nmpc.sil.identify.report import curves_csv
+from mambo_nmpc.sil.identify.response import AxisParameters, FirstOrder, Interval
 from mambo_nmpc.sil.paper.sensed import SensedRow, SensedSummary
 from mambo_nmpc.sil.paper.table2 import CASES, Claim, Table2Row, Table2Summary
 from mambo_nmpc.sil.plant.airframe import NOMINAL
@@ -229,6 +234,33 @@ def regress_folder(folder: Path) -> None:
     ).write(folder)
 
 
+def identify_folder(folder: Path) -> None:
+    """Write an identification that refused one axis."""
+
+    def known(value: float) -> Interval:
+        return Interval(value, 0.02)
+
+    fit = AxisParameters(known(0.83), known(0.14), known(0.05), known(0.09), None)
+    roll = AxisResult("good", [], 0.1, 0.99, 0.002, 0.002, fit, FirstOrder(0.83, 0.05, 0.09), 0.001, 0.0005)
+    pitch = AxisResult("refused", ["too calm"], 0.01, np.nan, np.nan, np.nan, None, None, np.nan, 0.0005)
+    motion = Motion(known(0.87), known(0.15), (known(0.01), known(0.0)), 0.95, 0.06)
+    wave = np.sin(np.arange(500.0) / 20.0)
+    tilt = np.stack([wave, wave])
+    curves = Curves(0.01 * np.arange(500.0), tilt, 0.8 * tilt, np.stack([0.8 * wave, np.full(500, np.nan)]))
+    (folder / "fit.csv").write_text(curves_csv(curves), "utf-8")
+    IdentifySummary(
+        logs=[LogResult(HOSTILE, 5.0, {"roll_rad": HOSTILE})],
+        duration_s=5.0,
+        split_s=2.5,
+        roll=roll,
+        pitch=pitch,
+        motion=motion,
+        noise=Noise(np.nan, 0.01),
+        model={},
+        remarks=[HOSTILE],
+    ).write(folder)
+
+
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
     "replay": replay_folder,
@@ -240,5 +272,6 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "verify": verify_folder,
     "campaign": campaign_folder,
     "regress": regress_folder,
+    "identify": identify_folder,
 }
 """A folder of every command."""
