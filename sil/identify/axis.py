@@ -1,4 +1,4 @@
-"""One axis: fitted on all stretches, its order chosen by the held-out error, and the verdict."""
+"""One axis: fitted on all stretches, with or without an integrator, and the verdict."""
 
 import math
 from collections.abc import Sequence
@@ -50,22 +50,29 @@ class AxisFit:
 
 
 def fit_axis(segments: Sequence[Segment], axis: int) -> AxisFit | None:
-    """Fit one axis and choose its order by the held-out error; None without a command."""
+    """Fit one axis and choose its order; None without a command.
+
+    The integrator is taken if it lowers the held-out error and its interval does not hold 0.
+    """
     if command_deviation_rad(segments, axis) < NO_COMMAND_RAD:
         return None
     first = [segment.counted & segment.first_half for segment in segments]
     second = [segment.counted & ~segment.first_half for segment in segments]
     halves = [fit_response(segments, axis, first, integrator=each) for each in (False, True)]
     errors = [root_mean_square(residuals(each, segments, axis, second)) for each in halves]
-    chosen = int(errors[1] < WORTH * errors[0])
     tilts = [segment.tilt_rad[axis][mask] for segment, mask in zip(segments, second, strict=True)]
     spread = root_mean_square([tilt - tilt.mean() for tilt in tilts])
     every = [segment.counted for segment in segments]
     plain = fit_response(segments, axis, every, integrator=False)
-    whole = fit_response(segments, axis, every, integrator=True) if chosen else plain
+    whole, known, chosen = plain, intervals(plain, segments, axis, every), 0
+    if errors[1] < WORTH * errors[0]:
+        richer = fit_response(segments, axis, every, integrator=True)
+        found = intervals(richer, segments, axis, every)
+        if found.integral_1_s is not None and found.integral_1_s.value > found.integral_1_s.within:
+            whole, known, chosen = richer, found, 1
     return AxisFit(
         whole,
-        intervals(whole, segments, axis, every),
+        known,
         FirstOrder(plain.gain, plain.lag_s, plain.delay_s),
         halves[chosen],
         1.0 - (errors[chosen] / max(spread, 1e-300)) ** 2,

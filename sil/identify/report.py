@@ -6,7 +6,7 @@ from mambo_nmpc.sil.identify.identify import Curves
 from mambo_nmpc.sil.identify.record import AxisResult, IdentifySummary
 from mambo_nmpc.sil.identify.response import Interval
 from mambo_nmpc.sil.identify.signals import DEGREE
-from mambo_nmpc.sil.show.numbers import digits
+from mambo_nmpc.sil.show.numbers import three_digits
 
 ADVICE: Final = (
     "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
@@ -80,7 +80,7 @@ def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
         ("white noise of position", summary.noise.position_m, "m"),
         ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),
     ):
-        rows += [(words, f"{digits(value)} {unit}")] if value == value else []  # noqa: PLR0124 - NaN
+        rows += [(words, f"{three_digits(value)} {unit}")] if value == value else []  # noqa: PLR0124 - NaN
     return rows
 
 

@@ -179,7 +179,11 @@ def ulog(columns: Mapping[str, Array], *, quaternion: bool) -> bytes:
     commands = [columns["roll_command_rad"], columns["pitch_command_rad"]]
     motion = [columns[name] for name in ("x_m", "y_m")] + [0.0 * roll - 1.0]
     motion += [columns[name] for name in ("vx_m_s", "vy_m_s")]
-    topics = [_quaternion(*commands, yaw) if quaternion else commands, _quaternion(roll, pitch, yaw), motion]
+    topics = [
+        _quaternion(commands[0], commands[1], yaw) if quaternion else commands,
+        _quaternion(roll, pitch, yaw),
+        motion,
+    ]
 
     def message(kind: bytes, content: bytes) -> bytes:
         return struct.pack("<Hc", len(content), kind) + content
