@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.plain_file import read_plain_file
 from mambo_nmpc.sil.errors import LogError
 from mambo_nmpc.sil.identify.columns import Column, choose_columns
-from mambo_nmpc.sil.identify.signals import REQUIRED, TIME, FlightLog, Signal
+from mambo_nmpc.sil.identify.signals import OPTIONAL, REQUIRED, TIME, FlightLog, Signal
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 LARGEST_FILE_BYTES: Final = 100_000_000
@@ -23,6 +23,10 @@ _FASTER: Final = "log at 50 to 100 Hz; for a clock in ms write --columns time_s=
 SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.0002, 0.025
 """Bounds on the median time between two samples: 5 kHz to 40 Hz. A command that is logged rarely
 would be read as a late one."""
+
+
+LONGEST_OPTIONAL_PERIOD_S: Final = 0.1
+"""Median time between two samples of position, velocity or yaw beyond which they are left out."""
 
 
 def read_csv(path: Path, chosen: Mapping[str, Column]) -> FlightLog:
@@ -125,11 +129,12 @@ def _log(name: str, columns: Mapping[str, Column], values: Mapping[str, FloatArr
 
 
 def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
-    """Return the log without repeated times; raises LogError if times fall, or are in another unit.
+    """Return the log without repeated times and rare signals.
 
+    Raises LogError if times fall, or are in another unit.
     `fix` says how to log faster.
     """
-    signals, faults = {}, []
+    signals, faults, remarks = {}, [], list(log.remarks)
     for name, signal in log.signals.items():
         step_s = np.diff(signal.time_s)
         if (step_s < 0.0).any():
@@ -141,14 +146,17 @@ def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
             )
             break
         fresh = np.append(step_s > 0.0, values=True)
-        signals[name] = Signal(signal.time_s[fresh], signal.value[fresh], signal.column)
         period_s = float(np.median(step_s[step_s > 0.0])) if (step_s > 0.0).any() else 0.0
+        rate = f"{echo(signal.column)} has a sample every {period_s:.3g} s by the time {echo(clock)}"
+        if name in OPTIONAL and period_s > LONGEST_OPTIONAL_PERIOD_S:
+            remarks.append(f"{log.name}: {rate}: left out, because that is too rare")
+            continue
         if name in REQUIRED and not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
             faults.append(
-                f"{log.name}: {echo(signal.column)} has a sample every {period_s:.3g} s by the time "
-                f"{echo(clock)}; that must be {SHORTEST_PERIOD_S:g}..{LONGEST_PERIOD_S:g} s: {fix}"
+                f"{log.name}: {rate}; that must be {SHORTEST_PERIOD_S:g}..{LONGEST_PERIOD_S:g} s: {fix}"
             )
             break
+        signals[name] = Signal(signal.time_s[fresh], signal.value[fresh], signal.column)
     if faults:
         raise LogError(tuple(faults))
-    return FlightLog(log.name, signals, log.remarks)
+    return FlightLog(log.name, signals, tuple(remarks))

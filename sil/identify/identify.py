@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.errors import LogError
 from mambo_nmpc.sil.identify.axis import AxisFit, fit_axis, judge_axis
 from mambo_nmpc.sil.identify.checks import EXCITED_RAD, NAMES, check_log, check_units
@@ -47,9 +48,15 @@ def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> list[Flig
     """Read CSV files and, by their ending .ulg, ULog files; raises LogError with the faults of all."""
     logs: list[FlightLog] = []
     faults: list[str] = []
-    for path in paths:
+    ulogs = [path.suffix.lower() == ".ulg" for path in paths]
+    if columns and all(ulogs):
+        faults.append("--columns is for CSV files; a ULog needs none")
+    for path, is_ulog in zip(paths, ulogs, strict=True):
+        if sum(path.resolve() == other.resolve() for other in paths) > 1:
+            faults.append(f"{echo(str(path))}: is named twice; a log counts once")
+            continue
         try:
-            logs.append(read_ulog(path) if path.suffix.lower() == ".ulg" else read_csv(path, columns))
+            logs.append(read_ulog(path) if is_ulog else read_csv(path, columns))
         except LogError as error:
             faults += error.faults
     if faults:

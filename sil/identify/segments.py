@@ -97,18 +97,24 @@ class Segment:
 
 def cut(log: FlightLog) -> list[Segment]:
     """Return the stretches of a log without gap, tumble or ground contact, each of `SHORTEST_S` or more."""
-    needed = [log.signals[name] for name in (*COMMANDS, *TILTS)]
-    start_s = max(signal.time_s[0] for signal in needed)
-    end_s = min(signal.time_s[-1] for signal in needed)
-    if end_s - start_s < SHORTEST_S:
-        return []
-    time_s = start_s + PERIOD_S * np.arange(int((end_s - start_s) / PERIOD_S) + 1)
-    flown = np.ones(len(time_s), np.bool_)
-    for signal in needed:
-        _strike_gaps(flown, time_s, signal)
+    moves = next((names for names in (VELOCITY, POSITION) if all(name in log.signals for name in names)), ())
+    names = (*COMMANDS, *TILTS, *moves, *(name for name in (YAW,) if name in log.signals))
+    commands = HeldCommand.of(log.signals[COMMANDS[0]]), HeldCommand.of(log.signals[COMMANDS[1]])
+    found = []
+    for start_s, end_s in _gapless([log.signals[name] for name in names]):
+        if end_s - start_s >= SHORTEST_S:
+            time_s = start_s + PERIOD_S * np.arange(int((end_s - start_s) / PERIOD_S) + 1, dtype=np.float64)
+            found += _cut_stretch(log, commands, time_s)
+    return found
+
+
+def _cut_stretch(
+    log: FlightLog, commands: tuple[HeldCommand, HeldCommand], time_s: FloatArray
+) -> list[Segment]:
+    """Return the stretches of a part (m,) without gaps that have neither tumble nor ground contact."""
     tilt_rad = np.stack([_onto(time_s, log.signals[name]) for name in TILTS])
     tumbling = np.asarray((np.abs(tilt_rad) > LARGEST_TILT_RAD).any(axis=0))
-    flown &= ~_widen(tumbling, TUMBLE_MARGIN_S)
+    flown = ~_widen(tumbling, TUMBLE_MARGIN_S)
     grounded = _grounded(log, time_s)
     if not grounded.all():
         flown &= ~_widen(grounded, GROUND_MARGIN_S)
@@ -116,7 +122,6 @@ def cut(log: FlightLog) -> list[Segment]:
     yaw = _onto(time_s, log.signals[YAW], turn=True) if YAW in log.signals else np.zeros_like(time_s)
     thrust = log.signals.get(THRUST)
     thrust_m_s2 = None if thrust is None else _onto(time_s, thrust)
-    commands = HeldCommand.of(log.signals[COMMANDS[0]]), HeldCommand.of(log.signals[COMMANDS[1]])
     return [
         Segment(
             log.name,
@@ -143,10 +148,19 @@ def _onto(time_s: FloatArray, signal: Signal, *, turn: bool = False) -> FloatArr
     return np.interp(time_s, signal.time_s, value)
 
 
-def _strike_gaps(flown: NDArray[np.bool_], time_s: FloatArray, signal: Signal) -> None:
-    """Mark the times inside a gap of a signal as not flown."""
-    for at in np.flatnonzero(np.diff(signal.time_s) > LONGEST_GAP_S):
-        flown[(time_s > signal.time_s[at]) & (time_s < signal.time_s[at + 1])] = False
+def _gapless(signals: Sequence[Signal]) -> list[tuple[float, float]]:
+    """Return begin and end of every time in which no signal has a gap of more than `LONGEST_GAP_S`."""
+    gaps = []
+    for signal in signals:
+        wide = np.flatnonzero(np.diff(signal.time_s) > LONGEST_GAP_S)
+        gaps += list(zip(signal.time_s[wide].tolist(), signal.time_s[wide + 1].tolist(), strict=True))
+    begin_s = max(float(signal.time_s[0]) for signal in signals)
+    end_s = min(float(signal.time_s[-1]) for signal in signals)
+    found = []
+    for gap_begin_s, gap_end_s in sorted(gaps):
+        found.append((begin_s, min(gap_begin_s, end_s)))
+        begin_s = max(begin_s, gap_end_s)
+    return [*found, (begin_s, end_s)]
 
 
 def _grounded(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:

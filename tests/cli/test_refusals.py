@@ -12,7 +12,7 @@ from tests.support.command import run
 COMMANDS = ["generate", "fly", "table2", "footprint", "sweep", "faults", "verify", "campaign", "tune"]
 
 
-@pytest.mark.parametrize("command", [*COMMANDS, "init"])
+@pytest.mark.parametrize("command", [*COMMANDS, "init", "identify"])
 def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
     """It would be the current folder."""
     said, talk = run(command, "-o", "", code=2)

@@ -122,6 +122,31 @@ def test_stretches_without_flight_are_left_out() -> None:
     assert 34.0 < summary.duration_s < 38.0
 
 
+def test_a_clock_that_jumps_is_a_gap() -> None:
+    """By a second, or by fifty years, as when a clock is set in flight."""
+    log = fly(TRUTH, Flown(duration_s=40.0), 1)[0]
+    late = log["time_s"] + np.where(np.arange(4000) < 2000, 0.0, 1.7e9)
+    summary = found(log | {"time_s": late})
+    demand_truth(summary, TRUTH)
+    assert summary.duration_s == pytest.approx(40.0, abs=0.1)
+
+
+def test_an_outage_of_the_position_is_cut_out() -> None:
+    """A second without velocity, and a velocity that is too rare to be used."""
+    columns = fly(TRUTH, Flown(), 1)[0]
+    log = log_of(columns)
+    kept = np.abs(columns["time_s"] - 15.0) > 0.5
+    signals = dict(log.signals)
+    for name in ("vx_m_s", "vy_m_s"):
+        signal = signals[name]
+        signals[name] = replace(signal, time_s=signal.time_s[kept], value=signal.value[kept])
+    summary = identify([replace(log, signals=signals)])[0]
+    demand_truth(summary, TRUTH)
+    assert summary.duration_s == pytest.approx(29.0, abs=0.1)
+    assert summary.motion is not None
+    assert abs(summary.motion.acceleration_per_tilt.value - TRUTH.acceleration_per_tilt) < 0.04
+
+
 def demand_cover(estimates: list[Interval], truths: list[float], least: float) -> None:
     """Demand that a share of the intervals covers the truth, and that they are not wide without need."""
     inside = [abs(one.value - truth) <= one.within for one, truth in zip(estimates, truths, strict=True)]

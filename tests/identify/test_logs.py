@@ -147,6 +147,30 @@ def test_many_faults_of_a_file_are_counted(tmp_path: Path) -> None:
     assert faults[-1] == "and 3995 more fields that are no number"
 
 
+def test_rare_signals_are_left_out(tmp_path: Path) -> None:
+    """A yaw with every twentieth row, which is said."""
+    path = write_log(FLOWN, tmp_path / "log.csv")
+    lines = [line.split(",") for line in path.read_text("utf-8").splitlines()]
+    place = lines[0].index("yaw_rad")
+    for number, line in enumerate(lines[1:]):
+        line[place] = line[place] if number % 20 == 0 else ""
+    path.write_text("\n".join(map(",".join, lines)), "utf-8")
+    log = read(Path("log.csv"))
+    assert "yaw_rad" not in log.signals
+    assert log.remarks == (
+        "log.csv: yaw_rad has a sample every 0.2 s by the time time_s: left out, because that is too rare",
+    )
+
+
+def test_a_log_counts_once(tmp_path: Path) -> None:
+    """Twice the same would halve the intervals; and a ULog has no columns to name."""
+    path = write_log(FLOWN, tmp_path / "log.csv")
+    with pytest.raises(LogError, match=r"log.csv: is named twice"):
+        read_logs([path, Path("log.csv")], {})
+    with pytest.raises(LogError, match="--columns is for CSV files"):
+        read_logs([Path("log.ulg")], parse_columns("x_m=x"))
+
+
 def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     """Missing, a folder, a pipe, too large; all logs' faults at once."""
     huge, pipe = tmp_path / "huge.csv", tmp_path / "pipe.csv"
