@@ -30,8 +30,8 @@ SINES_HZ: Final = (0.5, 0.9, 1.6, 2.6, 3.7, 5.1)
 SINES_RAD: Final = DEGREE
 """Rms of the tilt that the sum of sines needs."""
 
-PERIOD_S: Final = 0.02
-"""Time between two waypoints."""
+PERIOD_S: Final = 0.01
+"""Time between two waypoints: an update of the controller, so that its target accelerates evenly."""
 
 _SCRIPT: Final = "crazyflie.py.j2"
 
@@ -91,7 +91,7 @@ def waypoints_csv() -> str:
     """Return the manoeuvre as the waypoints that `fly --trajectory` reads."""
     time_s = PERIOD_S * np.arange(round(DURATION_S / PERIOD_S) + 1, dtype=np.float64)
     rows = zip(time_s.tolist(), *(each.tolist() for each in reference_m(time_s)), strict=True)
-    lines = [f"{time:.2f},{x + 0.0:.5f},{y + 0.0:.5f}" for time, x, y in rows]
+    lines = [f"{time:.2f},{x + 0.0:.7f},{y + 0.0:.7f}" for time, x, y in rows]
     return "\n".join(["time_s,x_m,y_m", *lines]) + "\n"
 
 
