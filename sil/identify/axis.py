@@ -28,6 +28,9 @@ GOOD_COMMAND_RAD: Final = 2.0 * DEGREE
 GAINS: Final = (0.4, 1.5)
 """Bounds on a plausible gain."""
 
+VAGUE_GAIN, VAGUE_LAG_S = 0.1, 0.05
+"""Half-widths of the intervals of gain and lag beyond which an axis is weak."""
+
 SHORT_DELAY_S, LONG_DELAY_S = 0.002, 0.15
 """Dead times beyond which an offset between two clocks is likely."""
 
@@ -131,12 +134,15 @@ def _refusals(command_rad: float, flown_s: float, fit: AxisFit) -> list[str]:
 
 def _weaknesses(command_rad: float, flown_s: float, fit: AxisFit) -> list[str]:
     """Return why an axis that is not refused is weak."""
-    delay_s = fit.whole.delay_s
+    delay_s, gain, lag_s = fit.whole.delay_s, fit.intervals.gain.within, fit.intervals.lag_s.within
     clocks = f"a dead time of {1e3 * delay_s:.0f} ms: do command and measured tilt share a clock?"
     found = {
         f"commanded by {command_rad / DEGREE:.1f} degrees (rms); 2 degrees make it good": command_rad
         < GOOD_COMMAND_RAD,
         f"{flown_s:.0f} s of flight; {GOOD_FIT_S:g} s make it good": flown_s < GOOD_FIT_S,
+        f"the gain is known within {gain:.2f} only; fly more than one frequency": gain > VAGUE_GAIN,
+        f"the lag is known within {1e3 * lag_s:.0f} ms only; fly more than one frequency": lag_s
+        > VAGUE_LAG_S,
         "the lag ended at a bound of its search": fit.whole.lag_at_bound,
         clocks: not SHORT_DELAY_S < delay_s < LONG_DELAY_S,
     }

@@ -37,6 +37,9 @@ SURPLUS_S: Final = 0.005
 """Factors on the 95 % intervals, and what is added to those of times. Residuals of real logs are correlated
 for longer than the window; with these factors the intervals hold from flight to flight."""
 
+_LEAST_VARIANCE: Final = 1e-12
+"""Least variance of the residuals that intervals assume."""
+
 Masks = Sequence[NDArray[np.bool_]]
 
 
@@ -157,18 +160,20 @@ def newey_west(slopes: Sequence[FloatArray], errors: Sequence[FloatArray], windo
     """Return the covariance (p, p) of least-squares parameters whose residuals are correlated.
 
     `slopes` (m, p) and `errors` (m,) are those of each segment; correlations beyond `window` samples, and
-    between segments, are taken as 0 (Newey and West 1987).
+    between segments, are taken as 0 (Newey and West 1987). A combination of parameters that the samples do
+    not show gets the variance 1.
     """
     whole = np.concatenate(list(slopes))
-    bread = np.linalg.pinv(whole.T @ whole)
-    meat = np.zeros_like(bread)
+    samples, parameters = whole.shape
+    variance = max(root_mean_square(errors) ** 2, _LEAST_VARIANCE)
+    meat = variance * variance * np.eye(parameters)
     for slope, error in zip(slopes, errors, strict=True):
         scores = slope * error[:, np.newaxis]
         meat += scores.T @ scores
         for lag in range(1, min(window, len(scores) - 1) + 1):
             cross = scores[lag:].T @ scores[:-lag]
             meat += (1.0 - lag / (window + 1.0)) * (cross + cross.T)
-    samples, parameters = whole.shape
+    bread = np.linalg.inv(whole.T @ whole + variance * np.eye(parameters))
     return np.asarray(bread @ meat @ bread * (samples / max(samples - parameters, 1)))
 
 

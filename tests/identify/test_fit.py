@@ -48,6 +48,25 @@ def test_thirty_seconds_of_the_figure_of_eight_suffice(seed: int) -> None:
             assert abs(trim.value - truth) < 0.01
 
 
+def test_one_frequency_cannot_tell_lag_from_dead_time() -> None:
+    """Their sum and the gain are found; the interval of the lag says so, and the verdict is weak."""
+    time_s, lag_s = 0.01 * np.arange(3000.0), 0.14
+    random = np.random.default_rng(1)
+    phase = 1.2 * (time_s - 0.005)
+    command = 0.1 * np.sin(phase + 0.006)
+    share = 1.0 / (1.0 + (1.2 * lag_s) ** 2)
+    later = phase - 1.2 * 0.03
+    tilt = 0.1 * share * (np.sin(later) - 1.2 * lag_s * np.cos(later)) + 0.002 * random.normal(size=3000)
+    log = {"time_s": time_s, "roll_command_rad": command, "pitch_command_rad": command}
+    summary = found(log | {"roll_rad": tilt, "pitch_rad": tilt})
+    for axis, fit in zip(summary.axes.values(), fits(summary), strict=True):
+        assert axis.verdict == "weak"
+        assert any("the lag is known within" in reason for reason in axis.reasons)
+        assert abs(fit.gain.value - 1.0) < fit.gain.within < 0.05
+        assert abs(fit.sum_s.value - lag_s - 0.03) < fit.sum_s.within < 0.02
+        assert abs(fit.lag_s.value - lag_s) < fit.lag_s.within
+
+
 @pytest.mark.parametrize(
     "truth",
     [
