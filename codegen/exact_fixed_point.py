@@ -113,7 +113,7 @@ def _formats(*sections: Any) -> ExactFormats:
         "feedback": fractional_bits(*feedback) if any(feedback) else 0,
         "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
         "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
-        "ratio": fractional_bits(*np.abs(law.ratios).flat) if law.moves == 2 else 0,
+        "ratio": fractional_bits(*np.abs(law.ratios)) if law.moves == 2 else 0,
         "per_step": fractional_bits(1 / period_s),
         "per_step2": fractional_bits(1 / period_s**2),
     }
@@ -200,9 +200,8 @@ def _bounds(settings: Sections) -> _Bounds:
     rows = max(np.max(np.sum(np.abs(row), axis=-1)) for row in (attitude.tilt_row, attitude.integral_row))
     move = float(np.max(np.abs(law.rows) @ [states[name] for name in STATES]))
     if law.moves == 2:
-        ratio = max(1.0, float(np.max(np.abs(law.ratios))))
         limit = float(np.max(attitude.command_limit_m_step2))
-        move = ratio * (move + (ratio * (move + limit)) + limit)
+        move += float(np.max(np.abs(law.ratios))) * (move + limit)
     return _Bounds(
         states=states,
         position=max(states["e"], reach_m + corrections[0], reach_m + speed + acceleration),

@@ -44,8 +44,8 @@ class QuadraticConstants:
     moves:          1, or 2 with a ramp.
     rows:           (2, moves, 8) the unlimited minimum, the free moves in m/step^2, from the state; axis 0 is
                     right (roll), axis 1 forward (pitch).
-    ratios:         (2, 3) of the second derivatives H of the cost by two moves: H12/H11, H12/H22, H22/H11;
-                    (2, 0) for one move.
+    ratios:         (2,) H12/H11 of the second derivatives H of the cost by two moves: by how much the best
+                    first move falls when the second rises; 0 for one move.
     spectral_radius: (2,) of the closed loop without limits.
     """
 
@@ -66,7 +66,7 @@ def _constants(horizon: Horizon, model: Model, cost: Cost, damping: Damping) -> 
     return QuadraticConstants(
         moves=laws[0].rows.shape[0],
         rows=np.array([law.rows for law in laws]),
-        ratios=np.array([law.ratios for law in laws]),
+        ratios=np.array([law.ratio for law in laws]),
         spectral_radius=np.array([law.spectral_radius for law in laws]),
     )
 
@@ -83,20 +83,20 @@ class _Law:
         self._input_cost = mp.matrix([[(mp.mpf(cost.response_time_s) ** 3 / period_s) ** 2]])
         self._to_go = solve_riccati(self._transition, self._input, self._state_cost, self._input_cost)
         ramp = round(horizon.ramp_s / horizon.update_period_s)
-        rows, ratios = self._two_moves(ramp) if ramp else self._one_move()
+        rows, ratio = self._two_moves(ramp) if ramp else self._one_move()
         scale = _scale(loop, period_s)
         self.rows = np.array(
             [[float(rows[move, k] * scale[k]) for k in range(8)] for move in range(rows.rows)]
         )
-        self.ratios = [float(ratio) for ratio in ratios]
+        self.ratio = float(ratio)
         self.spectral_radius = self._spectral_radius(rows)
 
-    def _one_move(self) -> tuple[Matrix, list[Any]]:
+    def _one_move(self) -> tuple[Matrix, Any]:
         rows = -feedback_gain(self._transition, self._input, self._input_cost, self._to_go)
         rows[0, _COMMAND] += 1
-        return rows, []
+        return rows, mp.mpf(0)
 
-    def _two_moves(self, ramp: int) -> tuple[Matrix, list[Any]]:
+    def _two_moves(self, ramp: int) -> tuple[Matrix, Any]:
         """Sum the cost over both moves as a quadratic form of state and moves, and minimise it."""
         form = mp.zeros(10)
         form[:8, :8] = self._to_go
@@ -111,12 +111,7 @@ class _Law:
             cost += self._input_cost[0] * (change.T * change)
             form = sum_costs(transition, cost, form, steps)
         curvature = form[8:, 8:]
-        ratios = [
-            curvature[0, 1] / curvature[0, 0],
-            curvature[0, 1] / curvature[1, 1],
-            curvature[1, 1] / curvature[0, 0],
-        ]
-        return -(mp.inverse(curvature) * form[8:, :8]), ratios
+        return -(mp.inverse(curvature) * form[8:, :8]), curvature[0, 1] / curvature[0, 0]
 
     def _spectral_radius(self, rows: Matrix) -> float:
         """Return the spectral radius of the states that the command moves."""

@@ -93,8 +93,7 @@ def test_two_moves_are_the_minimum_of_a_simulated_cost() -> None:
             rows = -np.linalg.solve(curvature, slope)
             used = axis.scale != 0
             assert in_si(settings)[index][:, used] == pytest.approx(rows[:, used], rel=1e-8)
-            (h11, h12), (_, h22) = curvature
-            assert law.ratios[index] == pytest.approx([h12 / h11, h12 / h22, h22 / h11], rel=1e-9)
+            assert law.ratios[index] == pytest.approx(curvature[0, 1] / curvature[0, 0], rel=1e-9)
 
 
 def test_a_cost_of_many_steps_is_the_sum_of_its_steps() -> None:
@@ -213,8 +212,7 @@ def test_two_moves_have_the_digits_of_the_flown_controller() -> None:
         *(-6.624725, -2.884852, -0.588049, 0.057918, -0.265591, -0.145323, -0.043196, 0.720681),
         *(-5.687594, -5.795883, -2.509028, 0.561034, -0.597956, -0.795338, -0.101963, -0.809781),
     ]
-    h11, h12, h22 = 0.3274581, 0.1802868, 0.1604498
-    assert design.law.ratios[0] == pytest.approx([h12 / h11, h12 / h22, h22 / h11], rel=5e-7)
+    assert design.law.ratios[0] == pytest.approx(0.1802868 / 0.3274581, rel=5e-7)
     transition, command = attitude_model(design.settings, "roll")
     assert printed(transition, 7) == [
         *(0.9282866, 0.0330256, 0.0581182),

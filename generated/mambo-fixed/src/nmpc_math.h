@@ -150,7 +150,7 @@ static inline nmpc_real_t nmpc_feedback_product(nmpc_real_t factor, nmpc_real_t 
 
 static inline nmpc_real_t nmpc_ratio_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 31);
+    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 32);
 }
 
 static inline nmpc_real_t nmpc_change_product(nmpc_real_t factor, nmpc_real_t value)
@@ -202,7 +202,7 @@ static inline nmpc_real_t nmpc_position_change(nmpc_real_t velocity_m_step)
 
 static inline nmpc_real_t nmpc_move_acceleration(nmpc_real_t move_m_step2)
 {
-    return move_m_step2 * ((nmpc_real_t)1 << 10);
+    return move_m_step2 * ((nmpc_real_t)1 << 9);
 }
 
 /* Sums of the products of a row. */
@@ -213,7 +213,7 @@ static inline nmpc_real_t nmpc_attitude_sum(nmpc_sum_t sum)
 
 static inline nmpc_real_t nmpc_row_sum(nmpc_sum_t sum)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(sum, 33);
+    return (nmpc_real_t)NMPC_ROUNDED(sum, 32);
 }
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, with absolute errors of at most 2e-09. */

@@ -14,8 +14,12 @@
  *
  * Free are U1, the command of this control step, and U2, to which the command then runs in a ramp of 0.4 s; behind
  * it the cost to go is that of the Riccati equation. Without limits the minimum is U = rows [e v w j a i c u]. Each of
- * U1 and U2 is limited to the same box, and the minimum in the box is found in closed form: at most one comparison of
- * two costs.
+ * U1 and U2 is limited to the same box. With H the second derivatives of the cost, the minimum in the box has
+ *
+ *     U1 = clamp(U1 - H12/H11 (clamp(U2) - U2)):
+ *
+ * the best U1 beside U2 at its limit, if U2 is beyond it. The minimum could be elsewhere only with U1 at its limit and
+ * U2 within: then U1 is so far beyond, H12^2 being less than H11 H22, that this line cuts it off at the same limit.
  * The axes do not interact, so there is one such problem for each.
  */
 #ifndef NMPC_OPTIMIZER_H
