@@ -192,8 +192,13 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
 
 def quadratic_case(index: int, scalar: str) -> Settings:
     """Make the valid settings number `index`: the corners first, then random ones of a seed."""
+    return settings_of(case_values(index) | {"code.scalar": scalar})
+
+
+def case_values(index: int) -> Values:
+    """Return the values of the settings number `index` by their dotted paths."""
     if index < len(CORNER_SETTINGS):
-        return settings_of(CORNER_SETTINGS[index] | {"code.scalar": scalar})
+        return CORNER_SETTINGS[index]
     rng = np.random.default_rng(index)
 
     def some(low: float, high: float) -> float:
@@ -218,7 +223,6 @@ def quadratic_case(index: int, scalar: str) -> Settings:
         "observer.outage_s": float(rng.integers(0, 40)) * period_s if period_s < 0.05 else 0.3,
         "ranges.position_m": float(rng.choice([5.0, 1000.0, 10000.0])),
         "ranges.velocity_m_s": float(rng.choice([2.0, 100.0])),
-        "code.scalar": scalar,
     }
     noises = ("acceleration_noise", "disturbance_noise", "position_noise", "velocity_noise")
     values |= {f"observer.{name}": float(10.0 ** rng.uniform(-3, 1)) for name in noises}
@@ -234,7 +238,7 @@ def quadratic_case(index: int, scalar: str) -> Settings:
             * min(0.2, 0.9 * gain * tilt_rad)
             * rng.uniform(-1, 1),
         }
-    return settings_of(values)
+    return values
 
 
 def quadratic_settings(scalar: str = "float32", **horizon: Any) -> Settings:
