@@ -13,7 +13,7 @@ FILES = ("sweep.csv", "sweep.png", "sweep.svg")
 
 
 def sweep(
-    source: Source = "mambo",
+    source: Source = "mambo-1norm",
     *,
     scalar: Scalar = None,
     board: Annotated[

@@ -16,7 +16,7 @@ from mambo_nmpc.sil.controllers.pd import PdController, pd_controller
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.metrics import measure, saturated_share
 from mambo_nmpc.sil.flight.names import PD_NAMES, PdName
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
@@ -77,6 +77,8 @@ def test_a_crash_at_the_start_of_the_clock_counts() -> None:
 def expected_row(trace: Trace, pd: str) -> dict[str, object]:
     """Return the row of a flight of a PD alone, without its counts."""
     row: dict[str, object] = {f"{pd}_trace_sha256": trace.digest()}
+    limit_rad = Settings().limits.tilt_rad
+    row[f"{pd}_saturated_share"] = float(saturated_share(trace.command_rad, float(np.float32(limit_rad)))[0])
     row |= {f"{pd}_{name}": float(values[0]) for name, values in vars(measure(trace)).items()}
     if isinstance(trace, SensedTrace):
         seen = vars(measure(trace.as_seen()))
@@ -96,7 +98,8 @@ def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -
         alone = fly(single, pd_controller(pd, single))
         assert (alone.status == NOT_CALLED).any()
         assert row == {f"{pd}_crashed": 0, f"{pd}_refused_updates": 0} | expected_row(alone, pd)
-        assert set(row) == set(columns([pd], sensed=sensors != "none"))
+        titles = {*columns([pd], sensed=sensors != "none"), f"{pd}_saturated_share"}
+        assert set(row) == titles
 
 
 def test_the_table_has_crashes_and_counts_before_metrics_and_digest() -> None:
@@ -115,6 +118,8 @@ def test_an_update_is_refused_when_the_controller_was_called_and_did_not_accept(
     trace = flown()
     trace.status[:, 1] = NOT_CALLED
     trace.status[[1, 2, 9], 1] = [Status.OK, Status.BAD_STATE, Status.BAD_TARGET]
-    found = _evaluate(trace, float(np.abs(trace.command_rad).max()), NOMINAL)
+    trace.command_rad[:] = 0.0
+    trace.command_rad[:51, 1, 0] = 0.35
+    found = _evaluate(trace, 0.35, NOMINAL)
     assert found["refused_updates"] == [0, 2]
-    assert 0 < max(found["saturated_share"]) < 1
+    assert found["saturated_share"] == [0.0, 51 / len(trace.time_s)]

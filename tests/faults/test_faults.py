@@ -356,8 +356,8 @@ LINES
 
 def test_the_table_has_one_row_per_fault() -> None:
     """Both courses are side by side; a column for both shows the worse."""
-    worse: dict[str, Any] = {"largest_command_rad": 0.35, "saturated_share": 0.5, "end": End.AWAY}
-    text = table([VERDICT, replace(VERDICT, course="hover", **worse)])
+    worse = replace(VERDICT, largest_command_rad=0.35, saturated_share=0.5, end=End.AWAY)
+    text = table([VERDICT, replace(worse, course="hover")])
     assert "| state NaN, 1 s | BAD_STATE | 0.35 | 0.40 | 50.0 | 1.00 | 2.0 | 1.00 | 2.0 | away |" in text
     assert "eight 0.100 m, hover 0.100 m" in text
 
