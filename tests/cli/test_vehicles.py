@@ -76,10 +76,11 @@ def test_a_wrong_drone_is_refused_and_nothing_is_left(command: str) -> None:
     if command == "tune":
         require_module("optuna")
     Path("wrong.toml").write_text(DRONE.replace("0.03\n", "-1\n", 1), "utf-8")
-    _, said = run(command, "--vehicle", "wrong.toml", "-o", "out", code=2)
+    source = ["mambo-1norm"] if command == "sweep" else []
+    _, said = run(command, *source, "--vehicle", "wrong.toml", "-o", "out", code=2)
     assert said.startswith("wrong.toml: body.mass_kg = -1 must lie in 0.001..100")
     assert not Path("out").exists()
-    _, said = run(command, "--vehicle", "crazyfly", "-o", "out", code=2)
+    _, said = run(command, *source, "--vehicle", "crazyfly", "-o", "out", code=2)
     assert said.startswith("crazyfly is neither a shipped vehicle nor a file (did you mean crazyflie?)")
 
 
@@ -128,7 +129,7 @@ def test_a_campaign_flies_another_drone_and_its_flights_replay() -> None:
 def test_a_study_states_its_drone() -> None:
     """In its summary and in its identity."""
     require_module("optuna")
-    text = 'flights = 1\n[flight]\nduration_s = 1.0\nvehicle = "mine.toml"\n'
+    text = 'flights = 1\nbase = "mambo-1norm"\n[flight]\nduration_s = 1.0\nvehicle = "mine.toml"\n'
     Path("tune.toml").write_text(text + "[search]\noptimizer.iterations = { choice = [4, 5] }\n", "utf-8")
     run("tune", "tune.toml", "--trials", "1", "--workers", "1", "-o", "out")
     assert summary("out")["vehicle"] == presets.load("mine.toml").model_dump()
@@ -163,8 +164,8 @@ def test_faults_and_sweeps_state_their_drone() -> None:
     """In their summaries."""
     run("faults", "--vehicle", "mine.toml", "-o", "faults")
     assert summary("faults")["vehicle"]["name"] == "mine"
-    small = ["--prediction", "5", "--control", "1", "--iterations", "3"]
-    run("sweep", "--vehicle", "mine.toml", *small, "-o", "mine")
+    small = ["mambo-1norm", "--prediction", "5", "--control", "1", "--iterations", "3"]
+    run("sweep", *small, "--vehicle", "mine.toml", "-o", "mine")
     run("sweep", *small, "-o", "mambo")
     assert summary("mine")["vehicle"]["name"] == "mine"
     assert summary("mine")["points"][0]["iae_m_s"] != summary("mambo")["points"][0]["iae_m_s"]
