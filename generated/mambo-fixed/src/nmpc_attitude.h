@@ -47,8 +47,8 @@ extern "C" {
 #define NMPC_PITCH_TRIM_COMMAND_RAD 0
 
 /* The largest |u| that a move may have, and the largest |a|, |i| and |c|, and |u| when it turns. */
-#define NMPC_RIGHT_LIMIT_M_STEP2 23042
-#define NMPC_FORWARD_LIMIT_M_STEP2 23042
+#define NMPC_RIGHT_LIMIT_M_STEP2 46084
+#define NMPC_FORWARD_LIMIT_M_STEP2 46084
 #define NMPC_ATTITUDE_LIMIT_M_STEP2 62212207
 
 /* Set the model to the steady attitude of a command. */

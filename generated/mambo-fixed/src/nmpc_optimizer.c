@@ -23,11 +23,8 @@ static const nmpc_real_t rows[2][2][NMPC_STATES] = {
     }
 };
 
-/* H12/H11, H12/H22 and H22/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
-static const nmpc_real_t ratios[2][3] = {
-    { 679905287, 1726101373, 845886289 },
-    { 681643300, 1722679844, 849732959 }
-};
+/* H12/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
+static const nmpc_real_t ratios[2] = { 1359810574, 1363286600 };
 
 static nmpc_real_t row_product(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
 {
@@ -41,38 +38,11 @@ static nmpc_real_t row_product(const nmpc_real_t row[NMPC_STATES], const nmpc_re
     return nmpc_row_sum(sum);
 }
 
-/* The cost above the minimum without limits, over H11/2, of moves that differ from it by these. */
-static nmpc_sum_t excess(const nmpc_real_t ratio[3], nmpc_real_t first_m_step2, nmpc_real_t second_m_step2)
-{
-    const nmpc_sum_t cross = (nmpc_sum_t)nmpc_ratio_product(ratio[0], second_m_step2) * first_m_step2;
-    const nmpc_sum_t square = (nmpc_sum_t)nmpc_ratio_product(ratio[2], second_m_step2) * second_m_step2;
-
-    return (((nmpc_sum_t)first_m_step2 * first_m_step2) + (cross + cross)) + square;
-}
-
 nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
 {
-    const nmpc_real_t *const ratio = ratios[axis];
     const nmpc_real_t first = row_product(rows[axis][0], state);
     const nmpc_real_t second = row_product(rows[axis][1], state);
-    const nmpc_real_t first_limited = nmpc_clamp(first, limit_m_step2);
-    nmpc_real_t move = first_limited;
+    const nmpc_real_t second_change = nmpc_clamp(second, limit_m_step2) - second;
 
-    if (nmpc_within(second, limit_m_step2) == 0) {
-        /* The second move is at its limit: the best first one beside it. */
-        const nmpc_real_t second_change = nmpc_clamp(second, limit_m_step2) - second;
-
-        move = nmpc_clamp(first - nmpc_ratio_product(ratio[0], second_change), limit_m_step2);
-        if (nmpc_within(first, limit_m_step2) == 0) {
-            /* Or the first one is: the best second one beside it. */
-            const nmpc_real_t first_change = first_limited - first;
-            const nmpc_real_t other =
-                nmpc_clamp(second - nmpc_ratio_product(ratio[1], first_change), limit_m_step2);
-
-            if (excess(ratio, first_change, other - second) < excess(ratio, move - first, second_change)) {
-                move = first_limited;
-            }
-        }
-    }
-    return move;
+    return nmpc_clamp(first - nmpc_ratio_product(ratios[axis], second_change), limit_m_step2);
 }

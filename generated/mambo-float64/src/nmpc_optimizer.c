@@ -27,11 +27,8 @@ static const nmpc_real_t rows[2][2][NMPC_STATES] = {
     }
 };
 
-/* H12/H11, H12/H22 and H22/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
-static const nmpc_real_t ratios[2][3] = {
-    { 0.3166055711186864, 0.8037785874937275, 0.39389649841991725 },
-    { 0.3174148966671222, 0.8021853136187601, 0.39568774356541525 }
-};
+/* H12/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
+static const nmpc_real_t ratios[2] = { 0.3166055711186864, 0.3174148966671222 };
 
 static nmpc_real_t row_product(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
 {
@@ -45,38 +42,11 @@ static nmpc_real_t row_product(const nmpc_real_t row[NMPC_STATES], const nmpc_re
     return sum;
 }
 
-/* The cost above the minimum without limits, over H11/2, of moves that differ from it by these. */
-static nmpc_sum_t excess(const nmpc_real_t ratio[3], nmpc_real_t first_m_step2, nmpc_real_t second_m_step2)
-{
-    const nmpc_sum_t cross = (ratio[0] * second_m_step2) * first_m_step2;
-    const nmpc_sum_t square = (ratio[2] * second_m_step2) * second_m_step2;
-
-    return ((first_m_step2 * first_m_step2) + (cross + cross)) + square;
-}
-
 nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
 {
-    const nmpc_real_t *const ratio = ratios[axis];
     const nmpc_real_t first = row_product(rows[axis][0], state);
     const nmpc_real_t second = row_product(rows[axis][1], state);
-    const nmpc_real_t first_limited = nmpc_clamp(first, limit_m_step2);
-    nmpc_real_t move = first_limited;
+    const nmpc_real_t second_change = nmpc_clamp(second, limit_m_step2) - second;
 
-    if (nmpc_within(second, limit_m_step2) == 0) {
-        /* The second move is at its limit: the best first one beside it. */
-        const nmpc_real_t second_change = nmpc_clamp(second, limit_m_step2) - second;
-
-        move = nmpc_clamp(first - (ratio[0] * second_change), limit_m_step2);
-        if (nmpc_within(first, limit_m_step2) == 0) {
-            /* Or the first one is: the best second one beside it. */
-            const nmpc_real_t first_change = first_limited - first;
-            const nmpc_real_t other =
-                nmpc_clamp(second - (ratio[1] * first_change), limit_m_step2);
-
-            if (excess(ratio, first_change, other - second) < excess(ratio, move - first, second_change)) {
-                move = first_limited;
-            }
-        }
-    }
-    return move;
+    return nmpc_clamp(first - (ratios[axis] * second_change), limit_m_step2);
 }
