@@ -10,7 +10,7 @@ from mambo_nmpc.sil.identify.record import AxisResult, Verdict
 from mambo_nmpc.sil.identify.response import (
     AxisParameters,
     FirstOrder,
-    Response,
+    FittedResponse,
     fit_response,
     intervals,
     residuals,
@@ -42,10 +42,10 @@ LARGEST_SPREAD_S: Final = 0.03
 class AxisFit:
     """The fits of one axis: on all samples, and on the first halves, with errors in the second halves."""
 
-    whole: Response
+    whole: FittedResponse
     intervals: AxisParameters
     first_order: FirstOrder
-    half: Response
+    half: FittedResponse
     r2: float
     error_rad: float
     other_error_rad: float
@@ -149,7 +149,7 @@ def _weaknesses(command_rad: float, flown_s: float, fit: AxisFit) -> list[str]:
     return [words for words, holds in found.items() if holds]
 
 
-def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int, whole: Response) -> list[str]:
+def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int, whole: FittedResponse) -> list[str]:
     """Return the remark that the logs, each fitted alone, have different sums of lag and dead time."""
     useful = [
         each

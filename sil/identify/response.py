@@ -52,7 +52,7 @@ class Interval:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class FittedResponse:
     """Parameters of one axis; `integral_1_s` is 0 without an integrator."""
 
     gain: float
@@ -78,7 +78,7 @@ class Response:
         return np.log(values)
 
 
-def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool) -> Response:
+def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool) -> FittedResponse:
     """Fit one axis of all segments at once, on the samples of `masks`."""
     order = 3 if integrator else 2
     low, high = _LOW[:order], _HIGH[:order]
@@ -95,10 +95,12 @@ def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integr
     gain, parts = _project(logs, segments, axis, masks)
     offsets = tuple(tilt_mean - gain * unit_mean for _, _, unit_mean, tilt_mean in parts)
     values = np.exp(logs).tolist()
-    return Response(gain, values[0], values[1], values[2] if integrator else 0.0, offsets)
+    return FittedResponse(gain, values[0], values[1], values[2] if integrator else 0.0, offsets)
 
 
-def residuals(response: Response, segments: Sequence[Segment], axis: int, masks: Masks) -> list[FloatArray]:
+def residuals(
+    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks
+) -> list[FloatArray]:
     """Return measured less modelled tilt of each segment on the samples of `masks`, offsets as fitted."""
     return [
         (segment.tilt_rad[axis] - response.predict(segment, axis, offset))[mask]
@@ -131,7 +133,9 @@ class AxisParameters:
     integral_1_s: Interval | None
 
 
-def intervals(response: Response, segments: Sequence[Segment], axis: int, masks: Masks) -> AxisParameters:
+def intervals(
+    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks
+) -> AxisParameters:
     """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened."""
     logs = response.logs
     slopes = _slopes(response, logs, segments, axis, masks)
@@ -224,7 +228,7 @@ def _project(
 
 
 def _slopes(
-    response: Response, logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
+    response: FittedResponse, logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
 ) -> list[FloatArray]:
     """Return the derivatives (m, p) of the modelled tilt of each segment: logarithms, gain, each offset."""
     found = []

@@ -1,6 +1,7 @@
 """The controller with a quadratic cost in closed loop with the plant that it models, and in bad weather."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,9 +128,11 @@ def test_a_bad_state_leaves_no_trace_of_its_value() -> None:
     for bad in BAD_STATES:
         drone, controller = LinearDrone(settings, 0.4), ExactReferenceController(Design(settings))
         drone.put((0.4, -0.2))
-        outcomes = fly(
-            controller, drone, 40, lambda step, state, bad=bad: np.array(bad) if 20 <= step < 23 else state
-        )
+
+        def spoil(step: int, state: Any, bad: list[float] = bad) -> Any:
+            return np.array(bad) if 20 <= step < 23 else state
+
+        outcomes = fly(controller, drone, 40, spoil)
         assert [int(outcome.status[0]) for outcome in outcomes[19:24]] == [
             Status.OK,
             *[Status.BAD_STATE] * 3,

@@ -44,6 +44,28 @@ def departures(settings: Settings) -> dict[str, Any]:
             },
         ),
         (
+            "crazyflie",
+            {
+                "horizon.ramp_s": 0.4,
+                "model.roll_lag_s": 0.1347,
+                "model.pitch_lag_s": 0.1347,
+                "model.roll_delay_s": 0.0235,
+                "model.pitch_delay_s": 0.0235,
+                "model.roll_integral_1_s": 0.4616,
+                "model.pitch_integral_1_s": 0.4616,
+                "model.drag_1_s": 0.15,
+                "model.attitude": "predicted",
+                "target.acceleration": "tracked",
+                "cost.norm": "quadratic",
+                "cost.response_time_s": 0.144,
+                "observer.disturbance_noise": 3.0,
+                "observer.position_noise": 0.001,
+                "observer.velocity_noise": 0.15,
+                "observer.age_s": 0.01,
+                "limits.tilt_rad": 0.5,
+            },
+        ),
+        (
             "mambo-1norm",
             {
                 "horizon.prediction_step_s": 0.055,
@@ -70,7 +92,7 @@ def test_preset_departs_from_table_1_where_it_says(name: str, expected: dict[str
 
 def test_every_preset_is_described_in_one_line() -> None:
     """The list of presets has a sentence for each."""
-    assert presets.names() == ("mambo", "mambo-1norm", "table1", "table1-printed")
+    assert presets.names() == ("crazyflie", "mambo", "mambo-1norm", "table1", "table1-printed")
     for name in presets.names():
         description = presets.description(name)
         assert description.endswith(".")
@@ -93,7 +115,10 @@ def test_unknown_source_lists_presets_and_suggests_init(name: str) -> None:
     with pytest.raises(SourceNotFoundError) as caught:
         presets.load(name)
     message = str(caught.value)
-    assert "presets are mambo, mambo-1norm, table1, table1-printed, and `mambo-nmpc init` writes" in message
+    assert (
+        "presets are crazyflie, mambo, mambo-1norm, table1, table1-printed, and `mambo-nmpc init` writes"
+        in message
+    )
     assert ("mamba is neither a preset nor a file (did you mean mambo?)" in message) == (name == "mamba")
     assert message.isprintable()
     assert len(message) < 300

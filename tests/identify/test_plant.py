@@ -15,7 +15,7 @@ from mambo_nmpc.sil.identify.columns import KNOWN, Column
 from mambo_nmpc.sil.identify.identify import identify, read_logs
 from mambo_nmpc.sil.identify.manoeuvre import SINES_HZ, waypoints_csv
 from mambo_nmpc.sil.identify.record import IdentifySummary
-from mambo_nmpc.sil.identify.response import Response
+from mambo_nmpc.sil.identify.response import FittedResponse
 from mambo_nmpc.sil.identify.segments import PERIOD_S, HeldCommand, Segment
 from mambo_nmpc.sil.identify.signals import COMMANDS, Signal
 from mambo_nmpc.sil.sensors.instruments import Sensors
@@ -66,7 +66,7 @@ def rise_s(summary: IdentifySummary, name: str, share: float) -> float:
     step = HeldCommand.of(Signal(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "step"))
     zero = np.zeros_like(time_s)
     segment = Segment("", time_s, (step, step), np.stack([zero, zero]), zero, None, None)
-    response = Response(1.0, fit.lag_s.value, fit.delay_s.value, integral, (0.0,))
+    response = FittedResponse(1.0, fit.lag_s.value, fit.delay_s.value, integral, (0.0,))
     risen = response.predict(segment, 0, 0.0)
     above = int(np.argmax(risen > share))
     return float(np.interp(share, risen[above - 1 : above + 1], time_s[above - 1 : above + 1])) - 1.0
