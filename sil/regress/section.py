@@ -11,7 +11,8 @@ def regress_section(folder: Path, summary: RegressSummary) -> Section:
     """Return the section of a suite."""
     content = {
         "folder": str(folder),
-        "controller": f"{summary.controller}, settings {summary.settings[:16]}",
+        "controller": f"{summary.controller}, settings {summary.settings[:16]}, "
+        f"vehicle {' and '.join(summary.vehicles)}",
         "rows": list(group_rows(summary)),
         "failed": summary.failed[:MOST_SHOWN],
         "more": max(len(summary.failed) - MOST_SHOWN, 0),
