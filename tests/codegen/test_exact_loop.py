@@ -1,7 +1,6 @@
 """The controller with a quadratic cost in closed loop with the plant that it models, and in bad weather."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -121,6 +120,11 @@ def test_a_trim_takes_no_disturbance_to_learn() -> None:
 BAD_STATES = ([np.nan] * 7, [np.inf] + [0.0] * 6, [0.0] * 3 + [1e9] + [0.0] * 3, [0.0] * 6 + [-np.inf])
 
 
+def told_in_between(bad: list[float]) -> Callable[[int, Array], Array]:
+    """Return what tells the controller a bad state in three steps."""
+    return lambda step, state: np.array(bad) if 20 <= step < 23 else state
+
+
 def test_a_bad_state_leaves_no_trace_of_its_value() -> None:
     """Whichever bad state it was: all stored numbers are the same after it, and finite."""
     settings = settings_of(EXACT | {"damping.roll_rate_feedback_s": 0.05, "target.acceleration": "tracked"})
@@ -128,11 +132,7 @@ def test_a_bad_state_leaves_no_trace_of_its_value() -> None:
     for bad in BAD_STATES:
         drone, controller = LinearDrone(settings, 0.4), ExactReferenceController(Design(settings))
         drone.put((0.4, -0.2))
-
-        def spoil(step: int, state: Any, bad: list[float] = bad) -> Any:
-            return np.array(bad) if 20 <= step < 23 else state
-
-        outcomes = fly(controller, drone, 40, spoil)
+        outcomes = fly(controller, drone, 40, told_in_between(bad))
         assert [int(outcome.status[0]) for outcome in outcomes[19:24]] == [
             Status.OK,
             *[Status.BAD_STATE] * 3,
