@@ -60,11 +60,7 @@ FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
     "another bit": (bits.check, Harm(OBSERVER, r"NMPC_VELOCITY_BY_POSITION", "NMPC_VELOCITY_BY_VELOCITY")),
     "another order of operations": (
         bits.check,
-        Harm(
-            OPTIMIZER,
-            r"sum = sum \+ \(row\[k\] \* state\[k\]\)",
-            "sum = (sum + (row[k] * state[k])) + 0 * sum",
-        ),
+        Harm(OPTIMIZER, r"row\[k\] \* state\[k\]", "row[NMPC_STATES - k] * state[NMPC_STATES - k]"),
     ),
     "a flag that stays": (bits.check, Harm(STEP, r"    self->saturated = 0U;\n", "")),
     "an outage a step too long": (
