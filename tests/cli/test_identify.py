@@ -8,6 +8,8 @@ import pytest
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.toml_file import parse_document
 from mambo_nmpc.sil.identify.plots import read_curves
+from mambo_nmpc.sil.vehicles.presets import load
+from mambo_nmpc.sil.vehicles.sections import FirstOrderAttitude
 from tests.support.command import run
 from tests.support.logs import Flown, Truth, crazyflie_columns, fly, write_log
 
@@ -53,6 +55,21 @@ def test_a_log_becomes_a_model() -> None:
     assert vehicle["body"]["drag_1_s"] == summary["model"]["drag_1_s"]
     curves = read_curves(Path("out/fit.csv"))
     assert curves["time_s"][-1] > summary["split_s"] > 10.0
+
+
+def test_a_vehicle_that_is_data_is_identified_again() -> None:
+    """What `fly --vehicle` simulates is what its trace shows, and what vehicle.toml says again."""
+    run("identify", "--manoeuvre", "eight.csv")
+    drone = ("crazyflie", "--vehicle", "crazyflie-flown")
+    run("fly", *drone, "--trajectory", "eight.csv", "--duration-s", "30", "--no-pictures", "-o", "flight")
+    run("identify", "flight/trace.csv", "-o", "out")
+    truth, found = load("crazyflie-flown").attitude, load("out/vehicle.toml").attitude
+    assert isinstance(truth, FirstOrderAttitude)
+    assert isinstance(found, FirstOrderAttitude)
+    for one, other in ((truth.roll, found.roll), (truth.pitch, found.pitch)):
+        assert other.gain == pytest.approx(one.gain, abs=0.005)
+        assert other.lag_s + other.dead_time_s == pytest.approx(one.lag_s + one.dead_time_s, abs=0.002)
+    assert found.acceleration_per_tilt_g == pytest.approx(truth.acceleration_per_tilt_g, abs=0.01)
 
 
 def test_json_is_the_summary() -> None:
