@@ -47,7 +47,8 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("zero -> one", "zero -> one #1", "zero -> one #2")
     },
     **{
-        ("loop.c", "wire_t wire = { { { <real>, <real> } } };", change): "the first command replaces it"
+        ("loop.c", f"{line} = {{ {{ {{ <real>, <real> }} }} }};", change): "the first command replaces it"
+        for line in ("wire_t wire", "late_t late")
         for change in ("zero -> one", "zero -> one #1")
     },
     **{
