@@ -148,14 +148,18 @@ static float largest_float(nmpc_real_t number, int bits)
 static int rounds_halves(nmpc_t *self)
 {
     const float angle_unit_rad = 1.0f / (float)((nmpc_sum_t)1 << NMPC_ANGLE_BITS);
-    const nmpc_float_weights_t weights = { 0.49999997f / (float)((nmpc_sum_t)1 << NMPC_TRACKING_BITS),
-                                           0.5f / (float)((nmpc_sum_t)1 << NMPC_EFFORT_BITS) };
     const float given[3] = { 0.49999997f, 0.5f, 1.5f };
     const nmpc_real_t nearest[3] = { 0, 1, 2 };
-    int is_good = (nmpc_float_set_weights(self, &weights) == NMPC_OK) && (self->weights.tracking == 0)
-                  && (self->weights.effort == 1);
+    int is_good = 1;
     int i;
 
+#ifndef NMPC_STORED_NUMBERS
+    const nmpc_float_weights_t weights = { 0.49999997f / (float)((nmpc_sum_t)1 << NMPC_TRACKING_BITS),
+                                           0.5f / (float)((nmpc_sum_t)1 << NMPC_EFFORT_BITS) };
+
+    is_good = (nmpc_float_set_weights(self, &weights) == NMPC_OK) && (self->weights.tracking == 0)
+              && (self->weights.effort == 1);
+#endif
     for (i = 0; i < 3; i++) {
         const nmpc_float_command_t last = { given[i] * angle_unit_rad, -given[i] * angle_unit_rad };
 
@@ -189,6 +193,59 @@ static int takes_the_ends(nmpc_t *self)
            && (nmpc_float_step(self, &pitched, &target, thrust_m_s2, &command) == NMPC_BAD_STATE);
 }
 
+#ifdef NMPC_STORED_NUMBERS
+/* Set the last command of `self` with floats and that of `other` with numbers. */
+static int sets_alike(nmpc_t *self, nmpc_t *other)
+{
+    const nmpc_float_command_t flown = { 0.0625f, -0.125f };
+    const nmpc_command_t flown_numbers = { NMPC_ANGLE(0.0625), NMPC_ANGLE(-0.125) };
+
+    return (nmpc_float_set_command(self, NULL) == NMPC_NULL_POINTER)
+           && (nmpc_float_set_command(self, &flown) == nmpc_set_command(other, &flown_numbers));
+}
+
+/* The estimate in floats is that in numbers, divided by powers of two. */
+static int tells_alike(const nmpc_t *self, const nmpc_t *other)
+{
+    nmpc_float_estimate_t found;
+    nmpc_estimate_t expected;
+    int is_good = (nmpc_float_last_estimate(self, NULL) == NMPC_NULL_POINTER)
+                  && (nmpc_float_last_estimate(NULL, &found) == NMPC_NULL_POINTER)
+                  && (nmpc_float_last_estimate(self, &found) == NMPC_OK)
+                  && (nmpc_last_estimate(other, &expected) == NMPC_OK) && (found.is_valid == expected.is_valid);
+    int axis;
+
+    for (axis = 0; is_good && (axis < 2); axis++) {
+        is_good = (found.position_m[axis]
+                   == ((float)expected.position_m[axis] / (float)((nmpc_sum_t)1 << NMPC_POSITION_BITS)))
+                  && (found.velocity_m_s[axis]
+                      == ((float)expected.velocity_m_s[axis] / (float)((nmpc_sum_t)1 << NMPC_VELOCITY_BITS)))
+                  && (found.disturbance_m_s2[axis]
+                      == ((float)expected.disturbance_m_s2[axis] / (float)((nmpc_sum_t)1 << NMPC_DISTURBANCE_BITS)));
+    }
+    return is_good;
+}
+#else
+/* Set the weights of `self` with floats and those of `other` with numbers: a float holds 24 bits of a weight. */
+static int sets_alike(nmpc_t *self, nmpc_t *other)
+{
+    const nmpc_float_weights_t weights = { NMPC_TRACKING_WEIGHT / (float)(1L << NMPC_TRACKING_BITS),
+                                           NMPC_EFFORT_WEIGHT / (float)(1L << NMPC_EFFORT_BITS) };
+
+    return (nmpc_float_set_weights(self, NULL) == NMPC_NULL_POINTER)
+           && (nmpc_float_set_weights(self, &weights) == NMPC_OK)
+           && ((float)self->weights.effort == (float)NMPC_EFFORT_WEIGHT)
+           && (nmpc_set_weights(other, &self->weights) == NMPC_OK);
+}
+
+static int tells_alike(const nmpc_t *self, const nmpc_t *other)
+{
+    return (nmpc_last_cost(self) == nmpc_last_cost(other))
+           && (nmpc_float_last_cost(self)
+               == ((float)nmpc_last_cost(other) / (float)((nmpc_sum_t)1 << NMPC_COST_BITS)));
+}
+#endif
+
 /* A step with floats gives the same as one with the equal numbers of fixed point; floats outside every format are
  * refused. */
 static int passes_floats(nmpc_t *self)
@@ -205,8 +262,6 @@ static int passes_floats(nmpc_t *self)
     const nmpc_target_t target_numbers = { { 1, -1 }, { 0, NMPC_VELOCITY(0.25) } };
     const nmpc_float_command_t last = { 0.125f, -0.25f };
     const nmpc_command_t last_numbers = { NMPC_ANGLE(0.125), NMPC_ANGLE(-0.25) };
-    const nmpc_float_weights_t weights = { NMPC_TRACKING_WEIGHT / (float)(1L << NMPC_TRACKING_BITS),
-                                           NMPC_EFFORT_WEIGHT / (float)(1L << NMPC_EFFORT_BITS) };
     const float unheld[4] = { NAN, INFINITY, -INFINITY, 2147483648.0f / (float)(1L << NMPC_THRUST_BITS) };
     nmpc_t other;
     nmpc_command_t command;
@@ -218,18 +273,12 @@ static int passes_floats(nmpc_t *self)
     nmpc_init(self);
     nmpc_init(&other);
     is_good = (nmpc_float_reset(self, NULL) == NMPC_NULL_POINTER)
-              && (nmpc_float_set_weights(self, NULL) == NMPC_NULL_POINTER)
               && (nmpc_float_step(self, &state, &target, 9.75f, NULL) == NMPC_NULL_POINTER)
-              && (nmpc_float_reset(self, &last) == nmpc_reset(&other, &last_numbers))
-              && (nmpc_float_set_weights(self, &weights) == NMPC_OK)
-              && ((float)self->weights.effort == (float)NMPC_EFFORT_WEIGHT)
-              && (nmpc_set_weights(&other, &self->weights) == NMPC_OK); /* a float holds 24 bits of a weight */
+              && (nmpc_float_reset(self, &last) == nmpc_reset(&other, &last_numbers)) && sets_alike(self, &other);
     expected = nmpc_step(&other, &state_numbers, &target_numbers, gravity_m_s2, &command);
     is_good = is_good
               && is_alike(nmpc_float_step(self, &state, &target, 9.75f, &found), expected, &found, &command)
-              && (nmpc_last_cost(self) == nmpc_last_cost(&other))
-              && (nmpc_float_last_cost(self)
-                  == ((float)nmpc_last_cost(&other) / (float)((nmpc_sum_t)1 << NMPC_COST_BITS)))
+              && tells_alike(self, &other)
               && is_alike(nmpc_float_step(self, NULL, &target, 9.75f, &found), NMPC_NULL_POINTER, &found, &command)
               && is_alike(nmpc_float_step(self, &state, NULL, 9.75f, &found), NMPC_NULL_POINTER, &found, &command);
     for (i = 0; i < 4; i++) {
