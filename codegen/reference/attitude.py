@@ -102,9 +102,12 @@ class AttitudeModel:
     def command_rad(self, attitude: AttitudeState) -> Real:
         """Return roll and pitch (n, 2) that stand for the last commands."""
         product = self._products.command_product(self._command_rad, attitude.command)
-        return np.stack(
-            [product[:, 0] + self._trim_command[0], self._trim_command[1] - product[:, 1]], axis=1
-        )
+        roll, pitch = product[:, 0], -product[:, 1]
+        if self._trim_command[0] != 0:
+            roll = roll + self._trim_command[0]
+        if self._trim_command[1] != 0:
+            pitch = self._trim_command[1] - product[:, 1]
+        return np.stack([roll, pitch], axis=1)
 
     def _next(self, rows: Real, state: Real) -> Real:
         """Return the next a or i from states (n, 2, 4)."""

@@ -40,11 +40,6 @@ extern "C" {
 #define NMPC_ROLL_PER_ACCELERATION 1019.3679918450559
 #define NMPC_PITCH_PER_ACCELERATION 1019.3679918450559
 
-/* Measured and commanded roll and pitch without acceleration. */
-#define NMPC_ROLL_TRIM_RAD 0.0
-#define NMPC_PITCH_TRIM_RAD 0.0
-#define NMPC_ROLL_TRIM_COMMAND_RAD 0.0
-#define NMPC_PITCH_TRIM_COMMAND_RAD 0.0
 
 /* The largest |u| that a move may have, and the largest |a|, |i| and |c|, and |u| when it turns. */
 #define NMPC_RIGHT_LIMIT_M_STEP2 0.00034335
@@ -60,14 +55,12 @@ void nmpc_attitude_set_command(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t p
 /* The command, in rad, that stands for u; beyond the tilt limit by rounding at most. */
 static inline nmpc_real_t nmpc_attitude_roll(const nmpc_t *self)
 {
-    return (NMPC_ROLL_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_RIGHT])
-           + NMPC_ROLL_TRIM_COMMAND_RAD;
+    return NMPC_ROLL_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_RIGHT];
 }
 
 static inline nmpc_real_t nmpc_attitude_pitch(const nmpc_t *self)
 {
-    return NMPC_PITCH_TRIM_COMMAND_RAD
-           - (NMPC_PITCH_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_FORWARD]);
+    return -(NMPC_PITCH_PER_ACCELERATION * self->attitude.command_m_step2[NMPC_FORWARD]);
 }
 
 /* Set `tilt_m_step2` to the accelerations, right and forward, of a measured attitude. */

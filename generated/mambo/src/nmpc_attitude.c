@@ -37,9 +37,9 @@ static nmpc_real_t next(const nmpc_real_t row[NMPC_ATTITUDE_STATES], const nmpc_
 void nmpc_attitude_set_command(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
 {
     self->attitude.command_m_step2[NMPC_RIGHT] =
-        NMPC_ROLL_GAIN_M_STEP2_RAD * (roll_rad - NMPC_ROLL_TRIM_COMMAND_RAD);
+        NMPC_ROLL_GAIN_M_STEP2_RAD * roll_rad;
     self->attitude.command_m_step2[NMPC_FORWARD] =
-        -(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD));
+        -(NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_rad);
 }
 
 void nmpc_attitude_reset(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
@@ -58,8 +58,8 @@ void nmpc_attitude_reset(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_r
 
 void nmpc_attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2])
 {
-    tilt_m_step2[NMPC_RIGHT] = NMPC_GAIN_M_STEP2_RAD * (state->roll_rad - NMPC_ROLL_TRIM_RAD);
-    tilt_m_step2[NMPC_FORWARD] = -(NMPC_GAIN_M_STEP2_RAD * (state->pitch_rad - NMPC_PITCH_TRIM_RAD));
+    tilt_m_step2[NMPC_RIGHT] = NMPC_GAIN_M_STEP2_RAD * state->roll_rad;
+    tilt_m_step2[NMPC_FORWARD] = -(NMPC_GAIN_M_STEP2_RAD * state->pitch_rad);
 }
 
 void nmpc_attitude_advance(nmpc_t *self)
