@@ -237,6 +237,7 @@ def _quadratic_context(design: Design) -> dict[str, object]:
         "stored_numbers": len(design.stored),
         "stored_quantities": design.stored,
         "row_quantities": ROW,
+        "stored_limits": _stored_limits(design),
         "attitude_shares": [period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)],
         "steps_per_s": 1 / period_s,
         "steps2_per_s2": 1 / (period_s * period_s),
@@ -244,6 +245,24 @@ def _quadratic_context(design: Design) -> dict[str, object]:
         "shifts": formats.shifts if isinstance(formats, ExactFormats) else None,
         "plain_products": _plain_products(design),
     }
+
+
+def _stored_limits(design: Design) -> list[str]:
+    """Spell the limits of what a controller with a quadratic cost stores, in ascending order."""
+    numbers, tracker = design.numbers, design.tracker
+    limits = [
+        numbers.constant(design.settings.ranges.position_m, "position"),
+        numbers.constant(design.observer.velocity_limit_m_step, "speed"),
+        numbers.constant(design.observer.disturbance_limit_m_step2, "acceleration"),
+        numbers.constant(design.attitude.limit_m_step2, "acceleration"),
+        numbers.constant(design.settings.limits.tilt_rad, "angle"),
+    ]
+    if tracker:
+        limits += [
+            numbers.constant(tracker.acceleration_limit_m_step2, "acceleration"),
+            numbers.constant(tracker.jerk_limit_m_step2_update, "acceleration"),
+        ]
+    return [str(limit) for limit in sorted(limits)]
 
 
 def _plain_products(design: Design) -> list[str]:
