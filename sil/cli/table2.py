@@ -24,19 +24,18 @@ def table2(
     scalar: Scalar = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fly Table II of the paper with both PDs and every preset, and check the paper's claims."""
-    from mambo_nmpc.codegen.settings import presets
+    """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims."""
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
     from mambo_nmpc.sil.flight.names import PD_TITLES
     from mambo_nmpc.sil.flight.plots import draw_flights
     from mambo_nmpc.sil.flight.traces import write_npz
-    from mambo_nmpc.sil.paper.table2 import Table2Summary, fly_table2, judge_table2, table2_text
+    from mambo_nmpc.sil.paper.table2 import PRESETS, Table2Summary, fly_table2, judge_table2, table2_text
 
     if sensors:
         _fly_with_sensors(output, scalar, as_json=as_json)
         return
-    settings = {name: load(name, scalar) for name in presets.names()}
+    settings = {name: load(name, scalar) for name in PRESETS}
     files = {name: f"{name.lower()}.npz" for name in (*PD_TITLES.values(), *settings)}
     with new_results(output, Table2Summary.command, (*files.values(), *PICTURES)) as folder:
         with progress_bar("flying Table II") as progress:

@@ -30,6 +30,8 @@ CASES: Final[dict[str, Trajectory]] = {
 }
 """The trajectory that reproduces the printed PD row, and the two that the paper's text may mean."""
 
+PRESETS: Final = ("mambo", "mambo-1norm", "table1", "table1-printed")
+"""The presets for the Mambo."""
 DURATION_S: Final = 100.0
 _CLOSE: Final = 0.10
 
