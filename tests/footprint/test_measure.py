@@ -37,22 +37,22 @@ def measure_once(board: str, preset: str = "mambo", steps: int = 300) -> Footpri
 
 
 def test_the_crazyflie_keeps_its_promises() -> None:
-    """Preset mambo in 3.5 KiB of flash, 256 B of RAM, 256 B of stack and 4500 instructions."""
+    """Preset mambo in 4 KiB of flash, 128 B of RAM, 192 B of stack and 900 instructions."""
     footprint = measure_once("crazyflie")
-    assert footprint.added.flash.total <= 3584
-    assert footprint.added.ram.total <= 256
+    assert footprint.added.flash.total <= 4096
+    assert footprint.added.ram.total <= 128
     assert footprint.added.ram.own == footprint.instance_bytes
     limits = {limit.name: limit.value for limit in footprint.limits}
     assert (limits["flash"], limits["RAM"]) == (footprint.added.flash.total, footprint.added.ram.total)
     assert footprint.stack is not None
-    assert footprint.stack.bytes <= 256
+    assert footprint.stack.bytes <= 192
     assert footprint.counts is not None
-    assert footprint.counts.most_met <= 4500
+    assert footprint.counts.most_met <= 900
     assert footprint.counts.ticks == 300
     assert footprint.fits
 
 
-@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.24), ("table1", 1.12)])
+@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.3), ("mambo-1norm", 1.25), ("table1", 1.13)])
 def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
     """Most instructions met over least, on the Cortex-M4F; the first step of a flight is the cheapest."""
     counts = measure_once("crazyflie", preset).counts
@@ -118,7 +118,7 @@ def test_a_missing_measurement_is_reported(
 
 def test_a_tiny_budget_is_exceeded_everywhere() -> None:
     """Each exceeded limit is reported with its excess, then the largest symbols."""
-    tiny = {"flash_bytes": 2_000, "ram_bytes": 100, "stack_bytes": 100, "period_share": 0.002}
+    tiny = {"flash_bytes": 2_000, "ram_bytes": 100, "stack_bytes": 100, "period_share": 0.0005}
     whole = measure_once("crazyflie")
     small = {"name": "tiny", "budget": whole.board.budget.model_copy(update=tiny)}
     footprint = replace(whole, board=whole.board.model_copy(update=small))
@@ -129,12 +129,12 @@ def test_a_tiny_budget_is_exceeded_everywhere() -> None:
         found = re.search(rf"^tiny: {limit} (\d+) B is over its budget of {budget} B by (\d+) B$", text, re.M)
         assert found, text
         assert int(found[1]) == budget + int(found[2]) > budget
-    assert re.search(r"^tiny: time 0\.0\d+ ms is over its budget of 0\.02 ms by 0\.0\d+ ms$", text, re.M)
+    assert re.search(r"^tiny: time 0\.00\d+ ms is over its budget of 0\.005 ms by 0\.00\d+ ms$", text, re.M)
     largest = re.search(r"^tiny: largest symbols: (.*)$", text, re.MULTILINE)
     assert largest
     sizes = [int(size) for size in re.findall(r" (\d+) B", largest[1])]
     assert sizes == sorted(sizes, reverse=True)
-    assert "nmpc_cost_evaluate" in largest[1]
+    assert "nmpc_optimizer_minimize" in largest[1]
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_wider_arithmetic_is_reported_with_its_caller(
         assert find_forbidden(image, "float64") == ()
 
 
-@pytest.mark.parametrize(("preset", "most"), [("mambo", 6000), ("table1", 4400)])
+@pytest.mark.parametrize(("preset", "most"), [("mambo", 1300), ("mambo-1norm", 5100), ("table1", 4400)])
 def test_fixed_point_keeps_its_promises(preset: str, most: int) -> None:
     """A step takes a tenth of the instructions of float32 on the Mambo, and at most 400 B of stack."""
     settings = with_option(presets.load(preset), "code.scalar", "fixed")
