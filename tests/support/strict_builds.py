@@ -43,5 +43,6 @@ def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) 
     ffi = cffi.FFI()
     ffi.cdef(with_prefix(_DECLARATIONS, prefix))
     opened = ffi.dlopen(str(folder / "bundle.so"))
-    names = re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS)
+    absent = "_host_set_weights" if settings.cost.norm == "quadratic" else "_host_set_command"
+    names = [name for name in re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS) if name != absent]
     return SimpleNamespace(**{f"nmpc{name}": getattr(opened, f"{prefix}{name}") for name in names})
