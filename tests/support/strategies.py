@@ -335,7 +335,9 @@ def _lag_at_odds(draw: st.DrawFn, values: Values) -> Broken:
 
 def _others_at_odds(draw: st.DrawFn, values: Values) -> Broken:
     """Put more moves than predictions, a largest thrust not above the smallest, or a key twice."""
-    path = draw(st.sampled_from(["horizon.control", "ranges.thrust_acceleration_max_m_s2", *list(values)[::5]]))
+    path = draw(
+        st.sampled_from(["horizon.control", "ranges.thrust_acceleration_max_m_s2", *list(values)[::5]])
+    )
     if path == "horizon.control":
         prediction = draw(st.integers(1, 49))
         control = draw(st.integers(prediction + 1, 50))
