@@ -75,7 +75,9 @@ def fly(
     return outcomes
 
 
-@pytest.mark.parametrize("index", range(5))
+@pytest.mark.parametrize(
+    "index", [0, *(pytest.param(index, marks=pytest.mark.long) for index in range(1, 5))]
+)
 def test_the_loop_converges_with_any_settings_that_are_admitted(index: int) -> None:
     """From a small error, on the model's own plant: error and velocity vanish, whatever the settings."""
     without = {"model.drag_1_s": 0.0, "observer.age_s": 0.0}
@@ -92,7 +94,9 @@ def test_the_loop_converges_with_any_settings_that_are_admitted(index: int) -> N
     assert np.abs(drone.states[:, :2]).max() < max(1e-6, 0.5 * early)
 
 
-@pytest.mark.parametrize("yaw_rad", [0.0, 0.8, -2.5])
+@pytest.mark.parametrize(
+    "yaw_rad", [0.8, *(pytest.param(yaw, marks=pytest.mark.long) for yaw in (0.0, -2.5))]
+)
 def test_the_observer_finds_a_constant_disturbance(yaw_rad: float) -> None:
     """Wind along x and y: the estimate is the wind, and the drone stands at the target."""
     settings, wind = settings_of(EXACT), (0.6, -0.35)
@@ -187,6 +191,7 @@ def test_a_command_of_others_moves_the_model() -> None:
     assert used.set_command([[np.nan, 0.1]])[0] == Status.BAD_COMMAND
 
 
+@pytest.mark.long
 def test_a_tracked_target_is_followed_closer() -> None:
     """With an accelerating target the tracked loop follows much closer than the one that is not told."""
     errors = {}

@@ -149,6 +149,7 @@ def test_a_long_ramp_at_a_short_period_is_admitted() -> None:
     assert design.attitude.limit_m_step2 >= 2 * max(design.attitude.command_limit_m_step2)
 
 
+@pytest.mark.long
 @profile(max_examples=25)
 @given(quadratic_settings("float64"))
 def test_any_valid_settings_have_finite_constants_and_read_back_equal(settings: Settings) -> None:

@@ -10,7 +10,7 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.errors import CacheError
 from mambo_nmpc.sil.files.shared_library import LibrarySource, load_shared_library
-from tests.support.tools import toolchain
+from tests.support.tools import require, toolchain
 
 pytestmark = pytest.mark.usefixtures("empty_cache")
 
@@ -62,6 +62,7 @@ def test_a_library_is_built_once(empty_cache: Path) -> None:
 
 def test_what_cannot_be_loaded_is_refused(empty_cache: Path) -> None:
     """The message names the folder, and what to set if it may hold no programs."""
+    require("sh", "dash")
     script = 'case "$*" in *test.so*) echo no library > test.so;; esac'
     with pytest.raises(
         CacheError, match=rf"^cannot load {empty_cache}/.*noexec, set XDG_CACHE_HOME elsewhere"
@@ -71,6 +72,7 @@ def test_what_cannot_be_loaded_is_refused(empty_cache: Path) -> None:
 
 def test_a_compiler_that_writes_nothing_is_named(empty_cache: Path) -> None:
     """As a shell would read its command; nothing is cached."""
+    require("sh", "dash")
     with pytest.raises(BuildError, match=r"^sh -c 'exit 0' wrote no output; set CC to a C compiler"):
         load_shared_library(source(), Toolchain(("sh", "-c", "exit 0")))
     assert list(empty_cache.iterdir()) == []
