@@ -87,6 +87,7 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
             ("status", np.int32),
             ("iterations", np.int32),
             ("converged", np.int32),
+            ("saturated", np.int32),
             command,
             ("cost", numbers.wide),
             ("gradient", numbers.wide, moves),
@@ -174,6 +175,7 @@ class _Runs:
             outcome["missed"], outcome["saturated"] = memory.missed, memory.saturated
             outcome["stored"] = controller.stored
             return outcome
+        outcome["saturated"] = np.any(np.abs(memory.command_rad) >= self._design.limits.tilt, axis=1)
         for name in ("iterations", "converged", "cost"):
             outcome[name] = getattr(memory, name)
         for name in ("gradient", "plan_rad"):

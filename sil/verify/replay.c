@@ -89,7 +89,8 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
 /* Write what a call leaves in the controller and in `command`. */
 static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_command_t *command)
 {
-    const int32_t numbers[3] = { status, (int32_t)nmpc_last_iterations(self), (int32_t)nmpc_has_converged(self) };
+    const int32_t numbers[4] = { status, (int32_t)nmpc_last_iterations(self), (int32_t)nmpc_has_converged(self),
+                                 (int32_t)nmpc_is_saturated(self) };
     const nmpc_sum_t cost = nmpc_last_cost(self);
 
     nmpc_replay_write(numbers, sizeof(numbers));

@@ -104,6 +104,13 @@ _NEAREST: Final = ("one more", "one less")
 
 REASONS: Final[tuple[Reason, ...]] = (
     *reasons("src/nmpc_cost.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
+    *reasons(
+        "src/nmpc_math.h",
+        "clamped = (value < (nmpc_real_t)0) ? -limit : limit;",
+        "a value beyond a limit is not 0",
+        "< -> <=",
+        holds=lambda settings: not _is_fixed(settings),
+    ),
     *reasons("src/nmpc_math.h", _SIGN, _FAINT, "0 -> 1", "0 -> (-1) #1", holds=_is_fixed),
     *reasons(
         "src/nmpc_math.h", _SIGN, "only the sign of a slope or direction is read", "1 -> 2", "1 -> 2 #1"
