@@ -18,7 +18,13 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.markdown import table
-from mambo_nmpc.sil.campaign.file import CampaignFile, distributions, scenario
+from mambo_nmpc.sil.campaign.file import (
+    CampaignFile,
+    distributions,
+    scenario,
+    with_defaults,
+    with_drone,
+)
 from mambo_nmpc.sil.campaign.parameters import draw
 from mambo_nmpc.sil.controllers.pd import GAINS, PdController, PdFeedForwardController, PdGains
 from mambo_nmpc.sil.engine.simulate import fly
@@ -27,6 +33,7 @@ from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace
+from mambo_nmpc.sil.vehicles import presets as vehicles
 
 CURVES: Final[dict[str, dict[str, Any]]] = {
     "bernoulli": {"size_m": {"uniform": [1.0, 2.0]}, "rate_rad_s": {"uniform": [0.25, 0.75]}},
@@ -74,7 +81,10 @@ def drawn_flights(count: int = FLIGHTS) -> list[Flight]:
     for curve, drawn in CURVES.items():
         section = {"trajectory": curve, "duration_s": DURATION_S, **drawn}
         file = CampaignFile.model_validate({"seed": SEED, "flight": section})
-        parameters, shared = distributions(file.flight, file.draws), file.flight.model_dump()
+        drone = vehicles.load("mambo")
+        flight = with_drone(file.flight, drone, "benchmark", replaced=False)
+        parameters = distributions(flight, with_defaults(file.draws, drone))
+        shared = flight.model_dump() | {"vehicle": drone.model_dump()}
         scenarios = [scenario(shared, draw(SEED, number, parameters)) for number in range(count)]
         found.append(flight_of(scenarios, PERIOD_S))
     return found

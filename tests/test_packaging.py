@@ -139,11 +139,11 @@ def test_a_missing_template_is_a_bug_with_a_traceback(tmp_path: Path) -> None:
     for name in ("codegen", "sil"):
         (package / name).symlink_to(ROOT / name)
     shutil.copytree(ROOT / "templates", package / "templates")
-    (package / "templates" / "src" / "nmpc_cost.c.j2").unlink()
+    (package / "templates" / "quadratic" / "nmpc_observer.c.j2").unlink()
     command = [sys.executable, "-m", "mambo_nmpc", "generate", "-o", "c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("Traceback")
     assert "TemplateNotFound" in done.stderr.splitlines()[-1]
-    assert "nmpc_cost.c.j2" in done.stderr.splitlines()[-1]
+    assert "nmpc_observer.c.j2" in done.stderr.splitlines()[-1]
     assert not (tmp_path / "c").exists()

@@ -31,11 +31,11 @@ def plan_all(program: Ours, folder: Path) -> list[Array]:
     return [plans(library, random_inputs(600), follows=follows)[1] for follows in (False, True)]
 
 
-@pytest.mark.parametrize("preset", ["table1", "mambo"])
-def test_plain_roll_out_plans_what_the_generated_c_plans(preset: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("chosen", [presets.load("table1"), ONE_NORM], ids=["no lag", "lag"])
+def test_plain_roll_out_plans_what_the_generated_c_plans(chosen: Settings, tmp_path: Path) -> None:
     """In double both have the same plans, with and without lag, with and without warm start."""
     require("gcc", "gcc")
-    settings = with_option(presets.load(preset), "code.scalar", "float64", "test")
+    settings = with_option(chosen, "code.scalar", "float64", "test")
     ours = plan_all(bundle("ours", "", settings), tmp_path / "ours")
     plain = plan_all(rollout("plain", "", settings), tmp_path / "plain")
     for mine, theirs in zip(ours, plain, strict=True):

@@ -66,10 +66,10 @@ def test_rows_have_the_cost_and_slope_of_the_reference(index: int) -> None:
         np.testing.assert_array_equal(seen[-1].cost(step.plan_rad), cost)
 
 
-@pytest.mark.parametrize("name", ["table1", "mambo"])
-def test_no_plan_is_cheaper_than_the_optimum(name: str) -> None:
+@pytest.mark.parametrize("settings", [presets.load("table1"), ONE_NORM], ids=["no lag", "lag"])
+def test_no_plan_is_cheaper_than_the_optimum(settings: Settings) -> None:
     """The optimum is within the limit and costs no more than the controller's plan and nearby plans."""
-    settings, rng = presets.load(name), np.random.default_rng(1)
+    rng = np.random.default_rng(1)
     controller, model = ReferenceController(Design(settings), N), CostModel(settings)
     limit = settings.limits.tilt_rad
     last = np.zeros((N, 2))

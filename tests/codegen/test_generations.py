@@ -129,7 +129,7 @@ def run_in_a_process(script: str, files: dict[str, str], *arguments: str | Path)
 @pytest.mark.parametrize(("layout", "count"), [("", 16), ("amalgamated", 5)])
 def test_one_file_of_another_generation_stops_the_compiler(layout: str, count: int, tmp_path: Path) -> None:
     """Every C file of the bundle in turn comes from other settings; the compiler reads that file alone."""
-    ours, others = (generation(f"{preset} {layout}") for preset in ("mambo", "table1"))
+    ours, others = (generation(f"{preset} {layout}") for preset in ("table1-printed", "table1"))
     place(ours, tmp_path)
     assert refusal(tmp_path) == ""
     changed = [path for path in ours if path.endswith((".c", ".h"))]
@@ -143,9 +143,9 @@ def test_one_file_of_another_generation_stops_the_compiler(layout: str, count: i
 
 def test_files_of_another_version_stop_the_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The same settings, another version of the generator."""
-    place(generation("mambo"), tmp_path)
+    place(generation("table1"), tmp_path)
     monkeypatch.setattr(rendering, "__version__", "99.0")
-    newer = rendering.render(ONE_NORM, with_digest=False)
+    newer = rendering.render(presets.load("table1"), with_digest=False)
     place({"src/nmpc_math.c": newer["src/nmpc_math.c"]}, tmp_path)
     assert AGAIN in refusal(tmp_path, "src/nmpc_math.c")
 
@@ -163,7 +163,7 @@ def test_the_check_carries_the_prefix() -> None:
 def test_any_mixture_stops_the_compiler(tmp_path: Path) -> None:
     """Each file from one of two generations, at random."""
     random.seed(11)
-    one, other = generation("mambo"), generation("table1")
+    one, other = generation("table1-printed"), generation("table1")
     paths = [path for path in one if path.endswith((".c", ".h"))]
     for _ in range(30):
         chosen = random.sample(paths, random.randint(1, len(paths) - 1))

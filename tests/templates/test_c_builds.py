@@ -165,7 +165,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     placed(named("drone"), tmp_path, amalgamate=amalgamate)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
-    digest = self_test_digest(Design(ONE_NORM), 1000)
+    digest = self_test_digest(Design(presets.load("mambo")), 1000)
     assert f"digest: 0x{digest:08X} after 100000 steps\n" in printed
     last = [float(word) for word in printed.splitlines()[-1].split()]
     assert abs(last[1] - last[3]) < 0.05

@@ -20,7 +20,7 @@ from tests.support.subjects import played_fault, subject
 from tests.support.tools import require
 
 MAMBO = ONE_NORM
-SETTINGS = {name: presets.load(name) for name in presets.names()} | {
+SETTINGS = {name: presets.load(name) for name in ("mambo-1norm", "table1", "table1-printed")} | {
     "fixed": with_option(MAMBO, "code.scalar", "fixed", "test"),
     "case 7": settings_case(7, "float64"),
 }
@@ -90,4 +90,4 @@ def test_every_reason_is_of_a_line_that_is_generated() -> None:
         for scalar in SCALARS
     ]
     for reason in REASONS:
-        assert any(reason.line in plain(files[reason.file]) for files in bundles), reason.line
+        assert any(reason.line in plain(files.get(reason.file, "")) for files in bundles), reason.line

@@ -49,7 +49,7 @@ FAULTS = {
     "x takes the target's acceleration along y": (PREDICTOR, "&prediction->x, target_acceleration_m_step2[0]", "&prediction->x, target_acceleration_m_step2[1]"),
     "the acceleration does not displace the target": (PREDICTOR, "        - (NMPC_DISPLACEMENT_SHARE * target_acceleration_m_step2);", "        - (nmpc_real_t)0;"),
     "the first velocity is an acceleration": (TRACKER, "(self->has_target != 0U) && ", ""),
-    "a jump is an acceleration": (TRACKER, "&& (limited_m_s == change_m_s)", ""),
+    "a jump is an acceleration": (TRACKER, "&& (is_steady != 0)", ""),
     "a jump keeps the jerk": (TRACKER, "tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;\n        }", "}"),
     "the jerk is not predicted": (TRACKER, "tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis]", "tracker->acceleration_m_step2[axis]"),
     "the gains change places": (TRACKER, "(NMPC_TRACKER_JERK_GAIN * ", "(NMPC_TRACKER_GAIN * "),

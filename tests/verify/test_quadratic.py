@@ -29,17 +29,12 @@ UNPROVEN = {
         STEP, r"\(\(has_target != 0\) && \(has_thrust != 0\)\) \? target : NULL", "target"
     ),
     "the command leaves the tilt limit": Harm(
-        STEP, r"nmpc_clamp\((nmpc_attitude_pitch[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"
+        STEP, r"nmpc_clamp\((nmpc_attitude_roll[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"
     ),
     "a set command is not clamped": Harm(
         STEP,
         r"command_rad\[0\] = nmpc_clamp\(command->roll_rad, NMPC_TILT_LIMIT_RAD\)",
         "command_rad[0] = command->roll_rad",
-    ),
-    "an estimate has no limit": Harm(
-        OBSERVER,
-        r"(?s)nmpc_clamp\((observer->position_m\[axis\] \+ [^,]*),\s*NMPC_ESTIMATED_POSITION_LIMIT_M\)",
-        r"(\1)",
     ),
     "the model has no limit": Harm(
         ATTITUDE, r"return nmpc_clamp\(sum, NMPC_ATTITUDE_LIMIT_M_STEP2\)", "return sum"
@@ -58,10 +53,7 @@ FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
         Harm(STEP, r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
     ),
     "another bit": (bits.check, Harm(OBSERVER, r"NMPC_VELOCITY_BY_POSITION", "NMPC_VELOCITY_BY_VELOCITY")),
-    "another order of operations": (
-        bits.check,
-        Harm(OPTIMIZER, r"row\[k\] \* state\[k\]", "row[NMPC_STATES - k] * state[NMPC_STATES - k]"),
-    ),
+    "another state": (bits.check, Harm(OPTIMIZER, r"row\[k\] \* state\[k\]", "row[k] * state[k - 1]")),
     "a flag that stays": (bits.check, Harm(STEP, r"    self->saturated = 0U;\n", "")),
     "an outage a step too long": (
         bits.check,
