@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mambo_nmpc.codegen.attitude import AttitudeConstants, attitude_constants
+from mambo_nmpc.codegen.attitude import AttitudeConstants, attitude_constants, feedback_steps
 from mambo_nmpc.codegen.exact_fixed_point import exact_formats
 from mambo_nmpc.codegen.fixed_point import formats
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
@@ -61,10 +61,7 @@ class Design:
     @cached_property
     def feedback_steps(self) -> tuple[float, float] | None:
         """Commands of roll and pitch per change of the angle in an update period; None without feedback."""
-        damping, period_s = self.settings.damping, self.settings.horizon.update_period_s
-        if damping.roll_rate_feedback_s == damping.pitch_rate_feedback_s == 0:
-            return None
-        return damping.roll_rate_feedback_s / period_s, damping.pitch_rate_feedback_s / period_s
+        return feedback_steps(self.settings)
 
     @property
     def stored(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.attitude import attitude_constants
+from mambo_nmpc.codegen.attitude import attitude_constants, feedback_steps
 from mambo_nmpc.codegen.fixed_point import SINE_BITS, Refusal, fractional_bits
 from mambo_nmpc.codegen.observer import observer_constants
 from mambo_nmpc.codegen.quadratic import STATES, quadratic_constants
@@ -89,7 +89,7 @@ def _formats(*sections: Any) -> ExactFormats:
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, tracker = quadratic_constants(settings), tracker_constants(settings)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
-    feedback = _feedback_steps(settings)
+    feedback = feedback_steps(settings)
     ranges = settings.ranges
 
     position = fractional_bits(bounds.position)
@@ -110,7 +110,7 @@ def _formats(*sections: Any) -> ExactFormats:
         "tracker": fractional_bits(tracker.step_squared_per_update_s) if tracker else 0,
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
         "command": fractional_bits(*attitude.command_rad_step2_m),
-        "feedback": fractional_bits(*feedback) if any(feedback) else 0,
+        "feedback": fractional_bits(*feedback) if feedback else 0,
         "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
         "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
         "ratio": fractional_bits(*np.abs(law.ratios)) if law.moves == 2 else 0,
@@ -164,11 +164,6 @@ def exact_refusals(settings: Sections) -> list[Refusal]:
     return [Refusal("ranges", "position_m", rule)]
 
 
-def _feedback_steps(settings: Sections) -> tuple[float, float]:
-    damping, period_s = settings.damping, settings.horizon.update_period_s
-    return damping.roll_rate_feedback_s / period_s, damping.pitch_rate_feedback_s / period_s
-
-
 def _inputs(bits: Mapping[str, int]) -> list[int]:
     """Return the fractional bits of the states that a row multiplies."""
     return [bits["position"], bits["speed"], *[bits["acceleration"]] * 6]
@@ -216,7 +211,7 @@ def _bounds(settings: Sections) -> _Bounds:
         ),
         move=move,
         angle=(2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
-        * max(1.0, *_feedback_steps(settings))
+        * max(1.0, *(feedback_steps(settings) or ()))
         + (2 * settings.limits.tilt_rad),
     )
 

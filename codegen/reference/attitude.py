@@ -26,6 +26,14 @@ class AttitudeState:
     cosine: Real
 
 
+def rotate(products: ExactArithmetic, vector: Real, sine: Real, cosine: Real) -> Real:
+    """Turn vectors (n, 2) by the angles of which sine and cosine (n,) are given."""
+    product, one, other = products.sine_product, vector[:, 0], vector[:, 1]
+    return np.stack(
+        [product(one, cosine) - product(other, sine), product(other, cosine) + product(one, sine)], axis=1
+    )
+
+
 class AttitudeModel:
     """The constants of the attitude model, in the scalar type of the controller."""
 
@@ -73,22 +81,11 @@ class AttitudeModel:
 
     def turn(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
         """Turn tilt and command to the heading with this sine and cosine (n,)."""
-        product = self._products.sine_product
         by_sine = self._products.sine_difference(sine, attitude.cosine, cosine, attitude.sine)
         by_cosine = self._products.sine_sum(cosine, attitude.cosine, sine, attitude.sine)
 
         def turned(vector: Real) -> Real:
-            right, forward = vector[:, 0], vector[:, 1]
-            return clamp(
-                np.stack(
-                    [
-                        product(right, by_cosine) - product(forward, by_sine),
-                        product(forward, by_cosine) + product(right, by_sine),
-                    ],
-                    axis=1,
-                ),
-                self._limit,
-            )
+            return clamp(rotate(self._products, vector, by_sine, by_cosine), self._limit)
 
         return replace(
             attitude, tilt=turned(attitude.tilt), command=turned(attitude.command), sine=sine, cosine=cosine

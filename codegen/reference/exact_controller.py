@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference.attitude import AttitudeModel, AttitudeState
+from mambo_nmpc.codegen.reference.attitude import AttitudeModel, AttitudeState, rotate
 from mambo_nmpc.codegen.reference.exact_arithmetic import exact_arithmetic
 from mambo_nmpc.codegen.reference.exact_optimizer import ExactOptimizer
 from mambo_nmpc.codegen.reference.inputs import Inputs, Status, choose
@@ -192,24 +192,12 @@ class ExactReferenceController:
         return self._optimizer.minimize(np.stack(state, axis=2))
 
     def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
-        product, right, forward = self._products.sine_product, heading[:, 0], heading[:, 1]
-        return np.stack(
-            [
-                product(forward, attitude.cosine) - product(right, attitude.sine),
-                product(right, attitude.cosine) + product(forward, attitude.sine),
-            ],
-            axis=1,
-        )
+        """Return vectors (n, 2) along x and y from those along right and forward."""
+        return rotate(self._products, heading[:, ::-1], attitude.sine, attitude.cosine)
 
     def _to_heading(self, attitude: AttitudeState, world: Real) -> Real:
-        product, x, y = self._products.sine_product, world[:, 0], world[:, 1]
-        return np.stack(
-            [
-                product(y, attitude.cosine) - product(x, attitude.sine),
-                product(x, attitude.cosine) + product(y, attitude.sine),
-            ],
-            axis=1,
-        )
+        """Return vectors (n, 2) along right and forward from those along x and y."""
+        return rotate(self._products, world[:, ::-1], attitude.sine, attitude.cosine)
 
     @property
     def stored(self) -> Real:
