@@ -13,6 +13,7 @@ whose error is at most `SLACK` times the least one, that with the smallest comma
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -21,9 +22,8 @@ from benchmarks.markdown import table
 from mambo_nmpc.sil.campaign.file import (
     CampaignFile,
     distributions,
+    load_its_drone,
     scenario,
-    with_defaults,
-    with_drone,
 )
 from mambo_nmpc.sil.campaign.parameters import draw
 from mambo_nmpc.sil.controllers.pd import GAINS, PdController, PdFeedForwardController, PdGains
@@ -33,7 +33,6 @@ from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.metrics import measure
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace
-from mambo_nmpc.sil.vehicles import presets as vehicles
 
 CURVES: Final[dict[str, dict[str, Any]]] = {
     "bernoulli": {"size_m": {"uniform": [1.0, 2.0]}, "rate_rad_s": {"uniform": [0.25, 0.75]}},
@@ -81,10 +80,9 @@ def drawn_flights(count: int = FLIGHTS) -> list[Flight]:
     for curve, drawn in CURVES.items():
         section = {"trajectory": curve, "duration_s": DURATION_S, **drawn}
         file = CampaignFile.model_validate({"seed": SEED, "flight": section})
-        drone = vehicles.load("mambo")
-        flight = with_drone(file.flight, drone, "benchmark", replaced=False)
-        parameters = distributions(flight, with_defaults(file.draws, drone))
-        shared = flight.model_dump() | {"vehicle": drone.model_dump()}
+        file, drone = load_its_drone(file, Path(), "the search", None)
+        parameters = distributions(file.flight, file.draws)
+        shared = file.flight.model_dump() | {"vehicle": drone.model_dump()}
         scenarios = [scenario(shared, draw(SEED, number, parameters)) for number in range(count)]
         found.append(flight_of(scenarios, PERIOD_S))
     return found

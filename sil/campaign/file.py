@@ -196,13 +196,7 @@ def read_as(model: type[File], path: Path) -> File:
 
 def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None) -> Campaign:
     """Load drone and controllers and check that each can be simulated."""
-    drone = choose_drone(file.flight, folder, source, vehicle)
-    file = file.model_copy(
-        update={
-            "flight": with_drone(file.flight, drone, source, replaced=vehicle is not None),
-            "draws": with_defaults(file.draws, drone),
-        }
-    )
+    file, drone = load_its_drone(file, folder, source, vehicle)
     entrants = tuple(load_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
     names = [entrant.name for entrant in entrants]
     for name in names:
@@ -236,6 +230,20 @@ def load_drone(named: str, folder: Path, place: str) -> VehicleFile:
 
 
 Flown = TypeVar("Flown", bound=FlightSection)
+
+
+def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -> tuple[File, VehicleFile]:
+    """Load the drone that `vehicle` or else the file names; return the file completed for it, and the drone.
+
+    The file has the sections flight and draws.
+    """
+    content: Any = file
+    drone = choose_drone(content.flight, folder, source, vehicle)
+    update = {
+        "flight": with_drone(content.flight, drone, source, replaced=vehicle is not None),
+        "draws": with_defaults(content.draws, drone),
+    }
+    return file.model_copy(update=update), drone
 
 
 def with_drone(flight: Flown, drone: VehicleFile, source: str, *, replaced: bool) -> Flown:

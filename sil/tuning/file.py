@@ -18,14 +18,12 @@ from mambo_nmpc.sil.campaign.file import (
     Draws,
     FileSection,
     FlightSection,
-    choose_drone,
     demand_flyable,
     distributions,
     format_value,
+    load_its_drone,
     load_settings,
     read_as,
-    with_defaults,
-    with_drone,
 )
 from mambo_nmpc.sil.campaign.parameters import Draw, draw
 from mambo_nmpc.sil.vehicles.model import VehicleFile
@@ -154,13 +152,7 @@ def read(path: Path, vehicle: str | None = None) -> Tuning:
 
 def _tuning(file: TuneFile, folder: Path, source: str, vehicle: str | None) -> Tuning:
     """Load drone and base; check that every combination of the ranges' ends is valid and can be simulated."""
-    drone = choose_drone(file.flight, folder, source, vehicle)
-    file = file.model_copy(
-        update={
-            "flight": with_drone(file.flight, drone, source, replaced=vehicle is not None),
-            "draws": with_defaults(file.draws, drone),
-        }
-    )
+    file, drone = load_its_drone(file, folder, source, vehicle)
     base = load_settings(file.base, folder, f"{source}: base")
     search = DEFAULT_SEARCH[base.cost.norm] if file.search is None else file.search
     file = file.model_copy(update={"search": search})
