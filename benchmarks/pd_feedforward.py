@@ -52,8 +52,6 @@ STEPS: Final = (0.5, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.1)
 DRAWS: Final = 12
 SLACK: Final = 1.1
 
-MakeController = Callable[[Flight], PositionController]
-
 
 @dataclass(frozen=True)
 class Judged:
@@ -88,11 +86,11 @@ def drawn_flights(count: int = FLIGHTS) -> list[Flight]:
     return found
 
 
-def judge(flights: list[Flight], make: MakeController) -> Judged:
-    """Fly all flights with the controllers that `make` returns."""
+def judge(flights: list[Flight], controller: PositionController) -> Judged:
+    """Fly all flights with a controller without memory."""
     iae_m_s, variation_rad, crashes = [], [], 0
     for flight in flights:
-        trace = fly(flight, make(flight))
+        trace = fly(flight, controller)
         assert isinstance(trace, SensedTrace)
         crashed = detect_crashes(trace)
         crashes += int(crashed.sum())
@@ -142,11 +140,11 @@ def row(name: str, gains: PdGains | None, judged: Judged) -> dict[str, str]:
 def main() -> None:
     """Print the paper's PD, the least error and the chosen gains as a table; the latter must be `GAINS`."""
     flights = drawn_flights()
-    stock = judge(flights, lambda _: PdController())
+    stock = judge(flights, PdController())
     found: dict[PdGains, Judged] = {}
 
     def judge_gains(gains: PdGains) -> Judged:
-        return judge(flights, lambda flight: PdFeedForwardController(flight, gains))
+        return judge(flights, PdFeedForwardController(gains))
 
     for gains, judged in search(judge_gains, stock.crashes):
         found[gains] = judged

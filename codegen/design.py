@@ -16,7 +16,7 @@ from mambo_nmpc.codegen.fixed_point import formats
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
 from mambo_nmpc.codegen.observer import ObserverConstants, observer_constants
 from mambo_nmpc.codegen.quadratic import QuadraticConstants, quadratic_constants
-from mambo_nmpc.codegen.representation import InputLimits, Representation
+from mambo_nmpc.codegen.representation import ACCELERATION, TARGET, InputLimits, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.tracker import TrackerConstants, tracker_constants
 from mambo_nmpc.codegen.trigonometry import fixed_trigonometry, trigonometry
@@ -35,7 +35,7 @@ class Design:
 
     @cached_property
     def tracker(self) -> TrackerConstants | None:
-        """The constants of the target tracker, in float64; None without `target.acceleration = "tracked"`."""
+        """The constants of the target tracker, in float64; None with `target.acceleration = "none"`."""
         return tracker_constants(self.settings)
 
     @property
@@ -64,11 +64,18 @@ class Design:
         return feedback_steps(self.settings)
 
     @property
+    def target(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_target_t, in their order."""
+        return (*TARGET, *ACCELERATION) if self.tracker and self.tracker.is_given else TARGET
+
+    @property
     def stored(self) -> tuple[str, ...]:
         """The quantity of each number in nmpc_t, in their order; for a quadratic cost."""
         observer = [*["position"] * 2, *["speed"] * 2, *["acceleration"] * 2]
         attitude = [*["acceleration"] * 8, *["sine"] * 2]
-        tracker = [*["velocity"] * 2, *["acceleration"] * 4] if self.tracker else []
+        tracker = ["acceleration"] * 4 if self.tracker else []
+        if self.tracker and not self.tracker.is_given:
+            tracker = ["velocity"] * 2 + tracker
         tilt = ["angle"] * 2 if self.feedback_steps else []
         return (*observer, *attitude, *tracker, *tilt, "angle", "angle")
 

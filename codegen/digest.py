@@ -17,7 +17,7 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.fixed_point import LARGEST
 from mambo_nmpc.codegen.reference import ExactStep, Step, reference_controller
 from mambo_nmpc.codegen.reference.math import Real, rounded
-from mambo_nmpc.codegen.representation import OUTCOME, STATE, TARGET, InputLimits, Representation
+from mambo_nmpc.codegen.representation import OUTCOME, STATE, InputLimits, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 
 TICKS: Final = 100
@@ -60,8 +60,9 @@ class InputScales:
     yaw_rad: float
     thrust_acceleration_m_s2: float
     hover_m_s2: float
-    target_change_m_s: float
-    """Of the change of the target's velocity from step to step; 0 without a tracker."""
+    target_motion: float
+    """Of what the tracker reads: the change of the target's velocity from step to step, in m/s, or a given
+    acceleration, in m/s^2; 0 without a tracker."""
 
 
 def input_scales(design: Design) -> InputScales:
@@ -74,7 +75,10 @@ def input_scales(design: Design) -> InputScales:
     hover_m_s2 = min(HOVER_M_S2, most_m_s2) if fixed else HOVER_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
     unit = 1 if fixed else _UNIT
-    tested_m_s = design.tracker.tested_change_m_s if design.tracker else 0.0
+    tracker, motion = design.tracker, 0.0
+    if tracker:
+        most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
+        motion = min(tracker.tested_input, most)
     return InputScales(
         target_position_m=position_m / unit,
         target_velocity_m_s=velocity_m_s / unit,
@@ -88,7 +92,7 @@ def input_scales(design: Design) -> InputScales:
         yaw_rad=100.0 / unit,
         thrust_acceleration_m_s2=thrust_m_s2 / unit,
         hover_m_s2=hover_m_s2,
-        target_change_m_s=min(tested_m_s, half_m_s / 4) / unit,
+        target_motion=motion / unit,
     )
 
 
@@ -120,7 +124,7 @@ def episode_inputs(design: Design, episodes: Words) -> Iterator[StepInputs]:
         for _ in range(TICKS_PER_INPUT):
             yield (
                 numbers.to_si(state, *STATE),
-                numbers.to_si(target, *TARGET),
+                numbers.to_si(target, *design.target),
                 numbers.to_si(thrust, "thrust"),
             )
             target = target + change
@@ -149,9 +153,10 @@ class _Generator:
 
 
 def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> tuple[Real, Real, Real, Real]:
-    """Draw states, targets, thrusts and changes of the targets (n, 4) from step to step, in numbers of the C.
+    """Draw states, targets, thrusts and changes of the targets from step to step, in numbers of the C.
 
-    Five in 64 have an input out of range. Without a tracker targets do not change.
+    Five in 64 have an input out of range, six if an acceleration is given. Velocities change for a tracker
+    that measures the acceleration by them.
     """
     numbers, limits = design.numbers, design.limits
     choice = generator.next()
@@ -171,9 +176,13 @@ def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> 
     state += [draw(scales.yaw_rad, "yaw")]
     thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_acceleration_m_s2, "thrust")
     thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
-    change = [np.zeros_like(thrust)] * 4
+    change = [np.zeros_like(thrust)] * len(design.target)
     if design.tracker:
-        change[2:] = [draw(scales.target_change_m_s, "velocity") for _ in range(2)]
+        motion = [draw(scales.target_motion, design.tracker.input_quantity) for _ in range(2)]
+        if design.tracker.is_given:
+            target += motion
+        else:
+            change[2:4] = motion
 
     fault = (choice >> 8) & 63
     position, pitch, yaw, velocity = _out_of_range(numbers, limits)
@@ -182,6 +191,8 @@ def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> 
     state[6] = np.where(fault == 2, yaw, state[6])
     target[3], change[3] = np.where(fault == 3, velocity, target[3]), np.where(fault == 3, 0, change[3])
     thrust = np.where(fault == 4, numbers.computed(0), thrust)
+    if len(target) > 4:
+        target[4] = np.where(fault == 5, position, target[4])
     return np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1)
 
 

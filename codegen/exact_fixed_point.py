@@ -107,7 +107,7 @@ def _formats(*sections: Any) -> ExactFormats:
         "move": min(fractional_bits(4 * bounds.move), acceleration),
         "disturbance": fractional_bits(max(settings.observer.disturbance_limit_m_s2, 0.001)),
         "step": fractional_bits(period_s),
-        "tracker": fractional_bits(tracker.step_squared_per_update_s) if tracker else 0,
+        "tracker": fractional_bits(tracker.factor) if tracker else 0,
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
         "command": fractional_bits(*attitude.command_rad_step2_m),
         "feedback": fractional_bits(*feedback) if feedback else 0,
@@ -138,7 +138,7 @@ def _formats(*sections: Any) -> ExactFormats:
             bits[f"{name}_by_{by}"] = shift + bits[kind] - source
     for name, source in zip(STATES, _inputs(bits), strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
-    return ExactFormats(bits, shifts | _product_shifts(bits))
+    return ExactFormats(bits, shifts | _product_shifts(bits, tracker.input_quantity if tracker else ""))
 
 
 def exact_refusals(settings: Sections) -> list[Refusal]:
@@ -211,7 +211,7 @@ def _bounds(settings: Sections) -> _Bounds:
         ),
         move=move,
         angle=(2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
-        * max(1.0, *(feedback_steps(settings) or ()))
+        * max([1.0, *(feedback_steps(settings) or ())])
         + (2 * settings.limits.tilt_rad),
     )
 
@@ -237,8 +237,11 @@ def _shift(gains: Any, bounds: Sequence[float], inputs: Sequence[int], result: i
     return min(*words, _SUM_BITS - 1 - math.frexp(1.01 * total)[1] - result)
 
 
-def _product_shifts(bits: Mapping[str, int]) -> dict[str, int]:
-    """Return the right shift of each product: the bits of both factors less those of the result."""
+def _product_shifts(bits: Mapping[str, int], target_input: str) -> dict[str, int]:
+    """Return the right shift of each product: the bits of both factors less those of the result.
+
+    `target_input` is the quantity that the tracker reads, if there is one.
+    """
     factors = {
         "speed_product": ("step", "velocity", "speed"),
         "drag_product": ("drag", "speed", "acceleration"),
@@ -248,7 +251,7 @@ def _product_shifts(bits: Mapping[str, int]) -> dict[str, int]:
         "per_step2_product": ("per_step2", "acceleration", "disturbance"),
         "aged_position": ("age", "speed", "position"),
         "aged_velocity": ("age", "acceleration", "speed"),
-        "change_product": ("tracker", "velocity", "acceleration"),
+        "target_product": ("tracker", target_input, "acceleration"),
     }
     unused = {name for name in ("drag", "age", "tracker") if not bits[name]}
     shifts = {

@@ -75,7 +75,8 @@ class Formats:
     distance_gradient:  gradient of the distance, m/rad.
     tracking, effort:   lambda_1 and lambda_2, 1/m and 1/rad.
     factor:             eta+ and eta-.
-    tracker:            tau^2 over the update period, s; 0 without a tracker.
+    tracker:            tau^2 over the update period, s, or tau^2, s^2, for a given acceleration; 0 without a
+                        tracker.
     cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
     error_limit:        limit to which the initial error is clamped, an integer of the format of positions.
     tracking_limit, effort_limit: largest weights, integers of their formats.
@@ -198,7 +199,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         tracking=tracking,
         effort=effort,
         factor=factor,
-        tracker=fractional_bits(tracker.step_squared_per_update_s) if tracker else 0,
+        tracker=fractional_bits(tracker.factor) if tracker else 0,
         cost=tracking + error,
         gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),

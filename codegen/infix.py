@@ -15,7 +15,7 @@ _FORMS: Final = {
     "gain_product": "{} * {}",
     "share_product": "{} * {}",
     "step_product": "{} * {}",
-    "change_product": "{} * {}",
+    "target_product": "{} * {}",
     "tracker_product": "{} * {}",
     "initial_error": "{}",
     "error_change": "{}",

@@ -178,6 +178,7 @@ def _context(design: Design) -> dict[str, object]:
             "scalar_bytes": _BYTES[scalar][0],
             "instance_bytes": _instance_bytes(design),
             "tracker": design.tracker,
+            "given": design.tracker is not None and design.tracker.is_given,
             "trigonometry": design.trigonometry,
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
@@ -278,7 +279,7 @@ def _plain_products(design: Design) -> list[str]:
         "aged_velocity": bool(design.observer.age_steps),
         "feedback_product": design.feedback_steps is not None,
         "ratio_product": design.law.moves > 1,
-        "change_product": design.tracker is not None,
+        "target_product": design.tracker is not None,
         "tracker_product": design.tracker is not None,
     }
     return [name for name, is_wanted in wanted.items() if is_wanted]
@@ -318,7 +319,7 @@ def _instance_bytes(design: Design) -> int:
         return (len(design.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
     moves = 2 * settings.horizon.control
     weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if design.tables.has_lag else 3), 2
-    tracker, flags = (6, 3) if design.tracker else (0, 2)
+    tracker, flags = (4 if design.tracker.is_given else 6, 3) if design.tracker else (0, 2)
     numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
     before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
     return -(-(before_flags + flags) // sum_bytes) * sum_bytes

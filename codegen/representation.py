@@ -21,6 +21,7 @@ from mambo_nmpc.codegen.settings.sections import Sections
 
 STATE: Final = (*["position"] * 2, *["velocity"] * 2, *["angle"] * 2, "yaw")
 TARGET: Final = (*["position"] * 2, *["velocity"] * 2)
+ACCELERATION: Final = ("thrust", "thrust")
 THRUST: Final = ("thrust",)
 COMMAND: Final = ("angle", "angle")
 WEIGHTS: Final = ("tracking", "effort")

@@ -24,9 +24,10 @@ _GOLDEN_RATIO: Final = 0.6180339887498949
 
 @dataclass(frozen=True)
 class SelfTestStep:
-    """One step: inputs state (7,), target (4,), thrust; results status, command (2,) and other numbers.
+    """One step: inputs and results.
 
-    Those are cost and gradient (2,) of the 1-norm; (k,) all stored numbers with a quadratic cost.
+    Inputs: state (7,), target (4,) or (6,), thrust. Results: status, command (2,) and other numbers: cost and
+    gradient (2,) of the 1-norm; (k,) all stored numbers with a quadratic cost.
     """
 
     state: tuple[float, ...]
@@ -42,8 +43,8 @@ def self_test(design: Design) -> list[SelfTestStep]:
 
     The first input has a position error below the smallest normal number, so that a board that flushes such
     numbers to zero fails. Every seventh input is out of range: first a state, then a target, then a thrust.
-    For a tracker the target's velocity changes little from step to step. The values are a Weyl sequence; a
-    library's random numbers may change with its version.
+    For a tracker that reads it the target's velocity changes little from step to step. The values are a Weyl
+    sequence; a library's random numbers may change with its version.
     """
     settings = design.settings
     controller = reference_controller(design)
@@ -52,18 +53,22 @@ def self_test(design: Design) -> list[SelfTestStep]:
     spread = _weyl_sequence()
     scalar = settings.code.scalar
     tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
-    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * 4, hover_thrust(settings))]
+    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * len(design.target), hover_thrust(settings))]
+    tracker = design.tracker
+    measures = tracker is not None and not tracker.is_given
     velocity_m_s, change_m_s = [0.0, 0.0], speed_m_s
-    if design.tracker:
-        change_m_s = min(design.tracker.tested_change_m_s, speed_m_s / 8)
+    if tracker and measures:
+        change_m_s = min(tracker.tested_input, speed_m_s / 8)
     for index in range(1, STEPS):
         target = [_next(spread, scale) for scale in (position_m, position_m, change_m_s, change_m_s)]
-        if design.tracker:
+        if measures:
             velocity_m_s = [v + change for v, change in zip(velocity_m_s, target[2:], strict=True)]
             target[2:] = velocity_m_s
         error = [_next(spread, scale) for scale in (*[0.15 * position_m] * 2, *[0.5 * speed_m_s] * 2)]
         tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
         state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
+        if tracker and tracker.is_given:
+            target += [_next(spread, tracker.input_limit / 2) for _ in range(2)]
         thrust = hover_thrust(settings, _next(spread, 2.0))
         if index % 7 == 6:
             match index // 7:

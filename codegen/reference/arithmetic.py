@@ -68,8 +68,8 @@ class Arithmetic(Protocol):
     def step_product(self, step_rad: Real, factor: Any) -> Real:
         """Return step size * eta."""
 
-    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
-        """Return factor * change of a velocity, m/step^2."""
+    def target_product(self, factor: Any, value: Real) -> Real:
+        """Return factor * change of a velocity, m/s, or given acceleration, m/s^2; in m/step^2."""
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         """Return gain * acceleration, m/step^2."""
@@ -127,8 +127,8 @@ class FloatArithmetic:
     def step_product(self, step_rad: Real, factor: Any) -> Real:
         return step_rad * factor
 
-    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
-        return factor_s * change_m_s
+    def target_product(self, factor: Any, value: Real) -> Real:
+        return factor * value
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         return gain * acceleration_m_step2
@@ -143,6 +143,8 @@ class FixedArithmetic:
         self._trigonometry: FixedTrigonometry = design.trigonometry
         self._step_s = self.numbers.constant(design.settings.horizon.prediction_step_s, "step")
         self._step_squared_s2 = self.numbers.constant(design.tables.step_squared_s2, "step_squared")
+        is_given = design.tracker is not None and design.tracker.is_given
+        self._target_bits = formats.thrust if is_given else formats.velocity
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return fixed_sine_cosine(yaw_rad, self._trigonometry)
@@ -195,9 +197,9 @@ class FixedArithmetic:
     def step_product(self, step_rad: Real, factor: Any) -> Real:
         return (step_rad * factor) >> self._formats.factor
 
-    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
+    def target_product(self, factor: Any, value: Real) -> Real:
         f = self._formats
-        return rounded(factor_s * change_m_s, f.tracker + f.velocity - f.acceleration)
+        return rounded(factor * value, f.tracker + self._target_bits - f.acceleration)
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         return rounded(gain * acceleration_m_step2, SINE_BITS)

@@ -151,7 +151,7 @@ class ReferenceController:
     def _track(self, target: Real) -> TargetMotion:
         if self._tracker is None:
             return self.memory.target
-        return self._tracker.update(self.memory.target, target[:, 2:4])
+        return self._tracker.update(self.memory.target, target[:, self._tracker.columns])
 
     def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
         memory = self.memory

@@ -33,8 +33,8 @@ class ExactArithmetic(Protocol):
     def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
         """Return a b + c d of sines and cosines."""
 
-    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
-        """Return factor * change of a velocity, m/step^2."""
+    def target_product(self, factor: Any, value: Real) -> Real:
+        """Return factor * change of a velocity, m/s, or given acceleration, m/s^2; in m/step^2."""
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         """Return gain * acceleration, m/step^2."""
@@ -136,7 +136,7 @@ class FloatExactArithmetic:
     def _correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
         return (gain * by_m) + (other_gain * by_m_step)
 
-    sine_product = change_product = tracker_product = drag_product = aged_position = aged_velocity = _product
+    sine_product = target_product = tracker_product = drag_product = aged_position = aged_velocity = _product
     tilt_product = command_product = feedback_product = ratio_product = _product
     position_correction = velocity_correction = disturbance_correction = _correction
 
@@ -162,8 +162,8 @@ class FixedExactArithmetic:
     def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
         return np.clip(rounded((a * b) + (c * d), SINE_BITS), -(2**SINE_BITS), 2**SINE_BITS)
 
-    def change_product(self, factor_s: Any, change_m_s: Real) -> Real:
-        return self._rounded(factor_s * change_m_s, "change_product")
+    def target_product(self, factor: Any, value: Real) -> Real:
+        return self._rounded(factor * value, "target_product")
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         return self._rounded(gain * acceleration_m_step2, "tracker_product")

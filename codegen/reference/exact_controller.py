@@ -146,7 +146,7 @@ class ExactReferenceController:
         commands = allows_command & (missed != self._no_estimate)
         motion = memory.target
         if self._tracker is not None:
-            motion = choose(commands, self._tracker.update(motion, target[:, 2:4]), motion)
+            motion = choose(commands, self._tracker.update(motion, target[:, self._tracker.columns]), motion)
         moves = self._minimize(attitude, estimate, motion, target, tilt)
         moved = replace(attitude, command=self._products.move_acceleration(moves))
         command = (
@@ -208,7 +208,8 @@ class ExactReferenceController:
         columns += [attitude.tilt, attitude.integral, attitude.lagged, attitude.command]
         columns += [attitude.sine[:, None], attitude.cosine[:, None]]
         if self._tracker is not None:
-            columns += [motion.velocity_m_s, motion.acceleration_m_step2, motion.jerk_m_step2_update]
+            columns += [] if self._tracker.is_given else [motion.velocity_m_s]
+            columns += [motion.acceleration_m_step2, motion.jerk_m_step2_update]
         if self._feedback is not None:
             columns += [memory.tilt_rad]
         return np.concatenate([*columns, memory.command_rad], axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference.math import Real, clamp
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_nmpc.codegen.representation import COMMAND, STATE, THRUST
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -35,17 +35,20 @@ class Inputs:
     """The inputs of n controllers, in the numbers of the C."""
 
     def __init__(self, design: Design) -> None:
-        self._numbers = design.numbers
+        self._numbers, self._target = design.numbers, design.target
         self.limits = design.limits
 
     def quantize(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike
     ) -> tuple[Real, Real, Real]:
-        """Return states (n, 7), targets (n, 4) and thrusts (n,) as numbers."""
+        """Return states (n, 7), targets (n, k) and thrusts (n,) as numbers; k is 4, or 6 with accelerations.
+
+        The columns of a target beyond k are ignored.
+        """
         thrusts = np.asarray(thrust_acceleration_m_s2)[:, None]
         return (
             self.numbers(state, STATE),
-            self.numbers(target, TARGET),
+            self.numbers(np.asarray(target)[:, : len(self._target)], self._target),
             self.numbers(thrusts, THRUST)[:, 0],
         )
 
@@ -62,7 +65,11 @@ class Inputs:
             & within(state[:, 4:6], limits.attitude)
             & within(state[:, 6:7], limits.yaw)
         )
-        good_target = within(target[:, 0:2], limits.position) & within(target[:, 2:4], limits.velocity)
+        good_target = (
+            within(target[:, 0:2], limits.position)
+            & within(target[:, 2:4], limits.velocity)
+            & within(target[:, 4:], limits.thrust_most)
+        )
         good_thrust: Rows = (thrust >= limits.thrust_least) & (thrust <= limits.thrust_most)
         return good_state, good_target, good_thrust
 

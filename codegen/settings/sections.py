@@ -156,19 +156,20 @@ class Model(SettingsSection):
 class Target(SettingsSection):
     """What the controller knows of the target's motion beyond its position and velocity."""
 
-    acceleration: Literal["none", "tracked"] = Field(
+    acceleration: Literal["none", "given", "tracked"] = Field(
         "none",
         description='Acceleration of the target in the prediction: "none" predicts a target of constant '
-        'velocity, as the paper does (eq 11); "tracked" estimates the acceleration from the velocities of '
-        "successive steps and holds it over the horizon, which removes most of the tracking error on curved "
-        "paths. The target's velocity must then be that of its motion, without noise.",
+        'velocity, as the paper does (eq 11); "given" takes it from the caller, in a further member of the '
+        'target; "tracked" estimates it from the velocities of successive steps, which must then be those '
+        "of the target's motion, without noise. Held over the horizon, it removes most of the tracking error "
+        "on curved paths.",
     )
     tracker_gain: Number = Field(
         0.3,
         ge=0.01,
         le=1,
-        description="Share of a new acceleration that the estimate takes: a larger gain follows faster and "
-        "is noisier.",
+        description="Share of a new acceleration that the estimate of the acceleration and its rate takes: "
+        "a larger gain follows faster and is noisier.",
     )
 
 

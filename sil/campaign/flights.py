@@ -92,7 +92,7 @@ def _report_part(number: int, parts: int, share: float) -> None:
 
 def _controller(entrant: Entrant, flight: Flight) -> PositionController:
     if entrant.kind != "nmpc":
-        return pd_controller(entrant.kind, flight)
+        return pd_controller(entrant.kind)
     with _BUILDING:
         return CompiledController(entrant.settings, flight.flights)
 

@@ -77,13 +77,11 @@ def fly_once(options: FlyOptions) -> None:
     if options.controller not in PD_TITLES:
         _check_ranges(flight, settings, options.trajectory)
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
-        controller = _on_board(options, settings) if options.on else _controller(options, settings, flight)
+        controller = _on_board(options, settings) if options.on else _controller(options, settings)
         with progress_bar("flying") as progress:
             trace = simulate(flight, controller, progress, engine=options.engine)
         same_bits = (
-            None
-            if options.on is None
-            else trace.same_bits(simulate(flight, _controller(options, settings, flight)))
+            None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
         )
         write_trace(trace, folder)
         if options.pictures:
@@ -129,14 +127,14 @@ def finish(summary: FlightSummary, options: FlyOptions, files: tuple[str, ...]) 
         raise typer.Exit(1)
 
 
-def _controller(options: FlyOptions, settings: Settings, flight: Flight) -> PositionController:
+def _controller(options: FlyOptions, settings: Settings) -> PositionController:
     match options.controller:
         case "reference":
             return reference_controller(Design(settings))
         case "nmpc":
             return CompiledController(settings)
         case pd:
-            return pd_controller(pd, flight)
+            return pd_controller(pd)
 
 
 def _on_board(options: FlyOptions, settings: Settings) -> PositionController:

@@ -12,7 +12,7 @@ from mambo_nmpc.sil.controllers.inner_steps import WatchedController, write_inne
 from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.files.folders import new_results
-from mambo_nmpc.sil.flight.loop import Flight, PositionController
+from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.loop import fly as simulate
 from mambo_nmpc.sil.flight.report import ReplaySummary, judge
 from mambo_nmpc.sil.flight.scenario import Record, flight_of, read_record
@@ -37,7 +37,7 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             raise FlightError(f"--replay {echo(str(file))} contains the whole flight: leave out {option}")
     record = read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
-    watched, controller = _controllers(record, flight)
+    watched, controller = _controllers(record)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(options.output, ReplaySummary.command, files) as folder:
         with progress_bar("replaying") as progress:
@@ -62,11 +62,11 @@ def fly_again(options: FlyOptions, file: Path) -> None:
     finish(summary, options, written if watched is None else (*written, INNER_STEPS))
 
 
-def _controllers(record: Record, flight: Flight) -> tuple[WatchedController | None, PositionController]:
+def _controllers(record: Record) -> tuple[WatchedController | None, PositionController]:
     """Return the one that records its iterations, None if it has none, and the one that flies."""
     match record.controller:
         case "pd" | "pd-feedforward":
-            return None, pd_controller(record.controller, flight)
+            return None, pd_controller(record.controller)
         case _ if record.settings.cost.norm == "quadratic":
             return None, reference_controller(Design(record.settings))
         case _:

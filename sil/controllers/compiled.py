@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import ExactStep, Step
-from mambo_nmpc.codegen.representation import COMMAND, OUTCOME, STATE, TARGET, THRUST, WEIGHTS, Representation
+from mambo_nmpc.codegen.representation import COMMAND, OUTCOME, STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.controllers.build import build_library, ffi
@@ -24,14 +24,18 @@ def digest_compiled(library: Any, episodes: int) -> int:
 
 
 def as_arrays(
-    numbers: Representation, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
+    design: Design, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
 ) -> list[NDArray[Any]]:
-    """Return state (n, 7), target (n, 4), thrust (n,) as the C reads them; raises ValueError for shapes."""
+    """Return state (n, 7), target (n, 4) or (n, 6), thrust (n,) as the C reads them.
+
+    Columns of a target that the controller has no use for are left out. Raises ValueError for other shapes.
+    """
+    columns = len(design.target)
     return [
-        as_array(numbers, values, quantities, shape)
+        as_array(design.numbers, values, quantities, shape)
         for values, quantities, shape in (
             (state, STATE, (n, 7)),
-            (target, TARGET, (n, 4)),
+            (np.asarray(target)[:, :columns], design.target, (n, columns)),
             (thrust, THRUST, (n,)),
         )
     ]
@@ -129,11 +133,14 @@ class CompiledController:
         return self._set_each(self._library.nmpc_host_set_command, command_rad, COMMAND)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
-        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
+        """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
+
+        The target's columns are x, y, vx, vy, ax, ay; only a controller that is given the acceleration of its
+        target reads the last two, and needs them.
 
         Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
         """
-        inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
+        inputs = as_arrays(self._design, self._n, state, target, thrust_acceleration_m_s2)
         outcome = empty_outcome(self._design, self._n, np.intc)
         addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
         self._library.nmpc_batch_step(self._controllers, self._n, *map(_address, inputs), addresses)

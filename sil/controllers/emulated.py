@@ -59,7 +59,10 @@ class EmulatedController:
         self.machine = start(elf, core, limit_s, counting=counting)
         one = self._empty_outcome(1)
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
-        sizes = [self._instance_bytes, *(width * np.dtype(self.scalar).itemsize for width in (7, 4, 1))]
+        sizes = [
+            self._instance_bytes,
+            *(width * np.dtype(self.scalar).itemsize for width in (7, len(self._design.target), 1)),
+        ]
         sizes += [values.nbytes for values in one.values()]
         overhead = len(sizes) * (self.machine.word_bytes + _MAX_PADDING) + _MAX_PADDING  # pointers, alignment
         room = (self.machine.arena.free_bytes - overhead) // sum(sizes)
@@ -79,11 +82,13 @@ class EmulatedController:
             self._run_batch(batch, "nmpc_batch_init")
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
-        """Compute the next commands from state (n, 7), target (n, 4) and thrust_acceleration_m_s2 (n,).
+        """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
+
+        `CompiledController.step` explains k.
 
         Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
         """
-        inputs = as_arrays(self._numbers, self._n, state, target, thrust_acceleration_m_s2)
+        inputs = as_arrays(self._design, self._n, state, target, thrust_acceleration_m_s2)
         outcome = self._empty_outcome(self._n)
         for batch in self._batches():
             for address, values in zip(self._inputs, inputs, strict=True):

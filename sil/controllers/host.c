@@ -8,7 +8,12 @@
 
 /* Python passes arrays of numbers where the C reads structs. */
 typedef char assert_state_is_an_array[(sizeof(nmpc_state_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
-typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == 4 * sizeof(nmpc_real_t)) ? 1 : -1];
+#ifdef NMPC_HAS_TARGET_ACCELERATION
+#define TARGET_NUMBERS 6
+#else
+#define TARGET_NUMBERS 4
+#endif
+typedef char assert_target_is_an_array[(sizeof(nmpc_target_t) == TARGET_NUMBERS * sizeof(nmpc_real_t)) ? 1 : -1];
 typedef char assert_command_is_an_array[(sizeof(nmpc_command_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
 #ifndef NMPC_STORED_NUMBERS
 typedef char assert_weights_are_an_array[(sizeof(nmpc_weights_t) == 2 * sizeof(nmpc_real_t)) ? 1 : -1];
@@ -78,6 +83,9 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
         measured.velocity_m_s[i] = NUMBER(state[2 + i], VELOCITY);
         wanted.position_m[i] = NUMBER(target[i], POSITION);
         wanted.velocity_m_s[i] = NUMBER(target[2 + i], VELOCITY);
+#ifdef NMPC_HAS_TARGET_ACCELERATION
+        wanted.acceleration_m_s2[i] = NUMBER(target[4 + i], THRUST);
+#endif
     }
     measured.roll_rad = NUMBER(state[4], ANGLE);
     measured.pitch_rad = NUMBER(state[5], ANGLE);

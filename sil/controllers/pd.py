@@ -13,7 +13,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.names import PdName
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import sine_cosine
@@ -84,16 +83,11 @@ TILT_LIMIT_RAD: Final = 0.35
 class PdFeedForwardController:
     """Tilt = P x position error + D x velocity error + A x target acceleration, in body axes, clamped.
 
-    Position and velocity errors are those to the moving target. The accelerations are the exact ones of the
-    trajectory, so nothing estimates them. An instance flies one flight, from its first update to its last.
+    Position and velocity errors are those to the moving target, whose acceleration is given.
     """
 
-    def __init__(self, flight: Flight, gains: PdGains = GAINS) -> None:
+    def __init__(self, gains: PdGains = GAINS) -> None:
         self.gains = gains
-        accelerations = flight.target_accelerations_m_s2()
-        self.acceleration_m_s2 = np.ascontiguousarray(accelerations.transpose(1, 0, 2))
-        """Of the n targets at the k updates, in the world frame (n, k, 2)."""
-        self._update = 0
 
     def step(
         self,
@@ -101,14 +95,13 @@ class PdFeedForwardController:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> PdOutcome:
-        """Return the commands of the next update; arguments as in `PdController.step`."""
-        gains, acceleration = self.gains, self.acceleration_m_s2[:, self._update]
-        self._update += 1
+        """Return the commands for states (n, 7) and targets (n, 6); the last two are accelerations."""
+        gains = self.gains
         sine, cosine = sine_cosine(state[:, 6])
         tilt_x, tilt_y = (
             gains.position_rad_m * (target[:, axis] - state[:, axis])
             + gains.velocity_rad_s_m * (target[:, 2 + axis] - state[:, 2 + axis])
-            + gains.acceleration_rad_s2_m * acceleration[:, axis]
+            + gains.acceleration_rad_s2_m * target[:, 4 + axis]
             for axis in (0, 1)
         )
         command_rad = np.stack([cosine * tilt_y - sine * tilt_x, -(cosine * tilt_x + sine * tilt_y)], axis=-1)
@@ -117,6 +110,6 @@ class PdFeedForwardController:
         )
 
 
-def pd_controller(name: PdName, flight: Flight) -> PdController | PdFeedForwardController:
-    """Return the PD called `name` for a flight."""
-    return PdController() if name == "pd" else PdFeedForwardController(flight)
+def pd_controller(name: PdName) -> PdController | PdFeedForwardController:
+    """Return the PD called `name`."""
+    return PdController() if name == "pd" else PdFeedForwardController()

@@ -41,7 +41,8 @@ static inline void mark_lost(const engine_simulation_t *simulation, vehicle_stat
 
 /* Call the controller, unless the update is dropped, and record the update. */
 static inline void call(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
-                        int64_t update, const engine_draws_t *draws, engine_controller_t controller, void *self,
+                        int64_t update, const double *targets, const engine_draws_t *draws,
+                        engine_controller_t controller, void *self,
                         const seen_t *truth_now, const seen_t *seen, double thrust_n, double *command_rad,
                         const engine_trace_t *trace)
 {
@@ -56,7 +57,7 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
     for (i = 0; i < 7; i++) {
         measured[i] = dropped ? NAN : ((i < 2) ? seen->position_m[i] : ((i < 4) ? seen->velocity_m_s[i - 2] : seen->euler_rad[i - 4]));
     }
-    status = controller(self, measured, trace->target + (4 * row), thrust_acceleration_m_s2, answer_rad);
+    status = controller(self, measured, targets + (6 * row), thrust_acceleration_m_s2, answer_rad);
     if (dropped) {
         status = -1;
     } else {
@@ -77,8 +78,8 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
 }
 
 void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
-                const double *times_s, const engine_draws_t *draws, engine_controller_t controller, void *self,
-                const engine_trace_t *trace)
+                const double *times_s, const double *targets, const engine_draws_t *draws,
+                engine_controller_t controller, void *self, const engine_trace_t *trace)
 {
     vehicle_state_t state;
     suite_t suite;
@@ -153,8 +154,8 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
             thrust_n = (update < simulation->lifting_updates) ? simulation->take_off_thrust_n
                                                               : altitude_thrust_n(simulation, &seen);
             if (tick == 0) {
-                call(simulation, flight, index, update, draws, controller, self, &truth_now, &seen, thrust_n,
-                     command_rad, trace);
+                call(simulation, flight, index, update, targets, draws, controller, self, &truth_now, &seen,
+                     thrust_n, command_rad, trace);
             }
             carry(flight, ticks, command_rad, &wire, arriving_rad);
             if (simulation->attitude == FIRST_ORDER) {

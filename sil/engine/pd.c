@@ -32,13 +32,13 @@ static inline double tilt(const engine_pd_feedforward_t *pd, const double *state
 {
     return ((pd->position_rad_m * (target[axis] - state[axis]))
             + (pd->velocity_rad_s_m * (target[2 + axis] - state[2 + axis])))
-           + (pd->acceleration_rad_s2_m * pd->acceleration_m_s2[axis]);
+           + (pd->acceleration_rad_s2_m * target[4 + axis]);
 }
 
 int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,
                                    double thrust_acceleration_m_s2, double *command_rad)
 {
-    engine_pd_feedforward_t *pd = self;
+    const engine_pd_feedforward_t *pd = self;
     const double tilt_x = tilt(pd, state, target, 0);
     const double tilt_y = tilt(pd, state, target, 1);
     double sine;
@@ -48,6 +48,5 @@ int64_t engine_pd_feedforward_step(void *self, const double *state, const double
     sine_cosine(state[6], &sine, &cosine);
     command_rad[0] = clip((cosine * tilt_y) - (sine * tilt_x), -pd->tilt_limit_rad, pd->tilt_limit_rad);
     command_rad[1] = clip(-((cosine * tilt_x) + (sine * tilt_y)), -pd->tilt_limit_rad, pd->tilt_limit_rad);
-    pd->acceleration_m_s2 += 2;
     return 0;
 }

@@ -147,7 +147,6 @@ typedef struct {
 
 /* Arrays of a trace, (updates, flights, axes). Without sensors the last three are NULL. */
 typedef struct {
-    double *target;
     double *position_m;
     double *velocity_m_s;
     double *euler_rad;
@@ -159,14 +158,15 @@ typedef struct {
     double *seen_euler_rad;
 } engine_trace_t;
 
-/* A position controller: reads a state of 7 and a target of 4 numbers, writes roll and pitch, returns a status. */
+/* A position controller: reads a state of 7 and a target of 6 numbers, writes roll and pitch, returns a status. */
 typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
                                        double thrust_acceleration_m_s2, double *command_rad);
 
-/* Simulate the flight with index `index` from start to end and write its rows of the trace. */
+/* Simulate the flight with index `index` from start to end, with its rows of `targets` (updates, flights, 6), and write
+ * its rows of the trace. */
 void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
-                const double *times_s, const engine_draws_t *draws, engine_controller_t controller, void *self,
-                const engine_trace_t *trace);
+                const double *times_s, const double *targets, const engine_draws_t *draws,
+                engine_controller_t controller, void *self, const engine_trace_t *trace);
 
 /* The stock PD position controller; it has no state. Its constants: see engine_pd_t. */
 typedef struct {
@@ -178,14 +178,12 @@ typedef struct {
 int64_t engine_pd_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
                        double *command_rad);
 
-/* The PD with feed-forward: PdFeedForwardController. The acceleration is that of the target at the next update, x and
- * y in the world frame; those of all later updates follow. */
+/* The PD with feed-forward: PdFeedForwardController. */
 typedef struct {
     double position_rad_m;
     double velocity_rad_s_m;
     double acceleration_rad_s2_m;
     double tilt_limit_rad;
-    const double *acceleration_m_s2;
 } engine_pd_feedforward_t;
 
 int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from dataclasses import astuple
 from typing import Any, Final
 
 import numpy as np
@@ -66,17 +67,14 @@ def fly(
 def fly_compiled(
     engine: Any, flight: Flight, controller: EngineController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate the flights in a library of `build.load`, one after the other.
-
-    Raises ValueError for a PD with feed-forward that was made for another flight.
-    """
-    times_s, targets = flight.times_s(), np.ascontiguousarray(flight.targets())
+    """Simulate the flights in a library of `build.load`, one after the other."""
+    times_s, targets = flight.times_s(), flight.given_targets()
     simulation = simulation_record(flight, times_s)
     flights = flight_records(flight, targets[0])
-    trace = allocate_trace(times_s, targets, sensed=flight.sensors is not None)
+    trace = allocate_trace(times_s, targets[..., :4], sensed=flight.sensors is not None)
     ticks = len(times_s) * flight.ticks_per_update
     draws = _Buffers(flight, len(times_s), ticks)
-    step, instances, stride = _native(engine, controller, trace)
+    step, instances, stride = _native(engine, controller)
     record = ffi.new(
         "engine_trace_t *",
         {
@@ -90,6 +88,7 @@ def fly_compiled(
             pointer("engine_flight_t *", flights[index : index + 1]),
             index,
             pointer("double *", times_s),
+            pointer("double *", targets),
             draws.draw(seed),
             step,
             ffi.cast("char *", instances) + index * stride,
@@ -123,39 +122,15 @@ class _Buffers:
         return self._record
 
 
-def _native(engine: Any, controller: EngineController, trace: Trace) -> tuple[Any, Any, int]:
+def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
     """Return the function of a step, the instances, which the caller keeps, and the bytes of each."""
     if isinstance(controller, PdController):
         return engine.engine_pd_step, _PD, 0
     if isinstance(controller, PdFeedForwardController):
-        instances = _feed_forward_instances(controller, trace)
-        return engine.engine_pd_feedforward_step, instances, ffi.sizeof(instances[0])
+        gains = ffi.new("engine_pd_feedforward_t *", (*astuple(controller.gains), TILT_LIMIT_RAD))
+        return engine.engine_pd_feedforward_step, gains, 0
     step, instances, stride = controller.native
     return _cast("engine_controller_t", step), _cast("char *", instances), stride
-
-
-def _feed_forward_instances(controller: PdFeedForwardController, trace: Trace) -> Any:
-    """Return an engine_pd_feedforward_t for each flight; raises ValueError."""
-    accelerations, gains = controller.acceleration_m_s2, controller.gains
-    updates, flights = trace.target.shape[:2]
-    if accelerations.shape[:2] != (flights, updates):
-        raise ValueError(
-            f"the PD with feed-forward is that of {accelerations.shape[0]} flights with "
-            f"{accelerations.shape[1]} updates, and not of {flights} with {updates}"
-        )
-    return ffi.new(
-        "engine_pd_feedforward_t[]",
-        [
-            (
-                gains.position_rad_m,
-                gains.velocity_rad_s_m,
-                gains.acceleration_rad_s2_m,
-                TILT_LIMIT_RAD,
-                pointer("double *", one),
-            )
-            for one in accelerations
-        ],
-    )
 
 
 def _cast(kind: str, address: Any) -> Any:

@@ -20,7 +20,7 @@ from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 @dataclass(frozen=True, eq=False)
 class ControllerInput:
-    """Inputs of one controller at one update: state (7,), target (4,), thrust over mass."""
+    """Inputs of one controller at one update: state (7,), target (6,), thrust over mass."""
 
     state: FloatArray
     target: FloatArray
@@ -76,7 +76,7 @@ def wrap_yaw(now: ControllerInput, _began: ControllerInput, _since: int) -> Cont
 
 def move_target(by_m: float) -> Alter:
     """Move the target along x."""
-    shift = np.array([by_m, 0.0, 0.0, 0.0])
+    shift = np.array([by_m, *[0.0] * 5])
     return lambda now, _began, _since: replace(now, target=now.target + shift)
 
 

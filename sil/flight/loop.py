@@ -61,9 +61,9 @@ class PositionController(Protocol):
     """The interface of a position controller to the closed loop."""
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
-        """Return the command for states (n, 7), targets (n, 4) and thrust accelerations (n,).
+        """Return the command for states (n, 7), targets (n, 6) and thrust accelerations (n,).
 
-        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy], in the world frame (NED).
+        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy, ax, ay], in the world frame (NED).
         The thrust acceleration is positive along -z of the body.
         """
         ...
@@ -144,12 +144,13 @@ class Flight:
         """
         return self._for_each_flight(self.trajectory.target(self.times_s()))
 
-    def target_accelerations_m_s2(self) -> FloatArray:
-        """Return the targets' accelerations (k, n, 2) at the times of the updates.
+    def given_targets(self) -> FloatArray:
+        """Return the targets (k, n, 6) as controllers are given them: with their accelerations.
 
         Raises `FlightError` as `targets`.
         """
-        return self._for_each_flight(self.trajectory.acceleration(self.times_s()))
+        accelerations = self._for_each_flight(self.trajectory.acceleration(self.times_s()))
+        return np.ascontiguousarray(np.concatenate([self.targets(), accelerations], axis=-1))
 
     def _for_each_flight(self, values: FloatArray) -> FloatArray:
         """Return values of one trajectory (k, m), or of each (k, n, m), as (k, n, m)."""
@@ -167,7 +168,7 @@ def fly(
 
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
-    times_s, targets = flight.times_s(), flight.targets()
+    times_s, targets = flight.times_s(), flight.given_targets()
     lifting_until = lifting_updates(flight, times_s)
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
@@ -178,7 +179,8 @@ def fly(
     caller = _Caller(
         controller,
         Drops(flight.link, seeds),
-        allocate_trace(times_s, targets, sensed=suite is not None),
+        targets,
+        allocate_trace(times_s, targets[..., :4], sensed=suite is not None),
         drone.body.mass_kg,
     )
     for update, time_s in enumerate(times_s):
@@ -279,8 +281,10 @@ def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) ->
 class _Caller:
     """Calls the position controller of n flights, records the trace and holds the command (2, n)."""
 
-    def __init__(self, controller: PositionController, drops: Drops, trace: Trace, mass_kg: float) -> None:
-        self._controller, self._drops, self._mass_kg = controller, drops, mass_kg
+    def __init__(
+        self, controller: PositionController, drops: Drops, targets: FloatArray, trace: Trace, mass_kg: float
+    ) -> None:
+        self._controller, self._drops, self._targets, self._mass_kg = controller, drops, targets, mass_kg
         self.trace = trace
         self.command_rad: FloatArray = np.zeros((2, trace.flights))
 
@@ -297,9 +301,7 @@ class _Caller:
         if dropped is not None:
             measured[dropped] = np.nan
         thrust_acceleration_m_s2 = thrust_n / self._mass_kg
-        outcome = self._controller.step(
-            measured, np.ascontiguousarray(trace.target[update]), thrust_acceleration_m_s2
-        )
+        outcome = self._controller.step(measured, self._targets[update], thrust_acceleration_m_s2)
         trace.position_m[update] = true.position_m.T
         trace.velocity_m_s[update] = true.velocity_m_s.T
         trace.euler_rad[update] = true.euler_rad.T

@@ -91,7 +91,7 @@ def fly_sensed(
         n = flights if sensors is not None and sensors.noise_scale else 1
         flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
         controller: PositionController = (
-            pd_controller(pds[name], flight) if name in pds else CompiledController(settings[name], n)
+            pd_controller(pds[name]) if name in pds else CompiledController(settings[name], n)
         )
         trace = fly(flight, controller, report_part(progress, index, len(jobs)))
         rows.append(_judge(name, view, trace))

@@ -82,9 +82,7 @@ def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], Non
     Calls `progress` with the share done. Returns the traces by controller, with one flight for each case.
     """
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
-    controllers: dict[str, PositionController] = {
-        PD_TITLES[name]: pd_controller(name, flight) for name in PD_NAMES
-    }
+    controllers: dict[str, PositionController] = {PD_TITLES[name]: pd_controller(name) for name in PD_NAMES}
     controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
     return {
         name: fly(flight, controller, report_part(progress, index, len(controllers)))

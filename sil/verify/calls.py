@@ -1,7 +1,7 @@
 """Calls of the C interface as bytes, and what the reference returns for them.
 
-A call is one byte and twelve numbers of the controller's scalar type, which `fuzz/nmpc_fuzz.c` of a bundle
-decodes. A tape is a sequence of calls of one controller, which is initialised before the first call.
+A call is one byte and the numbers of a step in the controller's scalar type, which `fuzz/nmpc_fuzz.c` of a
+bundle decodes. A tape is a sequence of calls of one controller, which is initialised before the first call.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Status, choose, reference_controller
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
+from mambo_nmpc.codegen.representation import ACCELERATION, COMMAND, STATE, TARGET, THRUST, WEIGHTS
 from mambo_nmpc.codegen.settings.model import Settings
 
 Tape = NDArray[Any]
@@ -52,10 +52,15 @@ _POINTERS: Final = {
 }
 
 
+def step_quantities(design: Design) -> tuple[str, ...]:
+    """Return the quantities of a step's numbers: state, target, thrust, and the acceleration if given."""
+    return (*STATE, *TARGET, *THRUST, *(ACCELERATION if len(design.target) > len(TARGET) else ()))
+
+
 def _quantities(design: Design) -> dict[ApiFunction, tuple[str, ...]]:
     """Return the quantities of the numbers that each function reads."""
     return {
-        ApiFunction.STEP: (*STATE, *TARGET, *THRUST),
+        ApiFunction.STEP: step_quantities(design),
         ApiFunction.RESET: COMMAND,
         ApiFunction.SET_WEIGHTS: COMMAND if design.is_quadratic else WEIGHTS,
         ApiFunction.INIT: COMMAND,
@@ -64,7 +69,8 @@ def _quantities(design: Design) -> dict[ApiFunction, tuple[str, ...]]:
 
 def call_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of a call: function in bits 0 and 1 of the byte, null pointers in bits 2 to 5."""
-    return np.dtype([("call", np.uint8), ("values", Design(settings).numbers.scalar, 12)])
+    design = Design(settings)
+    return np.dtype([("call", np.uint8), ("values", design.numbers.scalar, len(step_quantities(design)))])
 
 
 def outcome_type(settings: Settings) -> np.dtype[Any]:
@@ -97,7 +103,7 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
 
 
 def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls: int = 0) -> Tape:
-    """Return a call of `function` for each row of values (n, 1..12); `nulls` is the mask of null pointers."""
+    """Return a call of `function` for each row of values (n, k); `nulls` is the mask of null pointers."""
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
     design = Design(settings)
@@ -152,7 +158,8 @@ class _Runs:
             return status
 
         def step(values: NDArray[Any]) -> NDArray[np.int64]:
-            status: NDArray[np.int64] = controller.step(values[:, 0:7], values[:, 7:11], values[:, 11]).status
+            target = np.concatenate([values[:, 7:11], values[:, 12:]], axis=1)
+            status: NDArray[np.int64] = controller.step(values[:, 0:7], target, values[:, 11]).status
             return status
 
         set_other = controller.set_command if self._design.is_quadratic else controller.set_weights

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.literals import SCALARS, Scalar
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
+from mambo_nmpc.codegen.representation import COMMAND, WEIGHTS
 from mambo_nmpc.codegen.self_test import hover_thrust
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
@@ -25,6 +25,7 @@ from mambo_nmpc.sil.verify.calls import (
     Tape,
     answers,
     calls,
+    step_quantities,
 )
 from mambo_nmpc.sil.verify.inputs import StepInputs, random_steps
 
@@ -101,8 +102,11 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         *[ranges.velocity_m_s] * 2,
     ]
     bounds = [(-limit, limit) for limit in symmetric]
-    bounds.append((ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2))
-    for index, (quantity, ends) in enumerate(zip((*STATE, *TARGET, *THRUST), bounds, strict=True)):
+    most_m_s2 = ranges.thrust_acceleration_max_m_s2
+    bounds.append((ranges.thrust_acceleration_min_m_s2, most_m_s2))
+    quantities = step_quantities(Design(settings))
+    bounds += [(-most_m_s2, most_m_s2)] * (len(quantities) - len(bounds))
+    for index, (quantity, ends) in enumerate(zip(quantities, bounds, strict=True)):
         for value in _around(settings, quantity, *ends):
             good = _good_steps(settings, rng, 4)
             good[1, index] = value
@@ -119,9 +123,9 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     pairs += [
         (ApiFunction.RESET, COMMAND, (-limit,) * 2, (limit,) * 2) for limit in (ATTITUDE_LIMIT_RAD, tilt)
     ]
-    for function, quantities, lows, highs in pairs:
+    for function, names, lows, highs in pairs:
         for index in range(2):
-            for value in _around(settings, quantities[index], lows[index], highs[index]):
+            for value in _around(settings, names[index], lows[index], highs[index]):
                 pair = np.full((1, 2), 0.1 * tilt)
                 pair[0, index] = value
                 yield _surround(settings, rng, calls(settings, function, pair))
@@ -247,7 +251,9 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
             limits.thrust_most,
         ]
     )
-    steps = numbers.to_si(most * rng.choice([-1, 1], (512, 12)), *STATE, *TARGET, *THRUST)
+    quantities = step_quantities(Design(settings))
+    most = np.append(most, [limits.thrust_most] * (len(quantities) - len(most)))
+    steps = numbers.to_si(most * rng.choice([-1, 1], (512, len(most))), *quantities)
     steps[:, 11] = np.abs(steps[:, 11])
     steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
     yield from calls(settings, ApiFunction.STEP, steps).reshape(-1, 4)
@@ -267,28 +273,33 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
 def _target_motion(settings: Settings) -> Iterator[Tape]:
     """For a tracker change the target's velocity by its limit and the numbers next to it, either way.
 
-    Then accelerate it to and fro along both axes, so that acceleration and jerk reach their limits, with a
-    reset on the way.
+    If the acceleration is given, set it to its limit and the numbers next to that. Then accelerate the target
+    to and fro along both axes, so that acceleration and jerk reach their limits, with a reset on the way.
     """
     tracker, ranges = Design(settings).tracker, settings.ranges
     if tracker is None:
         return
 
-    def steps(velocity_m_s: Array) -> Tape:
-        rows = np.zeros((len(velocity_m_s), 12))
-        rows[:, 2:4] = rows[:, 9:11] = np.clip(velocity_m_s, -ranges.velocity_m_s, ranges.velocity_m_s)
+    def steps(motion: Array) -> Tape:
+        rows = np.zeros((len(motion), 14 if tracker.is_given else 12))
+        if tracker.is_given:
+            rows[:, 12:] = motion
+        else:
+            rows[:, 2:4] = rows[:, 9:11] = np.clip(motion, -ranges.velocity_m_s, ranges.velocity_m_s)
         rows[:, 0], rows[:, 11] = 1e-3, hover_thrust(settings)
         return calls(settings, ApiFunction.STEP, rows)
 
-    limit_m_s = tracker.change_limit_m_s
-    for change_m_s in _around(settings, "velocity", -limit_m_s, limit_m_s):
-        if np.isfinite(change_m_s):
+    limit = tracker.input_limit
+    for value in _around(settings, tracker.input_quantity, -limit, limit):
+        if np.isfinite(value):
             for columns in ([1, 0], [0, 1]):
-                yield steps(np.outer([0.0, change_m_s, change_m_s, 0.0], columns))
-    changes_m_s = limit_m_s * np.repeat([0.5, 0.9, -0.9, 0.99, -0.99, 0.2], 8)
-    velocity_m_s = np.cumsum(changes_m_s)[:, None] * [1.0, -0.7]
+                yield steps(np.outer([0.0, value, value, 0.0], columns))
+    motion = limit * np.repeat([0.5, 0.9, -0.9, 0.99, -0.99, 0.2], 8)
+    if not tracker.is_given:
+        motion = np.cumsum(motion)
+    both = motion[:, None] * [1.0, -0.7]
     again = calls(settings, ApiFunction.RESET, np.zeros((1, 2)))
-    yield np.concatenate([steps(velocity_m_s), again, steps(velocity_m_s[::-1])])
+    yield np.concatenate([steps(both), again, steps(both[::-1])])
 
 
 def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
@@ -299,14 +310,18 @@ def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
 
 
 def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
-    """Draw inputs of steps within the ranges (n, 12)."""
+    """Draw inputs of steps within the ranges (n, k), in the order of `step_quantities`."""
     ranges = settings.ranges
     position_m, speed_m_s = min(1.0, ranges.position_m / 4), min(1.0, ranges.velocity_m_s / 4)
     scale = np.array([position_m] * 2 + [speed_m_s] * 2 + [0.3, 0.3, 3.0])
     state = rng.uniform(-1, 1, (n, 7)) * scale
     target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
-    return np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
+    steps = np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
+    tracker = Design(settings).tracker
+    if tracker and tracker.is_given:
+        steps = np.concatenate([steps, rng.uniform(-0.5, 0.5, (n, 2)) * tracker.input_limit], axis=1)
+    return steps
 
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
@@ -330,5 +345,6 @@ def _floating(settings: Settings) -> Scalar:
 
 
 def _rows(inputs: StepInputs) -> Array:
-    """Join state, target and thrust into rows (n, 12)."""
-    return np.concatenate([inputs.state, inputs.target, inputs.thrust[:, None]], axis=1)
+    """Join the inputs into rows (n, k), in the order of `step_quantities`."""
+    target = inputs.target
+    return np.concatenate([inputs.state, target[:, :4], inputs.thrust[:, None], target[:, 4:]], axis=1)

@@ -16,7 +16,7 @@ NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
 
 @dataclass(frozen=True)
 class StepInputs:
-    """Inputs of one step of n controllers: state (n, 7), target (n, 4), thrust (n,)."""
+    """Inputs of one step of n controllers: state (n, 7), target (n, 4) or (n, 6), thrust (n,)."""
 
     state: Array
     target: Array
@@ -47,20 +47,31 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
 
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
+    tracker = Design(settings).tracker
+    if tracker and tracker.is_given:
+        target = np.concatenate([target, _accelerations(tracker.input_limit, high, n, rng)], axis=1)
     return StepInputs(state, target, thrust)
+
+
+def _accelerations(limit_m_s2: float, range_m_s2: float, n: int, rng: np.random.Generator) -> Array:
+    """Draw accelerations (n, 2) of targets, some beyond the tracker's limit or the range of the input."""
+    drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, (n, 2))
+    special = rng.random((n, 2)) < 0.05
+    edges = [0.0, -0.0, limit_m_s2, -limit_m_s2, range_m_s2, -range_m_s2, 1.001 * range_m_s2, *NOT_IN_RANGE]
+    return np.where(special, rng.choice(edges, (n, 2)), np.clip(drawn, -range_m_s2, range_m_s2))
 
 
 def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generator) -> list[StepInputs]:
     """Draw the inputs of consecutive steps of n controllers, independent of each other.
 
-    For a tracker two targets in three change their velocity little from step to step; one in five of these
-    changes is a jump.
+    For a tracker that measures it, two targets in three change their velocity little from step to step; one
+    in five of these changes is a jump.
     """
     drawn = [random_inputs(settings, n, rng) for _ in range(steps)]
     tracker = Design(settings).tracker
-    if tracker is None:
+    if tracker is None or tracker.is_given:
         return drawn
-    limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_change_m_s
+    limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_input
     with np.errstate(invalid="ignore"):
         for before, now in itertools.pairwise(drawn):
             moved = before.target[:, 2:] + rng.uniform(-change_m_s, change_m_s, (n, 2))

@@ -37,5 +37,5 @@ def test_the_flights_are_those_of_a_campaign() -> None:
     flights = drawn_flights(2)
     assert len({flight.seeds for flight in flights}) == 1
     assert all(flight.sensors is not None and flight.disturbances.windy for flight in flights)
-    stock, ours = judge(flights, lambda _: PdController()), judge(flights, PdFeedForwardController)
+    stock, ours = judge(flights, PdController()), judge(flights, PdFeedForwardController())
     assert all(close < far for close, far in zip(ours.iae_m_s, stock.iae_m_s, strict=True))

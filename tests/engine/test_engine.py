@@ -69,7 +69,7 @@ def controller(kind: str, flight: Flight) -> CompiledController | PdController |
     """Make controllers for a flight: a PD, or preset mambo in a scalar type."""
     for name in PD_NAMES:
         if kind == name:
-            return pd_controller(name, flight)
+            return pd_controller(name)
     return CompiledController(with_option(MAMBO, "code.scalar", kind, "test"), flight.flights)
 
 
@@ -111,7 +111,7 @@ def digests(engine: Any) -> list[str]:
     for batch in BATCHES.values():
         flight = flight_of(batch, PERIOD_S)
         for name in PD_NAMES:
-            trace = fly_compiled(engine, flight, pd_controller(name, flight))
+            trace = fly_compiled(engine, flight, pd_controller(name))
             found += [trace.digest(index) for index in range(len(batch))]
     return found
 
@@ -162,15 +162,6 @@ def test_what_is_no_c_flies_in_numpy() -> None:
     assert reference.same_bits(fly(flight, CompiledController(MAMBO)))
     late = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, link=Link(delay_ticks=201))
     assert fly(late, PdController()).same_bits(loop.fly(late, PdController()))
-
-
-def test_a_pd_with_feed_forward_flies_only_the_flight_it_was_made_for() -> None:
-    """The C would read beside its accelerations."""
-    toolchain("gcc")
-    made, longer, more = (Flight(Bernoulli(2.0, 0.5), *size) for size in ((0.2, 2), (0.3, 2), (0.2, 3)))
-    for other in (longer, more):
-        with pytest.raises(ValueError, match="is that of 2 flights with 21 updates, and not of"):
-            fly(other, PdFeedForwardController(made))
 
 
 def test_without_a_compiler_the_flight_is_the_same_and_says_so(

@@ -64,9 +64,7 @@ def digests(path: Path) -> list[str]:
     """Return the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
     engine = ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
-    traces = [
-        fly_compiled(engine, flight, pd_controller(name, flight)) for name in PD_NAMES for flight in flights
-    ]
+    traces = [fly_compiled(engine, flight, pd_controller(name)) for name in PD_NAMES for flight in flights]
     settings = ONE_NORM
     traces += [
         fly_compiled(engine, flight, CompiledController(settings, flight.flights)) for flight in flights[:2]

@@ -56,7 +56,7 @@ from tests.support.tools import require
 MAMBO = ONE_NORM
 EIGHT = next(iter(CASES.values()))
 DOCS = Path(__file__).parents[2] / "docs" / "faults.md"
-NOW = ControllerInput(np.arange(1.0, 8.0), np.arange(4.0), 9.81)
+NOW = ControllerInput(np.arange(1.0, 8.0), np.arange(6.0), 9.81)
 BEGAN = ControllerInput(-NOW.state, -NOW.target, 1.0)
 FLOWN_S = 1.5
 
@@ -82,7 +82,7 @@ def test_a_fault_alters_only_the_inputs_that_it_names() -> None:
     assert burst(NOW, BEGAN, 0).state[1:].tolist() == NOW.state[1:].tolist()
     assert scale_state([1, 1, 1, 1, 2, 2, 2])(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 10, 12, 14]
     assert shift_yaw(1.0)(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 5, 6, 8]
-    assert move_target(100.0)(NOW, BEGAN, 0).target.tolist() == [100, 1, 2, 3]
+    assert move_target(100.0)(NOW, BEGAN, 0).target.tolist() == [100, 1, 2, 3, 4, 5]
     assert report_thrust(0.0)(NOW, BEGAN, 0).thrust_acceleration_m_s2 == 0.0
     assert NOW.state.tolist() == [1, 2, 3, 4, 5, 6, 7]
 

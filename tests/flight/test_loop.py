@@ -34,7 +34,7 @@ class Lean:
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> PdOutcome:
         """Return the same command for every flight."""
-        assert (state.shape[1], target.shape[1]) == (7, 4)
+        assert (state.shape[1], target.shape[1]) == (7, 6)
         assert len(state) == len(target) == len(thrust_acceleration_m_s2)
         command_rad = np.tile([self.roll_rad, self.pitch_rad], (len(state), 1))
         return PdOutcome(command_rad, np.full(len(state), 3, dtype=np.int64))
@@ -117,9 +117,10 @@ def test_controller_receives_the_recorded_state_and_target() -> None:
     flight = Flight(FIGURE_OF_EIGHT, 3.0, yaw_rad=0.4, vehicle=Vehicle(wind_m_s2=(0.5, 0.3)))
     trace = fly(flight, Recorder())
     state = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad], axis=-1)
-    for values, recorded in zip(
-        zip(*given, strict=True), (state, trace.target, trace.thrust_acceleration_m_s2), strict=True
-    ):
+    acceleration = FIGURE_OF_EIGHT.acceleration(trace.time_s)[:, None]
+    target = np.concatenate([trace.target, acceleration], axis=-1)
+    expected = (state, target, trace.thrust_acceleration_m_s2)
+    for values, recorded in zip(zip(*given, strict=True), expected, strict=True):
         np.testing.assert_array_equal(np.stack(values), recorded)
 
 

@@ -82,6 +82,6 @@ def _random_settings(
         },
         "code": {"scalar": scalar},
     }
-    document["target"] = {"acceleration": str(rng.choice(["none", "tracked"]))}
+    document["target"] = {"acceleration": str(rng.choice(["none", "tracked", "given"]))}
     document["horizon"]["update_period_s"] = float(10.0 ** rng.uniform(-3, 0))
     return Settings.model_validate(document)

@@ -60,7 +60,7 @@ def digests(engine: EngineName) -> dict[str, str]:
     found: dict[str, str] = {}
     for names in batches.values():
         flight = flight_of([SCENARIOS[name] for name in names], period_s)
-        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd, flight), engine=engine) for pd in PD_NAMES}
+        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd), engine=engine) for pd in PD_NAMES}
         traces |= {
             preset: fly(flight, CompiledController(settings, len(names)), engine=engine)
             for preset, settings in chosen.items()

@@ -184,6 +184,7 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
         "observer.outage_s": 0.0,
         "model.pitch_trim_rad": -0.03,
     },
+    TWO_MOVES | {"target.acceleration": "given", "target.tracker_gain": 0.6},
     TWO_MOVES
     | {"observer.disturbance_limit_m_s2": 0.0, "ranges.position_m": 5.0, "ranges.velocity_m_s": 2.0},
 )
@@ -210,7 +211,7 @@ def case_values(index: int) -> Values:
         "horizon.update_period_s": period_s,
         "horizon.ramp_s": float(rng.choice([0.0, max(0.02, 2 * period_s), 0.4, 1.0])),
         "limits.tilt_rad": tilt_rad,
-        "target.acceleration": str(rng.choice(["none", "tracked"])),
+        "target.acceleration": str(rng.choice(["none", "tracked", "given"])),
         "target.tracker_gain": float(rng.uniform(0.05, 1)),
         "model.attitude": str(rng.choice(["measured", "predicted"])),
         "model.acceleration_per_tilt": float(rng.uniform(0.5, 1.5)),

@@ -68,8 +68,8 @@ def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[S
         )
         bounds = [ranges.position_m] * 2 + [ranges.velocity_m_s] * 2
         calm = flying & (rng.random(n) < 0.97)
-        inputs.target[:] = np.where(
-            calm[:, None], np.clip(target, np.negative(bounds), bounds), inputs.target
+        inputs.target[:, :4] = np.where(
+            calm[:, None], np.clip(target, np.negative(bounds), bounds), inputs.target[:, :4]
         )
         state[:, :4] = np.clip(state[:, :4], np.negative(bounds), bounds)
         inputs.state[:] = np.where(calm[:, None], state, inputs.state)

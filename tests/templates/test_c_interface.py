@@ -234,7 +234,7 @@ def test_the_acceleration_is_found_kept_over_a_jump_and_never_beyond_its_limit()
     assert np.array_equal(kept, found)
     assert list(self.tracker.jerk_m_step2_update) == [0.0, 0.0]
     for step in range(200):
-        fast = 0.999 * constants.change_limit_m_s * (abs(step % 60 - 30) - 15)
+        fast = 0.999 * constants.input_limit * (abs(step % 60 - 30) - 15)
         lib.nmpc_tracker_update(self, [fast, -fast])
         assert max(map(abs, self.tracker.acceleration_m_step2)) <= np.float32(
             constants.acceleration_limit_m_step2

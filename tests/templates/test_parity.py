@@ -166,11 +166,12 @@ def quantize_acceleration(blocks: SubBlocks, rng: np.random.Generator) -> NDArra
     return blocks.numbers.quantize(drawn, ("acceleration",) * 2)
 
 
+@pytest.mark.parametrize("kind", ["tracked", "given"])
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
-def test_tracker_equals_the_reference(index: int, scalar: str) -> None:
+def test_tracker_equals_the_reference(index: int, scalar: str, kind: str) -> None:
     """Velocity, acceleration and jerk have the same bits, in ramps, at both limits and over jumps."""
-    tracked = with_option(settings_case(index, scalar), "target.acceleration", "tracked")
+    tracked = with_option(settings_case(index, scalar), "target.acceleration", kind)
     blocks = SubBlocks(with_option(tracked, "horizon.update_period_s", 0.01))
     controller, constants = blocks.ffi.new("nmpc_t *"), blocks.design.tracker
     assert constants is not None
@@ -182,15 +183,15 @@ def test_tracker_equals_the_reference(index: int, scalar: str) -> None:
         "jerk_m_step2_update": constants.jerk_limit_m_step2_update,
     }
     limits_reached = set()
-    velocity = np.zeros((1, 2))
+    value = np.zeros((1, 2))
     for step in range(400):
-        if step % 10 == 0:  # the same change for ten steps, to and fro; one in ten is a jump
-            change = constants.change_limit_m_s * rng.uniform(0.55, 1.05, (1, 2)) * (-1) ** (step // 10)
-        velocity = velocity + change
-        given = blocks.numbers.quantize(velocity, TARGET[2:])
+        if step % 10 == 0:  # the same acceleration for ten steps, to and fro; one in ten is beyond the limit
+            drawn = constants.input_limit * rng.uniform(0.55, 1.05, (1, 2)) * (-1) ** (step // 10)
+        value = drawn if constants.is_given else value + drawn
+        given = blocks.numbers.quantize(value, [constants.input_quantity] * 2)
         motion = tracker.update(motion, blocks.computed(given))
         blocks.lib.nmpc_tracker_update(controller, blocks.pointer("nmpc_real_t", given))
-        for name in ("velocity_m_s", *limits):
+        for name in limits if constants.is_given else ("velocity_m_s", *limits):
             found = blocks.unpack(getattr(controller.tracker, name))
             assert bits(found) == bits(getattr(motion, name)[0].astype(blocks.scalar)), (step, name)
         for name, limit in limits.items():

@@ -109,9 +109,9 @@ def test_a_check_passes(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("variant", ["one move", "measured", "untracked"])
+@pytest.mark.parametrize("variant", ["one move", "measured", "untracked", "given"])
 def test_other_settings_are_proven(variant: str, tmp_path: Path) -> None:
-    """One free move, a measured attitude of old measurements, no tracker and no feedback."""
+    """One free move, a measured attitude of old measurements, no tracker and no feedback, an acceleration."""
     require("frama-c", "frama-c-base")
     document = quadratic_settings().model_dump()
     match variant:
@@ -120,6 +120,8 @@ def test_other_settings_are_proven(variant: str, tmp_path: Path) -> None:
         case "measured":
             document["model"]["attitude"] = "measured"
             document["observer"]["age_s"] = 0.03
+        case "given":
+            document["target"]["acceleration"] = "given"
         case _:
             document["target"]["acceleration"] = "none"
             document["damping"]["roll_rate_feedback_s"] = 0.0

@@ -171,7 +171,7 @@ struct nmpc_controller {
     nmpc_sum_t cost;                      /* J, eq 12, of that plan */
     unsigned char iterations;             /* how many iterations updated the plan, at most I_max */
     unsigned char converged;              /* 1 once J changed by less than epsilon */
-    unsigned char has_target;             /* 1 once tracker.velocity_m_s is a target's */
+    unsigned char has_target;             /* 1 once the tracker has seen a target */
 };
 
 #ifdef __cplusplus

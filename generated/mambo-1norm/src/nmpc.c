@@ -46,6 +46,11 @@ static int is_good_point(const nmpc_real_t position_m[2], const nmpc_real_t velo
            && nmpc_within(velocity_m_s[1], NMPC_VELOCITY_RANGE_M_S);
 }
 
+static int is_good_target(const nmpc_target_t *target)
+{
+    return is_good_point(target->position_m, target->velocity_m_s);
+}
+
 static nmpc_status_t check_input(const nmpc_state_t *state, const nmpc_target_t *target,
                                  nmpc_real_t thrust_acceleration_m_s2)
 {
@@ -56,7 +61,7 @@ static nmpc_status_t check_input(const nmpc_state_t *state, const nmpc_target_t 
           && nmpc_within(state->pitch_rad, NMPC_ATTITUDE_RANGE_RAD)
           && nmpc_within(state->yaw_rad, NMPC_YAW_RANGE_RAD))) {
         status = NMPC_BAD_STATE;
-    } else if (!is_good_point(target->position_m, target->velocity_m_s)) {
+    } else if (!is_good_target(target)) {
         status = NMPC_BAD_TARGET;
     } else if (!nmpc_between(thrust_acceleration_m_s2, NMPC_THRUST_ACCELERATION_MIN_M_S2,
                              NMPC_THRUST_ACCELERATION_MAX_M_S2)) {

@@ -121,6 +121,11 @@ static int nmpc_fuzz_is_good_point(const nmpc_real_t position_m[2], const nmpc_r
            && nmpc_fuzz_lies_in(velocity_m_s[1], -NMPC_VELOCITY_RANGE_M_S, NMPC_VELOCITY_RANGE_M_S);
 }
 
+static int nmpc_fuzz_is_good_target(const nmpc_target_t *target)
+{
+    return nmpc_fuzz_is_good_point(target->position_m, target->velocity_m_s);
+}
+
 /* Return the status that nmpc.h promises for a step without null pointers. */
 static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
 {
@@ -131,7 +136,7 @@ static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
                            NMPC_THRUST_ACCELERATION_MAX_M_S2)) {
         status = NMPC_BAD_THRUST;
     }
-    if (!nmpc_fuzz_is_good_point(call->target.position_m, call->target.velocity_m_s)) {
+    if (!nmpc_fuzz_is_good_target(&call->target)) {
         status = NMPC_BAD_TARGET;
     }
     if (!(nmpc_fuzz_is_good_point(call->state.position_m, call->state.velocity_m_s)
@@ -199,7 +204,7 @@ static nmpc_fuzz_call_t nmpc_fuzz_other_refused(const nmpc_fuzz_call_t *call)
         other.state.position_m[0] = (nmpc_real_t)2147483647;
         other.state.roll_rad = (nmpc_real_t)0;
     }
-    if (!nmpc_fuzz_is_good_point(call->target.position_m, call->target.velocity_m_s)) {
+    if (!nmpc_fuzz_is_good_target(&call->target)) {
         other.target.velocity_m_s[1] = (nmpc_real_t)2147483647;
         other.target.position_m[0] = (nmpc_real_t)0;
     }

@@ -147,7 +147,7 @@ struct nmpc_controller {
     nmpc_real_t command_rad[NMPC_ANGLES]; /* the last command */
     unsigned char missed;                 /* control steps since the last good state */
     unsigned char saturated;              /* 1 if the last command lies at the tilt limit */
-    unsigned char has_target;             /* 1 once tracker.velocity_m_s is a target's */
+    unsigned char has_target;             /* 1 once the tracker has seen a target */
 };
 
 #ifdef __cplusplus

@@ -52,6 +52,11 @@ static int is_good_state(const nmpc_state_t *state)
            && nmpc_within(state->yaw_rad, NMPC_YAW_RANGE_RAD);
 }
 
+static int is_good_target(const nmpc_target_t *target)
+{
+    return is_good_point(target->position_m, target->velocity_m_s);
+}
+
 static int is_good_command(const nmpc_command_t *command)
 {
     return nmpc_within(command->roll_rad, NMPC_ATTITUDE_RANGE_RAD)
@@ -242,7 +247,7 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
 
     if ((state != NULL) && (target != NULL)) {
         const int has_state = is_good_state(state);
-        const int has_target = is_good_point(target->position_m, target->velocity_m_s);
+        const int has_target = is_good_target(target);
         const int has_thrust = nmpc_between(thrust_acceleration_m_s2, NMPC_THRUST_ACCELERATION_MIN_M_S2,
                                             NMPC_THRUST_ACCELERATION_MAX_M_S2);
 

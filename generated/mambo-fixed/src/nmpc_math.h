@@ -153,7 +153,7 @@ static inline nmpc_real_t nmpc_ratio_product(nmpc_real_t factor, nmpc_real_t val
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 32);
 }
 
-static inline nmpc_real_t nmpc_change_product(nmpc_real_t factor, nmpc_real_t value)
+static inline nmpc_real_t nmpc_target_product(nmpc_real_t factor, nmpc_real_t value)
 {
     return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 24);
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Target tracker: the target's acceleration, estimated from its velocities by an alpha-beta filter (not in the paper).
+ * Target tracker: the target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper).
  *
  * Index k counts control steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the
  * target, A_T = tau^2 a_T its acceleration, and J_T the change of A_T from one control step to the next: the jerk. In

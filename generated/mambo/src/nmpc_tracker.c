@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Target tracker: the target's acceleration, estimated from its velocities by an alpha-beta filter (not in the paper).
+ * Target tracker: the target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper).
  */
 #include "nmpc_tracker.h"
 
@@ -22,6 +22,21 @@ void nmpc_tracker_clear(nmpc_t *self)
     self->has_target = 0U;
 }
 
+/* Take the acceleration of the target along `axis` in this control step into the estimates. */
+static void correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t measured_m_step2)
+{
+    const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
+    const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
+
+    tracker->acceleration_m_step2[axis] =
+        nmpc_clamp(predicted_m_step2 + (NMPC_TRACKER_GAIN * difference_m_step2),
+                   NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2);
+    tracker->jerk_m_step2_update[axis] =
+        nmpc_clamp(tracker->jerk_m_step2_update[axis]
+                       + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
+                   NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+}
+
 void nmpc_tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
 {
     nmpc_tracker_t *const tracker = &self->tracker;
@@ -32,18 +47,7 @@ void nmpc_tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
         const int is_steady = nmpc_within(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
 
         if ((self->has_target != 0U) && (is_steady != 0)) {
-            const nmpc_real_t measured_m_step2 = NMPC_STEP_SQUARED_PER_UPDATE_S * change_m_s;
-            const nmpc_real_t predicted_m_step2 =
-                tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
-            const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
-
-            tracker->acceleration_m_step2[axis] =
-                nmpc_clamp(predicted_m_step2 + (NMPC_TRACKER_GAIN * difference_m_step2),
-                           NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2);
-            tracker->jerk_m_step2_update[axis] =
-                nmpc_clamp(tracker->jerk_m_step2_update[axis]
-                               + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
-                           NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+            correct(tracker, axis, NMPC_STEP_SQUARED_PER_UPDATE_S * change_m_s);
         } else {
             /* The first velocity, or a jump: the acceleration stays. */
             tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;
