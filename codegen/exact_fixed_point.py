@@ -17,10 +17,11 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_nmpc.codegen.attitude import attitude_constants, feedback_steps
-from mambo_nmpc.codegen.fixed_point import SINE_BITS, Refusal, fractional_bits
+from mambo_nmpc.codegen.fixed_point import SINE_BITS, fractional_bits
 from mambo_nmpc.codegen.observer import observer_constants
 from mambo_nmpc.codegen.quadratic import STATES, quadratic_constants
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.settings.refusal import Refusal
 from mambo_nmpc.codegen.settings.sections import Sections
 from mambo_nmpc.codegen.tracker import tracker_constants
 

@@ -20,8 +20,10 @@ from typing import Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.attitude import feedback_steps
 from mambo_nmpc.codegen.horizon import HorizonTables, horizon_tables
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_nmpc.codegen.settings.refusal import Refusal
 from mambo_nmpc.codegen.settings.sections import Sections
 from mambo_nmpc.codegen.tracker import TrackerConstants, tracker_constants
 
@@ -77,6 +79,7 @@ class Formats:
     factor:             eta+ and eta-.
     tracker:            tau^2 over the update period, s, or tau^2, s^2, for a given acceleration; 0 without a
                         tracker.
+    feedback:           rate feedback in steps; 0 without.
     cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
     error_limit:        limit to which the initial error is clamped, an integer of the format of positions.
     tracking_limit, effort_limit: largest weights, integers of their formats.
@@ -99,6 +102,7 @@ class Formats:
     effort: int
     factor: int
     tracker: int
+    feedback: int
     cost: int
     gradient: int
     error_limit: int
@@ -125,24 +129,17 @@ class _Bounds:
     response: float
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """Why fixed point cannot represent settings: the key to change, and the rule that it breaks."""
-
-    section: str
-    name: str
-    rule: str
-
-
 def formats(settings: Sections, tables: HorizonTables) -> Formats:
     """Choose the formats of `settings`; `refusals` says whether they are fine enough."""
     ranges, optimizer, tilt = settings.ranges, settings.optimizer, settings.limits.tilt_rad
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
     bounds, tracker = _bounds(settings, tables), tracker_constants(settings)
 
+    feedback = feedback_steps(settings)
     factor = fractional_bits(optimizer.increase)
     angle = fractional_bits(
         ATTITUDE_LIMIT_RAD + (tilt if tables.has_lag else 0),
+        tilt + (2 * ATTITUDE_LIMIT_RAD * max(1.0, *feedback) if feedback else 0),
         2 * tilt,
         tilt + optimizer.step_max_rad,
         optimizer.step_max_rad * optimizer.increase,
@@ -200,6 +197,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         effort=effort,
         factor=factor,
         tracker=fractional_bits(tracker.factor) if tracker else 0,
+        feedback=fractional_bits(*feedback) if feedback else 0,
         cost=tracking + error,
         gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),

@@ -17,6 +17,8 @@ from decimal import Decimal, localcontext
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.settings.fields import SHORTEST_LAG_S
+from mambo_nmpc.codegen.settings.refusal import Refusal
 from mambo_nmpc.codegen.settings.sections import Horizon, Sections
 
 
@@ -70,16 +72,40 @@ def horizon_tables(settings: Sections) -> HorizonTables:
     model, period_s = settings.model, settings.horizon.prediction_step_s
     step_squared_s2 = period_s * period_s
     share = 0.5 if model.position_update == "exact" else 0.5 / period_s
-    roll, pitch = (_angle(period_s, lag_s, share) for lag_s in (model.roll_lag_s, model.pitch_lag_s))
-    same_lag = model.roll_lag_s == model.pitch_lag_s
+    lags_s = roll_lag_s, pitch_lag_s = shortened_lags_s(settings)
+    roll, pitch = (_angle(period_s, lag_s, share) for lag_s in lags_s)
+    same_lag = roll_lag_s == pitch_lag_s
     return HorizonTables(
         step_squared_s2=step_squared_s2,
         displacement_share=share,
         angles=(roll, pitch),
-        has_lag=model.roll_lag_s > 0 or model.pitch_lag_s > 0,
+        has_lag=max(lags_s) > 0,
         angles_per_response=2 if same_lag else 1,
         response_sum=_response_sum(settings.horizon, (roll,) if same_lag else (roll, pitch)),
     )
+
+
+def shortened_lags_s(settings: Sections) -> tuple[float, float]:
+    """Return the attitude lags of roll and pitch, which the feedback of their rates shortens; 0 for none."""
+    model, damping = settings.model, settings.damping
+    return (
+        model.roll_lag_s and model.roll_lag_s - damping.roll_rate_feedback_s,
+        model.pitch_lag_s and model.pitch_lag_s - damping.pitch_rate_feedback_s,
+    )
+
+
+def lag_refusals(settings: Sections) -> list[Refusal]:
+    """Return which lags of a controller with a 1-norm the feedback of the rates would more than undo."""
+    refused = []
+    for angle, lag_s in zip(("roll", "pitch"), shortened_lags_s(settings), strict=True):
+        feedback_s = getattr(settings.damping, f"{angle}_rate_feedback_s")
+        if feedback_s and lag_s and lag_s < SHORTEST_LAG_S:
+            shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
+            rule = (
+                f"must be 0 or at least {shortest_s:g} with damping.{angle}_rate_feedback_s = {feedback_s:g}"
+            )
+            refused.append(Refusal("model", f"{angle}_lag_s", rule))
+    return refused
 
 
 def _angle(period_s: float, lag_s: float, share: float) -> AngleConstants:

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.attitude import AttitudeLoop, attitude_loops
-from mambo_nmpc.codegen.fixed_point import Refusal
 from mambo_nmpc.codegen.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
 from mambo_nmpc.codegen.settings.fields import SHORTEST_LAG_S
+from mambo_nmpc.codegen.settings.refusal import Refusal
 from mambo_nmpc.codegen.settings.sections import Cost, Damping, Horizon, Model, Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")

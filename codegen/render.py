@@ -178,6 +178,8 @@ def _context(design: Design) -> dict[str, object]:
             "scalar_bytes": _BYTES[scalar][0],
             "instance_bytes": _instance_bytes(design),
             "tracker": design.tracker,
+            "feedback": design.feedback_steps is not None,
+            "feedback_steps": design.feedback_steps,
             "given": design.tracker is not None and design.tracker.is_given,
             "trigonometry": design.trigonometry,
             "sine_error": SINE_ERRORS[scalar],
@@ -233,8 +235,6 @@ def _quadratic_context(design: Design) -> dict[str, object]:
         "attitude": design.attitude,
         "observer": design.observer,
         "law": design.law,
-        "feedback": design.feedback_steps is not None,
-        "feedback_steps": design.feedback_steps,
         "stored_numbers": len(design.stored),
         "stored_quantities": design.stored,
         "row_quantities": ROW,
@@ -320,6 +320,8 @@ def _instance_bytes(design: Design) -> int:
     moves = 2 * settings.horizon.control
     weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if design.tables.has_lag else 3), 2
     tracker, flags = (4 if design.tracker.is_given else 6, 3) if design.tracker else (0, 2)
+    if design.feedback_steps:
+        command, flags = command + 4, flags + 1
     numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
     before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
     return -(-(before_flags + flags) // sum_bytes) * sum_bytes

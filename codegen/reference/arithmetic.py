@@ -74,6 +74,9 @@ class Arithmetic(Protocol):
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         """Return gain * acceleration, m/step^2."""
 
+    def feedback_product(self, steps: Any, change_rad: Real) -> Real:
+        """Return steps * change of an angle, rad."""
+
 
 class FloatArithmetic:
     """Products in float32 or float64."""
@@ -132,6 +135,9 @@ class FloatArithmetic:
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         return gain * acceleration_m_step2
+
+    def feedback_product(self, steps: Any, change_rad: Real) -> Real:
+        return steps * change_rad
 
 
 class FixedArithmetic:
@@ -203,6 +209,9 @@ class FixedArithmetic:
 
     def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
         return rounded(gain * acceleration_m_step2, SINE_BITS)
+
+    def feedback_product(self, steps: Any, change_rad: Real) -> Real:
+        return rounded(steps * change_rad, self._formats.feedback)
 
 
 def arithmetic(design: Design) -> Arithmetic:

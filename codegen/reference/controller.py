@@ -9,7 +9,7 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.inputs import Inputs, Status, choose
-from mambo_nmpc.codegen.reference.math import Real
+from mambo_nmpc.codegen.reference.math import Real, clamp
 from mambo_nmpc.codegen.reference.optimizer import Minimize, Rprop, Search
 from mambo_nmpc.codegen.reference.predictor import Predictor
 from mambo_nmpc.codegen.reference.tracker import TargetMotion, Tracker, unknown_motion
@@ -20,8 +20,10 @@ from mambo_nmpc.codegen.representation import WEIGHTS
 class Memory:
     """State of n controllers between two steps.
 
-    command_rad is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost (n,), gradient (n, control, 2),
-    iterations (n,), converged (n,). Without a tracker `target` stays unknown.
+    command_rad, the first moves of the last plan, is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost
+    (n,), gradient (n, control, 2), iterations (n,), converged (n,). Without a tracker `target` stays unknown.
+    sent_rad (n, 2) are the last commands, tilt_rad (n, 2) the angles of the last good step, has_tilt (n,)
+    whether there was one.
     """
 
     command_rad: Real
@@ -32,6 +34,9 @@ class Memory:
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
     target: TargetMotion
+    sent_rad: Real
+    tilt_rad: Real
+    has_tilt: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,7 @@ class Step:
     command_rad: (n, 2) roll and pitch commands, in rad.
     cost:        (n,) cost of the plan that the last iteration evaluated.
     gradient:    (n, control, 2) gradient of that plan, per rad.
-    plan_rad:    (n, control, 2) the optimized moves, the first of which is the command.
+    plan_rad:    (n, control, 2) the optimized moves; the first and the rate feedback are the command.
     iterations:  (n,) updates made.
     converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
 
@@ -68,6 +73,10 @@ class ReferenceController:
         settings, products = design.settings, arithmetic(design)
         self.settings = settings
         self._numbers, self._inputs = design.numbers, Inputs(design)
+        self._products = products
+        self._feedback = design.feedback_steps and np.array(
+            [design.numbers.constant(steps, "feedback") for steps in design.feedback_steps]
+        )
         self._predictor = Predictor(design, products)
         self._tracker = Tracker(design.tracker, products) if design.tracker else None
         self._rprop = Rprop(settings, products)
@@ -84,6 +93,9 @@ class ReferenceController:
             iterations=np.zeros(n, np.int64),
             converged=np.zeros(n, np.bool_),
             target=unknown_motion(np.zeros((n, 2), computed)),
+            sent_rad=np.zeros((n, 2), computed),
+            tilt_rad=np.zeros((n, 2), computed),
+            has_tilt=np.zeros(n, np.bool_),
         )
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
@@ -94,7 +106,14 @@ class ReferenceController:
         """
         command, good = self._inputs.command(command_rad)
         plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
-        new = replace(self.memory, command_rad=command, plan_rad=plan, target=unknown_motion(command))
+        new = replace(
+            self.memory,
+            command_rad=command,
+            plan_rad=plan,
+            target=unknown_motion(command),
+            sent_rad=command,
+            has_tilt=np.zeros(len(command), np.bool_),
+        )
         self.memory = choose(good, new, self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
@@ -112,7 +131,8 @@ class ReferenceController:
         """Compute the next commands.
 
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
-        target (n, 4): x, y (m), vx, vy (m/s). thrust_acceleration_m_s2 (n,): thrust over mass, up.
+        target (n, 4): x, y (m), vx, vy (m/s); (n, 6) with ax, ay (m/s^2) where the acceleration is given.
+        thrust_acceleration_m_s2 (n,): thrust over mass, up.
         """
         states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
         status = self._inputs.status(*self._inputs.check(states, targets, thrusts))
@@ -135,18 +155,30 @@ class ReferenceController:
             iterations=searched.iterations,
             converged=searched.converged,
             target=motion,
+            sent_rad=self._command(searched.moves_rad[:, 0], states[:, 4:6]),
+            tilt_rad=states[:, 4:6],
+            has_tilt=np.ones(len(states), np.bool_),
         )
         new = self.memory = choose(good, new, self.memory)
         to_si = self._numbers.to_si
         return Step(
             status=status,
-            command_rad=to_si(new.command_rad, "angle"),
+            command_rad=to_si(new.sent_rad, "angle"),
             cost=to_si(new.cost, "cost"),
             gradient=to_si(new.gradient, "gradient"),
             plan_rad=to_si(new.plan_rad, "angle"),
             iterations=new.iterations,
             converged=new.converged,
         )
+
+    def _command(self, moves_rad: Real, tilt_rad: Real) -> Real:
+        """Return the commands (n, 2): the first moves, and what the rates of the attitude add."""
+        if self._feedback is None:
+            return moves_rad
+        memory = self.memory
+        change = self._products.feedback_product(self._feedback, tilt_rad - memory.tilt_rad)
+        added = np.where(memory.has_tilt[:, None], moves_rad + change, moves_rad)
+        return clamp(added, self._inputs.limits.tilt)
 
     def _track(self, target: Real) -> TargetMotion:
         if self._tracker is None:

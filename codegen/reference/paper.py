@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.horizon import shortened_lags_s
 from mambo_nmpc.codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -44,7 +45,7 @@ class Paper:
     def roll_out(self, R: Array, T: Array, u_1_m: float, U: Array) -> Array:
         """Return the errors r - Tp (N_p, 2) of eqs 8-11, one row for each predicted step."""
         tau, model = self.settings.horizon.prediction_step_s, self.settings.model
-        lag = np.array([model.roll_lag_s, model.pitch_lag_s])  # (5)
+        lag = np.array(shortened_lags_s(self.settings))  # (5)
         decay = np.where(lag > 0, np.exp(-tau / np.where(lag > 0, lag, 1.0)), 0.0)
         tau_2_half = tau**2 / 2 if model.position_update == "exact" else tau / 2  # (1)
         r, v, angle, Tp, Tv, Ta = R[0:2], R[2:4], R[4:6], T[0:2], T[2:4], T[4:6]

@@ -45,7 +45,6 @@ _QUADRATIC: Final = {
         "age_s",
         "outage_s",
     },
-    "damping": {"roll_rate_feedback_s", "pitch_rate_feedback_s"},
 }
 
 

@@ -9,10 +9,12 @@ from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_nmpc.codegen.exact_fixed_point import exact_refusals
-from mambo_nmpc.codegen.fixed_point import Refusal, refusals
+from mambo_nmpc.codegen.fixed_point import refusals
+from mambo_nmpc.codegen.horizon import lag_refusals
 from mambo_nmpc.codegen.quadratic import quadratic_refusals
 from mambo_nmpc.codegen.settings.methods import is_used, used_values
-from mambo_nmpc.codegen.settings.sections import Sections, Target
+from mambo_nmpc.codegen.settings.refusal import Refusal
+from mambo_nmpc.codegen.settings.sections import Damping, Sections, Target
 
 
 class Settings(Sections):
@@ -21,8 +23,8 @@ class Settings(Sections):
     @model_validator(mode="after")
     def _obeys_joint_rules(self) -> Self:
         refused = list(self._unused())
-        if not refused and self.cost.norm == "quadratic":
-            refused = quadratic_refusals(self)
+        if not refused:
+            refused = quadratic_refusals(self) if self.cost.norm == "quadratic" else lag_refusals(self)
         if not refused and self.code.scalar == "fixed":
             refused = exact_refusals(self) if self.cost.norm == "quadratic" else refusals(self)
         if refused:
@@ -51,10 +53,15 @@ class Settings(Sections):
 
     @property
     def in_use(self) -> dict[str, dict[str, Any]]:
-        """The values that the C depends on, by section: without [target] and cost.norm at their defaults."""
+        """The values that the C depends on, by section.
+
+        Without [target], and with a 1-norm without cost.norm and [damping], if they are the defaults.
+        """
         values = used_values(self)
         if self.cost.norm == "1-norm":
             del values["cost"]["norm"]
+            if self.damping == Damping():
+                del values["damping"]
         if self.target == Target():
             del values["target"]
         return values

@@ -175,14 +175,13 @@ class _Runs:
         memory = controller.memory
         writes = (function == ApiFunction.STEP) & ((nulls & NULL_COMMAND) == 0)
         level = ((nulls & NULL_SELF) != 0)[:, None]
-        outcome["command_rad"] = np.where(
-            writes[:, None], np.where(level, 0, memory.command_rad), UNWRITTEN_RAD
-        )
+        sent_rad = memory.command_rad if self._design.is_quadratic else memory.sent_rad
+        outcome["command_rad"] = np.where(writes[:, None], np.where(level, 0, sent_rad), UNWRITTEN_RAD)
         if self._design.is_quadratic:
             outcome["missed"], outcome["saturated"] = memory.missed, memory.saturated
             outcome["stored"] = controller.stored
             return outcome
-        outcome["saturated"] = np.any(np.abs(memory.command_rad) >= self._design.limits.tilt, axis=1)
+        outcome["saturated"] = np.any(np.abs(sent_rad) >= self._design.limits.tilt, axis=1)
         for name in ("iterations", "converged", "cost"):
             outcome[name] = getattr(memory, name)
         for name in ("gradient", "plan_rad"):

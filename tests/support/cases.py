@@ -83,5 +83,8 @@ def _random_settings(
         "code": {"scalar": scalar},
     }
     document["target"] = {"acceleration": str(rng.choice(["none", "tracked", "given"]))}
+    document["damping"] = {"roll_rate_feedback_s": float(rng.choice([0.0, 0.0, 0.0005, 0.02]))}
+    if 0 < lags[0] < 0.001 + document["damping"]["roll_rate_feedback_s"]:
+        document["damping"] = {}
     document["horizon"]["update_period_s"] = float(10.0 ** rng.uniform(-3, 0))
     return Settings.model_validate(document)

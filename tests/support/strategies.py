@@ -48,8 +48,12 @@ def valid_values(draw: st.DrawFn) -> Values:
     """
     prediction = draw(st.integers(1, 50))
     update = draw(st.sampled_from(["exact", "printed"]))
-    no_lag = st.just(0.0)
-    lag = no_lag if update == "printed" else no_lag | numbers("model.roll_lag_s", low=0.001)
+    none, lags = st.just(0.0), {}
+    for angle in ("roll", "pitch"):
+        key, feedback = f"model.{angle}_lag_s", f"damping.{angle}_rate_feedback_s"
+        lags[feedback] = draw(none | numbers(feedback))
+        shortest = lags[feedback] + 0.001001 if lags[feedback] else 0.001
+        lags[key] = draw(none if update == "printed" else none | numbers(key, low=shortest))
     step_min = draw(numbers("optimizer.step_min_rad"))
     initial = draw(numbers("optimizer.initial_step_rad", low=step_min))
     thrust_min = draw(numbers("ranges.thrust_acceleration_min_m_s2"))
@@ -57,8 +61,7 @@ def valid_values(draw: st.DrawFn) -> Values:
         "horizon.prediction": prediction,
         "horizon.control": draw(st.integers(1, prediction)),
         "model.position_update": update,
-        "model.roll_lag_s": draw(lag),
-        "model.pitch_lag_s": draw(lag),
+        **lags,
         "optimizer.iterations": draw(st.integers(1, 100)),
         "optimizer.initial_step_rad": initial,
         "optimizer.step_max_rad": draw(numbers("optimizer.step_max_rad", low=initial)),
