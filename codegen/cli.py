@@ -1,15 +1,25 @@
 """The commands that generate C: init, presets, schema, generate."""
 
 import json
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_nmpc.codegen.command import AsJson, Scalar, Source, complete_presets, examples, load, output_option
-from mambo_nmpc.codegen.errors import DriftError, FileExistsRefusedError, UnwritableError, echo
+from mambo_nmpc.codegen.command import (
+    AsJson,
+    OutputFile,
+    Overwrite,
+    Scalar,
+    Source,
+    complete_presets,
+    examples,
+    load,
+    output_option,
+    write_file,
+)
+from mambo_nmpc.codegen.errors import DriftError, echo
 
 if TYPE_CHECKING:
     from mambo_nmpc.codegen.bundle import Changes, Drift
@@ -41,33 +51,16 @@ def init(
             help="Preset to start from; `mambo-nmpc presets` lists them.", autocompletion=complete_presets
         ),
     ] = "mambo",
-    output: Annotated[
-        Path,
-        output_option("File to write, - for stdout."),
-    ] = Path("controller.toml"),
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
+    output: OutputFile = Path("controller.toml"),
+    force: Overwrite = False,
 ) -> None:
     """Write a controller.toml that holds and explains every setting."""
-    from mambo_nmpc.codegen.atomic import put
     from mambo_nmpc.codegen.settings import controller_toml, presets
 
     text = controller_toml.to_toml(presets.preset(preset), presets.description(preset))
-    if str(output) == "-":
-        typer.echo(text, nl=False)
-        return
-    name = echo(str(output))
-    place = Path(os.path.realpath(output))
-    if place.exists() and not place.is_file():
-        raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
-    try:
-        if os.path.lexists(output) and not force:
-            raise FileExistsRefusedError(
-                f"{name}: already exists; name another with -o, or overwrite it with --force"
-            )
-        put(place, text.encode())
-    except OSError as error:
-        raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
-    typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)
+    if write_file(text, output, force=force):
+        name = echo(str(output))
+        typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)
 
 
 def list_presets(as_json: AsJson = False) -> None:

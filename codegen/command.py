@@ -20,8 +20,10 @@ from mambo_nmpc.codegen.errors import (
     INTERRUPTED,
     NO_READER,
     TERMINATED,
+    FileExistsRefusedError,
     MamboNmpcError,
     Terminated,
+    UnwritableError,
     echo,
 )
 
@@ -157,6 +159,35 @@ def _output_path(text: str | Path) -> Path:
     if text == "":
         raise typer.BadParameter("must not be empty; the current folder is .")
     return Path(text)
+
+
+OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]
+Overwrite = Annotated[bool, typer.Option("--force", help="Overwrite the file.")]
+
+
+def write_file(text: str, output: Path, *, force: bool) -> bool:
+    """Write `text` to a file, whole or not at all, or print it for `-`; return whether it is a file.
+
+    Raises FileExistsRefusedError unless `force`, UnwritableError.
+    """
+    from mambo_nmpc.codegen.atomic import put
+
+    if str(output) == "-":
+        typer.echo(text, nl=False)
+        return False
+    name = echo(str(output))
+    place = Path(os.path.realpath(output))
+    if place.exists() and not place.is_file():
+        raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
+    try:
+        if os.path.lexists(output) and not force:
+            raise FileExistsRefusedError(
+                f"{name}: already exists; name another with -o, or overwrite it with --force"
+            )
+        put(place, text.encode())
+    except OSError as error:
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
+    return True
 
 
 def load(source: str, scalar: str | None) -> "Settings":

@@ -58,15 +58,16 @@ def to_toml(settings: Settings, title: str = _TITLE) -> str:
 
     Keys that the controller does not use are left out.
     """
-    parts = [_comment(title), _comment("A missing key takes the value of preset table1.")]
+    parts = [comment(title), comment("A missing key takes the value of preset table1.")]
     for section, values in used_values(settings).items():
-        parts += ["", _comment(SECTIONS[section]), f"[{section}]"]
+        parts += ["", comment(SECTIONS[section]), f"[{section}]"]
         for name, value in values.items():
             key = KEYS[f"{section}.{name}"]
-            admits = _comment(f"{key.kind.capitalize()}: {key.domain}.")
-            parts += ["", _comment(key.description), admits, f"{name} = {spell(value)}"]
+            admits = comment(f"{key.kind.capitalize()}: {key.domain}.")
+            parts += ["", comment(key.description), admits, f"{name} = {spell(value)}"]
     return "\n".join(parts) + "\n"
 
 
-def _comment(text: str) -> str:
+def comment(text: str) -> str:
+    """Return `text` as a comment of TOML, wrapped."""
     return textwrap.fill(text, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
