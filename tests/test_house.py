@@ -32,6 +32,7 @@ WINGS = [
     "verify",
     "tuning",
     "identify",
+    "derivation",
     "report",
     "cli",
     "package",

@@ -11,6 +11,7 @@ from mambo_nmpc.codegen import cli as generating
 from mambo_nmpc.codegen.command import examples, root
 from mambo_nmpc.codegen.errors import Terminated
 from mambo_nmpc.sil.cli.campaign import campaign
+from mambo_nmpc.sil.cli.design import design
 from mambo_nmpc.sil.cli.doctor import doctor
 from mambo_nmpc.sil.cli.faults import faults
 from mambo_nmpc.sil.cli.fly import fly
@@ -34,6 +35,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "sweep": sweep,
     "doctor": doctor,
     "vehicles": vehicles,
+    "design": design,
     "faults": faults,
     "verify": verify,
     "regress": regress,
@@ -66,6 +68,8 @@ mambo-nmpc sweep --board rp2040 --fit
 mambo-nmpc vehicles
 mambo-nmpc vehicles generic > my-drone.toml
 mambo-nmpc vehicles --schema > vehicle.schema.json
+mambo-nmpc design crazyflie
+mambo-nmpc design identified/vehicle.toml -o controller.toml
 mambo-nmpc faults mambo -o faults
 mambo-nmpc faults --scalar fixed
 mambo-nmpc verify

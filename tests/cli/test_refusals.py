@@ -45,6 +45,7 @@ def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
         "identify no.csv --columns x -o a/b",
         "report no-folder -o a/b",
         "init no-preset -o a/b",
+        "design no-drone -o a/b",
         "generate --prefix 1x -o a/b",
     ],
 )

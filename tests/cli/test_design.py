@@ -1,0 +1,91 @@
+"""`design`: from a drone, or from a log of one, to a controller.toml that flies it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.settings import controller_toml
+from mambo_nmpc.codegen.settings.presets import load
+from tests.support.command import run
+
+DRONE = """\
+[body]
+mass_kg = 0.1
+drag_1_s = 0.1
+
+[attitude]
+kind = "first_order"
+acceleration_per_tilt_g = 0.95
+roll = { gain = 0.9, lag_s = 0.06, dead_time_s = 0.05 }
+pitch = { gain = 0.9, lag_s = 0.06, dead_time_s = 0.05 }
+"""
+
+
+def test_it_writes_a_file_that_flies() -> None:
+    """And says what to do next, and for which drone the settings are."""
+    Path("mine.toml").write_text(DRONE, "utf-8")
+    _, said = run("design", "mine.toml")
+    assert said == "wrote controller.toml; next: mambo-nmpc fly controller.toml --vehicle mine.toml\n"
+    assert Path("controller.toml").read_text("utf-8").startswith("# For vehicle mine.toml, derived")
+    run("fly", "controller.toml", "--vehicle", "mine.toml", "--no-pictures", "--duration-s", "20")
+    assert json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["max_error_m"] < 0.2
+
+
+@pytest.mark.long
+def test_a_log_gives_settings_with_two_commands() -> None:
+    """`identify`, then `design`: the drone of the log flies closer with them than with a preset."""
+    run("identify", "--manoeuvre", "eight.csv")
+    drone = ("--vehicle", "crazyflie-flown", "--sensors", "mocap", "--no-pictures")
+    flown = ("--trajectory", "eight.csv", "--duration-s", "30", "-o", "log")
+    run("fly", "crazyflie", *drone, *flown)
+    run("identify", "log/trace.csv", "-o", "identified")
+    run("design", "identified/vehicle.toml")
+    errors = {}
+    for source in ("controller.toml", "mambo", "crazyflie"):
+        run("fly", source, *drone, "--duration-s", "20")
+        errors[source] = json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["iae_m_s"]
+    assert errors["controller.toml"] < 0.5 * min(errors["mambo"], errors["crazyflie"])
+
+
+def test_to_stdout_it_prints_the_file_alone() -> None:
+    """Which is that of -o."""
+    text, said = run("design", "generic", "-o", "-")
+    assert said == ""
+    run("design", "generic", "-o", "made/generic.toml")
+    assert Path("made/generic.toml").read_text("utf-8") == text
+    assert controller_toml.parse(text, "stdout") == load("made/generic.toml")
+
+
+def test_a_file_somebody_worked_on_stays() -> None:
+    """Until --force."""
+    Path("controller.toml").write_text("mine", "utf-8")
+    _, said = run("design", "generic", code=2)
+    assert said == "controller.toml: already exists; name another with -o, or overwrite it with --force\n"
+    assert Path("controller.toml").read_text("utf-8") == "mine"
+    run("design", "generic", "--force")
+    assert load("controller.toml").cost.norm == "quadratic"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("mass_kg = 0.1", "mass_kg = -1.0", "mine.toml: body.mass_kg = -1.0 must lie in 0.001..100"),
+        (
+            "roll = { gain = 0.9",
+            "roll = { gain = 2.5",
+            "settings for vehicle mine.toml: model.roll_gain = 2.5 must lie in 0.2..2",
+        ),
+    ],
+)
+def test_a_drone_without_settings_is_refused(old: str, new: str, said: str) -> None:
+    """With file, key, value and rule; nothing is written."""
+    Path("mine.toml").write_text(DRONE.replace(old, new), "utf-8")
+    assert run("design", "mine.toml", code=2)[1].startswith(said)
+    assert not Path("controller.toml").exists()
+
+
+def test_an_unknown_drone_is_refused() -> None:
+    """With the names there are."""
+    said = run("design", "crazyfly", code=2)[1]
+    assert said.startswith("crazyfly is neither a shipped vehicle nor a file (did you mean crazyflie?)")
