@@ -33,6 +33,7 @@ WINGS = [
     "tuning",
     "identify",
     "derivation",
+    "api",
     "report",
     "cli",
     "package",

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -25,6 +26,7 @@ from mambo_nmpc.sil.plant.rigid_body import (
     to_world,
 )
 from mambo_nmpc.sil.plant.rotors import Rotors
+from mambo_nmpc.sil.vehicles import presets
 from mambo_nmpc.sil.vehicles.model import VehicleFile
 from mambo_nmpc.sil.vehicles.sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
 
@@ -94,6 +96,19 @@ class Vehicle:
     def of(cls, drone: VehicleFile) -> "Vehicle":
         """Return a drone as it is described."""
         return cls(airframe_of(drone), drone.motor_lag_s, drone.body.drag_1_s, drone=drone)
+
+    @classmethod
+    def from_preset(cls, name: str) -> "Vehicle":
+        """Return a shipped drone; raises SourceNotFoundError."""
+        return cls.of(presets.preset(name))
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> "Vehicle":
+        """Return the drone of a vehicle.toml.
+
+        Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
+        """
+        return cls.of(presets.read(Path(path)))
 
     @cached_property
     def loop(self) -> MotorLoop | FirstOrderDrone:

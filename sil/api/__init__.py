@@ -1,0 +1,1 @@
+"""What `mambo_nmpc` offers to programs: controllers, vehicles and flights, with arrays in and records out."""
