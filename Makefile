@@ -4,7 +4,7 @@
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
-# make bench      time flights against RotorPy, and updates against peers; results in build/bench
+# make bench      time flights against RotorPy, fly its Crazyflie, time updates against peers; results in build/bench
 # make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
 
@@ -72,6 +72,7 @@ generated: $(SETUP)
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights
+	$(BIN)/python -m benchmarks.rotorpy_flights
 	$(BIN)/python -m benchmarks.times
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)

@@ -13,13 +13,13 @@ from mambo_nmpc.codegen.settings.controller_toml import comment
 from mambo_nmpc.codegen.settings.keys import spell
 from mambo_nmpc.sil.derivation.response import fit_steps
 from mambo_nmpc.sil.vehicles.model import VehicleFile
-from mambo_nmpc.sil.vehicles.sections import FirstOrderAttitude, MocapSensors, NoSensors
+from mambo_nmpc.sil.vehicles.sections import FirstOrderAttitude, MamboSensors, MocapSensors, NoSensors
 
 UPDATE_PERIOD_S: Final = 0.01
 RAMP_S: Final = 0.4
 
 QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
-MOST_TILT_RAD: Final = 0.5
+MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
 
 QUICK_DISTURBANCE_M_S3: Final = 3.0
 CALM_DISTURBANCE_M_S3: Final = 1.0
@@ -136,13 +136,18 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
 
 
 def _tilt_limit(drone: VehicleFile) -> Derived:
-    """Return half the tilt at which the largest thrust carries the weight."""
+    """Return half the tilt at which the largest thrust carries the weight, within a bound."""
     ratio = drone.altitude.thrust_max_n / drone.weight_n
     half_rad = 0.5 * math.acos(1.0 / ratio)
     words = f"Half the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
-    if half_rad > MOST_TILT_RAD:
-        words += f"; at most {MOST_TILT_RAD:g}, since the model takes a tilt for its tangent"
-    return Derived("limits", "tilt_rad", _round(max(min(half_rad, MOST_TILT_RAD), 0.01)), words)
+    by_flow = isinstance(drone.sensors, MamboSensors)
+    most_rad = MOST_TILT_BY_FLOW_RAD if by_flow else MOST_TILT_RAD
+    if half_rad > most_rad:
+        why = (
+            "the optical flow drifts in larger tilts" if by_flow else "the model takes a tilt for its tangent"
+        )
+        words += f"; at most {most_rad:g}, since {why}"
+    return Derived("limits", "tilt_rad", _round(max(min(half_rad, most_rad), 0.01)), words)
 
 
 def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:

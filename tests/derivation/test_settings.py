@@ -153,6 +153,11 @@ def test_the_observer_follows_the_sensors() -> None:
     assert settings_for(vehicles.preset("mambo")).observer == type(observer)()
 
 
+def test_optical_flow_lowers_the_tilt_limit() -> None:
+    """To that of the preset for the Mambo, whose thrust would allow more."""
+    assert settings_for(vehicles.preset("mambo")).limits.tilt_rad == 0.35
+
+
 def test_a_strong_drone_may_use_its_thrust() -> None:
     """A thrust beyond the default range would be refused at every step."""
     strong = changed(GENERIC, altitude={"thrust_max_n": 0.1 * 70.2})
