@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from typing import Literal
+from typing import Any, Literal
 
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.atomic import is_left_over, stage
@@ -47,32 +47,40 @@ class Drift:
     diff: str = ""
 
 
-def manifest(files: Mapping[str, str]) -> str:
-    """Return the manifest of `files` as JSON text."""
+def manifest(files: Mapping[str, str], target: str | None = None) -> str:
+    """Return the manifest of `files` as JSON text; `target` is that of `generate --for`."""
+    head = {"generator": f"{GENERATOR} {__version__}"} | ({"target": target} if target else {})
     sha256s = {path: _sha256(files[path].encode()) for path in sorted(files)}
-    return json.dumps({"generator": f"{GENERATOR} {__version__}", "files": sha256s}, indent=2) + "\n"
+    return json.dumps({**head, "files": sha256s}, indent=2) + "\n"
 
 
 def write(
-    files: Mapping[str, str], directory: Path, *, force: bool = False, dry_run: bool = False
+    files: Mapping[str, str],
+    directory: Path,
+    target: str | None = None,
+    *,
+    force: bool = False,
+    dry_run: bool = False,
 ) -> Changes:
-    """Make `directory` hold the bundle `files`, file by file, and return what changed.
+    """Make `directory` hold the bundle `files`, of a target or of none, file by file; return what changed.
 
     All new files are on the disk before the first one is renamed; the manifest is renamed last. A run killed
     between the renames leaves C files of two bundles, which do not compile together; repeating the run
     completes the bundle. With `dry_run` nothing is written. Without `force`, raises ForeignFilesError if it
-    would overwrite the user's work, and LayoutError if the folder holds a bundle of the other layout. Raises
-    UnwritableError if the file system refuses.
+    would overwrite the user's work, and LayoutError if the folder holds a bundle of another target or layout.
+    Raises UnwritableError if the file system refuses.
     """
-    contents = _contents(files)
+    contents = _contents(files, target)
     name = echo(str(directory))
-    target = Path(os.path.realpath(directory))
+    place = Path(os.path.realpath(directory))
     try:
-        changes = _plan(contents, target, name, force=force)
+        if not force:
+            _refuse_other_target(target, place, name)
+        changes = _plan(contents, place, name, force=force)
         if not dry_run:
-            _apply(contents, changes, target, name, force=force)
+            _apply(contents, changes, place, name, force=force)
         ours = {*contents, *changes.removed}
-        kept = (path for path in _files_in(target) if path not in ours and not is_left_over(path))
+        kept = (path for path in _files_in(place) if path not in ours and not is_left_over(path))
         return replace(changes, kept=tuple(kept))
     except OSError as error:
         file = error.filename2 or error.filename
@@ -80,12 +88,12 @@ def write(
         raise UnwritableError(f"{name}: cannot be written: {error.strerror}{where}") from error
 
 
-def check(files: Mapping[str, str], directory: Path) -> tuple[Drift, ...]:
+def check(files: Mapping[str, str], directory: Path, target: str | None = None) -> tuple[Drift, ...]:
     """Return how `directory` differs from the bundle `files`, byte for byte; ignore other files.
 
     Raises UnwritableError if a file cannot be read.
     """
-    contents = _contents(files)
+    contents = _contents(files, target)
     drifts = []
     try:
         for path, content in contents.items():
@@ -101,12 +109,12 @@ def check(files: Mapping[str, str], directory: Path) -> tuple[Drift, ...]:
     return (*drifts, *(Drift(path, "stale") for path in stale))
 
 
-def _contents(files: Mapping[str, str]) -> dict[str, bytes]:
+def _contents(files: Mapping[str, str], target: str | None) -> dict[str, bytes]:
     """Return {path: bytes} of bundle and manifest, sorted by path; raises ValueError for an unsafe path."""
     unsafe = [path for path in files if not _is_safe(path) or path == MANIFEST]
     if unsafe:
         raise ValueError(f"not a path of a bundle: {unsafe[0]!r}")
-    complete = {**files, MANIFEST: manifest(files)}
+    complete = {**files, MANIFEST: manifest(files, target)}
     return {path: complete[path].encode() for path in sorted(complete)}
 
 
@@ -183,6 +191,18 @@ def _refuse_other_layout(contents: Iterable[str], known: Iterable[str], name: st
         raise LayoutError(f"{name}: {is_now}; {change} --amalgamate, or change the layout with --force")
 
 
+def _refuse_other_target(target: str | None, place: Path, name: str) -> None:
+    """Refuse to write over the bundle of another target, or of none: every file of it would be removed."""
+    document = _document(place)
+    if document is not None and (known := document.get("target")) != target:
+        is_now = (
+            f"is for target {echo(str(known))}; add --for {echo(str(known))}"
+            if known
+            else ("is an ordinary bundle; leave out --for")
+        )
+        raise LayoutError(f"{name}: {is_now}, name another folder, or change it with --force")
+
+
 def _refuse_foreign(foreign: tuple[str, ...], known: Iterable[str], name: str) -> None:
     """Refuse to overwrite the files `foreign`, if there are any."""
     if foreign:
@@ -200,19 +220,27 @@ def _known(target: Path) -> dict[str, object]:
 
     Paths that lead out of `target` are left out.
     """
-    content = _content(target / MANIFEST) or b""
     try:
-        document = json.loads(content)
-        if document["generator"].split()[0] != GENERATOR:
+        document = _document(target)
+        if document is None:
             return {}
         listed = {
             path: sha256
             for path, sha256 in document["files"].items()
             if _is_safe(path) and not any((target / parent).is_symlink() for parent in _folders_of(path))
         }
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (ValueError, LookupError, TypeError, AttributeError):
         return {}
-    return {**listed, MANIFEST: _sha256(content)}
+    return {**listed, MANIFEST: _sha256(_content(target / MANIFEST) or b"")}
+
+
+def _document(place: Path) -> dict[str, Any] | None:
+    """Return the manifest in the folder `place`, if it is one of ours."""
+    try:
+        document: dict[str, Any] = json.loads(_content(place / MANIFEST) or b"")
+        return document if document["generator"].split()[0] == GENERATOR else None
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
 
 
 def _folders_of(path: str) -> list[PurePosixPath]:

@@ -9,6 +9,7 @@ import typer
 
 from mambo_nmpc.codegen.command import (
     AsJson,
+    OptionalSource,
     OutputFile,
     Overwrite,
     Scalar,
@@ -20,6 +21,7 @@ from mambo_nmpc.codegen.command import (
     write_file,
 )
 from mambo_nmpc.codegen.errors import DriftError, echo
+from mambo_nmpc.codegen.targets import TARGETS, complete_targets, find_target
 
 if TYPE_CHECKING:
     from mambo_nmpc.codegen.bundle import Changes, Drift
@@ -40,6 +42,7 @@ def register(app: typer.Typer) -> None:
             "mambo-nmpc generate -o controller",
             "mambo-nmpc generate controller.toml -o controller --prefix roll_pitch",
             "mambo-nmpc generate controller.toml -o controller --check",
+            "mambo-nmpc generate --for crazyflie -o app",
         )
     )(generate)
 
@@ -88,8 +91,17 @@ def generate(
         Path,
         output_option("Folder of the bundle."),
     ],
-    source: Source = "mambo",
+    source: OptionalSource = None,
     *,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            help=f"Write a folder that builds for: {', '.join(TARGETS)}.",
+            metavar="TARGET",
+            autocompletion=complete_targets,
+        ),
+    ] = None,
     check: Annotated[
         bool,
         typer.Option("--check", help="Write nothing; exit 1 with a diff if the folder is not up to date."),
@@ -108,21 +120,24 @@ def generate(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Generate the C of a controller into a folder."""
+    """Generate the C of a controller into a folder, with --for one that builds for a drone or a tool."""
     from mambo_nmpc.codegen import bundle
-    from mambo_nmpc.codegen.render import render
+    from mambo_nmpc.codegen.render import render, render_target
     from mambo_nmpc.codegen.settings import controller_toml
 
     if check and (force or dry_run):
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")
-    settings = load(source, scalar)
+    if amalgamate and target is not None:
+        raise typer.BadParameter("--for decides the layout: leave one of them out", param_hint="--amalgamate")
+    wanted = None if target is None else find_target(target)
+    settings = load(source or (wanted.preset if wanted else "mambo"), scalar)
     if prefix is not None:
         settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")
-    files = render(settings, amalgamate=amalgamate)
+    files = render_target(settings, wanted) if wanted else render(settings, amalgamate=amalgamate)
     if check:
-        _report_drifts(bundle.check(files, output), output, as_json=as_json)
+        _report_drifts(bundle.check(files, output, target), output, as_json=as_json)
     else:
-        changes = bundle.write(files, output, force=force, dry_run=dry_run)
+        changes = bundle.write(files, output, target, force=force, dry_run=dry_run)
         _report_changes(changes, settings, output, dry_run=dry_run, as_json=as_json)
 
 

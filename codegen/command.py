@@ -46,6 +46,13 @@ def complete_presets(incomplete: str) -> list[str]:
 Source = Annotated[
     str, typer.Argument(help="A preset or a controller.toml.", autocompletion=complete_presets)
 ]
+OptionalSource = Annotated[
+    str | None,
+    typer.Argument(
+        help="A preset or a controller.toml; by default mambo, with --for the preset of the target.",
+        autocompletion=complete_presets,
+    ),
+]
 Scalar = Annotated[
     str | None, typer.Option(help="Scalar type of the C (code.scalar).", metavar="float32|float64|fixed")
 ]

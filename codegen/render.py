@@ -3,7 +3,7 @@
 import hashlib
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, Final
 
@@ -28,6 +28,7 @@ from mambo_nmpc.codegen.self_test import hover_thrust, self_test
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
@@ -88,10 +89,7 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
 
-    context = _context(design) | {
-        "amalgamated": amalgamate,
-        "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
-    }
+    context = _context(design, with_digest=with_digest) | {"amalgamated": amalgamate}
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
     if design.numbers.formats is None:
         text = {name: infix(content) for name, content in text.items()}
@@ -109,6 +107,32 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
             f"include/{name}" if name in public else f"src/{name}": content for name, content in text.items()
         }
     files = library | {path: template.render(context | layout) for path, template in project.items()}
+    return _finish(files, settings)
+
+
+def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bool = True) -> dict[str, str]:
+    """Render the folder of `target`, {relative POSIX path: text}: the amalgamated library and its templates.
+
+    `with_digest` as in `render`.
+    """
+    bundle = render(settings, amalgamate=True, with_digest=with_digest)
+    library = {
+        f"{target.library}{name}": bundle[name]
+        for name in (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
+    }
+    environment = _environment()
+    context = _context(Design(settings), with_digest=with_digest)
+    own = f"{TARGETS_FOLDER}/{target.name}/"
+    files = {
+        path.removeprefix(own).removesuffix(".j2"): environment.get_template(path).render(context)
+        for path in environment.list_templates(extensions=["j2"])
+        if path.startswith(own)
+    }
+    return library | _finish(files, settings)
+
+
+def _finish(files: Mapping[str, str], settings: Settings) -> dict[str, str]:
+    """Return rendered `files` with guards and the prefix of `settings`, and their controller.toml."""
     prefix, settings_id = settings.code.prefix, _settings_id(settings)
     named = {
         with_prefix(path, prefix): with_prefix(_add_guard(path, text, settings_id), prefix)
@@ -148,8 +172,8 @@ def _number_filter(name: str) -> Callable[..., str]:
     return spell
 
 
-def _context(design: Design) -> dict[str, object]:
-    """Return all values that the templates insert."""
+def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
+    """Return all values that the templates insert; `with_digest` as in `render`."""
     settings, numbers = design.settings, design.numbers
     scalar = settings.code.scalar
     own = _quadratic_context(design) if design.is_quadratic else _one_norm_context(design)
@@ -190,6 +214,7 @@ def _context(design: Design) -> dict[str, object]:
             "ticks": TICKS,
             "held": TICKS_PER_INPUT,
             "self_test_steps": TICKS * episode_count(settings),
+            "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
             "spread": input_scales(design),
             "boards": [
                 {

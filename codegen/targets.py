@@ -1,0 +1,55 @@
+"""The targets of `mambo-nmpc generate --for`: folders that build as they are, in a firmware or a tool.
+
+A target is an entry here and a folder of templates, `templates/firmware/NAME`, laid out like the folder that
+they make: `src/Kbuild.j2` becomes `src/Kbuild`. Names of the controller in paths and texts get its prefix.
+"""
+
+import difflib
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_nmpc.codegen.errors import SourceNotFoundError, echo
+
+TARGETS_FOLDER: Final = "firmware"
+"""The folder of templates that holds those of each target."""
+
+
+@dataclass(frozen=True)
+class FirmwareTarget:
+    """Where a controller is used.
+
+    name:    as in `--for`, and of the folder of templates.
+    preset:  the settings if the user names none.
+    library: the folder of nmpc.h and nmpc.c, the amalgamated library, with a slash at its end.
+    purpose: one line for `--help`.
+    """
+
+    name: str
+    preset: str
+    library: str
+    purpose: str
+
+
+_TARGETS: Final = (
+    FirmwareTarget("platformio", "mambo", "src/", "a library for PlatformIO"),
+    FirmwareTarget("espidf", "mambo", "", "a component for ESP-IDF"),
+)
+TARGETS: Final = {target.name: target for target in _TARGETS}
+"""All targets by name."""
+
+
+def complete_targets(incomplete: str) -> list[str]:
+    """Return the targets that begin with `incomplete`, for the shell."""
+    return [name for name in TARGETS if name.startswith(incomplete)]
+
+
+def find_target(name: str) -> FirmwareTarget:
+    """Return the target of that name; raises SourceNotFoundError."""
+    if name in TARGETS:
+        return TARGETS[name]
+    near = difflib.get_close_matches(name, TARGETS, n=1)
+    guess = f" (did you mean {near[0]}?)" if near else ""
+    raise SourceNotFoundError(
+        f"--for {echo(name)} is not a target{guess}; targets are {', '.join(TARGETS)}; without --for the "
+        "bundle has a Makefile and fits any firmware"
+    )

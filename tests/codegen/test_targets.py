@@ -1,0 +1,95 @@
+"""The mechanism of `generate --for`: one folder a target, protected as every bundle is."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen.render import render, render_target
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.targets import TARGETS
+from tests.support.command import run
+
+LONGEST_PAGE = 80
+"""Lines of a README that is one page."""
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_folder_is_made_of_the_preset_of_its_target_and_kept(name: str, tmp_path: Path) -> None:
+    """Without a source it has the target's preset; its own controller.toml makes it again; --check agrees."""
+    folder = str(tmp_path / "out")
+    run("generate", "--for", name, "-o", folder)
+    settings = f"{folder}/controller.toml"
+    assert presets.load(settings) == presets.preset(TARGETS[name].preset)
+    assert run("generate", settings, "--for", name, "-o", folder)[0] == ""
+    run("generate", "--for", name, "-o", folder, "--check")
+    assert json.loads((tmp_path / "out" / "manifest.json").read_text("utf-8"))["target"] == name
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_the_library_is_the_amalgamated_one_with_every_prefix(name: str) -> None:
+    """What a target compiles is what the other tests prove; its own files carry the prefix too."""
+    target = TARGETS[name]
+    settings = presets.preset(target.preset)
+    files, library = (
+        render_target(settings, target, with_digest=False),
+        render(settings, amalgamate=True, with_digest=False),
+    )
+    assert [files[f"{target.library}{path}"] for path in ("nmpc.h", "nmpc.c")] == [
+        library[path] for path in ("nmpc.h", "nmpc.c")
+    ]
+    left = settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "left"})})
+    renamed = render_target(left, target, with_digest=False)
+    assert f"{target.library}left.c" in renamed
+    assert not [path for path, text in renamed.items() if path != "controller.toml" and "nmpc_step" in text]
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_page_says_how_to_build_to_watch_and_to_go_back(name: str) -> None:
+    """The README of a target is one page."""
+    target = TARGETS[name]
+    text = render_target(presets.preset(target.preset), target, with_digest=False)["README.md"]
+    assert len(text.splitlines()) <= LONGEST_PAGE
+    for heading in ("Build", "Watch", "Go back"):
+        assert f"**{heading}.**" in text
+    assert f"--for {name}" in text
+
+
+def test_an_edited_file_drifts_and_is_kept(tmp_path: Path) -> None:
+    """As in every bundle: --check shows it, a run refuses it, --force takes it back."""
+    folder = str(tmp_path)
+    run("generate", "--for", "espidf", "-o", folder)
+    (tmp_path / "CMakeLists.txt").write_text("mine\n", "utf-8")
+    assert "\n-mine\n" in run("generate", "--for", "espidf", "-o", folder, "--check", code=1)[0]
+    assert "CMakeLists.txt (edited by hand)" in run("generate", "--for", "espidf", "-o", folder, code=2)[1]
+    assert run("generate", "--for", "espidf", "-o", folder, "--force")[0] == "changed CMakeLists.txt\n"
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "message"),
+    [
+        (["--for", "espidf"], [], "is for target espidf; add --for espidf"),
+        (["--for", "espidf"], ["--for", "platformio"], "is for target espidf; add --for espidf"),
+        ([], ["--for", "espidf"], "is an ordinary bundle; leave out --for"),
+    ],
+)
+def test_a_folder_of_another_target_is_replaced_only_by_force(
+    first: list[str], then: list[str], message: str, tmp_path: Path
+) -> None:
+    """A forgotten --for would remove every file."""
+    folder = str(tmp_path / "out")
+    run("generate", *first, "-o", folder)
+    assert message in run("generate", *then, "-o", folder, code=2)[1]
+    run("generate", *then, "-o", folder, "--force")
+    run("generate", *then, "-o", folder, "--check")
+
+
+def test_unknown_targets_and_contradictions_are_refused(tmp_path: Path) -> None:
+    """With a guess, and with the targets that there are."""
+    said = run("generate", "--for", "espid", "-o", str(tmp_path), code=2)[1]
+    assert said.startswith("--for espid is not a target (did you mean espidf?); targets are ")
+    assert all(name in said for name in TARGETS)
+    assert (
+        "--amalgamate" in run("generate", "--for", "espidf", "--amalgamate", "-o", str(tmp_path), code=2)[1]
+    )
+    assert not list(tmp_path.iterdir())

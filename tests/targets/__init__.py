@@ -1,0 +1,1 @@
+"""Tests of targets: folders that build as they are, and fly."""
