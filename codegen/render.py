@@ -113,15 +113,16 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
 def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bool = True) -> dict[str, str]:
     """Render the folder of `target`, {relative POSIX path: text}: the amalgamated library and its templates.
 
-    `with_digest` as in `render`.
+    `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update period.
     """
+    ticks = target.ticks_per_update(settings.horizon.update_period_s)
     bundle = render(settings, amalgamate=True, with_digest=with_digest)
     library = {
         f"{target.library}{name}": bundle[name]
         for name in (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
     }
     environment = _environment()
-    context = _context(Design(settings), with_digest=with_digest)
+    context = _context(Design(settings), with_digest=with_digest) | {"ticks_per_update": ticks}
     own = f"{TARGETS_FOLDER}/{target.name}/"
     files = {
         path.removeprefix(own).removesuffix(".j2"): environment.get_template(path).render(context)

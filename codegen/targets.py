@@ -8,7 +8,7 @@ import difflib
 from dataclasses import dataclass
 from typing import Final
 
-from mambo_nmpc.codegen.errors import SourceNotFoundError, echo
+from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, echo
 
 TARGETS_FOLDER: Final = "firmware"
 """The folder of templates that holds those of each target."""
@@ -21,18 +21,33 @@ class FirmwareTarget:
     name:    as in `--for`, and of the folder of templates.
     preset:  the settings if the user names none.
     library: the folder of nmpc.h and nmpc.c, the amalgamated library, with a slash at its end.
-    purpose: one line for `--help`.
+    tick_s:  the period with which the firmware calls, in s; None where the caller chooses it.
     """
 
     name: str
     preset: str
     library: str
-    purpose: str
+    tick_s: float | None = None
+
+    def ticks_per_update(self, update_period_s: float) -> int:
+        """Return the ticks of an update period, 1 without a tick; raises InvalidSettingsError."""
+        if self.tick_s is None:
+            return 1
+        ticks = round(update_period_s / self.tick_s)
+        if ticks < 1 or abs(update_period_s - ticks * self.tick_s) > 1e-9:
+            raise InvalidSettingsError(
+                (
+                    f"horizon.update_period_s = {update_period_s:g} must be a whole multiple of "
+                    f"{self.tick_s:g}, the period in seconds with which the firmware of {self.name} calls",
+                )
+            )
+        return ticks
 
 
 _TARGETS: Final = (
-    FirmwareTarget("platformio", "mambo", "src/", "a library for PlatformIO"),
-    FirmwareTarget("espidf", "mambo", "", "a component for ESP-IDF"),
+    FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
+    FirmwareTarget("espidf", "mambo", ""),
+    FirmwareTarget("platformio", "mambo", "src/"),
 )
 TARGETS: Final = {target.name: target for target in _TARGETS}
 """All targets by name."""

@@ -1,0 +1,184 @@
+"""The Crazyflie's app, compiled with stubs of the firmware, and called as the firmware calls it."""
+
+import math
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import cffi
+import numpy as np
+
+from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+from tests.support.tools import require
+
+STUBS: Final = Path(__file__).parent.parent / "targets" / "crazyflie_stubs"
+FIRMWARE_FLAGS: Final = (
+    *("-Os", "-std=gnu11", "-fno-math-errno", "-fno-strict-aliasing", "-fno-strict-overflow"),
+    *("-fomit-frame-pointer", "-ffunction-sections", "-fdata-sections"),
+    *("-Wall", "-Wdouble-promotion", "-Werror"),
+)
+"""Flags of the firmware that any gcc takes."""
+
+TICKS_PER_UPDATE: Final = 10
+"""Ticks of the firmware's loop, 1 ms each, in an update period."""
+DEGREES: Final = 180.0 / math.pi
+
+_TYPES = "".join(
+    line for line in (STUBS / "stabilizer_types.h").read_text("utf-8").splitlines(True) if line[0] != "#"
+)
+_INTERFACE: Final = cffi.FFI()
+_INTERFACE.cdef(
+    _TYPES
+    + """
+    struct variable { const char *type; const char *name; void *address; };
+    extern setpoint_t host_flown;
+    extern int host_pid_calls;
+    extern char host_console[1000];
+    extern const struct variable host_logged[];
+    extern const struct variable host_parameters[];
+    const struct variable *host_find(const struct variable *table, const char *name);
+    void controllerOutOfTreeInit(void);
+    bool controllerOutOfTreeTest(void);
+    void controllerOutOfTree(control_t *control, const setpoint_t *setpoint, const sensorData_t *sensors,
+                             const state_t *state, const stabilizerStep_t step);
+    """
+)
+
+
+def compile_host(source: Path, output: Path, *flags: str) -> Path:
+    """Compile a source for this machine with the firmware's flags and `flags`; return the object."""
+    shell(
+        *(require("gcc", "gcc"), *FIRMWARE_FLAGS, *flags, f"-I{STUBS}", f"-I{source.parent}", "-fPIC"),
+        *("-c", source, "-o", output),
+    )
+    return output
+
+
+def link(objects: Sequence[Path], output: Path) -> Any:
+    """Link objects as a shared library, and load it."""
+    shell(require("gcc", "gcc"), "-shared", *objects, "-o", output)
+    return _INTERFACE.dlopen(str(output))
+
+
+def shell(*command: str | Path) -> None:
+    """Run a command that must succeed."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a controller of a simulated flight returns."""
+
+    command_rad: FloatArray
+    status: IntArray
+
+
+class Crazyflie:
+    """One drone's app: `tick` is a millisecond, `update` ten of them."""
+
+    def __init__(self, library: Any) -> None:
+        self.library = library
+        self.setpoint: Any = _INTERFACE.new("setpoint_t *")
+        self.state: Any = _INTERFACE.new("state_t *")
+        self._control, self._sensors = _INTERFACE.new("control_t *"), _INTERFACE.new("sensorData_t *")
+        self.time_ms = 1000
+        library.controllerOutOfTreeInit()
+
+    @property
+    def flown(self) -> Any:
+        """The set-point that the PID controller got last."""
+        return self.library.host_flown
+
+    @property
+    def console(self) -> str:
+        """What the app printed."""
+        return _INTERFACE.string(self.library.host_console).decode()  # type: ignore[union-attr] # bytes
+
+    def modes(self, mode: str) -> None:
+        """Set the modes of x, y and z."""
+        self.setpoint.mode.x = self.setpoint.mode.y = self.setpoint.mode.z = getattr(self.library, mode)
+
+    def logged(self, name: str) -> Any:
+        """Return the value of a logged variable."""
+        found = self.library.host_find(self.library.host_logged, name.encode())
+        return self._pointer(found)[0]
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter."""
+        found = self.library.host_find(self.library.host_parameters, name.encode())
+        self._pointer(found)[0] = value
+
+    def _pointer(self, variable: Any) -> Any:
+        kind = _INTERFACE.string(variable.type).decode()  # type: ignore[union-attr] # bytes
+        return _INTERFACE.cast(f"{kind} *", variable.address)
+
+    def tick(self) -> tuple[float, float]:
+        """Call the app for the next millisecond; return roll and pitch of what flies, in degrees."""
+        self.library.controllerOutOfTree(
+            self._control, self.setpoint, self._sensors, self.state, self.time_ms
+        )
+        self.time_ms += 1
+        return self.flown.attitude.roll, self.flown.attitude.pitch
+
+    def place(self, state: FloatArray) -> None:
+        """Set the state from [x, y, vx, vy, roll, pitch, yaw], north-east-down."""
+        self.state.position.x, self.state.position.y = state[0], -state[1]
+        self.state.velocity.x, self.state.velocity.y = state[2], -state[3]
+        attitude = self.state.attitude
+        attitude.roll, attitude.pitch, attitude.yaw = (
+            DEGREES * state[4],
+            DEGREES * state[5],
+            -DEGREES * state[6],
+        )
+
+    def aim(self, target: FloatArray, acceleration: FloatArray) -> None:
+        """Send a set-point with [x, y, vx, vy] and an acceleration, north-east-down."""
+        setpoint = self.setpoint
+        values = [int(1000 * value) / 1000 for value in (*target, *acceleration)]
+        setpoint.position.x, setpoint.position.y = values[0], -values[1]
+        setpoint.velocity.x, setpoint.velocity.y = values[2], -values[3]
+        setpoint.acceleration.x, setpoint.acceleration.y = values[4], -values[5]
+        setpoint.timestamp = self.time_ms
+
+    def update(self, state: FloatArray) -> tuple[float, float]:
+        """Run the ticks of an update with one state, [x, y, vx, vy, roll, pitch, yaw]; return what flies.
+
+        The state is NaN in all ticks but the first, in which the app shall read it.
+        """
+        self.place(state)
+        command = self.tick()
+        self.place(np.full(7, np.nan))
+        held = {self.tick() for _ in range(TICKS_PER_UPDATE - 1)}
+        assert held == {command}, "the command is held between updates"
+        return command
+
+
+class Fleet:
+    """A position controller of the closed loop: one app a flight.
+
+    accelerations:        of the targets (k, n, 2) at successive updates.
+    updates_per_setpoint: every how many updates a set-point comes, by radio.
+    """
+
+    def __init__(
+        self, apps: Sequence[Crazyflie], accelerations: FloatArray, updates_per_setpoint: int = 1
+    ) -> None:
+        self.apps, self._updates = apps, 0
+        self._accelerations, self._updates_per_setpoint = accelerations, updates_per_setpoint
+        for app in apps:
+            app.modes("modeAbs")
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Answer:
+        """Run the ticks of an update; states (n, 7) and targets (n, 4) as in `PositionController`."""
+        del thrust_acceleration_m_s2
+        if self._updates % self._updates_per_setpoint == 0:
+            for app, one, acceleration in zip(
+                self.apps, target, self._accelerations[self._updates], strict=True
+            ):
+                app.aim(one, acceleration)
+        self._updates += 1
+        commands = [app.update(one) for app, one in zip(self.apps, state, strict=True)]
+        return Answer(np.array(commands) / DEGREES, np.array([app.logged("status") for app in self.apps]))

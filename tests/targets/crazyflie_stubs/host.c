@@ -1,0 +1,55 @@
+/* The part of the firmware around an out-of-tree controller: it keeps what the PID controller was given to fly. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "app.h"
+#include "controller.h"
+#include "controller_pid.h"
+#include "debug.h"
+#include "log.h"
+#include "task.h"
+
+setpoint_t host_flown;
+int host_pid_calls;
+char host_console[1000];
+
+void controllerPidInit(void) {}
+bool controllerPidTest(void) { return true; }
+
+void controllerPid(control_t *control, const setpoint_t *setpoint, const sensorData_t *sensors, const state_t *state,
+                   const stabilizerStep_t step)
+{
+    (void)control;
+    (void)sensors;
+    (void)state;
+    (void)step;
+    host_flown = *setpoint;
+    host_pid_calls++;
+}
+
+void vTaskDelay(unsigned int ticks) { (void)ticks; }
+
+int consolePrintf(const char *format, ...)
+{
+    const size_t used = strlen(host_console);
+    va_list arguments;
+    int length;
+
+    va_start(arguments, format);
+    length = vsnprintf(&host_console[used], sizeof host_console - used, format, arguments);
+    va_end(arguments);
+    return length;
+}
+
+const struct variable *host_find(const struct variable *table, const char *name)
+{
+    const struct variable *found;
+
+    for (found = &table[1]; found->type != 0; found++) {
+        if (strcmp(found->name, name) == 0) {
+            return found;
+        }
+    }
+    return 0;
+}

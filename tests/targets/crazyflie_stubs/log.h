@@ -1,0 +1,22 @@
+/* Stub of the Crazyflie's firmware: one group, which the host's program reads by name. */
+#ifndef LOG_H
+#define LOG_H
+
+struct variable {
+    const char *type;
+    const char *name;
+    void *address;
+};
+
+extern const struct variable host_logged[];
+extern const struct variable host_parameters[];
+
+#define LOG_UINT8 "uint8_t"
+#define LOG_UINT32 "uint32_t"
+#define LOG_FLOAT "float"
+
+#define LOG_GROUP_START(group) const struct variable host_logged[] = { { "group", #group, 0 },
+#define LOG_ADD(variable_type, variable_name, variable_address) { variable_type, #variable_name, variable_address },
+#define LOG_GROUP_STOP(group) { 0, #group, 0 } };
+
+#endif

@@ -1,0 +1,380 @@
+"""The app for the Crazyflie: built as its firmware builds it, flown through stubs of the firmware."""
+
+import itertools
+import re
+import runpy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.errors import InvalidSettingsError
+from mambo_nmpc.codegen.render import render_target
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.targets import TARGETS
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.traces import Trace
+from mambo_nmpc.sil.flight.trajectories import Circle
+from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_nmpc.sil.vehicles import presets as vehicles
+from tests.support.bundles import place
+from tests.support.crazyflie import FIRMWARE_FLAGS, STUBS, Crazyflie, Fleet, compile_host, link, shell
+from tests.support.one_norm import ONE_NORM
+from tests.support.tools import require
+
+SETTINGS = presets.preset("crazyflie")
+APP = "src/nmpc_app.c"
+ARM = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fconserve-stack")
+LARGEST_STACK_BYTES = 400
+
+# Each wrong line, in the place of what it is in the app.
+FRAME_MUTANTS = {
+    "x": ("= state->position.x", "= -state->position.x"),
+    "y": ("= -state->position.y", "= state->position.y"),
+    "vx": ("= state->velocity.x", "= -state->velocity.x"),
+    "vy": ("= -state->velocity.y", "= state->velocity.y"),
+    "roll": ("roll_rad = RAD_PER_DEG * state", "roll_rad = -RAD_PER_DEG * state"),
+    "pitch": ("pitch_rad = RAD_PER_DEG * state", "pitch_rad = -RAD_PER_DEG * state"),
+    "yaw": ("yaw_rad = -RAD_PER_DEG * state", "yaw_rad = RAD_PER_DEG * state"),
+    "target x": ("position_m[0] = setpoint->position.x +", "position_m[0] = -setpoint->position.x +"),
+    "target y": ("= -(setpoint->position.y +", "= (setpoint->position.y +"),
+    "target vx": ("velocity_m_s[0] = vx", "velocity_m_s[0] = -vx"),
+    "target vy": ("velocity_m_s[1] = -vy", "velocity_m_s[1] = vy"),
+    "command roll": ("= DEG_PER_RAD * (float)command.roll", "= -DEG_PER_RAD * (float)command.roll"),
+    "command pitch": ("= DEG_PER_RAD * (float)command.pitch", "= -DEG_PER_RAD * (float)command.pitch"),
+}
+# What carries a set-point on until the next one, 100 ms later.
+AGE_MUTANTS = {
+    "no age": ("0.001f * (float)", "0.0f * (float)"),
+    "acceleration x": ("velocity.x + (age_s *", "velocity.x - (age_s *"),
+    "acceleration y": ("velocity.y + (age_s *", "velocity.y - (age_s *"),
+    "half": ("(0.5f * age_s * (setpoint->velocity.x", "(age_s * (setpoint->velocity.x"),
+}
+
+
+@dataclass(frozen=True)
+class Built:
+    """A folder of the target, with the objects that do not change with the app, and the app."""
+
+    folder: Path
+    objects: tuple[Path, ...]
+    library: Any
+
+    def app(self) -> Crazyflie:
+        """Return a drone with the app as it is."""
+        return Crazyflie(self.library)
+
+    def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
+        """Return a drone with an app in which `right` reads `wrong`."""
+        text = (self.folder / APP).read_text("utf-8")
+        assert text.count(right) == 1, f"the template moved on: {right}"
+        source = self.folder / "src" / f"{name.replace(' ', '_')}.c"
+        source.write_text(text.replace(right, wrong), "utf-8")
+        return Crazyflie(linked(source, self.objects))
+
+
+def linked(source: Path, objects: tuple[Path, ...]) -> Any:
+    """Compile an app, link it with `objects`, and load it."""
+    compiled = compile_host(source, source.with_suffix(".o"), "-ffp-contract=off")
+    return link((compiled, *objects), source.with_suffix(".so"))
+
+
+def build(folder: Path) -> Built:
+    """Compile the target in `folder`."""
+    library = compile_host(folder / "src" / "nmpc.c", folder / "nmpc.o", "-ffp-contract=off")
+    objects = (library, compile_host(STUBS / "host.c", folder / "host.o"))
+    return Built(folder, objects, linked(folder / APP, objects))
+
+
+def folder_of(settings: Settings, folder: Path) -> Path:
+    """Write the target for `settings` into `folder`."""
+    return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """Return the target for its preset, compiled."""
+    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+
+
+def flight_of(apps: int) -> Flight:
+    """Return flights of a circle, at a heading at which every sign counts."""
+    drone = Vehicle.of(vehicles.load("crazyflie"))
+    return Flight(Circle(1.0, 1.2), duration_s=4.0, flights=apps, yaw_rad=0.8, vehicle=drone)
+
+
+def flown_by(apps: list[Crazyflie], updates_per_setpoint: int = 1) -> Trace:
+    """Fly the circle with each app."""
+    flight = flight_of(len(apps))
+    return fly(flight, Fleet(apps, flight.target_accelerations_m_s2(), updates_per_setpoint))
+
+
+@pytest.fixture(scope="module")
+def alone() -> Trace:
+    """Fly the circle with the controller alone."""
+    return fly(flight_of(1), CompiledController(SETTINGS))
+
+
+def test_every_sign_of_the_frames_counts(built: Built, alone: Trace) -> None:
+    """Through the app the drone flies as with the controller alone; a wrong sign takes it away from there."""
+    trace = flown_by([built.app(), *(built.mutant(name, *mutant) for name, mutant in FRAME_MUTANTS.items())])
+    right, *wrong = np.abs(trace.position_m - alone.position_m).max(axis=(0, 2))
+    assert right < 0.002  # set-points are rounded to a millimetre
+    assert not {name for name, value in zip(FRAME_MUTANTS, wrong, strict=True) if value < 0.04}
+
+
+def test_set_points_by_radio_are_carried_on_by_their_acceleration(built: Built, alone: Trace) -> None:
+    """With 10 set-points a second it flies as by itself; without their age or acceleration it does not."""
+    apps = [built.app(), *(built.mutant(name, *mutant) for name, mutant in AGE_MUTANTS.items())]
+    right, *wrong = measure(flown_by(apps, updates_per_setpoint=10)).iae_m_s
+    assert right == pytest.approx(measure(alone).iae_m_s[0], rel=0.05)
+    assert not {name for name, value in zip(AGE_MUTANTS, wrong, strict=True) if value < 1.2 * right}
+
+
+@pytest.mark.parametrize("mode", ["modeVelocity", "modeDisable"])
+def test_other_set_points_go_to_the_firmware_unchanged(mode: str, built: Built) -> None:
+    """Velocity, attitude, level-out and stop, in x, in y or in both, whether it flew before or not."""
+    for flew_before, axes in itertools.product((False, True), ("x", "y", "xy")):
+        app = built.app()
+        app.modes("modeAbs")
+        app.aim(np.array([2.0, 1.0, 0.0, 0.0]), np.zeros(2))
+        if flew_before:
+            app.update(np.zeros(7))
+            assert app.flown.mode.x == app.library.modeDisable
+        for axis in axes:
+            setattr(app.setpoint.mode, axis, getattr(app.library, mode))
+        app.setpoint.attitude.roll, app.setpoint.attitude.pitch = 1.5, -2.5
+        assert app.tick() == (1.5, -2.5)
+        assert content(app.flown) == content(app.setpoint)
+
+
+def content(setpoint: Any) -> list[Any]:
+    """Return the members of a set-point that the app could change."""
+    mode, attitude = setpoint.mode, setpoint.attitude
+    values = [mode.x, mode.y, mode.z, mode.roll, mode.pitch, mode.yaw, attitude.roll, attitude.pitch]
+    return [*values, setpoint.position.x, setpoint.velocity.x, setpoint.thrust]
+
+
+def test_height_and_yaw_stay_with_the_firmware(built: Built) -> None:
+    """Of a set-point of ours only x, y, roll and pitch change."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.setpoint.position.z, app.setpoint.attitude.yaw, app.setpoint.mode.yaw = (
+        1.25,
+        30.0,
+        app.library.modeAbs,
+    )
+    app.update(np.zeros(7))
+    assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, 30.0)
+    assert (app.flown.mode.z, app.flown.mode.yaw) == (app.library.modeAbs, app.library.modeAbs)
+    assert (app.flown.mode.roll, app.flown.mode.pitch) == (app.library.modeAbs, app.library.modeAbs)
+
+
+def flown_since(app: Crazyflie, state: FloatArray, updates: int) -> list[tuple[float, float]]:
+    """Return what flies in the next updates, in a state that does not change."""
+    return [app.update(state) for _ in range(updates)]
+
+
+def test_a_take_over_begins_anew_at_the_present_attitude(built: Built) -> None:
+    """After other set-points, or a gap in which another controller was chosen, nothing is remembered."""
+    here = np.array([0.3, -0.2, 0.4, 0.1, 0.1, -0.05, 0.3])
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.zeros(4), np.zeros(2))
+    fresh = flown_since(app, here, 5)
+    for interruption in ("mode", "gap", "init"):
+        flown_since(app, -here, 20)
+        match interruption:
+            case "mode":
+                app.modes("modeVelocity")
+                app.update(here)
+                app.modes("modeAbs")
+            case "gap":
+                app.time_ms += 10
+            case "init":
+                app.library.controllerOutOfTreeInit()
+        app.aim(np.zeros(4), np.zeros(2))
+        assert flown_since(app, here, 5) == fresh, interruption
+    assert flown_since(app, here, 5) != fresh
+
+
+def test_between_two_updates_the_firmware_flies_until_the_first(built: Built) -> None:
+    """A set-point of ours that comes between updates waits for the next, for less than an update period."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.time_ms = 1004
+    app.setpoint.attitude.roll = 7.5
+    for _ in range(6):
+        assert app.tick()[0] == 7.5
+        assert app.flown.mode.x == app.library.modeAbs
+    app.tick()
+    assert app.flown.mode.x == app.library.modeDisable
+
+
+def test_the_parameter_on_leaves_all_to_the_firmware(built: Built) -> None:
+    """It switches in flight, without another controller number."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.update(np.zeros(7))
+    assert app.flown.mode.x == app.library.modeDisable
+    for on, expected in ((0, app.library.modeAbs), (1, app.library.modeDisable)):
+        app.set_parameter("on", on)
+        flown_since(app, np.zeros(7), 1)
+        assert app.flown.mode.x == expected
+
+
+def test_lost_positions_are_counted_and_end_level(built: Built) -> None:
+    """The controller flies on by its estimate, then level; the next good state is flown as ever."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.array([0.5, 0.5, 0.0, 0.0]), np.zeros(2))
+    flown_since(app, np.zeros(7), 3)
+    before = app.logged("refused")
+    outage = flown_since(app, np.full(7, np.nan), 60)
+    assert app.logged("status") == 2
+    assert app.logged("refused") == before + 60
+    assert 0.0 not in outage[0]
+    assert outage[-1] == (0.0, 0.0)
+    assert flown_since(app, np.zeros(7), 1)[0] != (0.0, 0.0)
+    assert app.logged("status") == 0
+
+
+def test_the_log_shows_commands_saturation_and_disturbance(built: Built) -> None:
+    """In degrees, and in the firmware's frame: a disturbance to the left is positive along y."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.array([9.0, 0.0, 0.0, 0.0]), np.zeros(2))
+    roll, pitch = flown_since(app, np.zeros(7), 60)[-1]
+    assert (app.logged("roll"), app.logged("pitch")) == (roll, pitch)
+    assert app.logged("saturated") == 1
+    app.library.controllerOutOfTreeInit()
+    app.aim(np.zeros(4), np.zeros(2))
+    for step in range(20):
+        app.update(np.array([0.0, -0.01 * step, 0.0, -0.1 * step, 0.0, 0.0, 0.0]))
+    assert app.logged("disturbanceY") > 0.1
+    assert abs(app.logged("disturbanceX")) < 0.01
+
+
+def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_path: Path) -> None:
+    """The console names the step and the flag; the firmware then refuses to fly."""
+    app = built.app()
+    assert app.library.controllerOutOfTreeTest()
+    folder = folder_of(SETTINGS, tmp_path)
+    header = folder / "src" / "nmpc.h"
+    text = header.read_text("utf-8")
+    wrong = text.replace("define NMPC_TILT_LIMIT_RAD 0.5f", "define NMPC_TILT_LIMIT_RAD 0.4999f")
+    assert wrong != text
+    header.write_text(wrong, "utf-8")
+    broken = build(folder).app()
+    assert not broken.library.controllerOutOfTreeTest()
+    assert re.match(r"NMPC: self-test: step \d+ differs; .*-ffp-contract=off", broken.console)
+
+
+def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
+    """They act at the next update; a weight out of range changes nothing; the cost is logged."""
+    settings = presets.preset("mambo-1norm")
+    weighted = build(folder_of(settings, tmp_path))
+    here, costs = np.array([0.3, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0]), []
+    for tracking in (settings.cost.tracking_weight, 2 * settings.cost.tracking_weight, np.nan):
+        app = weighted.app()
+        app.modes("modeAbs")
+        app.aim(np.zeros(4), np.zeros(2))
+        app.set_parameter("tracking", tracking)
+        app.update(here)
+        costs.append(app.logged("cost"))
+    assert costs[1] == pytest.approx(2 * costs[0], rel=0.2)
+    assert costs[2] == costs[0]
+
+
+SUBJECTS = {
+    "crazyflie": SETTINGS,
+    "float64": with_option(SETTINGS, "code.scalar", "float64"),
+    "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
+    "1-norm": ONE_NORM,
+    "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),
+}
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path) -> None:
+    """Every warning of the firmware is an error there."""
+    compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+    folder = folder_of(SUBJECTS[name], tmp_path)
+    for source in sorted((folder / "src").glob("*.c")):
+        shell(
+            *(compiler, *ARM, *FIRMWARE_FLAGS, "-ffp-contract=off", "-ffreestanding"),
+            *(f"-I{STUBS}", "-c", source, "-o", folder / "object.o"),
+        )
+
+
+def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
+    """By the compiler's figures, along the calls that it saw: a tick without the PID controller's."""
+    compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+    folder = folder_of(SETTINGS, tmp_path)
+    frames: dict[str, int] = {}
+    calls: dict[str, set[str]] = {}
+    for name in ("nmpc", "nmpc_app"):
+        shell(
+            *(compiler, *ARM, *FIRMWARE_FLAGS, "-ffp-contract=off", "-ffreestanding", "-fcallgraph-info=su"),
+            *(f"-I{STUBS}", "-c", folder / "src" / f"{name}.c", "-o", folder / f"{name}.o"),
+        )
+        graph = (folder / f"{name}.ci").read_text("utf-8")
+        for title, label in re.findall(r'node: { title: "([^"]*)" label: "([^"]*)"', graph):
+            if size := re.search(r"(\d+) bytes \(static\)", label):
+                frames[short(title)] = int(size[1])
+        for source, target in re.findall(r'edge: { sourcename: "([^"]*)" targetname: "([^"]*)"', graph):
+            calls.setdefault(short(source), set()).add(short(target))
+
+    def deepest(function: str) -> int:
+        return frames.get(function, 0) + max(
+            (deepest(called) for called in calls.get(function, ())), default=0
+        )
+
+    assert "nmpc_step" in frames
+    assert 0 < deepest("controllerOutOfTree") <= LARGEST_STACK_BYTES
+
+
+def short(title: str) -> str:
+    """Return the name of a function without the file that it is static in."""
+    return title.rpartition(":")[2]
+
+
+def test_kbuild_lists_every_source_with_the_flag(built: Built) -> None:
+    """A source that is not listed is not linked; without the flag the Cortex-M4F's bits differ."""
+    text = (built.folder / "src" / "Kbuild").read_text("utf-8")
+    for name in ("nmpc", "nmpc_app"):
+        assert f"obj-y += {name}.o\n" in text
+        assert f"CFLAGS_{name}.o += -ffp-contract=off\n" in text
+    assert "CONFIG_CONTROLLER_OOT=y\n" in (built.folder / "app-config").read_text("utf-8")
+
+
+def test_an_update_period_that_the_firmware_cannot_keep_is_refused() -> None:
+    """Its loop runs at 1000 Hz."""
+    settings = with_option(SETTINGS, "horizon.update_period_s", 0.0125)
+    with pytest.raises(
+        InvalidSettingsError, match=r"update_period_s = 0\.0125 must be a whole multiple of 0\.001"
+    ):
+        render_target(settings, TARGETS["crazyflie"])
+
+
+@pytest.mark.parametrize("figure", ["hover", "eight", "circle"])
+def test_the_script_s_figures_can_be_flown(figure: str, built: Built) -> None:
+    """Velocity and acceleration are those of the position, within the limits; they begin and end at rest."""
+    script = runpy.run_path(str(built.folder / "fly.py"))
+    end_s = script["DURATION_S"]
+    for time_s in np.linspace(0.0, end_s, 200):
+        position, velocity, acceleration = script["motion"](figure, time_s)
+        before, after = (np.array(script["position_m"](figure, time_s + step)) for step in (-1e-3, 1e-3))
+        assert np.allclose((after - before) / 2e-3, velocity, atol=2e-3)
+        assert np.hypot(*acceleration) < 0.5 * 9.81 * SETTINGS.limits.tilt_rad
+        assert np.hypot(*position) <= 1.2
+    for time_s in (0.0, end_s):
+        position, velocity, _ = script["motion"](figure, time_s)
+        assert np.allclose([*position, *velocity], 0.0, atol=1e-3)
