@@ -4,6 +4,9 @@
 
 #include "stabilizer_types.h"
 
+void controller(control_t *control, const setpoint_t *setpoint, const sensorData_t *sensors, const state_t *state,
+                const stabilizerStep_t step);
+
 void controllerOutOfTreeInit(void);
 bool controllerOutOfTreeTest(void);
 void controllerOutOfTree(control_t *control, const setpoint_t *setpoint, const sensorData_t *sensors,
