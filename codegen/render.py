@@ -117,9 +117,10 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     """
     ticks = target.ticks_per_update(settings.horizon.update_period_s)
     bundle = render(settings, amalgamate=True, with_digest=with_digest)
+    header, source = (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
     library = {
-        f"{target.library}{name}": bundle[name]
-        for name in (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
+        f"{target.library}{header}": bundle[header],
+        f"{target.library}{source}": target.opening + bundle[source],
     }
     environment = _environment()
     context = _context(Design(settings), with_digest=with_digest) | {"ticks_per_update": ticks}

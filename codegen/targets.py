@@ -21,12 +21,14 @@ class FirmwareTarget:
     name:    as in `--for`, and of the folder of templates.
     preset:  the settings if the user names none.
     library: the folder of nmpc.h and nmpc.c, the amalgamated library, with a slash at its end.
+    opening: text before that of nmpc.c.
     tick_s:  the period with which the firmware calls, in s; None where the caller chooses it.
     """
 
     name: str
     preset: str
     library: str
+    opening: str = ""
     tick_s: float | None = None
 
     def ticks_per_update(self, update_period_s: float) -> int:
@@ -44,7 +46,16 @@ class FirmwareTarget:
         return ticks
 
 
+_NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add, with its one rounding, has other bits. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("-ffp-contract=off")
+#endif
+
+"""
 _TARGETS: Final = (
+    FirmwareTarget("arduino", "mambo", "src/", opening=_NO_FLAGS),
     FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
     FirmwareTarget("espidf", "mambo", ""),
     FirmwareTarget("platformio", "mambo", "src/"),

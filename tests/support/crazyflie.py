@@ -1,7 +1,6 @@
 """The Crazyflie's app, compiled with stubs of the firmware, and called as the firmware calls it."""
 
 import math
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ import cffi
 import numpy as np
 
 from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+from tests.support.shell import shell
 from tests.support.tools import require
 
 STUBS: Final = Path(__file__).parent.parent / "targets" / "crazyflie_stubs"
@@ -60,12 +60,6 @@ def link(objects: Sequence[Path], output: Path) -> Any:
     """Link objects as a shared library, and load it."""
     shell(require("gcc", "gcc"), "-shared", *objects, "-o", output)
     return _INTERFACE.dlopen(str(output))
-
-
-def shell(*command: str | Path) -> None:
-    """Run a command that must succeed."""
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,9 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 from mambo_nmpc.sil.vehicles import presets as vehicles
 from tests.support.bundles import place
-from tests.support.crazyflie import FIRMWARE_FLAGS, STUBS, Crazyflie, Fleet, compile_host, link, shell
+from tests.support.crazyflie import FIRMWARE_FLAGS, STUBS, Crazyflie, Fleet, compile_host, link
 from tests.support.one_norm import ONE_NORM
+from tests.support.shell import shell
 from tests.support.tools import require
 
 SETTINGS = presets.preset("crazyflie")

@@ -1,7 +1,6 @@
 """PlatformIO and ESP-IDF: their manifests are read, and the library is compiled as they say."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from mambo_nmpc.codegen.render import render_target
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.targets import TARGETS
 from tests.support.bundles import place
+from tests.support.shell import shell
 from tests.support.tools import require
 
 ARDUINO_FLAGS = ("-std=gnu11", "-Wall", "-Wextra", "-Werror", "-ffunction-sections", "-fdata-sections")
@@ -36,15 +36,6 @@ def folder_of(name: str, folder: Path) -> Path:
     """Write a target, of its preset, into `folder`."""
     target = TARGETS[name]
     return place(render_target(presets.preset(target.preset), target, with_digest=False), folder)
-
-
-def shell(*command: str | Path, folder: Path) -> str:
-    """Run a command that must succeed; return what it printed."""
-    done = subprocess.run(
-        [str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def fused(folder: Path, *flags: str) -> int:

@@ -1,0 +1,127 @@
+"""The Arduino library: compiled with Debian's core for the Mega and for Arm, its example flown here."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mambo_nmpc.codegen import boards
+from mambo_nmpc.codegen.render import render_target
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.targets import TARGETS
+from tests.support.bundles import place
+from tests.support.shell import shell
+from tests.support.tools import require, require_file
+
+STUBS = Path(__file__).parent / "arduino_stubs"
+CORE = Path("/usr/share/arduino/hardware/arduino/avr")
+MEGA = (
+    *(
+        "-mmcu=atmega2560",
+        "-DF_CPU=16000000L",
+        "-DARDUINO=10819",
+        "-DARDUINO_AVR_MEGA2560",
+        "-DARDUINO_ARCH_AVR",
+    ),
+    *("-Os", "-ffunction-sections", "-fdata-sections"),
+)
+"""Flags of the core's platform.txt and boards.txt; -flto is left out, which hides no warning."""
+STRICT = ("-Wall", "-Wextra", "-Werror")
+SUBJECTS = {
+    "mambo": presets.preset("mambo"),
+    "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
+    "1-norm": presets.preset("mambo-1norm"),
+}
+
+
+def folder_of(settings: Settings, folder: Path) -> Path:
+    """Write the target for `settings` into `folder`."""
+    return place(render_target(settings, TARGETS["arduino"], with_digest=False), folder)
+
+
+def sketch(folder: Path) -> Path:
+    """Return the example as the builder passes it to the compiler: with the core's header."""
+    text = (folder / "examples" / "Hover" / "Hover.ino").read_text("utf-8")
+    source = folder / "Hover.cpp"
+    source.write_text(f"#include <Arduino.h>\n{text}", "utf-8")
+    return source
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_the_example_reaches_its_target_on_this_machine(name: str, tmp_path: Path) -> None:
+    """The self-test passes, no input is refused, and the drone stands within a centimetre of its target."""
+    folder = folder_of(SUBJECTS[name], tmp_path)
+    shell(require("gcc", "gcc"), "-std=gnu11", *STRICT, "-c", folder / "src/nmpc.c", "-o", folder / "nmpc.o")
+    shell(
+        *(require("g++", "g++"), "-std=gnu++11", *STRICT, f"-I{STUBS}", f"-I{folder}/src"),
+        *(sketch(folder), STUBS / "main.cpp", folder / "nmpc.o", "-o", folder / "hover"),
+    )
+    version, self_test, *lines = shell(folder / "hover").splitlines()
+    assert version.startswith("mambo-nmpc ")
+    assert self_test == "self-test: all steps equal the reference"
+    assert len(lines) == 20
+    north, east, refused = (float(number) for number in re.findall(r"-?[\d.]+", lines[-1]))
+    assert (north, east) == pytest.approx((1.0, 0.0), abs=0.01)
+    assert refused == 0
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_the_core_of_debian_builds_and_links_the_example_for_the_mega(name: str, tmp_path: Path) -> None:
+    """Library and sketch without a warning, with the core's own flags, into the memory of an ATmega2560."""
+    core = require_file(CORE / "cores/arduino/Arduino.h", "arduino-core-avr").parent
+    c, cxx = require("avr-gcc", "gcc-avr"), require("avr-g++", "gcc-avr")
+    folder = folder_of(SUBJECTS[name], tmp_path)
+    headers = (f"-I{core}", f"-I{CORE / 'variants/mega'}", f"-I{folder / 'src'}")
+    modern = ("-std=gnu++11", "-fno-exceptions", "-fno-threadsafe-statics")
+    shell(c, *MEGA, "-std=gnu11", *STRICT, "-c", folder / "src/nmpc.c", "-o", folder / "nmpc.o")
+    shell(cxx, *MEGA, *modern, *STRICT, *headers, "-c", sketch(folder), "-o", folder / "sketch.o")
+    needed = ("main", "HardwareSerial", "HardwareSerial0", "Print", "Stream", "abi", "new")
+    for stem in needed:
+        shell(cxx, *MEGA, *modern, "-w", *headers, "-c", core / f"{stem}.cpp", "-o", folder / f"{stem}.o")
+    for stem in ("wiring", "wiring_digital", "hooks"):
+        shell(c, *MEGA, "-std=gnu11", "-w", *headers, "-c", core / f"{stem}.c", "-o", folder / f"{stem}.o")
+    elf = folder / "hover.elf"
+    shell(c, "-mmcu=atmega2560", "-Os", "-Wl,--gc-sections", *folder.glob("*.o"), "-lm", "-o", elf)
+    sizes = shell(require("avr-size", "binutils-avr"), elf).splitlines()[1].split()
+    text, data, bss = (int(size) for size in sizes[:3])
+    assert text + data < 248 * 1024
+    assert data + bss < 8 * 1024
+
+
+def test_without_a_flag_the_bits_are_kept(tmp_path: Path) -> None:
+    """An Arduino core for a Cortex-M4F has a GNU dialect and no place for a library's flags."""
+    compiler = require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+    folder = folder_of(SUBJECTS["mambo"], tmp_path)
+    flags = (*boards.load("crazyflie").compiler.flags, "-std=gnu11", "-Os", *STRICT, "-ffreestanding")
+    shell(compiler, *flags, "-c", folder / "src/nmpc.c", "-o", folder / "nmpc.o")
+    assert "\tvfm" not in shell(
+        require("arm-none-eabi-objdump", "binutils-arm-none-eabi"), "-d", folder / "nmpc.o"
+    )
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_keywords_are_the_names_of_the_header(name: str, tmp_path: Path) -> None:
+    """All its functions, types and statuses, and no others; a tab separates name and kind."""
+    folder = folder_of(SUBJECTS[name], tmp_path)
+    listed = dict(line.split("\t") for line in (folder / "keywords.txt").read_text("utf-8").splitlines())
+    header = re.sub(r"/\*.*?\*/", "", (folder / "src/nmpc.h").read_text("utf-8"), flags=re.DOTALL)
+    functions = set(re.findall(r"^[a-z][\w ]*[ *](nmpc_\w+)\(", header, re.MULTILINE))
+    assert {word for word, kind in listed.items() if kind == "KEYWORD2"} == functions
+    statuses = set(re.findall(r"\bNMPC_(?:OK|NULL_POINTER|BAD_\w+)(?= =)", header))
+    literals = {word for word, kind in listed.items() if kind == "LITERAL1"}
+    assert literals == statuses | {"NMPC_UPDATE_PERIOD_S", "NMPC_TILT_LIMIT_RAD"}
+    for word, kind in listed.items():
+        assert kind != "KEYWORD1" or re.search(rf"\b{word}\b", header)
+
+
+def test_library_properties_have_every_field_that_the_ide_wants(tmp_path: Path) -> None:
+    """Of its library specification, 1.5 format."""
+    folder = folder_of(SUBJECTS["mambo"], tmp_path)
+    lines = (folder / "library.properties").read_text("utf-8").splitlines()
+    fields = dict(line.split("=", 1) for line in lines)
+    wanted = ("name", "version", "author", "maintainer", "sentence", "paragraph", "category", "architectures")
+    assert all(fields[name] for name in wanted)
+    assert re.fullmatch(r"\d+\.\d+\.\d+", fields["version"])
+    assert (folder / "src" / fields["includes"]).is_file()
