@@ -46,7 +46,7 @@ class FirmwareTarget:
         return ticks
 
 
-_NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add, with its one rounding, has other bits. */
+_NO_FLAGS: Final = """/* No flag reaches this file; a fused multiply-add rounds once: its bits are others. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__)
@@ -58,6 +58,7 @@ _TARGETS: Final = (
     FirmwareTarget("arduino", "mambo", "src/", opening=_NO_FLAGS),
     FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
     FirmwareTarget("espidf", "mambo", ""),
+    FirmwareTarget("mambo", "mambo", "src/", tick_s=0.005),
     FirmwareTarget("platformio", "mambo", "src/"),
 )
 TARGETS: Final = {target.name: target for target in _TARGETS}
