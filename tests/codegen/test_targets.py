@@ -1,6 +1,7 @@
 """The mechanism of `generate --for`: one folder a target, protected as every bundle is."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,16 @@ def test_a_page_says_how_to_build_to_watch_and_to_go_back(name: str) -> None:
     for heading in ("Build", "Watch", "Go back"):
         assert f"**{heading}.**" in text
     assert f"--for {name}" in text
+
+
+def test_the_manual_has_a_section_for_every_target() -> None:
+    """docs/firmware.md: its command, and a row in its table with the preset."""
+    manual = (Path(__file__).parents[2] / "docs" / "firmware.md").read_text("utf-8")
+    sections = dict(re.findall(r"^## (\w+)$\n(.*?)(?=^## )", manual, re.MULTILINE | re.DOTALL))
+    assert sections.keys() == TARGETS.keys()
+    for name, target in TARGETS.items():
+        assert f"mambo-nmpc generate --for {name} -o " in sections[name]
+        assert re.search(rf"^\| \[`{name}`\]\(#{name}\) \|.*\| `{target.preset}` \|", manual, re.MULTILINE)
 
 
 def test_an_edited_file_drifts_and_is_kept(tmp_path: Path) -> None:
