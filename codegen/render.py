@@ -22,6 +22,7 @@ from mambo_nmpc.codegen.flags import (
     WARNING_FLAGS,
     proofs,
 )
+from mambo_nmpc.codegen.fmu import fmu_variables
 from mambo_nmpc.codegen.infix import infix
 from mambo_nmpc.codegen.representation import ROW, STATE, THRUST, WEIGHTS, Representation
 from mambo_nmpc.codegen.self_test import hover_thrust, self_test
@@ -123,7 +124,11 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         f"{target.library}{source}": target.opening + bundle[source],
     }
     environment = _environment()
-    context = _context(Design(settings), with_digest=with_digest) | {"ticks_per_update": ticks}
+    context = _context(Design(settings), with_digest=with_digest) | {
+        "ticks_per_update": ticks,
+        "variables": fmu_variables(settings),
+        "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
+    }
     own = f"{TARGETS_FOLDER}/{target.name}/"
     files = {
         path.removeprefix(own).removesuffix(".j2"): environment.get_template(path).render(context)

@@ -58,6 +58,7 @@ _TARGETS: Final = (
     FirmwareTarget("arduino", "mambo", "src/", opening=_NO_FLAGS),
     FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
     FirmwareTarget("espidf", "mambo", ""),
+    FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS),
     FirmwareTarget("mambo", "mambo", "src/", tick_s=0.005),
     FirmwareTarget("platformio", "mambo", "src/"),
 )

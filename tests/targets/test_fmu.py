@@ -1,0 +1,221 @@
+"""Functional mock-up units: validated and compiled by FMPy, flown with the bits of the controller alone."""
+
+import re
+import shutil
+import sys
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from mambo_nmpc.codegen.fmu import fmu_variables
+from mambo_nmpc.codegen.render import render_target
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.codegen.targets import TARGETS
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+from tests.support.bundles import place
+from tests.support.shell import shell
+from tests.support.tools import require, require_module
+
+VERSIONS: Final = ("2", "3")
+STATUS, SATURATED = [100], [101]
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
+SUBJECTS = {
+    "mambo": presets.preset("mambo"),
+    "float64": with_option(presets.preset("mambo"), "code.scalar", "float64"),
+    "1-norm": presets.preset("mambo-1norm"),
+}
+OTHERS = ("float64", "1-norm")
+"""Subjects whose flights are left to the long tests."""
+
+
+def built(settings: Settings, folder: Path) -> Path:
+    """Write the target for `settings` into `folder`, and build both units there."""
+    require("cc", "gcc")
+    require_module("fmpy")
+    place(render_target(settings, TARGETS["fmu"], with_digest=False), folder)
+    shell(sys.executable, folder / "build.py")
+    return folder
+
+
+def unpacked(unit: Path, folder: Path) -> Path:
+    """Unpack a unit into `folder`."""
+    with zipfile.ZipFile(unit) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What a controller of a simulated flight returns."""
+
+    command_rad: FloatArray
+    status: IntArray
+
+
+class Unit:
+    """A unit in an unpacked folder, through FMPy, as a position controller of one flight."""
+
+    def __init__(self, folder: Path, version: str, period_s: float) -> None:
+        described = import_module("fmpy").read_model_description(str(folder))
+        slave = getattr(import_module(f"fmpy.fmi{version}"), f"FMU{version}Slave")
+        self._unit: Any = slave(
+            guid=described.guid or described.instantiationToken,
+            unzipDirectory=str(folder),
+            modelIdentifier=described.coSimulation.modelIdentifier,
+            instanceName="controller",
+        )
+        kind = "Real" if version == "2" else "Float64"
+        self.set, self.get = (getattr(self._unit, f"{verb}{kind}") for verb in ("set", "get"))
+        self.get_status = getattr(self._unit, "getInteger" if version == "2" else "getInt32")
+        self._unit.instantiate()
+        if version == "2":
+            self._unit.setupExperiment(startTime=0.0)
+        self._unit.enterInitializationMode()
+        self._unit.exitInitializationMode()
+        self._period_s, self._steps = period_s, 0
+
+    def advance(self, duration_s: float) -> None:
+        """Make a communication step."""
+        self._unit.doStep(self._steps * self._period_s, duration_s)
+        self._steps += round(duration_s / self._period_s)
+
+    def reset(self) -> None:
+        """Return to the start state."""
+        self._unit.reset()
+
+    @property
+    def is_saturated(self) -> bool:
+        """Whether a command is at the tilt limit."""
+        return bool(self._unit.getBoolean(SATURATED)[0])
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outputs:
+        """Set the inputs, make a step of an update period, and return the outputs."""
+        self.set(range(12), [*state[0], *target[0], thrust_acceleration_m_s2[0]])
+        self.advance(self._period_s)
+        return Outputs(np.array([self.get([12, 13])]), np.array(self.get_status(STATUS)))
+
+    def close(self) -> None:
+        """Release the unit and its library."""
+        self._unit.terminate()
+        self._unit.freeInstance()
+
+
+def flown(settings: Settings, controller: PositionController) -> list[Any]:
+    """Fly a figure of eight, and return every array of the trace."""
+    period_s = settings.horizon.update_period_s
+    trace = fly(
+        Flight(Bernoulli(2.0, 0.5), duration_s=2.0, yaw_rad=0.4, update_period_s=period_s), controller
+    )
+    return [getattr(trace, column.name) for column in fields(trace)]
+
+
+def same(left: Sequence[Any], right: Sequence[Any]) -> bool:
+    """Whether all arrays are equal in every bit."""
+    return all(a.tobytes() == b.tobytes() for a, b in zip(left, right, strict=True))
+
+
+@pytest.mark.parametrize("name", ["mambo", *(pytest.param(name, marks=pytest.mark.long) for name in OTHERS)])
+def test_both_units_fly_with_the_bits_of_the_controller_alone(name: str, tmp_path: Path) -> None:
+    """FMPy finds no fault in a unit, and in a flight every bit of the trace is that of `fly`."""
+    settings = SUBJECTS[name]
+    folder = built(settings, tmp_path)
+    validate = import_module("fmpy.validation").validate_fmu
+    alone = flown(settings, CompiledController(settings))
+    for version in VERSIONS:
+        file = folder / f"nmpc_fmi{version}.fmu"
+        assert validate(str(file)) == []
+        unit = Unit(unpacked(file, tmp_path / version), version, settings.horizon.update_period_s)
+        assert same(flown(settings, unit), alone)
+        unit.close()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_importer_compiles_the_sources(version: str, tmp_path: Path) -> None:
+    """FMPy builds them with CMake as the unit describes them, and what it built flies the same bits."""
+    require("cmake", "cmake")
+    settings = SUBJECTS["mambo"]
+    folder = unpacked(built(settings, tmp_path / "out") / f"nmpc_fmi{version}.fmu", tmp_path / "unit")
+    shutil.rmtree(folder / "binaries")
+    objects = tmp_path / "objects"
+    objects.mkdir()
+    import_module("fmpy.build").build_platform_binary(folder, objects)
+    assert list((folder / "binaries").rglob("nmpc.so"))
+    unit = Unit(folder, version, settings.horizon.update_period_s)
+    assert same(flown(settings, unit), flown(settings, CompiledController(settings)))
+    unit.close()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) -> None:
+    """Start values, reset, several periods in a step, bad inputs as a status, and refusals."""
+    settings = SUBJECTS["1-norm"]
+    folder = unpacked(built(settings, tmp_path / "out") / f"nmpc_fmi{version}.fmu", tmp_path / "unit")
+    period_s = settings.horizon.update_period_s
+    starts = [variable.start for variable in fmu_variables(settings)]
+    one, other = Unit(folder, version, period_s), Unit(folder, version, period_s)
+    assert one.get(range(len(starts))) == starts
+    one.set([7], [3.0])
+    other.set([7], [3.0])
+    one.advance(5 * period_s)
+    for _ in range(5):
+        other.advance(period_s)
+    assert one.get([12, 13]) == other.get([12, 13]) != [0.0, 0.0]
+    assert one.is_saturated
+    for unit, weight in ((one, 0.0), (other, starts[14])):
+        unit.reset()
+        unit.set([7, 14], [0.1, weight])
+        unit.advance(period_s)
+    assert one.get([12, 13]) == [0.0, 0.0], "without a weight no error counts"
+    assert other.get([12, 13]) != [0.0, 0.0]
+    one.set([0], [np.nan])
+    one.advance(period_s)
+    assert one.get_status(STATUS) == [2]
+    one.reset()
+    assert (one.get(range(len(starts))), one.get_status(STATUS)) == (starts, [0])
+    for refused in (
+        lambda: one.advance(1.5 * period_s),
+        lambda: one.set([12], [0.1]),
+        lambda: one.get([99]),
+    ):
+        with pytest.raises(Exception, match="failed with status 3"):
+            refused()
+    one.close()
+    other.close()
+
+
+@pytest.mark.parametrize("name", [*SUBJECTS, "fixed"])
+def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp_path: Path) -> None:
+    """All warnings on and fatal; an importer finds each function of the standard's header in the library."""
+    require_module("fmpy")
+    compiler, nm = require("gcc", "gcc"), require("nm", "binutils")
+    fixed = with_option(presets.preset("mambo"), "code.scalar", "fixed")
+    settings = fixed if name == "fixed" else SUBJECTS[name]
+    folder = place(render_target(settings, TARGETS["fmu"], with_digest=False), tmp_path)
+    headers = Path(str(import_module("fmpy").__file__)).parent / "c-code"
+    for version in VERSIONS:
+        sources = [folder / "sources" / f"{stem}.c" for stem in ("nmpc", "nmpc_fmu", f"fmi{version}")]
+        library = tmp_path / f"fmi{version}.so"
+        shell(compiler, *STRICT, "-fPIC", "-shared", *sources, "-lm", "-o", library)
+        exported = set(re.findall(r" T (fmi\w+)", shell(nm, "-D", library)))
+        header = headers / f"fmi{version}Functions.h"
+        wanted = set(
+            re.findall(rf"^#define (fmi{version}[A-Z]\w+) +fmi\dFullName", header.read_text("utf-8"), re.M)
+        )
+        assert len(wanted) > 30
+        of_model_exchange = {
+            *("fmi2EnterEventMode", "fmi2NewDiscreteStates", "fmi2EnterContinuousTimeMode", "fmi2SetTime"),
+            *("fmi2CompletedIntegratorStep", "fmi2SetContinuousStates", "fmi2GetDerivatives"),
+            *("fmi2GetEventIndicators", "fmi2GetContinuousStates", "fmi2GetNominalsOfContinuousStates"),
+        }
+        assert wanted - of_model_exchange == exported
