@@ -139,6 +139,15 @@ def test_set_points_by_radio_are_carried_on_by_their_acceleration(built: Built, 
     assert not {name for name, value in zip(AGE_MUTANTS, wrong, strict=True) if value < 1.2 * right}
 
 
+def test_a_set_point_that_no_other_follows_does_not_run_away(built: Built) -> None:
+    """It is carried on for 100 ms; after two seconds at 0.5 m/s^2 it would be a metre away."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.zeros(4), np.array([0.5, 0.0]))
+    flown_since(app, np.zeros(7), 200)
+    assert app.logged("saturated") == 0
+
+
 @pytest.mark.parametrize("mode", ["modeVelocity", "modeDisable"])
 def test_other_set_points_go_to_the_firmware_unchanged(mode: str, built: Built) -> None:
     """Velocity, attitude, level-out and stop, in x, in y or in both, whether it flew before or not."""
@@ -206,6 +215,19 @@ def test_a_take_over_begins_anew_at_the_present_attitude(built: Built) -> None:
     assert flown_since(app, here, 5) != fresh
 
 
+def test_a_take_over_tells_the_controller_the_present_attitude(built: Built) -> None:
+    """Its first command is that of a controller which was reset to it; level, if the attitude is lost."""
+    here = np.array([0.3, -0.2, 0.4, 0.1, 0.1, -0.05, 0.3])
+    app, controller = built.app(), CompiledController(SETTINGS)
+    app.modes("modeAbs")
+    app.aim(np.zeros(4), np.zeros(2))
+    controller.reset([here[4:6]])
+    expected = controller.step([here], np.zeros((1, 4)), [9.81]).command_rad[0]
+    assert np.radians(app.update(here)) == pytest.approx(expected, abs=1e-6)
+    app.time_ms += 10
+    assert app.update(np.full(7, np.nan)) == (0.0, 0.0)
+
+
 def test_between_two_updates_the_firmware_flies_until_the_first(built: Built) -> None:
     """A set-point of ours that comes between updates waits for the next, for less than an update period."""
     app = built.app()
@@ -261,6 +283,10 @@ def test_the_log_shows_commands_saturation_and_disturbance(built: Built) -> None
         app.update(np.array([0.0, -0.01 * step, 0.0, -0.1 * step, 0.0, 0.0, 0.0]))
     assert app.logged("disturbanceY") > 0.1
     assert abs(app.logged("disturbanceX")) < 0.01
+    app.setpoint.position.x = np.nan
+    assert flown_since(app, np.array([0.0, -0.2, 0.0, -2.0, 0.0, 0.0, 0.0]), 60)[-1] == (0.0, 0.0)
+    assert app.logged("status") == 3
+    assert app.logged("disturbanceY") > 0.1, "it keeps its estimate while it flies level"
 
 
 def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_path: Path) -> None:
