@@ -28,7 +28,10 @@ class FmuVariable:
 
 
 def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
-    """Return the variables: 12 inputs, 2 outputs and, of a 1-norm, 2 weights, in the order of the C."""
+    """Return the variables in the order of the C: 12 inputs, 2 outputs, then those of some settings.
+
+    A given acceleration of the target has 2 inputs, a 1-norm 2 weights.
+    """
     ranges, tilt_rad = settings.ranges, settings.limits.tilt_rad
 
     def symmetric(name: str, unit: str, most: float, description: str) -> FmuVariable:
@@ -58,6 +61,12 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
         FmuVariable("roll_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "roll command"),
         FmuVariable("pitch_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "pitch command"),
     ]
+    if settings.target.acceleration == "given":
+        most_m_s2 = ranges.thrust_acceleration_max_m_s2
+        variables += [
+            symmetric("target_ax", "m/s2", most_m_s2, "acceleration of the target north"),
+            symmetric("target_ay", "m/s2", most_m_s2, "acceleration of the target east"),
+        ]
     if settings.cost.norm == "1-norm":
         tracking, effort = settings.cost.tracking_weight, settings.cost.effort_weight
         variables += [

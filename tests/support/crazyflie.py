@@ -128,10 +128,10 @@ class Crazyflie:
             -DEGREES * state[6],
         )
 
-    def aim(self, target: FloatArray, acceleration: FloatArray) -> None:
-        """Send a set-point with [x, y, vx, vy] and an acceleration, north-east-down."""
+    def aim(self, target: FloatArray) -> None:
+        """Send a set-point with [x, y, vx, vy, ax, ay], north-east-down, in millimetres as cflib does."""
         setpoint = self.setpoint
-        values = [int(1000 * value) / 1000 for value in (*target, *acceleration)]
+        values = [int(1000 * value) / 1000 for value in target]
         setpoint.position.x, setpoint.position.y = values[0], -values[1]
         setpoint.velocity.x, setpoint.velocity.y = values[2], -values[3]
         setpoint.acceleration.x, setpoint.acceleration.y = values[4], -values[5]
@@ -153,26 +153,21 @@ class Crazyflie:
 class Fleet:
     """A position controller of the closed loop: one app a flight.
 
-    accelerations:        of the targets (k, n, 2) at successive updates.
     updates_per_setpoint: every how many updates a set-point comes, by radio.
     """
 
-    def __init__(
-        self, apps: Sequence[Crazyflie], accelerations: FloatArray, updates_per_setpoint: int = 1
-    ) -> None:
+    def __init__(self, apps: Sequence[Crazyflie], updates_per_setpoint: int = 1) -> None:
         self.apps, self._updates = apps, 0
-        self._accelerations, self._updates_per_setpoint = accelerations, updates_per_setpoint
+        self._updates_per_setpoint = updates_per_setpoint
         for app in apps:
             app.modes("modeAbs")
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Answer:
-        """Run the ticks of an update; states (n, 7) and targets (n, 4) as in `PositionController`."""
+        """Run the ticks of an update; states (n, 7) and targets (n, 6) as in `PositionController`."""
         del thrust_acceleration_m_s2
         if self._updates % self._updates_per_setpoint == 0:
-            for app, one, acceleration in zip(
-                self.apps, target, self._accelerations[self._updates], strict=True
-            ):
-                app.aim(one, acceleration)
+            for app, one in zip(self.apps, target, strict=True):
+                app.aim(one)
         self._updates += 1
         commands = [app.update(one) for app, one in zip(self.apps, state, strict=True)]
         return Answer(np.array(commands) / DEGREES, np.array([app.logged("status") for app in self.apps]))

@@ -60,6 +60,13 @@ AGE_MUTANTS = {
 }
 
 
+# The acceleration where the settings let the caller give it.
+GIVEN_MUTANTS = {
+    "given x": ("= setpoint->acceleration.x", "= -setpoint->acceleration.x"),
+    "given y": ("= -setpoint->acceleration.y", "= setpoint->acceleration.y"),
+}
+
+
 @dataclass(frozen=True)
 class Built:
     """A folder of the target, with the objects that do not change with the app, and the app."""
@@ -114,7 +121,7 @@ def flight_of(apps: int) -> Flight:
 def flown_by(apps: list[Crazyflie], updates_per_setpoint: int = 1) -> Trace:
     """Fly the circle with each app."""
     flight = flight_of(len(apps))
-    return fly(flight, Fleet(apps, flight.target_accelerations_m_s2(), updates_per_setpoint))
+    return fly(flight, Fleet(apps, updates_per_setpoint))
 
 
 @pytest.fixture(scope="module")
@@ -143,9 +150,19 @@ def test_a_set_point_that_no_other_follows_does_not_run_away(built: Built) -> No
     """It is carried on for 100 ms; after two seconds at 0.5 m/s^2 it would be a metre away."""
     app = built.app()
     app.modes("modeAbs")
-    app.aim(np.zeros(4), np.array([0.5, 0.0]))
+    app.aim(np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0]))
     flown_since(app, np.zeros(7), 200)
     assert app.logged("saturated") == 0
+
+
+def test_a_given_acceleration_is_that_of_the_set_point(tmp_path: Path) -> None:
+    """With target.acceleration = "given" the flight is that of the controller alone; a wrong sign counts."""
+    given = build(folder_of(with_option(SETTINGS, "target.acceleration", "given"), tmp_path))
+    apps = [given.app(), *(given.mutant(name, *mutant) for name, mutant in GIVEN_MUTANTS.items())]
+    alone = fly(flight_of(1), CompiledController(with_option(SETTINGS, "target.acceleration", "given")))
+    right, *wrong = np.abs(flown_by(apps).position_m - alone.position_m).max(axis=(0, 2))
+    assert right < 0.002
+    assert not {name for name, value in zip(GIVEN_MUTANTS, wrong, strict=True) if value < 0.04}
 
 
 @pytest.mark.parametrize("mode", ["modeVelocity", "modeDisable"])
@@ -154,7 +171,7 @@ def test_other_set_points_go_to_the_firmware_unchanged(mode: str, built: Built) 
     for flew_before, axes in itertools.product((False, True), ("x", "y", "xy")):
         app = built.app()
         app.modes("modeAbs")
-        app.aim(np.array([2.0, 1.0, 0.0, 0.0]), np.zeros(2))
+        app.aim(np.array([2.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
         if flew_before:
             app.update(np.zeros(7))
             assert app.flown.mode.x == app.library.modeDisable
@@ -197,7 +214,7 @@ def test_a_take_over_begins_anew_at_the_present_attitude(built: Built) -> None:
     here = np.array([0.3, -0.2, 0.4, 0.1, 0.1, -0.05, 0.3])
     app = built.app()
     app.modes("modeAbs")
-    app.aim(np.zeros(4), np.zeros(2))
+    app.aim(np.zeros(6))
     fresh = flown_since(app, here, 5)
     for interruption in ("mode", "gap", "init"):
         flown_since(app, -here, 20)
@@ -210,7 +227,7 @@ def test_a_take_over_begins_anew_at_the_present_attitude(built: Built) -> None:
                 app.time_ms += 10
             case "init":
                 app.library.controllerOutOfTreeInit()
-        app.aim(np.zeros(4), np.zeros(2))
+        app.aim(np.zeros(6))
         assert flown_since(app, here, 5) == fresh, interruption
     assert flown_since(app, here, 5) != fresh
 
@@ -220,9 +237,9 @@ def test_a_take_over_tells_the_controller_the_present_attitude(built: Built) -> 
     here = np.array([0.3, -0.2, 0.4, 0.1, 0.1, -0.05, 0.3])
     app, controller = built.app(), CompiledController(SETTINGS)
     app.modes("modeAbs")
-    app.aim(np.zeros(4), np.zeros(2))
+    app.aim(np.zeros(6))
     controller.reset([here[4:6]])
-    expected = controller.step([here], np.zeros((1, 4)), [9.81]).command_rad[0]
+    expected = controller.step([here], np.zeros((1, 6)), [9.81]).command_rad[0]
     assert np.radians(app.update(here)) == pytest.approx(expected, abs=1e-6)
     app.time_ms += 10
     assert app.update(np.full(7, np.nan)) == (0.0, 0.0)
@@ -257,7 +274,7 @@ def test_lost_positions_are_counted_and_end_level(built: Built) -> None:
     """The controller flies on by its estimate, then level; the next good state is flown as ever."""
     app = built.app()
     app.modes("modeAbs")
-    app.aim(np.array([0.5, 0.5, 0.0, 0.0]), np.zeros(2))
+    app.aim(np.array([0.5, 0.5, 0.0, 0.0, 0.0, 0.0]))
     flown_since(app, np.zeros(7), 3)
     before = app.logged("refused")
     outage = flown_since(app, np.full(7, np.nan), 60)
@@ -273,12 +290,12 @@ def test_the_log_shows_commands_saturation_and_disturbance(built: Built) -> None
     """In degrees, and in the firmware's frame: a disturbance to the left is positive along y."""
     app = built.app()
     app.modes("modeAbs")
-    app.aim(np.array([9.0, 0.0, 0.0, 0.0]), np.zeros(2))
+    app.aim(np.array([9.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     roll, pitch = flown_since(app, np.zeros(7), 60)[-1]
     assert (app.logged("roll"), app.logged("pitch")) == (roll, pitch)
     assert app.logged("saturated") == 1
     app.library.controllerOutOfTreeInit()
-    app.aim(np.zeros(4), np.zeros(2))
+    app.aim(np.zeros(6))
     for step in range(20):
         app.update(np.array([0.0, -0.01 * step, 0.0, -0.1 * step, 0.0, 0.0, 0.0]))
     assert app.logged("disturbanceY") > 0.1
@@ -312,7 +329,7 @@ def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
     for tracking in (settings.cost.tracking_weight, 2 * settings.cost.tracking_weight, np.nan):
         app = weighted.app()
         app.modes("modeAbs")
-        app.aim(np.zeros(4), np.zeros(2))
+        app.aim(np.zeros(6))
         app.set_parameter("tracking", tracking)
         app.update(here)
         costs.append(app.logged("cost"))
@@ -323,6 +340,7 @@ def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
 SUBJECTS = {
     "crazyflie": SETTINGS,
     "float64": with_option(SETTINGS, "code.scalar", "float64"),
+    "given": with_option(SETTINGS, "target.acceleration", "given"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": ONE_NORM,
     "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),

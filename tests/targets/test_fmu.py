@@ -33,9 +33,10 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror")
 SUBJECTS = {
     "mambo": presets.preset("mambo"),
     "float64": with_option(presets.preset("mambo"), "code.scalar", "float64"),
+    "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
     "1-norm": presets.preset("mambo-1norm"),
 }
-OTHERS = ("float64", "1-norm")
+OTHERS = ("float64", "1-norm", "given")
 """Subjects whose flights are left to the long tests."""
 
 
@@ -84,6 +85,7 @@ class Unit:
         self._unit.enterInitializationMode()
         self._unit.exitInitializationMode()
         self._period_s, self._steps = period_s, 0
+        self._is_given = "target_ax" in {variable.name for variable in described.modelVariables}
 
     def advance(self, duration_s: float) -> None:
         """Make a communication step."""
@@ -101,7 +103,9 @@ class Unit:
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outputs:
         """Set the inputs, make a step of an update period, and return the outputs."""
-        self.set(range(12), [*state[0], *target[0], thrust_acceleration_m_s2[0]])
+        self.set(range(12), [*state[0], *target[0, :4], thrust_acceleration_m_s2[0]])
+        if self._is_given:
+            self.set([14, 15], target[0, 4:])
         self.advance(self._period_s)
         return Outputs(np.array([self.get([12, 13])]), np.array(self.get_status(STATUS)))
 

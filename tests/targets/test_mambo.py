@@ -44,6 +44,14 @@ MUTANTS = {
 }
 
 
+SUBJECTS = {
+    "mambo": presets.preset("mambo"),
+    "1-norm": presets.preset("mambo-1norm"),
+    "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
+    "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
+}
+
+
 @dataclass(frozen=True)
 class Angles:
     """What a controller of a simulated flight returns."""
@@ -62,7 +70,7 @@ class FlightProcess:
         """Return pitch, roll, status and refused for [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy]."""
         x, y, vx, vy, roll, pitch, yaw = state
         ahead, right = math.cos(yaw) * vx + math.sin(yaw) * vy, math.cos(yaw) * vy - math.sin(yaw) * vx
-        sensors = [x, y, 0.0, yaw, pitch, roll, ahead, right, 0.0, 0.0, 0.0, 0.0, *target, -thrust_n]
+        sensors = [x, y, 0.0, yaw, pitch, roll, ahead, right, 0.0, 0.0, 0.0, 0.0, *target[:4], -thrust_n]
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._process.stdin.write(np.array(sensors, "<f4").tobytes())
@@ -159,15 +167,13 @@ def test_lost_states_are_counted_and_end_level(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("optimisation", ["-O0", "-O3"])
-@pytest.mark.parametrize("name", ["mambo", "mambo-1norm", "fixed"])
+@pytest.mark.parametrize("name", SUBJECTS)
 def test_the_flags_of_both_toolboxes_build_it_without_a_word(
     name: str, optimisation: str, tmp_path: Path
 ) -> None:
     """One has no optimisation, one -O3; both are gnu89, warnings are errors; the block needs only libm."""
     compiler = require("arm-linux-gnueabi-gcc", "gcc-arm-linux-gnueabi and libc6-dev-armel-cross")
-    mambo = presets.preset("mambo")
-    settings = with_option(mambo, "code.scalar", "fixed") if name == "fixed" else presets.preset(name)
-    place(render_target(settings, TARGETS["mambo"], with_digest=False), tmp_path)
+    place(render_target(SUBJECTS[name], TARGETS["mambo"], with_digest=False), tmp_path)
     shell(
         *(compiler, *VENDOR_FLAGS, optimisation, "-shared", "-Wl,--no-undefined"),
         *("src/nmpc.c", "src/nmpc_mambo.c", "-lm", "-o", "block.so"),
