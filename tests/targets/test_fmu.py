@@ -5,6 +5,7 @@ import shutil
 import sys
 import zipfile
 from collections.abc import Sequence
+from ctypes import CDLL
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
@@ -154,7 +155,7 @@ def test_an_importer_compiles_the_sources(version: str, tmp_path: Path) -> None:
     objects = tmp_path / "objects"
     objects.mkdir()
     import_module("fmpy.build").build_platform_binary(folder, objects)
-    assert list((folder / "binaries").rglob("nmpc.so"))
+    assert list((folder / "binaries").rglob("nmpc.*"))
     unit = Unit(folder, version, settings.horizon.update_period_s)
     assert same(flown(settings, unit), flown(settings, CompiledController(settings)))
     unit.close()
@@ -202,7 +203,7 @@ def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) ->
 def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp_path: Path) -> None:
     """All warnings on and fatal; an importer finds each function of the standard's header in the library."""
     require_module("fmpy")
-    compiler, nm = require("gcc", "gcc"), require("nm", "binutils")
+    compiler = require("gcc", "gcc")
     fixed = with_option(presets.preset("mambo"), "code.scalar", "fixed")
     settings = fixed if name == "fixed" else SUBJECTS[name]
     folder = place(render_target(settings, TARGETS["fmu"], with_digest=False), tmp_path)
@@ -211,7 +212,7 @@ def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp
         sources = [folder / "sources" / f"{stem}.c" for stem in ("nmpc", "nmpc_fmu", f"fmi{version}")]
         library = tmp_path / f"fmi{version}.so"
         shell(compiler, *STRICT, "-fPIC", "-shared", *sources, "-lm", "-o", library)
-        exported = set(re.findall(r" T (fmi\w+)", shell(nm, "-D", library)))
+        unit = CDLL(str(library))
         header = headers / f"fmi{version}Functions.h"
         wanted = set(
             re.findall(rf"^#define (fmi{version}[A-Z]\w+) +fmi\dFullName", header.read_text("utf-8"), re.M)
@@ -222,4 +223,4 @@ def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp
             *("fmi2CompletedIntegratorStep", "fmi2SetContinuousStates", "fmi2GetDerivatives"),
             *("fmi2GetEventIndicators", "fmi2GetContinuousStates", "fmi2GetNominalsOfContinuousStates"),
         }
-        assert wanted - of_model_exchange == exported
+        assert not {function for function in wanted - of_model_exchange if not hasattr(unit, function)}
