@@ -60,16 +60,24 @@ class Controller:
         The result has `command_rad` (n, 2), roll and pitch, never beyond the tilt limit, and `status` (n,):
         0, or why an input was refused, such as NaN or a position out of range
         (`codegen.reference.Status`). A quadratic cost adds `saturated`, a 1-norm `cost` and `plan_rad`.
-        Raises ValueError for records of another number of drones.
+        Raises ValueError for records of another number of drones, and for targets without acceleration where
+        the settings have `target.acceleration = "given"`.
         """
         for name, record in (("state", state), ("target", target)):
             if len(record.position_m) != self.n:
                 raise ValueError(
                     f"{name}: has {len(record.position_m)} drones; the controller was made for {self.n}"
                 )
+        aims = [target.position_m, target.velocity_m_s]
+        if self.settings.target.acceleration == "given":
+            if target.acceleration_m_s2 is None:
+                raise ValueError(
+                    'target: acceleration_m_s2 is missing; the settings have target.acceleration = "given"'
+                )
+            aims.append(target.acceleration_m_s2)
         outcome: Step | ExactStep = self._compiled.step(
             np.concatenate([state.position_m, state.velocity_m_s, state.attitude_rad], axis=1),
-            np.concatenate([target.position_m, target.velocity_m_s], axis=1),
+            np.concatenate(aims, axis=1),
             np.broadcast_to(np.asarray(thrust_acceleration_m_s2, np.float64), (self.n,)),
         )
         return outcome

@@ -53,16 +53,34 @@ class TargetState:
     position_m: FloatArray
     """x and y (n, 2)."""
     velocity_m_s: FloatArray
-    """Along the same axes (n, 2); the change from step to step tells the target's acceleration."""
+    """Along the same axes (n, 2)."""
+    acceleration_m_s2: FloatArray | None
+    """Along the same axes (n, 2); read, and then needed, with `target.acceleration = "given"` only."""
 
-    def __init__(self, position_m: ArrayLike, velocity_m_s: ArrayLike) -> None:
+    def __init__(
+        self, position_m: ArrayLike, velocity_m_s: ArrayLike, acceleration_m_s2: ArrayLike | None = None
+    ) -> None:
         given = {"position_m": position_m, "velocity_m_s": velocity_m_s}
-        _fill(self, given, {"position_m": 2, "velocity_m_s": 2})
+        if acceleration_m_s2 is None:
+            object.__setattr__(self, "acceleration_m_s2", None)
+        else:
+            given["acceleration_m_s2"] = acceleration_m_s2
+        _fill(self, given, dict.fromkeys(given, 2))
 
     @classmethod
-    def in_frame(cls, frame: FrameName, position_m: ArrayLike, velocity_m_s: ArrayLike) -> Self:
+    def in_frame(
+        cls,
+        frame: FrameName,
+        position_m: ArrayLike,
+        velocity_m_s: ArrayLike,
+        acceleration_m_s2: ArrayLike | None = None,
+    ) -> Self:
         """Return targets whose vectors (n, 2) or (n, 3) are in another frame."""
-        return cls(horizontal_to_ned(frame, position_m), horizontal_to_ned(frame, velocity_m_s))
+        return cls(
+            horizontal_to_ned(frame, position_m),
+            horizontal_to_ned(frame, velocity_m_s),
+            None if acceleration_m_s2 is None else horizontal_to_ned(frame, acceleration_m_s2),
+        )
 
 
 def _fill(record: Any, fields: dict[str, ArrayLike], columns: dict[str, int]) -> None:

@@ -22,7 +22,7 @@ from mambo_nmpc import (
 )
 from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import to_toml
+from mambo_nmpc.codegen.settings.controller_toml import to_toml, with_option
 from mambo_nmpc.sil.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.errors import FlightError
@@ -113,6 +113,24 @@ def test_wrong_shapes_are_refused_by_name() -> None:
         Controller.from_preset("crazyflie", 2).step(LEVEL, TargetState(np.zeros(2), np.zeros(2)))
     with pytest.raises(ValueError, match="n = 0 must be 1 or more"):
         Controller.from_preset("crazyflie", 0)
+
+
+def test_a_target_may_tell_its_acceleration() -> None:
+    """Where the settings ask for it; without it they are refused, and others ignore it."""
+    settings = with_option(presets.load("crazyflie"), "target.acceleration", "given")
+    given, other = Controller(settings), CompiledController(settings)
+    state = DroneState.in_frame("ENU", np.zeros(3), np.zeros(3), np.array([0.0, 0.0, np.pi / 2.0]))
+    north = np.array([0.0, 1.0, 0.0])
+    target = TargetState.in_frame("ENU", np.zeros(3), np.zeros(3), north)
+    command_rad = given.step(state, target).command_rad
+    told = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+    assert command_rad[0, 1] < 0.0
+    assert (command_rad == other.step(np.zeros((1, 7)), told, np.array([9.81])).command_rad).all()
+    with pytest.raises(ValueError, match="target: acceleration_m_s2 is missing"):
+        given.step(state, TargetState(np.zeros(2), np.zeros(2)))
+    assert (Controller.from_preset("crazyflie").step(state, target).command_rad == 0.0).all()
+    with pytest.raises(ValueError, match="acceleration_m_s2: has shape"):
+        TargetState(np.zeros(2), np.zeros(2), np.zeros(3))
 
 
 def test_bad_numbers_give_a_status_and_no_exception() -> None:
