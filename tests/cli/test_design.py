@@ -7,6 +7,7 @@ import pytest
 
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.presets import load
+from mambo_nmpc.sil.tuning.file import read
 from tests.support.command import run
 
 DRONE = """\
@@ -46,6 +47,15 @@ def test_a_log_gives_settings_with_two_commands() -> None:
         run("fly", source, *drone, "--duration-s", "20")
         errors[source] = json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["iae_m_s"]
     assert errors["controller.toml"] < 0.5 * min(errors["mambo"], errors["crazyflie"])
+
+
+def test_tune_starts_from_it() -> None:
+    """The tune.toml in docs/design.md holds the values that are derived for its drone."""
+    text = (Path(__file__).parents[2] / "docs" / "design.md").read_text("utf-8")
+    Path("tune.toml").write_text(text.split("```toml\n")[1].split("```")[0], "utf-8")
+    run("design", "crazyflie-flown")
+    tuning = read(Path("tune.toml"))
+    assert tuning.base == load("controller.toml")
 
 
 def test_to_stdout_it_prints_the_file_alone() -> None:
