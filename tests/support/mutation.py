@@ -22,8 +22,20 @@ FILES: Final = (
 LIMIT_S: Final = 5
 """Processor time of a mutant, in seconds; the generated C takes a tenth of one."""
 
+_LIBRARY: Final = "all.c"
+_OTHERS: Final = {
+    "fuzz/replay.c": ("include/nmpc_config.h",),
+    "src/nmpc_self_test.c": ("include/nmpc_config.h", "src/nmpc_math.h"),
+}
+"""What is linked with the library, and the files with mutants that it includes."""
+
 _FLAGS: Final = (*replay.FLAGS, "-Werror=return-type", "-Iinclude", "-Isrc", "-I.")
-_SANITIZED: Final = ("-O1", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+_FAST: Final[tuple[str, ...]] = ("-O1",)
+_SANITIZED: Final[tuple[str, ...]] = (
+    "-O1",
+    "-fsanitize=address,undefined,float-cast-overflow",
+    "-fno-sanitize-recover=all",
+)
 
 
 class Fate(StrEnum):
@@ -43,12 +55,13 @@ class Bench:
         self.settings = subject.settings
         self._folder = subject.bundle
         units = [path for path in FILES if path.endswith(".c") and (self._folder / path).is_file()]
-        (self._folder / "all.c").write_text("".join(f'#include "{unit}"\n' for unit in units))
+        (self._folder / _LIBRARY).write_text("".join(f'#include "{unit}"\n' for unit in units))
         replay.write_program("nmpc", self._folder / "fuzz")
         self._tapes, self._expected = cases(subject.settings)
         self._tapes_file = subject.folder / "tapes.bin"
         replay.write_tapes(subject.settings, self._tapes, self._tapes_file)
-        self._originals = {level: self._machine_code(level) for level in ("-O1", "-O3")}
+        self._originals = {flags: self._all_objects(flags) for flags in (_FAST, _SANITIZED)}
+        self._optimized = self._compile(("-O3",), _LIBRARY)
 
     def mutants_of(self, path: str) -> list[Mutant]:
         """Return the mutants of one file."""
@@ -61,31 +74,53 @@ class Bench:
         text = file.read_text("utf-8")
         file.write_text(mutant.apply(text), "utf-8")
         try:
-            return self._fate()
+            return self._fate(mutant.file)
         finally:
             file.write_text(text, "utf-8")
 
-    def _fate(self) -> Fate:
+    def difference(self) -> str | None:
+        """Compile all anew and run the cases; return what differs from the reference, None if nothing."""
+        return self._play(_FAST, self._all_objects(_FAST))
+
+    def _fate(self, changed: str) -> Fate:
         try:
-            same = self._machine_code("-O1") == self._originals["-O1"]
+            objects = self._objects(_FAST, changed)
         except BuildError:
             return Fate.REFUSED
-        if not same and self.difference(("-O1",)) is not None:
+        same = objects[0] == self._originals[_FAST][0]
+        if not same and self._play(_FAST, objects) is not None:
             return Fate.OTHER_BITS
         # Also where the machine code is the same: the compiler may rely on what is undefined.
-        if self.difference(_SANITIZED) is not None:
+        objects = self._objects(_SANITIZED, changed)
+        if objects != self._originals[_SANITIZED] and self._play(_SANITIZED, objects) is not None:
             return Fate.UNDEFINED
-        same = same or self._machine_code("-O3") == self._originals["-O3"]
+        same = same or self._compile(("-O3",), _LIBRARY) == self._optimized
         return Fate.SAME if same else Fate.SURVIVED
 
-    def _machine_code(self, level: str) -> bytes:
-        """Compile the library as one unit, and return the object file."""
-        self._gcc(level, "-c", "all.c", "-o", "all.o")
-        return (self._folder / "all.o").read_bytes()
+    def _all_objects(self, flags: tuple[str, ...]) -> list[bytes]:
+        return [self._compile(flags, unit) for unit in (_LIBRARY, *_OTHERS)]
 
-    def difference(self, flags: tuple[str, ...]) -> str | None:
-        """Compile and run the cases; return what differs from the reference, None if nothing does."""
-        self._gcc(*flags, "all.c", "fuzz/replay.c", "src/nmpc_self_test.c", "-o", "replay")
+    def _objects(self, flags: tuple[str, ...], changed: str) -> list[bytes]:
+        """Compile the library as one unit, and of the rest what includes the changed file."""
+        originals = self._originals[flags][1:]
+        return [
+            self._compile(flags, _LIBRARY),
+            *(
+                self._compile(flags, unit) if changed in included else original
+                for (unit, included), original in zip(_OTHERS.items(), originals, strict=True)
+            ),
+        ]
+
+    def _compile(self, flags: tuple[str, ...], unit: str) -> bytes:
+        self._gcc(*flags, "-c", unit, "-o", "unit.o")
+        return (self._folder / "unit.o").read_bytes()
+
+    def _play(self, flags: tuple[str, ...], objects: list[bytes]) -> str | None:
+        """Link and run the cases; return what differs from the reference, None if nothing does."""
+        names = [f"{index}.o" for index in range(len(objects))]
+        for name, code in zip(names, objects, strict=True):
+            (self._folder / name).write_bytes(code)
+        self._gcc(*flags, *names, "-o", "replay")
         limit_s = 10 * LIMIT_S if flags == _SANITIZED else LIMIT_S
         played = replay.play(self._folder / "replay", self._tapes_file, self.settings, self._tapes, limit_s)
         return replay.fault(played, self._expected)

@@ -113,7 +113,7 @@ def test_mutants_meet_their_fate(tmp_path: Path) -> None:
     ):
         mutant = next(one for one in bench.mutants_of(path) if one.wrong_line == wrong)
         assert bench.fate(mutant) is fate, wrong
-    assert bench.difference(("-O1",)) is None
+    assert bench.difference() is None
 
 
 def test_every_reason_is_of_a_mutant_that_there_is() -> None:
@@ -145,6 +145,6 @@ def test_every_fault_is_noticed_or_explained(
     """All mutants of preset mambo, and of mambo-1norm where it differs; the message has the survivors."""
     require("gcc", "gcc")
     bench = Bench(subject(in_scalar(settings, scalar), tmp_path))
-    assert bench.difference(("-O1",)) is None
+    assert bench.difference() is None
     survivors = [mutant.key for mutant in bench.mutants_of(path) if bench.fate(mutant) is Fate.SURVIVED]
     assert [key for key in survivors if not is_explained(key, REASONS, bench.settings)] == []
