@@ -115,8 +115,8 @@ def _formats(*sections: Any) -> ExactFormats:
         "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
         "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
         "ratio": fractional_bits(*np.abs(law.ratios)) if law.moves == 2 else 0,
-        "per_step": fractional_bits(1 / period_s),
-        "per_step2": fractional_bits(1 / period_s**2),
+        "per_step": fractional_bits(observer.steps_per_s),
+        "per_step2": fractional_bits(observer.steps2_per_s2),
     }
     shifts = {
         "attitude": _attitude_shift(attitude.tilt_row, attitude.integral_row, attitude.limit_m_step2, bits),

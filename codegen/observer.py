@@ -24,6 +24,7 @@ class ObserverConstants:
     drag_1_step:           acceleration by drag per velocity.
     age_steps:             age of the measurements.
     outage_steps:          control steps without a good measurement over which the observer predicts.
+    steps_per_s, steps2_per_s2: make velocities and accelerations SI units again.
     """
 
     gain: NDArray[np.float64]
@@ -32,18 +33,23 @@ class ObserverConstants:
     drag_1_step: float
     age_steps: float
     outage_steps: int
+    steps_per_s: float
+    steps2_per_s2: float
 
 
 def observer_constants(settings: Sections) -> ObserverConstants:
     """Derive the constants of the observer."""
-    observer, period_s = settings.observer, mp.mpf(settings.horizon.update_period_s)
+    observer, update_s = settings.observer, settings.horizon.update_period_s
+    period_s = mp.mpf(update_s)
     return ObserverConstants(
         gain=_gain(settings),
         disturbance_limit_m_step2=float(mp.mpf(observer.disturbance_limit_m_s2) * period_s**2),
         velocity_limit_m_step=float(mp.mpf(settings.ranges.velocity_m_s) * period_s),
         drag_1_step=float(mp.mpf(settings.model.drag_1_s) * period_s),
         age_steps=float(mp.mpf(observer.age_s) / period_s),
-        outage_steps=round(observer.outage_s / settings.horizon.update_period_s),
+        outage_steps=round(observer.outage_s / update_s),
+        steps_per_s=1 / update_s,
+        steps2_per_s2=1 / (update_s * update_s),
     )
 
 

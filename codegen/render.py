@@ -272,8 +272,6 @@ def _quadratic_context(design: Design) -> dict[str, object]:
         "row_quantities": ROW,
         "stored_limits": _stored_limits(design),
         "attitude_shares": [period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)],
-        "steps_per_s": 1 / period_s,
-        "steps2_per_s2": 1 / (period_s * period_s),
         "wide": "(nmpc_sum_t)" if formats else "",
         "shifts": formats.shifts if isinstance(formats, ExactFormats) else None,
         "plain_products": _plain_products(design),
