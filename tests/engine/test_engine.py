@@ -26,36 +26,12 @@ from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.link import Link
 from tests.support.one_norm import ONE_NORM
-from tests.support.scenarios import (
-    COUPLED,
-    CRAZYFLIE,
-    FLOWN,
-    INSTRUMENTS,
-    LATE,
-    LIMITED,
-    SENSED,
-    TAKE_OFF,
-    TRUTH,
-    captured,
-    drones,
-    scenarios,
-)
+from tests.support.scenarios import BATCHES, TRUTH, drones, scenarios
 from tests.support.tools import require, toolchain
 
 MAMBO = ONE_NORM
 PERIOD_S = MAMBO.horizon.update_period_s
 SCALARS = ("float32", "float64", "fixed")
-BATCHES = {
-    "truth": TRUTH,
-    "sensed": SENSED,
-    "coupled": COUPLED,
-    "take-off": TAKE_OFF,
-    "cascade": captured(CRAZYFLIE),
-    "limited": captured(LIMITED),
-    "flown": captured(FLOWN),
-    "late": captured(LATE),
-    "instruments": INSTRUMENTS,
-}
 BUILDS = [
     Toolchain(("gcc",), "-O0"),
     Toolchain(("gcc",), "-O3"),

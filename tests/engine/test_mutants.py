@@ -30,18 +30,7 @@ from tests.support.engine_reasons import reason
 from tests.support.engines import TICKS, build, estimates, tabulate, truths
 from tests.support.mutants import Mutant, mutants
 from tests.support.one_norm import ONE_NORM
-from tests.support.scenarios import (
-    COUPLED,
-    CRAZYFLIE,
-    FLOWN,
-    INSTRUMENTS,
-    LATE,
-    LIMITED,
-    SENSED,
-    TAKE_OFF,
-    TRUTH,
-    captured,
-)
+from tests.support.scenarios import BATCHES
 
 PERIOD_S: Final = 0.01
 STRIDE: Final = 8
@@ -53,17 +42,13 @@ FLAGS: Final = (
     *("-fsanitize=bounds", "-fsanitize-undefined-trap-on-error"),
 )
 """A variable without a value is not 0, and a read beside an array is a crash."""
-BATCHES: Final = (
-    *(TRUTH, SENSED, COUPLED, TAKE_OFF, INSTRUMENTS),
-    *(captured(drone) for drone in (CRAZYFLIE, LIMITED, FLOWN, LATE)),
-)
 FILES: Final = sorted({*SOURCES, *HEADERS} - {"engine.h", "records.h"})
 
 
 def digests(path: Path) -> list[str]:
     """Return the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
     engine = ffi.dlopen(str(path))
-    flights = [flight_of(batch, PERIOD_S) for batch in BATCHES]
+    flights = [flight_of(batch, PERIOD_S) for batch in BATCHES.values()]
     traces = [fly_compiled(engine, flight, pd_controller(name)) for name in PD_NAMES for flight in flights]
     settings = ONE_NORM
     traces += [

@@ -145,6 +145,19 @@ def captured(drone: VehicleFile) -> tuple[Scenario, ...]:
     )
 
 
+BATCHES: Final = {
+    "truth": TRUTH,
+    "sensed": SENSED,
+    "coupled": COUPLED,
+    "take-off": TAKE_OFF,
+    "instruments": INSTRUMENTS,
+    "cascade": captured(CRAZYFLIE),
+    "limited": captured(LIMITED),
+    "flown": captured(FLOWN),
+    "late": captured(LATE),
+}
+
+
 def _within(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high, allow_nan=False)
 
