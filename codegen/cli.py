@@ -13,7 +13,6 @@ from mambo_nmpc.codegen.command import (
     OutputFile,
     Overwrite,
     Scalar,
-    Source,
     complete_presets,
     examples,
     load,
