@@ -60,6 +60,7 @@ _TARGETS: Final = (
     FirmwareTarget("espidf", "mambo", ""),
     FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS),
     FirmwareTarget("mambo", "mambo", "src/", tick_s=0.005),
+    FirmwareTarget("pil", "mambo", ""),
     FirmwareTarget("platformio", "mambo", "src/"),
 )
 TARGETS: Final = {target.name: target for target in _TARGETS}
