@@ -43,6 +43,10 @@ class EmulationError(MamboNmpcError):
     """The program on the emulated core crashed, or exceeded its time limit."""
 
 
+class BoardError(MamboNmpcError):
+    """The board behind a port does not answer, or runs other firmware; the message names the port."""
+
+
 class WorkerError(MamboNmpcError):
     """A worker process or machine stopped before it returned its result."""
 

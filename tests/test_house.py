@@ -24,6 +24,7 @@ WINGS = [
     "emulation",
     "controllers",
     "engine",
+    "pil",
     "paper",
     "footprint",
     "faults",
@@ -39,7 +40,7 @@ WINGS = [
     "package",
 ]
 # Wings whose results must have the same bits on every processor, and what of them only draws or prints.
-EXACT_WINGS = {"vehicles", "plant", "sensors", "flight", "controllers", "paper", "faults", "campaign"}
+EXACT_WINGS = {"vehicles", "plant", "sensors", "flight", "controllers", "paper", "pil", "faults", "campaign"}
 ROUNDED = {"sil.flight.animation", "sil.faults.section"}
 # NumPy and math have these with other bits on other processors.
 INEXACT = {

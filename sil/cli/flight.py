@@ -4,6 +4,7 @@ import hashlib
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import typer
@@ -32,6 +33,7 @@ from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 from mambo_nmpc.sil.vehicles import presets as vehicles
+from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 GUSTS = "gusts"
 LONGEST_FLIGHT_S = 3600.0
@@ -46,14 +48,32 @@ def fly_once(options: FlyOptions) -> None:
     Raises FlightError, TrajectoryError, and the errors of loading settings or boards and of building the C.
     """
     settings = load(options.source, options.scalar)
+    drone = vehicles.load(options.vehicle)
+    flight = flight_of_options(options, settings, drone)
+    with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
+        controller = _on_board(options, settings) if options.on else _controller(options, settings)
+        with progress_bar("flying") as progress:
+            trace = simulate(flight, controller, progress, engine=options.engine)
+        same_bits = (
+            None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
+        )
+        write_flight(trace, options, folder)
+        summary = FlySummary(
+            **summary_fields(options, settings, drone, flight, trace) | {"same_bits_as_host": same_bits}
+        )
+        summary.write(folder)
+    finish(summary, flight_text(summary), options, written(options))
+
+
+def flight_of_options(options: FlyOptions, settings: Settings, drone: VehicleFile) -> Flight:
+    """Return the flight that the options describe; raises FlightError and TrajectoryError."""
     name, period_s = echo(options.source), settings.horizon.update_period_s
     curve = _trajectory(options)
-    wind_m_s2 = (0.0, 0.0) if options.wind == GUSTS else _wind(options.wind)
-    wind_speed_m_s = LIGHT_M_S if options.wind == GUSTS else 0.0
+    gusty = options.wind == GUSTS
     _within("--yaw-rad", options.yaw_rad, -1000.0, 1000.0)
-    drone = vehicles.load(options.vehicle)
     motor_lag_s = drone.motor_lag_s if options.motor_lag_s is None else options.motor_lag_s
     _within("--motor-lag-s", motor_lag_s, 0.0, 1.0)
+    wind_m_s2 = (0.0, 0.0) if gusty else _wind(options.wind)
     try:
         sensors = choose_sensors(options.sensors, drone)
     except FlightError as error:
@@ -69,41 +89,44 @@ def fly_once(options: FlyOptions) -> None:
             vehicle=replace(Vehicle.of(drone), motor_lag_s=motor_lag_s, wind_m_s2=wind_m_s2),
             update_period_s=period_s,
             seeds=(options.seed,),
-            disturbances=Disturbances(wind_speed_m_s=wind_speed_m_s),
+            disturbances=Disturbances(wind_speed_m_s=LIGHT_M_S if gusty else 0.0),
             sensors=sensors,
         )
     except FlightError as error:
         raise FlightError(f"{name}: horizon.{error}; only the simulation requires this") from error
     if options.controller not in PD_TITLES:
         _check_ranges(flight, settings, options.trajectory)
-    with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
-        controller = _on_board(options, settings) if options.on else _controller(options, settings)
-        with progress_bar("flying") as progress:
-            trace = simulate(flight, controller, progress, engine=options.engine)
-        same_bits = (
-            None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
-        )
-        write_trace(trace, folder)
-        if options.pictures:
-            draw_flight(trace, PD_TITLES.get(options.controller, f"NMPC, {name}"), folder)
-        waypoints = Path(options.trajectory) if isinstance(curve, Waypoints) else None
-        summary = FlySummary(
-            **vars(options)
-            | {
-                "board": options.on,
-                "same_bits_as_host": same_bits,
-                "settings": settings.digest,
-                "vehicle": drone,
-                "motor_lag_s": motor_lag_s,
-                "update_period_s": period_s,
-                "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
-                "wind_m_s2": wind_m_s2,
-                "wind_speed_m_s": wind_speed_m_s,
-                **judge(trace, settings, drone),
-            }
-        )
-        summary.write(folder)
-    finish(summary, options, FLIGHT_FILES if options.pictures else TRACE_FILES)
+    return flight
+
+
+def summary_fields(
+    options: FlyOptions, settings: Settings, drone: VehicleFile, flight: Flight, trace: Trace
+) -> dict[str, Any]:
+    """Return the fields of a `FlySummary` but `same_bits_as_host`."""
+    waypoints = Path(options.trajectory) if isinstance(flight.trajectory, Waypoints) else None
+    return vars(options) | {
+        "board": options.on,
+        "settings": settings.digest,
+        "vehicle": drone,
+        "motor_lag_s": flight.vehicle.motor_lag_s,
+        "update_period_s": flight.update_period_s,
+        "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
+        "wind_m_s2": flight.vehicle.wind_m_s2,
+        "wind_speed_m_s": flight.disturbances.wind_speed_m_s,
+        **judge(trace, settings, drone),
+    }
+
+
+def written(options: FlyOptions) -> tuple[str, ...]:
+    """Return the names of the files of one flight, without its summary."""
+    return FLIGHT_FILES if options.pictures else TRACE_FILES
+
+
+def write_flight(trace: Trace, options: FlyOptions, folder: Path) -> None:
+    """Write the files of `written`."""
+    write_trace(trace, folder)
+    if options.pictures:
+        draw_flight(trace, PD_TITLES.get(options.controller, f"NMPC, {echo(options.source)}"), folder)
 
 
 def write_trace(trace: Trace, folder: Path) -> None:
@@ -119,9 +142,9 @@ def draw_flight(trace: Trace, title: str, folder: Path) -> None:
     draw_flights({title: trace}, folder / "flight")
 
 
-def finish(summary: FlightSummary, options: FlyOptions, files: tuple[str, ...]) -> None:
-    """Print the results and the files written; exit 1 unless the summary is good."""
-    show(summary, flight_text(summary), as_json=options.as_json)
+def finish(summary: FlightSummary, text: str, options: FlyOptions, files: tuple[str, ...]) -> None:
+    """Print the results, as `text` or JSON, and the files written; exit 1 unless the summary is good."""
+    show(summary, text, as_json=options.as_json)
     typer.echo(f"{echo(str(options.output))}: {', '.join(files)}", err=True)
     if not summary.good:
         raise typer.Exit(1)

@@ -9,6 +9,10 @@ def fly(options: FlyOptions) -> None:
         from mambo_nmpc.sil.cli.replay import fly_again
 
         fly_again(options, options.replay)
+    elif options.port is not None:
+        from mambo_nmpc.sil.cli.port import fly_on_port
+
+        fly_on_port(options, options.port)
     else:
         from mambo_nmpc.sil.cli.flight import fly_once
 

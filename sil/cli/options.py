@@ -110,6 +110,15 @@ class FlyOptions:
             autocompletion=complete_boards,
         ),
     ] = None
+    port: Annotated[
+        str | None,
+        typer.Option(
+            help="Serial port of a board with the firmware of `generate --for pil`, which then flies the "
+            "drone; the C on this machine must have the same bits.",
+            metavar="DEVICE|socket://HOST:PORT",
+        ),
+    ] = None
+    baud: Annotated[int, typer.Option(help="Rate of the serial port.", min=1)] = 115200
     replay: Annotated[
         Path | None,
         typer.Option(

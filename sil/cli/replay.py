@@ -14,7 +14,7 @@ from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.files.folders import new_results
 from mambo_nmpc.sil.flight.loop import PositionController
 from mambo_nmpc.sil.flight.loop import fly as simulate
-from mambo_nmpc.sil.flight.report import ReplaySummary, judge
+from mambo_nmpc.sil.flight.report import ReplaySummary, flight_text, judge
 from mambo_nmpc.sil.flight.scenario import Record, flight_of, read_record
 
 INNER_STEPS = "inner-steps.npz"
@@ -59,7 +59,7 @@ def fly_again(options: FlyOptions, file: Path) -> None:
         )
         summary.write(folder)
     written = FLIGHT_FILES if options.pictures else TRACE_FILES
-    finish(summary, options, written if watched is None else (*written, INNER_STEPS))
+    finish(summary, flight_text(summary), options, written if watched is None else (*written, INNER_STEPS))
 
 
 def _controllers(record: Record) -> tuple[WatchedController | None, PositionController]:

@@ -168,7 +168,7 @@ def flight_text(summary: FlightSummary) -> str:
     if isinstance(summary, ReplaySummary) and summary.same_bits_as_recorded is not None:
         same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
         lines.append(f"replay: the trace {same} the recorded one, bit for bit")
-    if isinstance(summary, FlySummary) and summary.same_bits_as_host is not None:
+    if isinstance(summary, FlySummary) and summary.board is not None:
         same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
         lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")
     if summary.crash is not None:

@@ -15,21 +15,27 @@ from mambo_nmpc.sil.show.section import Section
 
 def fly_section(folder: Path, summary: FlySummary) -> Section:
     """Return the section of a flight; raises TraceError."""
+    facts, bad = {}, []
+    if summary.board is not None:
+        bits = ", bit for bit as on the host" if summary.same_bits_as_host else ""
+        facts["flown on"] = f"the emulated core of {summary.board}{bits}"
+        if summary.same_bits_as_host is False:
+            bad = [f"the trace of {summary.board} differs from that of the host"]
+    return flown_section(folder, summary, facts, bad)
+
+
+def flown_section(folder: Path, summary: FlySummary, facts: dict[str, str], bad: list[str]) -> Section:
+    """Return the section of a flight with its parameters, further facts and faults; raises TraceError."""
     name = PD_TITLES.get(summary.controller, f"NMPC, {summary.source}")
-    bits = "" if summary.same_bits_as_host is not True else ", bit for bit as on the host"
-    facts = {
+    parameters = {
         **_course(summary),
         "controller": f"{summary.controller}, settings {summary.settings[:16]} of {summary.source}",
         "start": f"{summary.start}, heading {summary.yaw_rad:g} rad",
         "disturbances": "steady acceleration {:g}, {:g} m/s²".format(*summary.wind_m_s2)
         + f"; wind with gusts {summary.wind_speed_m_s:g} m/s; motor lag {summary.motor_lag_s:g} s",
     }
-    if summary.board is not None:
-        facts["flown on"] = f"the emulated core of {summary.board}{bits}"
-    bad = []
-    if summary.same_bits_as_host is False:
-        bad = [f"the trace of {summary.board} differs from that of the host"]
-    return _flight(folder, summary, (name, f"Flight: {name}, {summary.trajectory}"), facts, bad)
+    titles = (name, f"Flight: {name}, {summary.trajectory}")
+    return _flight(folder, summary, titles, parameters | facts, bad)
 
 
 def replay_section(folder: Path, summary: ReplaySummary) -> Section:

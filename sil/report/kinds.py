@@ -25,6 +25,8 @@ from mambo_nmpc.sil.identify.section import identify_section
 from mambo_nmpc.sil.paper.section import sensed_section, table2_section
 from mambo_nmpc.sil.paper.sensed import SensedSummary
 from mambo_nmpc.sil.paper.table2 import Table2Summary
+from mambo_nmpc.sil.pil.report import BoardFlightSummary
+from mambo_nmpc.sil.pil.section import board_section
 from mambo_nmpc.sil.regress.report import RegressSummary
 from mambo_nmpc.sil.regress.section import regress_section
 from mambo_nmpc.sil.show.section import Section
@@ -34,6 +36,7 @@ from mambo_nmpc.sil.verify.section import verify_section
 _FINISHED: Final[dict[type[Summary], Callable[[Path, Any], Section]]] = {
     FlySummary: fly_section,
     ReplaySummary: replay_section,
+    BoardFlightSummary: board_section,
     Table2Summary: table2_section,
     SensedSummary: sensed_section,
     FootprintSummary: footprint_section,

@@ -245,7 +245,7 @@ def test_a_lost_flight_is_shown_as_far_as_it_went() -> None:
         (lambda folder: (folder / SUMMARY).write_text("[]"), "command = None must be one of fly, "),
         (
             lambda folder: (folder / SUMMARY).write_text('{"command": "dance"}'),
-            "command = dance must be one of fly, fly --replay, table2, ",
+            "command = dance must be one of fly, fly --replay, fly --port, table2, ",
         ),
         (
             lambda folder: (folder / SUMMARY).write_text('{"command": "fly", "generator": "x"}'),

@@ -1,0 +1,68 @@
+"""`fly --port`: the controller on a board flies the simulated drone."""
+
+import contextlib
+from functools import partial
+
+import typer
+
+from mambo_nmpc.codegen.digest import TICKS
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.cli.flight import (
+    FLIGHT_FILES,
+    finish,
+    flight_of_options,
+    summary_fields,
+    write_flight,
+    written,
+)
+from mambo_nmpc.sil.cli.options import FlyOptions, load
+from mambo_nmpc.sil.cli.progress import progress_bar
+from mambo_nmpc.sil.controllers.build import build_library
+from mambo_nmpc.sil.controllers.compiled import digest_compiled
+from mambo_nmpc.sil.errors import FlightError
+from mambo_nmpc.sil.files.folders import new_results
+from mambo_nmpc.sil.flight.loop import fly as simulate
+from mambo_nmpc.sil.pil.connection import Connection
+from mambo_nmpc.sil.pil.controller import BoardController
+from mambo_nmpc.sil.pil.port import open_port
+from mambo_nmpc.sil.pil.report import BoardFlightSummary, board_fields, board_text
+from mambo_nmpc.sil.vehicles import presets as vehicles
+
+EPISODES = 4
+"""Episodes of the self-test digest before the flight: a second on the slowest board."""
+
+
+def fly_on_port(options: FlyOptions, port: str) -> None:
+    """Fly once with the controller on the board at `port`; exit 1 if the drone is lost or a bit differs.
+
+    Raises BoardError, and what `fly_once` raises.
+    """
+    if options.controller != "nmpc" or options.on is not None:
+        raise FlightError(f"--port {echo(port)} flies the C on a board: leave out --controller and --on")
+    settings, drone = load(options.source, options.scalar), vehicles.load(options.vehicle)
+    flight = flight_of_options(options, settings, drone)
+    library = build_library(settings, host_toolchain())
+    say = partial(typer.echo, err=True)
+    with new_results(options.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:
+        with contextlib.closing(
+            Connection(port, partial(open_port, port, options.baud), settings, say=say)
+        ) as board:
+            first_difference = board.test()
+            same_digest = board.digest(EPISODES) == digest_compiled(library, EPISODES)
+            controller = BoardController(settings, board)
+            with progress_bar("flying") as progress:
+                trace = simulate(flight, controller, progress)
+        write_flight(trace, options, folder)
+        fields = summary_fields(options, settings, drone, flight, trace) | board_fields(board, controller)
+        summary = BoardFlightSummary(
+            **fields
+            | {
+                "self_test_difference": first_difference,
+                "same_digest": same_digest,
+                "digest_steps": EPISODES * TICKS,
+                "same_bits_as_host": not (first_difference or controller.different) and same_digest,
+            }
+        )
+        summary.write(folder)
+    finish(summary, board_text(summary), options, written(options))

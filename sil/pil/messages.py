@@ -1,0 +1,90 @@
+"""Requests to a board and its replies: the protocol that pil.h describes."""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final, Self
+
+PROTOCOL: Final = 1
+REPLY: Final = 0x80
+OUT_OF_STEP: Final = 0xFE
+DAMAGED: Final = 0xFF
+_HEAD: Final = struct.Struct("<BI")
+HEAD_BYTES: Final = _HEAD.size
+
+
+class Kind(IntEnum):
+    """What a request asks for."""
+
+    GREET = 1
+    RESET = 2
+    STEP = 3
+    TEST = 4
+    DIGEST = 5
+
+
+def request(kind: Kind, number: int, body: bytes = b"") -> bytes:
+    """Return the payload of a request."""
+    return _HEAD.pack(kind, number) + body
+
+
+def split(payload: bytes) -> tuple[int, int, bytes]:
+    """Return kind, number and body of a reply; a payload too short for them is a damaged one."""
+    if len(payload) < HEAD_BYTES:
+        return DAMAGED, 0, b""
+    return (*_HEAD.unpack_from(payload), payload[HEAD_BYTES:])
+
+
+@dataclass(frozen=True)
+class Greeting:
+    """What a board says of itself."""
+
+    protocol: int
+    clock_hz: int
+    """Frequency of its cycle counter."""
+    steps: int
+    """Steps since its reset."""
+    generator: str
+    settings: str
+    """The first digits of the settings digest."""
+    scalar: str
+    board: str
+
+    _NUMBERS = struct.Struct("<BII")
+
+    @classmethod
+    def parse(cls, body: bytes) -> Self | None:
+        """Return the greeting in the body of a reply; None if it is none."""
+        if len(body) < cls._NUMBERS.size:
+            return None
+        words = body[cls._NUMBERS.size :].decode("ascii", "replace").split("\n")
+        return cls(*cls._NUMBERS.unpack_from(body), *words) if len(words) == 4 else None
+
+
+@dataclass(frozen=True)
+class StepReply:
+    """The result of a step on a board."""
+
+    status: int
+    command: bytes
+    """Roll and pitch, as the C holds them."""
+    outcome_crc: int
+    """CRC-32 of every bit that the step left in the controller."""
+    cycles: int
+    stack_bytes: int
+
+    @classmethod
+    def parse(cls, body: bytes, number_bytes: int) -> Self | None:
+        """Return the result in the body of a reply, with numbers of `number_bytes`; None if it is none."""
+        shape = struct.Struct(f"<B{2 * number_bytes}sIIH")
+        return cls(*shape.unpack(body)) if len(body) == shape.size else None
+
+    @property
+    def bits(self) -> tuple[int, bytes, int]:
+        """All that must be equal wherever the step is run."""
+        return self.status, self.command, self.outcome_crc
+
+
+def step_reply_bytes(number_bytes: int) -> int:
+    """Return the length of the payload that answers a step, with numbers of `number_bytes`."""
+    return HEAD_BYTES + 1 + 2 * number_bytes + 10
