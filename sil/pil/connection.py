@@ -5,6 +5,7 @@ restarted, the steps so far are sent again, and it must answer them with the sam
 """
 
 import contextlib
+import os
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -47,7 +48,7 @@ class Patience:
     """How long to wait for a board, in s."""
 
     reply_s: float = 0.25
-    """For a reply, before the request is repeated; doubled with every repetition."""
+    """For a reply, before the request is repeated; every board answers a step sooner."""
     silence_s: float = 8.0
     """For a reply to any repetition; a board with a boot loader takes 2 s until it answers."""
     return_s: float = 30.0
@@ -193,7 +194,6 @@ class Connection:
             if reply is not None:
                 return reply
             self.faults["repeated"] += 1
-            wait_s *= 2.0
         arrived = (
             f"{self._received_bytes} B arrived, but no answer" if self._received_bytes else "nothing came"
         )
@@ -216,9 +216,16 @@ class Connection:
                     raise _RestartedError
                 if found == DAMAGED:
                     self.faults["damaged"] += 1
+                    self._drain(deadline)
                     return None
             size = max(1, self._port.in_waiting)
         return None
+
+    def _drain(self, deadline: float) -> None:
+        """Drop what is still on its way, so that each fault is answered by one repetition."""
+        while self._port.read(1) and time.monotonic() < deadline:
+            pass
+        self._receiver = Receiver()
 
     def _reconnect(self, error: OSError) -> None:
         """Wait until the port is back, with the same firmware behind it; raises BoardError."""
@@ -242,4 +249,6 @@ class Connection:
 
 
 def _reason(error: OSError) -> str:
-    return echo(error.strerror or str(error))
+    """Return why a port failed; pyserial's own words repeat the name of the port."""
+    cause = error.__context__ if isinstance(error.__context__, OSError) else error
+    return os.strerror(cause.errno) if cause.errno else echo(str(cause))

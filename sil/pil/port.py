@@ -7,7 +7,8 @@ from mambo_nmpc.sil.errors import BoardError
 
 BAUD: Final = 115200
 """The rate of the shipped boards."""
-READ_S: Final = 0.05
+READ_S: Final = 0.01
+"""How long a read waits for bytes."""
 
 
 class Port(Protocol):

@@ -6,6 +6,7 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict
 
+from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.flight.report import FlySummary, flight_text
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.controller import BoardController
@@ -57,7 +58,7 @@ def board_fields(board: Connection, controller: BoardController) -> dict[str, ob
     """Return the fields of a `BoardFlightSummary` that follow from a flight."""
     different, replies = controller.different, controller.replies
     return {
-        "board_says": board.greeting.board,
+        "board_says": echo(board.greeting.board),
         "clock_hz": board.greeting.clock_hz,
         "steps": len(replies),
         "different_steps": len(different),
