@@ -11,7 +11,7 @@ import pytest
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_nmpc.codegen.settings.controller_toml import to_toml, with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.firmware.build import ENTRY, builder
 from mambo_nmpc.sil.firmware.elf import load
@@ -74,6 +74,15 @@ def test_every_scalar_type_and_norm_flies_bit_for_bit(
         summary = flown(line, preset, "--scalar", scalar, "--duration-s", "0.2")
     names = {"host": "host process", "crazyflie": "STM32F405", "mega": "Arduino Mega 2560"}
     demand_same_bits(summary, 21, names[board])
+
+
+def test_a_given_acceleration_of_the_target_is_sent_too(tmp_path: Path) -> None:
+    """The target of such a controller has two more numbers."""
+    settings = with_option(presets.preset("mambo"), "target.acceleration", "given")
+    (tmp_path / "given.toml").write_text(to_toml(settings), "utf-8")
+    with serial_line(build_firmware(settings, "host", tmp_path / "pil")) as line:
+        summary = flown(line, "given.toml", "--duration-s", "0.2")
+    demand_same_bits(summary, 21, "host process")
 
 
 def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
