@@ -33,6 +33,7 @@ WINGS = [
     "verify",
     "tuning",
     "identify",
+    "replay",
     "derivation",
     "api",
     "report",

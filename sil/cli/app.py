@@ -19,6 +19,7 @@ from mambo_nmpc.sil.cli.footprint import footprint
 from mambo_nmpc.sil.cli.identify import identify
 from mambo_nmpc.sil.cli.options import FlyOptions, command_of
 from mambo_nmpc.sil.cli.regress import regress
+from mambo_nmpc.sil.cli.replay_log import replay
 from mambo_nmpc.sil.cli.report import report
 from mambo_nmpc.sil.cli.same_bits import same_bits
 from mambo_nmpc.sil.cli.sweep import sweep
@@ -42,6 +43,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "campaign": campaign,
     "tune": tune,
     "identify": identify,
+    "replay": replay,
     "report": report,
 }
 """Commands by name, in the order of the help."""
@@ -93,6 +95,8 @@ mambo-nmpc identify flight.csv -o identified
 mambo-nmpc identify monday.csv tuesday.csv -o identified
 mambo-nmpc identify flight.csv --columns roll_rad=deg*att.roll,pitch_rad=-deg*att.pitch
 mambo-nmpc identify flight.ulg -o identified
+mambo-nmpc replay flight/trace.csv
+mambo-nmpc replay flight.csv controller.toml -o replayed
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html
 """

@@ -56,8 +56,8 @@ KNOWN: Final[dict[str, tuple[Column, ...]]] = {
 (seen_) is what a real drone would log, and those of the Crazyflie, whose y, z and yaw have the other sign."""
 
 
-def parse_columns(text: str) -> dict[str, Column]:
-    """Return the columns that the option --columns names.
+def parse_columns(text: str, signals: Mapping[str, object] = KNOWN) -> dict[str, Column]:
+    """Return the columns that the option --columns names for `signals`.
 
     Its form is SIGNAL=COLUMN,... where COLUMN may have a sign and a factor, as in -deg*pitch or 0.001*t.
     Raises LogError with all faults.
@@ -69,9 +69,9 @@ def parse_columns(text: str) -> dict[str, Column]:
         try:
             if not equals or not column:
                 raise ValueError("must be SIGNAL=COLUMN, as in roll_rad=deg*att.roll")
-            if signal not in KNOWN:
-                near = difflib.get_close_matches(signal, KNOWN, n=1)
-                raise ValueError(f"must begin with {near[0] if near else 'one of ' + ', '.join(KNOWN)}")
+            if signal not in signals:
+                near = difflib.get_close_matches(signal, signals, n=1)
+                raise ValueError(f"must begin with {near[0] if near else 'one of ' + ', '.join(signals)}")
             if signal in found:
                 raise ValueError(f"names {signal} a second time")
             found[signal] = _parse_column(column)
@@ -98,12 +98,15 @@ def _parse_column(text: str) -> Column:
 
 
 def choose_columns(
-    header: Sequence[str], chosen: Mapping[str, Column]
+    header: Sequence[str], chosen: Mapping[str, Column], signals: Mapping[str, Sequence[Column]]
 ) -> tuple[dict[str, Column], list[str]]:
-    """Return the column of each signal that a file with this header has, and all faults."""
+    """Return the column of each signal that a file with this header has, and all faults.
+
+    `chosen` goes before the known columns of `signals`.
+    """
     found: dict[str, Column] = {}
     faults = []
-    for signal, known in KNOWN.items():
+    for signal, known in signals.items():
         if signal in chosen:
             column: Column | None = chosen[signal]
             if chosen[signal].name not in header:

@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +12,7 @@ import numpy as np
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.plain_file import read_plain_file
 from mambo_nmpc.sil.errors import LogError
-from mambo_nmpc.sil.identify.columns import Column, choose_columns
+from mambo_nmpc.sil.identify.columns import KNOWN, Column, choose_columns
 from mambo_nmpc.sil.identify.signals import OPTIONAL, REQUIRED, TIME, FlightLog, Signal
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
@@ -29,14 +29,19 @@ LONGEST_OPTIONAL_PERIOD_S: Final = 0.1
 """Median time between two samples of position, velocity or yaw beyond which they are left out."""
 
 
-def read_csv(path: Path, chosen: Mapping[str, Column]) -> FlightLog:
-    """Read the log at `path`; `chosen` has the columns that the user named. Raises LogError, all faults."""
+def read_csv(
+    path: Path, chosen: Mapping[str, Column], signals: Mapping[str, Sequence[Column]] = KNOWN
+) -> FlightLog:
+    """Read the log at `path`; `chosen` has the columns that the user named, `signals` the known ones of each.
+
+    Raises LogError, all faults.
+    """
     name = echo(str(path))
     rows = _rows(read_text(path))
     header = [column.strip() for column in next(rows, (0, []))[1]]
     if not any(header):
         raise LogError((f"{name}: is empty; the first line must name the columns",))
-    columns, faults = choose_columns(header, chosen)
+    columns, faults = choose_columns(header, chosen, signals)
     if faults:
         raise LogError(tuple(f"{name}: {fault}" for fault in faults))
     values, faults = _values(rows, {signal: header.index(each.name) for signal, each in columns.items()})

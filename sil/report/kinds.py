@@ -29,6 +29,8 @@ from mambo_nmpc.sil.pil.report import BoardFlightSummary
 from mambo_nmpc.sil.pil.section import board_section
 from mambo_nmpc.sil.regress.report import RegressSummary
 from mambo_nmpc.sil.regress.section import regress_section
+from mambo_nmpc.sil.replay.report import LogReplaySummary
+from mambo_nmpc.sil.replay.section import log_replay_section
 from mambo_nmpc.sil.show.section import Section
 from mambo_nmpc.sil.verify.report import VerifySummary
 from mambo_nmpc.sil.verify.section import verify_section
@@ -46,6 +48,7 @@ _FINISHED: Final[dict[type[Summary], Callable[[Path, Any], Section]]] = {
     RegressSummary: regress_section,
     CampaignSummary: campaign_section,
     IdentifySummary: identify_section,
+    LogReplaySummary: log_replay_section,
 }
 _SECTIONS: Final = _FINISHED | {UnfinishedCampaign: campaign_section}
 

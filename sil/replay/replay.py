@@ -1,0 +1,119 @@
+"""Feed the inputs in a flight log through the compiled controller, next to the commands of the log."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.errors import LogError
+from mambo_nmpc.sil.identify.columns import KNOWN, Column
+from mambo_nmpc.sil.identify.csv_log import read_csv
+from mambo_nmpc.sil.identify.signals import COMMANDS, DEGREE, THRUST, YAW, FlightLog
+from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+
+STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
+TARGET: Final[dict[str, tuple[Column, ...]]] = {
+    "target_x_m": (Column("target_x_m"), Column("ctrltarget.x")),
+    "target_y_m": (Column("target_y_m"), Column("ctrltarget.y", -1.0)),
+    "target_vx_m_s": (Column("target_vx_m_s"), Column("ctrltarget.vx")),
+    "target_vy_m_s": (Column("target_vy_m_s"), Column("ctrltarget.vy", -1.0)),
+}
+"""Known columns of the target: those of trace.csv, and those of the Crazyflie, whose y has the other sign."""
+SIGNALS: Final = {
+    **KNOWN,
+    **TARGET,
+    "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
+    "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
+}
+"""Known columns of each signal; the commands are those of the controller itself."""
+
+HOVER_M_S2: Final = 9.81
+_SAME_PERIOD: Final = 0.1
+"""Share by which the period of a log may differ from the update period, and its rows be the updates."""
+
+
+@dataclass(frozen=True, eq=False)
+class LogReplay:
+    """Commands of a log and of the compiled controller on its inputs, at the k updates."""
+
+    time_s: FloatArray
+    logged_rad: FloatArray
+    """Roll and pitch (k, 2)."""
+    replayed_rad: FloatArray
+    status: IntArray
+    """Status of each update (k,)."""
+    resampled: bool
+    """Whether the log has another rate than the controller: inputs are interpolated, commands held."""
+    remarks: tuple[str, ...]
+
+
+def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) -> LogReplay:
+    """Replay the log at `path`; `columns` has those that the user named.
+
+    The controller starts level, without an estimate, as after nmpc_init(). Raises LogError.
+    """
+    if len(Design(settings).target) != len(TARGET):
+        raise LogError(
+            (f'{echo(str(path))}: no log has the acceleration that target.acceleration = "given" needs',)
+        )
+    if path.suffix.lower() == ".ulg":
+        raise LogError(
+            (f"{echo(str(path))}: PX4's own controller flew it; replay takes CSV with the columns of yours",)
+        )
+    log = read_csv(path, columns, SIGNALS)
+    if missing := [name for name in (*STATE, *TARGET) if name not in log.signals]:
+        known = ", ".join(column.name for column in SIGNALS[missing[0]])
+        raise LogError(
+            (f"{log.name}: has no column for {missing[0]} ({known}); name it: --columns {missing[0]}=COLUMN",)
+        )
+    time_s, resampled = _updates(log, settings.horizon.update_period_s)
+    if len(time_s) < 2:
+        raise LogError((f"{log.name}: has no two updates of {settings.horizon.update_period_s:g} s",))
+    inputs = _interpolated if resampled else _held
+    state, target = inputs(log, STATE, time_s), inputs(log, tuple(TARGET), time_s)
+    thrust_m_s2 = (
+        _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), HOVER_M_S2)
+    )
+    controller = CompiledController(settings)
+    steps = [controller.step(state[k : k + 1], target[k : k + 1], thrust_m_s2[k]) for k in range(len(time_s))]
+    return LogReplay(
+        time_s,
+        _held(log, COMMANDS, time_s),
+        np.concatenate([step.command_rad for step in steps]).astype(np.float64),
+        np.concatenate([step.status for step in steps]),
+        resampled,
+        log.remarks,
+    )
+
+
+def _updates(log: FlightLog, period_s: float) -> tuple[FloatArray, bool]:
+    """Return the times of the updates, and whether they are not those of the logged commands."""
+    begin_s = max(signal.time_s[0] for signal in log.signals.values())
+    end_s = min(signal.time_s[-1] for signal in log.signals.values())
+    time_s = log.signals[COMMANDS[0]].time_s
+    if abs(float(np.median(np.diff(time_s))) - period_s) <= _SAME_PERIOD * period_s:
+        return time_s[(time_s >= begin_s) & (time_s <= end_s)], False
+    return begin_s + period_s * np.arange(1 + int((end_s - begin_s) / period_s)), True
+
+
+def _held(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
+    """Return signals at times (k,), each held from one sample to the next: (k, signals)."""
+    signals = [log.signals[name] for name in names]
+    places = [np.searchsorted(signal.time_s, time_s, side="right") - 1 for signal in signals]
+    return np.stack([signal.value[at] for signal, at in zip(signals, places, strict=True)], axis=1)
+
+
+def _interpolated(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
+    """Return signals at times (k,), between two samples on a straight line: (k, signals)."""
+    columns = []
+    for name in names:
+        signal = log.signals[name]
+        value = np.unwrap(signal.value) if name == YAW else signal.value
+        columns.append(np.interp(time_s, signal.time_s, value))
+    return np.stack(columns, axis=1)
