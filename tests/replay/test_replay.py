@@ -72,20 +72,23 @@ def test_where_a_log_begins_to_differ_is_told() -> None:
 
 def crazyflie_log(rows: list[dict[str, str]], commands: str) -> Iterator[list[object]]:
     """Yield a log as a Crazyflie's client writes it: its frame, degrees, ms, three blocks."""
+    degrees = math.degrees(1.0)
     blocks = {
-        "ctrltarget": {"x": ("target_x_m", 1.0), "y": ("target_y_m", -1.0)}
-        | {"vx": ("target_vx_m_s", 1.0), "vy": ("target_vy_m_s", -1.0)},
+        commands: {"roll": ("roll_command_rad", degrees), "pitch": ("pitch_command_rad", degrees)},
+        "ctrltarget": {
+            "x": ("target_x_m", 1.0),
+            "y": ("target_y_m", -1.0),
+            "vx": ("target_vx_m_s", 1.0),
+            "vy": ("target_vy_m_s", -1.0),
+        },
         "stateEstimate": {
             "x": ("x_m", 1.0),
             "y": ("y_m", -1.0),
             "vx": ("vx_m_s", 1.0),
             "vy": ("vy_m_s", -1.0),
-        }
-        | {"roll": ("roll_rad", math.degrees(1)), "pitch": ("pitch_rad", math.degrees(1))}
-        | {"yaw": ("yaw_rad", -math.degrees(1))},
-        commands: {
-            "roll": ("roll_command_rad", math.degrees(1)),
-            "pitch": ("pitch_command_rad", math.degrees(1)),
+            "roll": ("roll_rad", degrees),
+            "pitch": ("pitch_rad", degrees),
+            "yaw": ("yaw_rad", -degrees),
         },
     }
     names = [f"{block}.{name}" for block, columns in blocks.items() for name in columns]
