@@ -53,6 +53,17 @@ def _vehicle_option(about: str) -> Any:
 Drone = Annotated[str, _vehicle_option("")]
 OtherDrone = Annotated[str | None, _vehicle_option("; by default that of the file, or mambo")]
 
+PortName = Annotated[
+    str | None,
+    typer.Option(
+        "--port",
+        help="Serial port of a board with the firmware of `generate --for pil`; the C on it must have the "
+        "bits of that on this machine.",
+        metavar="DEVICE|socket://HOST:PORT",
+    ),
+]
+Baud = Annotated[int, typer.Option(help="Rate of the serial port.", min=1)]
+
 Options = TypeVar("Options")
 
 
@@ -110,15 +121,8 @@ class FlyOptions:
             autocompletion=complete_boards,
         ),
     ] = None
-    port: Annotated[
-        str | None,
-        typer.Option(
-            help="Serial port of a board with the firmware of `generate --for pil`, which then flies the "
-            "drone; the C on this machine must have the same bits.",
-            metavar="DEVICE|socket://HOST:PORT",
-        ),
-    ] = None
-    baud: Annotated[int, typer.Option(help="Rate of the serial port.", min=1)] = 115200
+    port: PortName = None
+    baud: Baud = 115200
     replay: Annotated[
         Path | None,
         typer.Option(

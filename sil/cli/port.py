@@ -1,12 +1,13 @@
 """`fly --port`: the controller on a board flies the simulated drone."""
 
-import contextlib
+from contextlib import AbstractContextManager, closing
 from functools import partial
 
 import typer
 
 from mambo_nmpc.codegen.digest import TICKS
 from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.cli.flight import (
     FLIGHT_FILES,
@@ -33,6 +34,12 @@ EPISODES = 4
 """Episodes of the self-test digest before the flight: a second on the slowest board."""
 
 
+def connect(port: str, baud: int, settings: Settings) -> AbstractContextManager[Connection]:
+    """Connect to the board at `port`, whose faults go to stderr; raises BoardError."""
+    say = partial(typer.echo, err=True)
+    return closing(Connection(port, partial(open_port, port, baud), settings, say=say))
+
+
 def fly_on_port(options: FlyOptions, port: str) -> None:
     """Fly once with the controller on the board at `port`; exit 1 if the drone is lost or a bit differs.
 
@@ -43,11 +50,8 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
     settings, drone = load(options.source, options.scalar), vehicles.load(options.vehicle)
     flight = flight_of_options(options, settings, drone)
     library = build_library(settings, host_toolchain())
-    say = partial(typer.echo, err=True)
     with new_results(options.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:
-        with contextlib.closing(
-            Connection(port, partial(open_port, port, options.baud), settings, say=say)
-        ) as board:
+        with connect(port, options.baud, settings) as board:
             first_difference = board.test()
             same_digest = board.digest(EPISODES) == digest_compiled(library, EPISODES)
             controller = BoardController(settings, board)

@@ -1,12 +1,13 @@
 """The command `same-bits`: compare the self-test digest of all builds."""
 
+import contextlib
 import json
 from dataclasses import asdict
 from typing import Annotated
 
 import typer
 
-from mambo_nmpc.sil.cli.options import AsJson, Scalar, Source, load, load_boards
+from mambo_nmpc.sil.cli.options import AsJson, Baud, PortName, Scalar, Source, load, load_boards
 
 
 def same_bits(
@@ -23,21 +24,39 @@ def same_bits(
             help="Self-test steps, in hundreds; by default as many as the bundle's self-test digest covers.",
         ),
     ] = None,
+    port: PortName = None,
+    baud: Baud = 115200,
     as_json: AsJson = False,
 ) -> None:
-    """Run the self-test steps in every build that this machine can make; exit 1 if a digest differs."""
+    """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
     from mambo_nmpc.codegen.digest import TICKS, episode_count
     from mambo_nmpc.sil.cli.progress import progress_bar
-    from mambo_nmpc.sil.footprint.same_bits import REFERENCE, BuildDigest, count_builds, run_everywhere
+    from mambo_nmpc.sil.footprint.same_bits import (
+        REFERENCE,
+        BuildDigest,
+        count_builds,
+        run_everywhere,
+        run_on_board,
+    )
 
     settings = load(source, scalar)
     chosen = [one for name in board.split(",") for one in load_boards(name)]
     count = episode_count(settings) if steps is None else steps // TICKS
     found: list[BuildDigest] = []
-    with progress_bar("comparing builds") as progress:
-        for result in run_everywhere(settings, chosen, count):
+    with contextlib.ExitStack() as stack:
+        progress = stack.enter_context(progress_bar("comparing builds"))
+        if port is None:
+            results = run_everywhere(settings, chosen, count)
+        else:
+            from mambo_nmpc.sil.cli.port import connect
+
+            results = run_on_board(
+                settings, stack.enter_context(connect(port, baud, settings)), count, progress
+            )
+        for result in results:
             found.append(result)
-            progress(len(found) / count_builds(chosen))
+            if port is None:
+                progress(len(found) / count_builds(chosen))
             if not as_json:
                 what = result.reason if result.digest is None else result.digest
                 typer.echo(f"{result.where:12}{result.compiler:26}{result.optimisation:5}{what}")

@@ -8,7 +8,7 @@ from typing import Final
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.digest import self_test_digest
-from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.errors import BuildError, echo
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.build import build_library
@@ -17,6 +17,7 @@ from mambo_nmpc.sil.controllers.emulated import build_guest, digest_emulated
 from mambo_nmpc.sil.errors import EmulatorError
 from mambo_nmpc.sil.files.scratch import scratch_folder
 from mambo_nmpc.sil.firmware.build import OPTIMISATIONS, Builder, builder, clang_builder
+from mambo_nmpc.sil.pil.connection import Connection
 
 HOST_COMPILERS: Final = ("gcc", "clang")
 BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}
@@ -44,6 +45,15 @@ def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -
         for name in BOARD_COMPILERS:
             for optimisation in OPTIMISATIONS:
                 yield _on_board(settings, board, name, optimisation, episodes)
+
+
+def run_on_board(
+    settings: Settings, board: Connection, episodes: int, progress: Callable[[float], None]
+) -> Iterator[BuildDigest]:
+    """Yield the digest of the reference, then that of a real board; call `progress` with the share done."""
+    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(Design(settings), episodes)))
+    digest = board.digest(episodes, progress)
+    yield BuildDigest("board", echo(board.greeting.board), "", _format(digest))
 
 
 def count_builds(boards: Sequence[Board]) -> int:

@@ -40,6 +40,7 @@ DIGEST_DIGITS: Final = 16
 """Digits of the settings digest that a board states."""
 
 _MOST_RESTARTS: Final = 10
+_MOST_RETURNS: Final = 100
 _REOPEN_PAUSE_S: Final = 0.1
 
 
@@ -49,6 +50,8 @@ class Patience:
 
     reply_s: float = 0.25
     """For a reply, before the request is repeated; every board answers a step sooner."""
+    test_s: float = 4.0
+    """The same for a self-test or an episode of the digest, of 100 steps: 1.5 s with a 1-norm on a Mega."""
     silence_s: float = 8.0
     """For a reply to any repetition; a board with a boot loader takes 2 s until it answers."""
     return_s: float = 30.0
@@ -101,11 +104,16 @@ class Connection:
         """Run the self-test, and reset; returns 0, or the number of the first step with other bits."""
         return int.from_bytes(self._ask_anew(Kind.TEST), "little", signed=True)
 
-    def digest(self, episodes: int) -> int:
-        """Run the first episodes of the self-test digest, and reset; returns their digest."""
+    def digest(self, episodes: int, progress: Callable[[float], None] | None = None) -> int:
+        """Run the first episodes of the self-test digest, and reset; returns their digest.
+
+        Calls `progress` with the share done after each.
+        """
         digest = b"\0\0\0\0"
         for episode in range(episodes):
             digest = self._ask(Kind.DIGEST, episode, digest, HEAD_BYTES + len(digest))
+            if progress is not None:
+                progress((episode + 1) / episodes)
         return int.from_bytes(digest, "little")
 
     def step(self, inputs: bytes) -> StepReply:
@@ -179,8 +187,9 @@ class Connection:
         the board stays silent, _RestartedError for a step that it does not expect, and OSError if the port
         fails while the board is greeted.
         """
-        frame, wait_s = encode(request(kind, number, body)), self._patience.reply_s
-        deadline = time.monotonic() + self._patience.silence_s
+        frame, patience = encode(request(kind, number, body)), self._patience
+        wait_s = patience.test_s if kind in (Kind.TEST, Kind.DIGEST) else patience.reply_s
+        deadline = time.monotonic() + patience.silence_s
         while time.monotonic() < deadline:
             try:
                 self._port.write(frame)
@@ -189,7 +198,7 @@ class Connection:
                 if kind == Kind.GREET:
                     raise
                 self._reconnect(error)
-                deadline = time.monotonic() + self._patience.silence_s
+                deadline = time.monotonic() + patience.silence_s
                 continue
             if reply is not None:
                 return reply
@@ -230,6 +239,8 @@ class Connection:
     def _reconnect(self, error: OSError) -> None:
         """Wait until the port is back, with the same firmware behind it; raises BoardError."""
         self.faults["reconnected"] += 1
+        if self.faults["reconnected"] > _MOST_RETURNS:
+            raise BoardError(f"--port {self._name}: is lost again and again; check plug and cable")
         self._say(f"{self._name}: lost: {_reason(error)}; waiting {self._patience.return_s:g} s for it")
         deadline = time.monotonic() + self._patience.return_s
         while True:

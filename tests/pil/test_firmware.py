@@ -102,6 +102,25 @@ def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
     assert "host process, /dev/pts" in (tmp_path / "page.html").read_text("utf-8")
 
 
+def test_the_whole_digest_is_computed_on_the_board(tmp_path: Path) -> None:
+    """By same-bits: that of the reference, and with wrong C another one, exit 1."""
+    elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
+    with serial_line(elf) as line:
+        said, _ = run("same-bits", "--port", line.port, "--steps", "2000")
+    reference, board, verdict = said.splitlines()
+    assert reference.split() == ["reference", "NumPy", board.split()[-1]]
+    assert board.startswith("board       host process")
+    assert verdict.startswith("2 of 2 builds have the digest of the reference over 2000 self-test steps")
+
+    def weigh_otherwise(files: dict[str, str]) -> None:
+        files["pil.c"] = files["pil.c"].replace("(int)number, get(body)", "(int)number + 1, get(body)")
+
+    other = build_firmware(presets.preset("mambo"), "host", tmp_path / "other", weigh_otherwise)
+    with serial_line(other) as line:
+        said, _ = run("same-bits", "--port", line.port, "--steps", "200", code=1)
+    assert "1 of 2 builds have the digest" in said
+
+
 def stack_bound(settings: Settings, folder: Path) -> int:
     """Return the bound of the stack of a step on the Crazyflie."""
     board = boards.load("crazyflie")
