@@ -33,7 +33,7 @@ endif
 
 # Tests that need no compiler and take seconds. They run with a PATH on which there is none.
 CHECKED = tests/test_house.py tests/campaign/test_campaign.py tests/files tests/firmware \
-    $(filter-out %/test_generations.py %/test_exact_loop.py %/test_quadratic.py %/test_quadratic_settings.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
+    $(filter-out %/test_generations.py %/test_exact_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/plant tests/sensors
 
 .PHONY: fly check test tools generated bench bench-peers clean

@@ -58,7 +58,7 @@ class Patience:
     """For a port that was closed, such as that of an unplugged board."""
 
 
-class _RestartedError(Exception):
+class _RestartedError(BoardError):
     """The board expects another step than the next one."""
 
 
