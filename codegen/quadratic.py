@@ -57,17 +57,32 @@ class QuadraticConstants:
 
 def quadratic_constants(settings: Sections) -> QuadraticConstants:
     """Derive the constants of the law."""
-    horizon = settings.horizon
-    laws = [
-        _law(horizon.update_period_s, horizon.ramp_s, settings.cost, loop)
-        for loop in attitude_loops(settings.model, settings.damping)
-    ]
+    laws = _laws(settings)
     return QuadraticConstants(
         moves=laws[0].rows.shape[0],
         rows=np.array([law.rows for law in laws]),
         ratios=np.array([law.ratio for law in laws]),
         spectral_radius=np.array([law.spectral_radius for law in laws]),
     )
+
+
+def second_derivatives(settings: Sections) -> NDArray[np.float64]:
+    """Return the second derivatives of the cost by the free moves, (2, 2, 2) for both axes of two moves.
+
+    Raises ValueError for one move, whose minimum does not depend on them.
+    """
+    laws = _laws(settings)
+    if laws[0].curvature is None:
+        raise ValueError("there is one free move")
+    return np.array([law.curvature for law in laws])
+
+
+def _laws(settings: Sections) -> list["_Law"]:
+    horizon = settings.horizon
+    return [
+        _law(horizon.update_period_s, horizon.ramp_s, settings.cost, loop)
+        for loop in attitude_loops(settings.model, settings.damping)
+    ]
 
 
 @lru_cache(maxsize=128)
@@ -86,6 +101,7 @@ class _Law:
         self._state_cost[1, 1] = mp.mpf(cost.velocity_weight_s) ** 2
         self._input_cost = mp.matrix([[(mp.mpf(cost.response_time_s) ** 3 / period_s) ** 2]])
         self._to_go = solve_riccati(self._transition, self._input, self._state_cost, self._input_cost)
+        self.curvature: list[list[float]] | None = None
         ramp = round(ramp_s / update_period_s)
         rows, ratio = self._two_moves(ramp) if ramp else self._one_move()
         scale = _scale(loop, period_s)
@@ -115,6 +131,7 @@ class _Law:
             cost += self._input_cost[0] * (change.T * change)
             form = sum_costs(transition, cost, form, steps)
         curvature = form[8:, 8:]
+        self.curvature = [[float(curvature[row, column]) for column in (0, 1)] for row in (0, 1)]
         return -(mp.inverse(curvature) * form[8:, :8]), curvature[0, 1] / curvature[0, 0]
 
     def _spectral_radius(self, rows: Matrix) -> float:

@@ -60,7 +60,7 @@ class ExactReferenceController:
         self._inputs = Inputs(design)
         self._observer = KalmanObserver(design, self._products)
         self._model = AttitudeModel(design, self._products)
-        self._optimizer = ExactOptimizer(design, self._products, self._model.command_limit)
+        self.optimizer = ExactOptimizer(design, self._products, self._model.command_limit)
         self._tracker = Tracker(design.tracker, self._products) if design.tracker else None
         self._feedback = design.feedback_steps and np.array(
             [self._numbers.constant(steps, "feedback") for steps in design.feedback_steps]
@@ -189,7 +189,7 @@ class ExactReferenceController:
             attitude.lagged,
             attitude.command,
         ]
-        return self._optimizer.minimize(np.stack(state, axis=2))
+        return self.optimizer.minimize(np.stack(state, axis=2))
 
     def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
         """Return vectors (n, 2) along x and y from those along right and forward."""
