@@ -160,6 +160,10 @@ class Board(BaseModel):
             )
         return budget
 
+    def is_called(self, words: str) -> bool:
+        """Return whether title or core contain `words`, as in STM32F405."""
+        return bool(words) and (words in self.title or words in self.core.value)
+
 
 def names() -> tuple[str, ...]:
     """Return the names of the boards, sorted."""
@@ -178,6 +182,11 @@ def load(name_or_path: str) -> Board:
     if path is None:
         raise _not_found(name_or_path)
     return _parse(read_text(path), echo(name_or_path), path.stem)
+
+
+def called(words: str) -> tuple[Board, ...]:
+    """Return the named boards whose title or core contain `words`."""
+    return tuple(board for board in map(load, names()) if board.is_called(words))
 
 
 def _parse(text: str, source: str, name: str) -> Board:

@@ -65,6 +65,7 @@ mambo-nmpc table2 --sensors -o seen
 mambo-nmpc footprint
 mambo-nmpc footprint controller.toml --board crazyflie -o footprint
 mambo-nmpc footprint --board my-board.toml --json
+mambo-nmpc footprint controller.toml --port /dev/ttyACM0 -o measured
 mambo-nmpc same-bits mambo --boards mambo,crazyflie
 mambo-nmpc same-bits controller.toml --port /dev/ttyACM0
 mambo-nmpc sweep --prediction 5:30:5 --control 1:3 --iterations 3,5,10 -o sweep

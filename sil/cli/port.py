@@ -5,6 +5,7 @@ from functools import partial
 
 import typer
 
+from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.digest import TICKS
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.settings.model import Settings
@@ -69,4 +70,7 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
             }
         )
         summary.write(folder)
-    finish(summary, board_text(summary), options, written(options))
+    text = board_text(summary)
+    if boards.called(board.greeting.board):
+        text += "\n  emulated count     mambo-nmpc footprint --port shows it beside the cycles"
+    finish(summary, text, options, written(options))

@@ -98,16 +98,21 @@ class CountingController:
         return self.steps.pop()
 
 
+def counted_flight(settings: Settings, ticks: int) -> Flight:
+    """Return the flight of `ticks` updates of `FLIGHT` from its start."""
+    period_s = STEP_S * max(1, round(settings.horizon.update_period_s / STEP_S))
+    return Flight(FLIGHT, duration_s=(ticks - 1) * period_s, update_period_s=period_s)
+
+
 def count_instructions(
     settings: Settings, elf: Path, core: str, ticks: int, search_steps: int
 ) -> InstructionCounts:
-    """Fly `ticks` updates of `FLIGHT` from its start, then search from the most expensive of them.
+    """Fly the `counted_flight`, then search from the most expensive of them.
 
     A refused tick returns early and does not count; raises FlightError if all are refused.
     """
     controller = CountingController(settings, elf, core)
-    period_s = STEP_S * max(1, round(settings.horizon.update_period_s / STEP_S))
-    fly(Flight(FLIGHT, duration_s=(ticks - 1) * period_s, update_period_s=period_s), controller)
+    fly(counted_flight(settings, ticks), controller)
     flown = [step for step in controller.steps if step.accepted]
     if not flown:
         raise FlightError("the controller refuses every tick of the flight, which is beyond its [ranges]")

@@ -23,6 +23,7 @@ from mambo_nmpc.sil.firmware.gate import Forbidden, find_forbidden
 from mambo_nmpc.sil.firmware.sizes import Added, measure_added
 from mambo_nmpc.sil.firmware.stack import StackReport, bound_stack
 from mambo_nmpc.sil.footprint.counts import InstructionCounts, count_instructions
+from mambo_nmpc.sil.footprint.on_board import BoardMeasurement
 
 COUNTED_TICKS: Final = 300
 """Consecutive ticks of the flight to count; the search for a more expensive step takes half as many."""
@@ -78,6 +79,8 @@ class Footprint:
     uncounted: str
     forbidden: tuple[Forbidden, ...]
     update_period_s: float
+    on_board: BoardMeasurement | None = None
+    """What the board at a port measured, if there is one."""
 
     @property
     def cycles(self) -> tuple[float, float] | None:
@@ -122,6 +125,11 @@ class Footprint:
         """Whether all measured values are within budget and nothing forbidden is linked."""
         return not self.forbidden and all(limit.share <= 1 for limit in self.limits)
 
+    @property
+    def good(self) -> bool:
+        """Whether it fits, and a board at a port has the bits of this machine."""
+        return self.fits and (self.on_board is None or not self.on_board.different_steps)
+
 
 def measure_footprint(
     settings: Settings, board: Board, optimisation: str = "-O2", counted_ticks: int = COUNTED_TICKS
@@ -153,15 +161,20 @@ def measure_footprint(
         )
 
 
+def usual_ticks(settings: Settings, ticks: int = COUNTED_TICKS) -> int:
+    """Return how many ticks of the flight are counted: `ticks`, or fewer if one takes long."""
+    work = settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
+    return max(_FEWEST_TICKS, min(ticks, ticks * _USUAL_WORK // work))
+
+
 def _counts(
     settings: Settings, found: Builder, folder: Path, ticks: int
 ) -> tuple[InstructionCounts | None, str]:
-    """Count the ticks of a flight, fewer if one takes long, and the steps of the search.
+    """Count the `usual_ticks` of a flight, and the steps of the search.
 
     Returns None and the reason if the board cannot be emulated, or the controller refuses the whole flight.
     """
-    work = settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations
-    ticks = max(_FEWEST_TICKS, min(ticks, ticks * _USUAL_WORK // work))
+    ticks = usual_ticks(settings, ticks)
     elf = build_guest(settings, found, folder)
     try:
         return count_instructions(settings, elf, found.board.emulated_core.value, ticks, ticks // 2), ""

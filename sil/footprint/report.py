@@ -11,6 +11,7 @@ from mambo_nmpc.sil.firmware.sizes import Parts
 from mambo_nmpc.sil.firmware.stack import Frame
 from mambo_nmpc.sil.footprint.counts import InstructionCounts
 from mambo_nmpc.sil.footprint.measure import Footprint, Limit
+from mambo_nmpc.sil.footprint.on_board import BoardMeasurement
 from mambo_nmpc.sil.show.page import render_page
 
 _HEAD = (
@@ -58,6 +59,35 @@ class BoardFootprint:
     forbidden: tuple[Forbidden, ...]
     functions: list[FunctionFootprint]
     notes: list[str]
+    on_board: BoardMeasurement | None = None
+
+    @property
+    def compared(self) -> list[tuple[str, str, str]]:
+        """A head and rows: what the board at the port measured, beside what was counted or estimated."""
+        board, counts = self.on_board, self.instructions
+        if board is None:
+            return []
+        counted, per_instruction = ("-",) * 4, "-"
+        if counts is not None and self.cycles_estimate is not None and self.time_s_estimate is not None:
+            (low, high), time_ms = self.cycles_estimate, [1000 * limit for limit in self.time_s_estimate]
+            counted = (
+                f"{counts.least} / {counts.mean:.0f} / {counts.most_met}",
+                f"{low:.0f}..{high:.0f}",
+                f"{time_ms[0]:.3g}..{time_ms[1]:.3g}",
+                f"{low / counts.most_met:.3g}..{high / counts.most_met:.3g}",
+            )
+            per_instruction = f"{board.mean_cycles / counts.mean:.3g}"
+        cycles = (board.cycles.least, board.cycles.median, board.cycles.most)
+        time_ms = [1000 * one / board.clock_hz for one in cycles]
+        stack = str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
+        return [
+            ("a step", "measured: least / median / most", "counted: least / mean / most met; estimated"),
+            ("instructions", "-", counted[0]),
+            ("cycles", " / ".join(f"{one:.0f}" for one in cycles), counted[1]),
+            ("time, ms", " / ".join(f"{one:.3g}" for one in time_ms), counted[2]),
+            ("cycles per instruction", per_instruction, counted[3]),
+            ("stack, B", str(board.stack_bytes), stack),
+        ]
 
 
 class FootprintSummary(Summary):
@@ -88,6 +118,8 @@ def text(footprints: Sequence[Footprint]) -> str:
     rows = [_HEAD, *(_row(footprint) for footprint in footprints)]
     lines = _columns(rows)
     if len(footprints) == 1:
+        if footprints[0].on_board is not None:
+            lines += ["", footprints[0].on_board.sentence, *_columns(_board(footprints[0]).compared)]
         functions = _functions(footprints[0])
         head = ("function", "size B", "own frame B", "deepest B", "instructions")
         lines += ["", *_columns([head, *(tuple(map(str, astuple(one))) for one in functions)])]
@@ -134,6 +166,7 @@ def _board(footprint: Footprint) -> BoardFootprint:
         forbidden=footprint.forbidden,
         functions=_functions(footprint),
         notes=_notes(footprint),
+        on_board=footprint.on_board,
     )
 
 
@@ -172,6 +205,12 @@ def _notes(footprint: Footprint) -> list[str]:
     for found in footprint.forbidden:
         callers = ", ".join(found.callers) or "an unknown function"
         notes.append(f"{name}: {found.symbol} ({found.kind}) must not be linked; called by {callers}")
+    measured, clock_hz = footprint.on_board, footprint.board.clock_hz.value
+    if measured is not None and measured.clock_hz != clock_hz:
+        notes.append(
+            f"{name}: measured at {measured.clock_hz / 1e6:g} MHz, estimated at {clock_hz / 1e6:g} MHz; "
+            "compare cycles, not times"
+        )
     if footprint.stack is None:
         core = footprint.board.core.value
         notes.append(f"{name}: stack is not measured: {core} cannot be disassembled")

@@ -12,8 +12,13 @@ def footprint_section(_folder: Path, summary: FootprintSummary) -> Section:
     """Return the section of footprints on boards."""
     fits = sum(board.fits for board in summary.boards)
     finding = f"fits {fits} of {len(summary.boards)} boards"
+    measured = [board.on_board for board in summary.boards if board.on_board is not None]
+    different = [one.board_says for one in measured if one.different_steps]
+    if different:
+        finding += f"; other bits on {different[0]}"
     title = f"Footprint of {summary.source}"
-    return Section("footprint", title, fits == len(summary.boards), finding, summary)
+    good = fits == len(summary.boards) and not different
+    return Section("footprint", title, good, finding, summary)
 
 
 def sweep_section(_folder: Path, summary: SweepSummary) -> Section:
