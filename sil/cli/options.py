@@ -123,6 +123,13 @@ class FlyOptions:
     ] = None
     port: PortName = None
     baud: Baud = 115200
+    real_time: Annotated[
+        bool,
+        typer.Option(
+            "--real-time",
+            help="With --port: one step every update period by the wall clock; count late replies.",
+        ),
+    ] = False
     replay: Annotated[
         Path | None,
         typer.Option(

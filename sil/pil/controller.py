@@ -13,6 +13,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, as_arrays
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.messages import StepReply
+from mambo_nmpc.sil.pil.pace import Pace
 from mambo_nmpc.sil.plant.arrays import IntArray
 
 
@@ -25,13 +26,13 @@ class BoardStep:
 
 
 class BoardController:
-    """One controller on a board.
+    """One controller on a board, called at a `pace`, or else as soon as the desk has the next inputs.
 
     `replies` holds those of all steps, `different` the numbers of the steps whose bits are not the desk's.
     """
 
-    def __init__(self, settings: Settings, board: Connection) -> None:
-        self._board, self._desk = board, CompiledController(settings)
+    def __init__(self, settings: Settings, board: Connection, pace: Pace | None = None) -> None:
+        self._board, self._desk, self._pace = board, CompiledController(settings), pace
         self._design = Design(settings)
         self.replies: list[StepReply] = []
         self.different: list[int] = []
@@ -45,7 +46,11 @@ class BoardController:
         """
         numbers = self._design.numbers
         inputs = as_arrays(self._design, 1, state, target, thrust_acceleration_m_s2)
+        if self._pace is not None:
+            self._pace.wait()
         reply = self._board.step(b"".join(_bytes(values) for values in inputs))
+        if self._pace is not None:
+            self._pace.note_reply()
         desk = self._desk.step(state, target, thrust_acceleration_m_s2)
         if reply.bits != desk_bits(self._design, desk):
             self.different.append(len(self.replies))

@@ -10,6 +10,7 @@ from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.flight.report import FlySummary, flight_text
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.controller import BoardController
+from mambo_nmpc.sil.pil.pace import Deadlines
 
 
 class Spread(BaseModel):
@@ -52,6 +53,8 @@ class BoardFlightSummary(FlySummary):
     """From request to reply, of the steps that were not repeated."""
     link_faults: dict[str, int]
     """What went wrong on the link and was made good: damaged, repeated, reconnected, restarts."""
+    deadlines: Deadlines | None = None
+    """Of a flight by the wall clock."""
 
 
 def board_fields(board: Connection, controller: BoardController) -> dict[str, object]:
@@ -90,6 +93,16 @@ def link_text(summary: BoardFlightSummary) -> str:
     return ", ".join(faults) + ": made good" if faults else "no fault"
 
 
+def real_time_text(deadlines: Deadlines, steps: int) -> str:
+    """Say how a flight by the wall clock kept its period."""
+    words = f"{deadlines.misses} of {steps} replies later than the period of {1e3 * deadlines.period_s:g} ms"
+    if deadlines.misses:
+        words += f", the worst by {1e3 * deadlines.worst_lateness_s:.3g} ms"
+    if deadlines.late_requests:
+        words += f"; this machine sent {deadlines.late_requests} requests late"
+    return words
+
+
 def board_text(summary: BoardFlightSummary) -> str:
     """Format the summary of a flight with a board."""
     found, cycles, trip = difference(summary), summary.cycles, summary.round_trip_s
@@ -107,4 +120,6 @@ def board_text(summary: BoardFlightSummary) -> str:
     if trip is not None:
         milliseconds = " / ".join(f"{1e3 * value:.3g}" for value in (trip.least, trip.median, trip.most))
         lines.append(f"  request to reply   {milliseconds} ms")
+    if summary.deadlines is not None:
+        lines.append(f"  real time          {real_time_text(summary.deadlines, summary.steps)}")
     return "\n".join([*lines, f"  link               {link_text(summary)}"])

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mambo_nmpc.sil.flight.section import flown_section
-from mambo_nmpc.sil.pil.report import BoardFlightSummary, difference, link_text
+from mambo_nmpc.sil.pil.report import BoardFlightSummary, difference, link_text, real_time_text
 from mambo_nmpc.sil.show.section import Section
 
 
@@ -19,4 +19,6 @@ def board_section(folder: Path, summary: BoardFlightSummary) -> Section:
         "link": link_text(summary)
         + ("" if trip is None else f"; request to reply {1e3 * trip.median:.3g} ms (median)"),
     }
+    if summary.deadlines is not None:
+        facts["real time"] = real_time_text(summary.deadlines, summary.steps)
     return flown_section(folder, summary, facts, [] if found is None else [found])

@@ -280,6 +280,7 @@ def test_other_bits_are_told_and_fail(
         (["--port", "x", "--controller", "pd"], "--port x flies the C on a board: leave out --controller"),
         (["--port", "x", "--on", "mega"], "--port x flies the C on a board: leave out --controller and --on"),
         (["--port", "x", "--replay", "y"], "contains the whole flight: leave out --port"),
+        (["--real-time"], "--real-time paces the requests to a board: give its --port, or leave it out"),
     ],
 )
 def test_a_port_that_cannot_be_is_refused(
