@@ -1,11 +1,15 @@
 """The presets: TOML files that hold and explain only what differs from the defaults."""
 
 import difflib
+from typing import Final
 
 from mambo_nmpc.codegen.errors import SourceNotFoundError, echo
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.settings.toml_file import PRESETS, existing_path, shipped
+
+CONTROLLER: Final = "controller.toml"
+"""The settings file in the folder of a bundle."""
 
 
 def names() -> tuple[str, ...]:
@@ -34,6 +38,19 @@ def load(name_or_path: str) -> Settings:
     if path is None:
         raise _not_found(name_or_path, "neither a preset nor a file")
     return controller_toml.read(path)
+
+
+def load_or_bundle(name_or_path: str) -> Settings:
+    """Return the settings of a preset, of a file, or of the bundle in a folder; raises as `load`."""
+    path = existing_path(name_or_path)
+    if name_or_path in names() or path is None or not path.is_dir():
+        return load(name_or_path)
+    if not (path / CONTROLLER).exists():
+        raise SourceNotFoundError(
+            f"{echo(name_or_path)}: is a folder without {CONTROLLER}; "
+            "name a settings file, or the folder of a bundle"
+        )
+    return controller_toml.read(path / CONTROLLER)
 
 
 def _text(name: str) -> str:

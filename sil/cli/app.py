@@ -17,6 +17,7 @@ from mambo_nmpc.sil.cli.faults import faults
 from mambo_nmpc.sil.cli.fly import fly
 from mambo_nmpc.sil.cli.footprint import footprint
 from mambo_nmpc.sil.cli.identify import identify
+from mambo_nmpc.sil.cli.identify_binary import identify_binary
 from mambo_nmpc.sil.cli.options import FlyOptions, command_of
 from mambo_nmpc.sil.cli.regress import regress
 from mambo_nmpc.sil.cli.replay_log import replay
@@ -44,6 +45,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "tune": tune,
     "identify": identify,
     "replay": replay,
+    "identify-binary": identify_binary,
     "report": report,
 }
 """Commands by name, in the order of the help."""
@@ -100,6 +102,8 @@ mambo-nmpc identify flight.csv --columns roll_rad=deg*att.roll,pitch_rad=-deg*at
 mambo-nmpc identify flight.ulg -o identified
 mambo-nmpc replay flight/trace.csv
 mambo-nmpc replay flight.csv controller.toml -o replayed
+mambo-nmpc identify-binary firmware.elf
+mambo-nmpc identify-binary firmware.hex controller.toml controller-old
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html
 """
