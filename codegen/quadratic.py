@@ -29,6 +29,8 @@ from mambo_nmpc.codegen.settings.refusal import Refusal
 from mambo_nmpc.codegen.settings.sections import Cost, Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
+MOVED: Final = ("e", "v", "a", "i", "c", "u")
+"""The states that the command moves."""
 _COMMAND: Final = 7
 MOST_OUTAGE_STEPS: Final = 250
 """The controller counts the control steps of an outage in one byte."""
@@ -77,6 +79,11 @@ def second_derivatives(settings: Sections) -> NDArray[np.float64]:
     return np.array([law.curvature for law in laws])
 
 
+def closed_loops(settings: Sections) -> NDArray[np.float64]:
+    """Return the transition of the states `MOVED` in a control step under the law, (2, 6, 6) in SI units."""
+    return np.array([law.closed_loop for law in _laws(settings)])
+
+
 def _laws(settings: Sections) -> list["_Law"]:
     horizon = settings.horizon
     return [
@@ -109,7 +116,8 @@ class _Law:
             [[float(rows[move, k] * scale[k]) for k in range(8)] for move in range(rows.rows)]
         )
         self.ratio = float(ratio)
-        self.spectral_radius = self._spectral_radius(rows)
+        self.closed_loop = self._closed_loop(rows)
+        self.spectral_radius = float(np.max(np.abs(np.linalg.eigvals(self.closed_loop))))
 
     def _one_move(self) -> tuple[Matrix, Any]:
         rows = -feedback_gain(self._transition, self._input, self._input_cost, self._to_go)
@@ -134,14 +142,13 @@ class _Law:
         self.curvature = [[float(curvature[row, column]) for column in (0, 1)] for row in (0, 1)]
         return -(mp.inverse(curvature) * form[8:, :8]), curvature[0, 1] / curvature[0, 0]
 
-    def _spectral_radius(self, rows: Matrix) -> float:
-        """Return the spectral radius of the states that the command moves."""
+    def _closed_loop(self, rows: Matrix) -> NDArray[np.float64]:
+        """Return the transition of the states that the command moves, without its limits."""
         change = rows[0, :].copy()
         change[_COMMAND] -= 1
         loop = self._transition + (self._input * change)
-        moved = [0, 1, 4, 5, 6, 7]
-        matrix = np.array([[float(loop[row, column]) for column in moved] for row in moved])
-        return float(np.max(np.abs(np.linalg.eigvals(matrix))))
+        moved = [STATES.index(name) for name in MOVED]
+        return np.array([[float(loop[row, column]) for column in moved] for row in moved])
 
 
 def _model(loop: AttitudeLoop, period_s: Any) -> tuple[Matrix, Matrix]:

@@ -207,7 +207,7 @@ def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
             "shell": "nmpc_float_" if numbers.formats else "nmpc_",
             "sum_type": literals.SUM_TYPES[scalar],
             "scalar_bytes": _BYTES[scalar][0],
-            "instance_bytes": _instance_bytes(design),
+            "instance_bytes": instance_bytes(design),
             "tracker": design.tracker,
             "feedback": design.feedback_steps is not None,
             "feedback_steps": design.feedback_steps,
@@ -340,7 +340,7 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     }
 
 
-def _instance_bytes(design: Design) -> int:
+def instance_bytes(design: Design) -> int:
     """Return the size of nmpc_t: its numbers, sums and single bytes, with padding."""
     settings = design.settings
     number_bytes, sum_bytes = _BYTES[settings.code.scalar]

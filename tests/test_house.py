@@ -35,6 +35,7 @@ WINGS = [
     "identify",
     "replay",
     "derivation",
+    "diff",
     "api",
     "report",
     "cli",

@@ -12,6 +12,7 @@ from mambo_nmpc.codegen.command import examples, root
 from mambo_nmpc.codegen.errors import Terminated
 from mambo_nmpc.sil.cli.campaign import campaign
 from mambo_nmpc.sil.cli.design import design
+from mambo_nmpc.sil.cli.diff import diff
 from mambo_nmpc.sil.cli.doctor import doctor
 from mambo_nmpc.sil.cli.faults import faults
 from mambo_nmpc.sil.cli.fly import fly
@@ -45,6 +46,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "tune": tune,
     "identify": identify,
     "replay": replay,
+    "diff": diff,
     "identify-binary": identify_binary,
     "report": report,
 }
@@ -102,6 +104,8 @@ mambo-nmpc identify flight.csv --columns roll_rad=deg*att.roll,pitch_rad=-deg*at
 mambo-nmpc identify flight.ulg -o identified
 mambo-nmpc replay flight/trace.csv
 mambo-nmpc replay flight.csv controller.toml -o replayed
+mambo-nmpc diff mambo controller.toml
+mambo-nmpc diff controller-old controller-new --vehicle crazyflie -o diff
 mambo-nmpc identify-binary firmware.elf
 mambo-nmpc identify-binary firmware.hex controller.toml controller-old
 mambo-nmpc report flight

@@ -1,0 +1,1 @@
+"""Two controllers in, and what differs between them in control terms out."""
