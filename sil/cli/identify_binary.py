@@ -18,7 +18,7 @@ def identify_binary(
         list[str] | None,
         typer.Argument(
             help="Controllers to compare with: controller.toml, folders of bundles; the presets always are.",
-            metavar="[SOURCE]...",
+            metavar="SOURCE...",
             autocompletion=complete_presets,
         ),
     ] = None,
