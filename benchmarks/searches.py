@@ -16,6 +16,7 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag
 
 from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.horizon import shortened_lags_s
 from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.optimizer import Evaluate, Rprop, Search
@@ -90,7 +91,7 @@ class CostModel:
         self._yaw_sign = 1.0 if model.yaw_convention == "printed" else -1.0
         self._times_s = horizon.prediction_step_s * np.arange(1, horizon.prediction + 1)
         self._held = np.minimum(np.arange(horizon.prediction), horizon.control - 1)
-        responses = [self._response(lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)]
+        responses = [self._response(lag_s) for lag_s in shortened_lags_s(settings)]
         self._of_angle = np.stack([angle for angle, _ in responses], axis=-1)
         self._of_moves = np.stack([moves for _, moves in responses], axis=-1)
         change = np.eye(horizon.control) - np.eye(horizon.control, k=-1)
@@ -120,7 +121,7 @@ class CostModel:
     ) -> Problems:
         """Return the problems of one update: state (n, 7), target (n, 4), thrust (n,), command (n, 2)."""
         states, last = np.asarray(state, np.float64), np.asarray(last_rad, np.float64)
-        offset = states[:, :4] - np.asarray(target, np.float64)
+        offset = states[:, :4] - np.asarray(target, np.float64)[:, :4]
         sine, cosine = np.sin(states[:, 6]), np.cos(states[:, 6])
         turn = np.array([[self._yaw_sign * sine, -cosine], [cosine, self._yaw_sign * sine]])
         gain = (turn * np.asarray(thrust, np.float64)).transpose(2, 0, 1)

@@ -191,7 +191,7 @@ class _RecordingController:
 
     def step(self, state: Any, target: Any, thrust_acceleration_m_s2: Any) -> Outcome:
         """Record, and step."""
-        moments = Moments(state, target, thrust_acceleration_m_s2, self._command, self._plan)
+        moments = Moments(state, target[:, :4], thrust_acceleration_m_s2, self._command, self._plan)
         self.moments.append(moments.exact(self._settings))
         step: Step = self._controller.step(state, target, thrust_acceleration_m_s2)
         self._command, self._plan = step.command_rad, step.plan_rad

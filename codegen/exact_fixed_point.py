@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_nmpc.codegen.attitude import attitude_constants, feedback_steps
-from mambo_nmpc.codegen.fixed_point import SINE_BITS, fractional_bits
+from mambo_nmpc.codegen.fixed_point import SINE_BITS, feedback_bits, fractional_bits
 from mambo_nmpc.codegen.observer import observer_constants
 from mambo_nmpc.codegen.quadratic import STATES, quadratic_constants
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
@@ -90,7 +90,6 @@ def _formats(*sections: Any) -> ExactFormats:
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law, tracker = quadratic_constants(settings), tracker_constants(settings)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
-    feedback = feedback_steps(settings)
     ranges = settings.ranges
 
     position = fractional_bits(bounds.position)
@@ -111,7 +110,7 @@ def _formats(*sections: Any) -> ExactFormats:
         "tracker": fractional_bits(tracker.factor) if tracker else 0,
         "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
         "command": fractional_bits(*attitude.command_rad_step2_m),
-        "feedback": fractional_bits(*feedback) if feedback else 0,
+        "feedback": feedback_bits(feedback_steps(settings)),
         "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
         "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
         "ratio": fractional_bits(*np.abs(law.ratios)) if law.moves == 2 else 0,

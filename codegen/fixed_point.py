@@ -197,7 +197,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         effort=effort,
         factor=factor,
         tracker=fractional_bits(tracker.factor) if tracker else 0,
-        feedback=fractional_bits(*feedback) if feedback else 0,
+        feedback=feedback_bits(feedback),
         cost=tracking + error,
         gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),
@@ -381,6 +381,11 @@ def _tracker_bound(tracker: TrackerConstants | None) -> float:
 def fractional_bits(*sizes: float) -> int:
     """Return the most fractional bits with which values of these sizes fit in a word."""
     return WORD_BITS - _integer_bits(max(sizes), 1.0)
+
+
+def feedback_bits(feedback: tuple[float, float] | None) -> int:
+    """Return the fractional bits of rate feedback in steps: at most those of a sine, a resolution of 1e-9."""
+    return min(fractional_bits(*feedback), SINE_BITS) if feedback else 0
 
 
 def _integer_bits(a: float, b: float) -> int:

@@ -128,6 +128,8 @@ def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index
     tilt = kind(settings.limits.tilt_rad)
     bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0])
 
+    target = np.append(bounds[:4], [ranges.thrust_acceleration_max_m_s2] * 2)
+
     def numbers(limits: Array) -> Array:
         shape = (n, len(limits))
         bits = rng.integers(0, 256, (*shape, kind(0).itemsize), np.uint8).view(kind)[:, :, 0]
@@ -140,6 +142,6 @@ def test_any_bits_at_all_keep_commands_within_the_limit_and_numbers_finite(index
     for step in range(steps):
         if step % 40 == 39:
             used.set_command(rng.uniform(-3.25, 3.25, (n, 2)))
-        outcome = used.step(numbers(bounds), numbers(bounds[:4]), np.full(n, 9.81))
+        outcome = used.step(numbers(bounds), numbers(target), np.full(n, 9.81))
         assert np.all(np.abs(outcome.command_rad) <= tilt)
         assert np.all(np.isfinite(outcome.stored))
