@@ -133,11 +133,9 @@ def contenders(work: Path) -> dict[str, tuple[Program, Path]]:
     }.items():
         folder = work / name
         folder.mkdir()
+        program.write(folder)
         if program.name == "daqp":
-            replace(program).write(folder)
             write_problem(folder)
-        else:
-            program.write(folder)
         found[name] = program, folder
     return found
 

@@ -120,8 +120,8 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     bundle = render(settings, amalgamate=True, with_digest=with_digest)
     header, source = (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
     library = {
-        f"{target.library}{header}": bundle[header],
-        f"{target.library}{source}": target.opening + bundle[source],
+        f"{target.source_folder}{header}": bundle[header],
+        f"{target.source_folder}{source}": target.opening + bundle[source],
     }
     environment = _environment()
     context = _context(Design(settings), with_digest=with_digest) | {

@@ -18,16 +18,16 @@ TARGETS_FOLDER: Final = "firmware"
 class FirmwareTarget:
     """Where a controller is used.
 
-    name:    as in `--for`, and of the folder of templates.
-    preset:  the settings if the user names none.
-    library: the folder of nmpc.h and nmpc.c, the amalgamated library, with a slash at its end.
+    name: as in `--for`, and of the folder of templates.
+    preset: the settings if the user names none.
+    source_folder: of nmpc.h and nmpc.c, the amalgamated library, with a slash at its end.
     opening: text before that of nmpc.c.
-    tick_s:  the period with which the firmware calls, in s; None where the caller chooses it.
+    tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
     """
 
     name: str
     preset: str
-    library: str
+    source_folder: str
     opening: str = ""
     tick_s: float | None = None
 

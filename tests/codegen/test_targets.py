@@ -36,11 +36,11 @@ def test_the_library_is_the_amalgamated_one_with_every_prefix(name: str) -> None
         render_target(settings, target, with_digest=False),
         render(settings, amalgamate=True, with_digest=False),
     )
-    assert files[f"{target.library}nmpc.h"] == library["nmpc.h"]
-    assert files[f"{target.library}nmpc.c"] == target.opening + library["nmpc.c"]
+    assert files[f"{target.source_folder}nmpc.h"] == library["nmpc.h"]
+    assert files[f"{target.source_folder}nmpc.c"] == target.opening + library["nmpc.c"]
     left = settings.model_copy(update={"code": settings.code.model_copy(update={"prefix": "left"})})
     renamed = render_target(left, target, with_digest=False)
-    assert f"{target.library}left.c" in renamed
+    assert f"{target.source_folder}left.c" in renamed
     assert not [path for path, text in renamed.items() if path != "controller.toml" and "nmpc_step" in text]
 
 

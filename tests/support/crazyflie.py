@@ -74,7 +74,7 @@ class Crazyflie:
     """One drone's app: `tick` is a millisecond, `update` ten of them."""
 
     def __init__(self, library: Any) -> None:
-        self.library = library
+        self.host = library
         self.setpoint: Any = _INTERFACE.new("setpoint_t *")
         self.state: Any = _INTERFACE.new("state_t *")
         self._control, self._sensors = _INTERFACE.new("control_t *"), _INTERFACE.new("sensorData_t *")
@@ -84,25 +84,25 @@ class Crazyflie:
     @property
     def flown(self) -> Any:
         """The set-point that the PID controller got last."""
-        return self.library.host_flown
+        return self.host.host_flown
 
     @property
     def console(self) -> str:
         """What the app printed."""
-        return _INTERFACE.string(self.library.host_console).decode()  # type: ignore[union-attr] # bytes
+        return _INTERFACE.string(self.host.host_console).decode()  # type: ignore[union-attr] # bytes
 
     def modes(self, mode: str) -> None:
         """Set the modes of x, y and z."""
-        self.setpoint.mode.x = self.setpoint.mode.y = self.setpoint.mode.z = getattr(self.library, mode)
+        self.setpoint.mode.x = self.setpoint.mode.y = self.setpoint.mode.z = getattr(self.host, mode)
 
     def logged(self, name: str) -> Any:
         """Return the value of a logged variable."""
-        found = self.library.host_find(self.library.host_logged, name.encode())
+        found = self.host.host_find(self.host.host_logged, name.encode())
         return self._pointer(found)[0]
 
     def set_parameter(self, name: str, value: float) -> None:
         """Set a parameter."""
-        found = self.library.host_find(self.library.host_parameters, name.encode())
+        found = self.host.host_find(self.host.host_parameters, name.encode())
         self._pointer(found)[0] = value
 
     def _pointer(self, variable: Any) -> Any:
@@ -111,9 +111,7 @@ class Crazyflie:
 
     def tick(self) -> tuple[float, float]:
         """Call the app for the next millisecond; return roll and pitch of what flies, in degrees."""
-        self.library.controllerOutOfTree(
-            self._control, self.setpoint, self._sensors, self.state, self.time_ms
-        )
+        self.host.controllerOutOfTree(self._control, self.setpoint, self._sensors, self.state, self.time_ms)
         self.time_ms += 1
         return self.flown.attitude.roll, self.flown.attitude.pitch
 

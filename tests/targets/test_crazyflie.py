@@ -73,11 +73,11 @@ class Built:
 
     folder: Path
     objects: tuple[Path, ...]
-    library: Any
+    host: Any
 
     def app(self) -> Crazyflie:
         """Return a drone with the app as it is."""
-        return Crazyflie(self.library)
+        return Crazyflie(self.host)
 
     def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
         """Return a drone with an app in which `right` reads `wrong`."""
@@ -174,9 +174,9 @@ def test_other_set_points_go_to_the_firmware_unchanged(mode: str, built: Built) 
         app.aim(np.array([2.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
         if flew_before:
             app.update(np.zeros(7))
-            assert app.flown.mode.x == app.library.modeDisable
+            assert app.flown.mode.x == app.host.modeDisable
         for axis in axes:
-            setattr(app.setpoint.mode, axis, getattr(app.library, mode))
+            setattr(app.setpoint.mode, axis, getattr(app.host, mode))
         app.setpoint.attitude.roll, app.setpoint.attitude.pitch = 1.5, -2.5
         assert app.tick() == (1.5, -2.5)
         assert content(app.flown) == content(app.setpoint)
@@ -196,12 +196,12 @@ def test_height_and_yaw_stay_with_the_firmware(built: Built) -> None:
     app.setpoint.position.z, app.setpoint.attitude.yaw, app.setpoint.mode.yaw = (
         1.25,
         30.0,
-        app.library.modeAbs,
+        app.host.modeAbs,
     )
     app.update(np.zeros(7))
     assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, 30.0)
-    assert (app.flown.mode.z, app.flown.mode.yaw) == (app.library.modeAbs, app.library.modeAbs)
-    assert (app.flown.mode.roll, app.flown.mode.pitch) == (app.library.modeAbs, app.library.modeAbs)
+    assert (app.flown.mode.z, app.flown.mode.yaw) == (app.host.modeAbs, app.host.modeAbs)
+    assert (app.flown.mode.roll, app.flown.mode.pitch) == (app.host.modeAbs, app.host.modeAbs)
 
 
 def flown_since(app: Crazyflie, state: FloatArray, updates: int) -> list[tuple[float, float]]:
@@ -226,7 +226,7 @@ def test_a_take_over_begins_anew_at_the_present_attitude(built: Built) -> None:
             case "gap":
                 app.time_ms += 10
             case "init":
-                app.library.controllerOutOfTreeInit()
+                app.host.controllerOutOfTreeInit()
         app.aim(np.zeros(6))
         assert flown_since(app, here, 5) == fresh, interruption
     assert flown_since(app, here, 5) != fresh
@@ -253,9 +253,9 @@ def test_between_two_updates_the_firmware_flies_until_the_first(built: Built) ->
     app.setpoint.attitude.roll = 7.5
     for _ in range(6):
         assert app.tick()[0] == 7.5
-        assert app.flown.mode.x == app.library.modeAbs
+        assert app.flown.mode.x == app.host.modeAbs
     app.tick()
-    assert app.flown.mode.x == app.library.modeDisable
+    assert app.flown.mode.x == app.host.modeDisable
 
 
 def test_the_parameter_on_leaves_all_to_the_firmware(built: Built) -> None:
@@ -263,8 +263,8 @@ def test_the_parameter_on_leaves_all_to_the_firmware(built: Built) -> None:
     app = built.app()
     app.modes("modeAbs")
     app.update(np.zeros(7))
-    assert app.flown.mode.x == app.library.modeDisable
-    for on, expected in ((0, app.library.modeAbs), (1, app.library.modeDisable)):
+    assert app.flown.mode.x == app.host.modeDisable
+    for on, expected in ((0, app.host.modeAbs), (1, app.host.modeDisable)):
         app.set_parameter("on", on)
         flown_since(app, np.zeros(7), 1)
         assert app.flown.mode.x == expected
@@ -294,7 +294,7 @@ def test_the_log_shows_commands_saturation_and_disturbance(built: Built) -> None
     roll, pitch = flown_since(app, np.zeros(7), 60)[-1]
     assert (app.logged("roll"), app.logged("pitch")) == (roll, pitch)
     assert app.logged("saturated") == 1
-    app.library.controllerOutOfTreeInit()
+    app.host.controllerOutOfTreeInit()
     app.aim(np.zeros(6))
     for step in range(20):
         app.update(np.array([0.0, -0.01 * step, 0.0, -0.1 * step, 0.0, 0.0, 0.0]))
@@ -309,7 +309,7 @@ def test_the_log_shows_commands_saturation_and_disturbance(built: Built) -> None
 def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_path: Path) -> None:
     """The console names the step and the flag; the firmware then refuses to fly."""
     app = built.app()
-    assert app.library.controllerOutOfTreeTest()
+    assert app.host.controllerOutOfTreeTest()
     folder = folder_of(SETTINGS, tmp_path)
     header = folder / "src" / "nmpc.h"
     text = header.read_text("utf-8")
@@ -317,7 +317,7 @@ def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_p
     assert wrong != text
     header.write_text(wrong, "utf-8")
     broken = build(folder).app()
-    assert not broken.library.controllerOutOfTreeTest()
+    assert not broken.host.controllerOutOfTreeTest()
     assert re.match(r"NMPC: self-test: step \d+ differs; .*-ffp-contract=off", broken.console)
 
 

@@ -94,6 +94,6 @@ def test_the_example_of_a_page_compiles(scalar: str, tmp_path: Path) -> None:
         folder = place(files | {"example.c": example}, tmp_path / name)
         shell(
             *(require("gcc", "gcc"), "-std=c99", "-Wall", "-Wextra", "-Werror"),
-            *(f"-I./{TARGETS[name].library}", "-c", "example.c"),
+            *(f"-I./{TARGETS[name].source_folder}", "-c", "example.c"),
             folder=folder,
         )
