@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.self_test import hover_thrust
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
-
-HOVER_M_S2 = 9.81
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
             "m/s2",
             ranges.thrust_acceleration_min_m_s2,
             ranges.thrust_acceleration_max_m_s2,
-            min(HOVER_M_S2, ranges.thrust_acceleration_max_m_s2),
+            hover_thrust(settings),
             "thrust over mass",
         ),
         FmuVariable("roll_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "roll command"),
@@ -69,8 +69,12 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
         ]
     if settings.cost.norm == "1-norm":
         tracking, effort = settings.cost.tracking_weight, settings.cost.effort_weight
+        numbers = Design(settings).numbers
+        most_tracking, most_effort = numbers.tracking_limit, numbers.effort_limit
         variables += [
-            FmuVariable("tracking_weight", "parameter", "1/m", 0.0, 1e6, tracking, "lambda1, eq 12"),
-            FmuVariable("effort_weight", "parameter", "1/rad", 0.0, 1e6, effort, "lambda2, eq 12"),
+            FmuVariable(
+                "tracking_weight", "parameter", "1/m", 0.0, most_tracking, tracking, "lambda1, eq 12"
+            ),
+            FmuVariable("effort_weight", "parameter", "1/rad", 0.0, most_effort, effort, "lambda2, eq 12"),
         ]
     return tuple(variables)

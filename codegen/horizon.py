@@ -95,15 +95,18 @@ def shortened_lags_s(settings: Sections) -> tuple[float, float]:
 
 
 def lag_refusals(settings: Sections) -> list[Refusal]:
-    """Return which lags of a controller with a 1-norm the feedback of the rates would more than undo."""
+    """Return which attitude lags are too short: for a quadratic cost, and for the feedback of the rates."""
     refused = []
-    for angle, lag_s in zip(("roll", "pitch"), shortened_lags_s(settings), strict=True):
+    is_quadratic = settings.cost.norm == "quadratic"
+    for angle in ("roll", "pitch"):
+        lag_s = getattr(settings.model, f"{angle}_lag_s")
         feedback_s = getattr(settings.damping, f"{angle}_rate_feedback_s")
-        if feedback_s and lag_s and lag_s < SHORTEST_LAG_S:
-            shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
-            rule = (
-                f"must be 0 or at least {shortest_s:g} with damping.{angle}_rate_feedback_s = {feedback_s:g}"
-            )
+        shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
+        if lag_s < shortest_s and (is_quadratic or (lag_s and feedback_s)):
+            reasons = ['cost.norm = "quadratic"'] if is_quadratic else []
+            reasons += [f"damping.{angle}_rate_feedback_s = {feedback_s:g}"] if feedback_s else []
+            least = f"at least {shortest_s:g}" if is_quadratic else f"0 or at least {shortest_s:g}"
+            rule = f"must be {least} with {' and '.join(reasons)}"
             refused.append(Refusal("model", f"{angle}_lag_s", rule))
     return refused
 

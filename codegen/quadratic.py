@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.attitude import AttitudeLoop, attitude_loops
+from mambo_nmpc.codegen.horizon import lag_refusals
 from mambo_nmpc.codegen.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
-from mambo_nmpc.codegen.settings.fields import SHORTEST_LAG_S
 from mambo_nmpc.codegen.settings.refusal import Refusal
 from mambo_nmpc.codegen.settings.sections import Cost, Sections
 
@@ -179,16 +179,9 @@ def _scale(loop: AttitudeLoop, period_s: Any) -> list[Any]:
 
 def quadratic_refusals(settings: Sections) -> list[Refusal]:
     """Return why a controller with a quadratic cost cannot have `settings`."""
-    refused = []
-    horizon, model, damping = settings.horizon, settings.model, settings.damping
+    refused = lag_refusals(settings)
+    horizon, model = settings.horizon, settings.model
     for angle in ("roll", "pitch"):
-        feedback_s = getattr(damping, f"{angle}_rate_feedback_s")
-        shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
-        if getattr(model, f"{angle}_lag_s") < shortest_s:
-            rule = f'must be at least {shortest_s:g} with cost.norm = "quadratic"'
-            if feedback_s:
-                rule += f" and damping.{angle}_rate_feedback_s = {feedback_s:g}"
-            refused.append(Refusal("model", f"{angle}_lag_s", rule))
         trim_rad, gain = getattr(model, f"{angle}_trim_rad"), getattr(model, f"{angle}_gain")
         if abs(trim_rad) >= gain * settings.limits.tilt_rad:
             rule = f"must be less than model.{angle}_gain times limits.tilt_rad"
