@@ -152,7 +152,7 @@ def _report_changes(
             typer.echo(f"{verb} {echo(path)}")
     would = "would be " if dry_run else ""
     state = f"{would}written" if changes.any else "unchanged"
-    typer.echo(f"{echo(str(output))}: {state}, settings {settings.digest[:16]}", err=True)
+    typer.echo(f"{echo(str(output))}: {state}, settings {settings.short_digest}", err=True)
 
 
 def _report_drifts(drifts: "tuple[Drift, ...]", output: Path, *, as_json: bool) -> None:

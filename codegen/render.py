@@ -196,7 +196,7 @@ def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
                 if key != "prefix"  # every public name shows it
             ],
             "version": __version__,
-            "digest": settings.digest[:16],
+            "digest": settings.short_digest,
             "settings_id": _settings_id(settings),
             "fixed": numbers.formats is not None,
             "formats": numbers.formats,

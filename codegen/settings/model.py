@@ -72,6 +72,11 @@ class Settings(Sections):
         canonical = json.dumps(self.in_use, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()
 
+    @property
+    def short_digest(self) -> str:
+        """The first 16 digits of the digest: what the generated C and the reports hold."""
+        return self.digest[:16]
+
     @classmethod
     def json_schema(cls) -> dict[str, Any]:
         """Return the JSON schema (draft 2020-12) of controller.toml, for editors."""

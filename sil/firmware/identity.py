@@ -11,8 +11,6 @@ from mambo_nmpc.codegen.plain_file import read_plain_file
 from mambo_nmpc.codegen.settings import controller_toml
 from mambo_nmpc.codegen.settings.model import Settings
 
-DIGEST_DIGITS: Final = 16
-"""Digits of the settings digest that the C holds."""
 LARGEST_FILE_BYTES: Final = 256_000_000
 
 _STRING: Final = re.compile(rb"mambo-nmpc ([0-9A-Za-z.+-]{1,40})(?: settings |\n)([0-9a-f]{16})(?![0-9a-f])")
@@ -67,7 +65,7 @@ def name_settings(
     names: dict[str, list[str]] = {}
     for source, settings in sources.items():
         for name, variant in _variants(source, settings):
-            names.setdefault(variant.digest[:DIGEST_DIGITS], []).append(name)
+            names.setdefault(variant.short_digest, []).append(name)
     return tuple(replace(one, settings=tuple(names.get(one.digest, ()))) for one in held)
 
 

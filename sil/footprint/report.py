@@ -106,7 +106,7 @@ def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) 
     """Return everything that was measured."""
     return FootprintSummary(
         source=source,
-        digest=settings.digest[:16],
+        digest=settings.short_digest,
         scalar=settings.code.scalar,
         optimisation=footprints[0].optimisation,
         boards=[_board(footprint) for footprint in footprints],

@@ -36,9 +36,6 @@ from mambo_nmpc.sil.pil.messages import (
 )
 from mambo_nmpc.sil.pil.port import Port
 
-DIGEST_DIGITS: Final = 16
-"""Digits of the settings digest that a board states."""
-
 _MOST_RESTARTS: Final = 10
 _MOST_RETURNS: Final = 100
 _REOPEN_PAUSE_S: Final = 0.1
@@ -160,7 +157,7 @@ class Connection:
     def _greet(self) -> Greeting:
         """Return the greeting; raises BoardError unless the board runs the firmware of the settings."""
         greeting = Greeting.parse(self._ask_anew(Kind.GREET))
-        settings, ours = self._settings.digest[:DIGEST_DIGITS], f"{GENERATOR} {__version__}"
+        settings, ours = self._settings.short_digest, f"{GENERATOR} {__version__}"
         if greeting is None or greeting.protocol != PROTOCOL:
             found = "another protocol" if greeting is None else f"version {greeting.protocol} of the protocol"
             fault = f"speaks {found}, and this is version {PROTOCOL}"

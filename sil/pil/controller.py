@@ -41,7 +41,6 @@ class BoardController:
         """Compute the next command from state (1, 7), target (1, k) and thrust_acceleration_m_s2 (1,).
 
         `CompiledController.step` explains k.
-
         Raises BoardError if the board is lost.
         """
         numbers = self._design.numbers

@@ -26,6 +26,7 @@ FLAGS: Final = (
     "-O1",
     "-fno-sanitize-recover=all",
     "-fsanitize=fuzzer,address,undefined,float-divide-by-zero,implicit-conversion,local-bounds",
+    "-fno-sanitize-coverage=stack-depth",  # it depends on where the stack begins, so runs would not repeat
 )
 
 

@@ -69,7 +69,7 @@ def summarise(found: Sequence[Verified], source: str, settings: Settings) -> Ver
     """Return the summary of all checks, without the digests of the files."""
     return VerifySummary(
         source=source,
-        digest=settings.digest[:16],
+        digest=settings.short_digest,
         scalar=settings.code.scalar,
         verdict=verdict(found),
         not_run=_left_out(found),

@@ -115,7 +115,7 @@ def test_generate_reports_what_it_did() -> None:
     """The first run creates; a second, from the bundle's own controller.toml, finds nothing to do."""
     created, talk = run("generate", "-o", "out")
     assert "created src/nmpc.c\n" in created
-    assert talk == f"out: written, settings {presets.preset('mambo').digest[:16]}\n"
+    assert talk == f"out: written, settings {presets.preset('mambo').short_digest}\n"
     assert {line.split()[1] for line in created.splitlines()} == {
         path.relative_to("out").as_posix() for path in Path("out").rglob("*") if path.is_file()
     }

@@ -57,7 +57,7 @@ def test_the_same_controller_does_not_fly() -> None:
     """Exit 0, also for a copy of the file."""
     Path("copy.toml").write_text(to_toml(MAMBO), "utf-8")
     said, _ = run("diff", "mambo", "copy.toml", "-o", "out")
-    assert said == f"mambo and copy.toml are the same controller: settings {MAMBO.digest[:16]}\n"
+    assert said == f"mambo and copy.toml are the same controller: settings {MAMBO.short_digest}\n"
     assert json.loads(Path("out/summary.json").read_text("utf-8"))["figures_a"] is None
 
 

@@ -61,8 +61,8 @@ def test_each_kind_of_image_tells_all_its_controllers(form: Callable[[bytes], by
     Path("image").write_bytes(form(b"\0\x11".join([b"start of code", *strings, b""])))
     held = held_controllers(Path("image"))
     assert [(one.version, one.digest) for one in held] == [
-        (__version__, FIXED.digest[:16]),
-        (__version__, MAMBO.digest[:16]),
+        (__version__, FIXED.short_digest),
+        (__version__, MAMBO.short_digest),
     ]
 
 
@@ -73,11 +73,11 @@ def test_presets_and_sources_are_named() -> None:
     Path("mine/controller.toml").write_text(to_toml(OWN), "utf-8")
     said, _ = run("identify-binary", "image", "mine")
     assert said.splitlines() == [
-        f"mambo-nmpc {__version__}, settings {FIXED.digest[:16]}: preset mambo --scalar fixed",
-        f"mambo-nmpc {__version__}, settings {OWN.digest[:16]}: mine",
+        f"mambo-nmpc {__version__}, settings {FIXED.short_digest}: preset mambo --scalar fixed",
+        f"mambo-nmpc {__version__}, settings {OWN.short_digest}: mine",
     ]
     unknown = json.loads(run("identify-binary", "image", "--json")[0])["controllers"][1]
-    assert unknown == {"version": __version__, "digest": OWN.digest[:16], "settings": []}
+    assert unknown == {"version": __version__, "digest": OWN.short_digest, "settings": []}
     assert "of no preset or source named" in run("identify-binary", "image")[0]
 
 

@@ -159,7 +159,7 @@ def test_a_board_that_restarts_with_other_firmware_is_refused(elf: Path, tmp_pat
     with (
         serial_line(elf, faults) as line,
         closing(connect(line.port, [])) as board,
-        pytest.raises(BoardError, match=f"and this flight that of {SETTINGS.digest[:16]}; generate it"),
+        pytest.raises(BoardError, match=f"and this flight that of {SETTINGS.short_digest}; generate it"),
     ):
         fly(FLIGHT, BoardController(SETTINGS, board))
 
@@ -168,7 +168,7 @@ def test_other_firmware_is_refused_by_name(elf: Path) -> None:
     """Both settings digests, exit 2."""
     with serial_line(elf) as line:
         said = run("fly", "table1", "--port", line.port, "--duration-s", "1", code=2)[1]
-    assert f"is that of settings {SETTINGS.digest[:16]}, and this flight that of " in said
+    assert f"is that of settings {SETTINGS.short_digest}, and this flight that of " in said
     assert "mambo-nmpc generate --for pil" in said
 
 

@@ -289,4 +289,4 @@ def test_the_version_traces_a_binary_to_its_settings() -> None:
     extension = build_extension(MAMBO)
     text = extension.ffi.string(extension.lib.nmpc_version()).decode()
     assert text.startswith("mambo-nmpc ")
-    assert text.endswith(f"settings {MAMBO.digest[:16]}")
+    assert text.endswith(f"settings {MAMBO.short_digest}")
