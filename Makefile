@@ -4,6 +4,7 @@
 #                 TOOLS=no installs no system packages: tests whose tool is missing are skipped by name
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
+# make docs       build the manual; its first page is build/docs/index.html
 # make bench      time flights against RotorPy, fly its Crazyflie, time updates against peers; results in build/bench
 # make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
@@ -14,6 +15,7 @@ BIN = $(VENV)/bin
 SETUP = $(VENV)/.installed
 SETUP_TEST = $(VENV)/.installed-test
 SETUP_BENCH = $(VENV)/.installed-bench
+SETUP_DOCS = $(VENV)/.installed-docs
 PEERS = build/peers
 SETUP_PEERS = $(PEERS)/.installed
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable
@@ -36,7 +38,7 @@ CHECKED = tests/test_house.py tests/campaign/test_campaign.py tests/files tests/
     $(filter-out %/test_generations.py %/test_exact_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/plant tests/sensors
 
-.PHONY: fly check test tools generated bench bench-peers clean
+.PHONY: fly check test tools generated docs bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
@@ -71,6 +73,10 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo-1norm -o generated/mambo-1norm
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1
 
+docs: $(SETUP_DOCS)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+	@echo "the manual: build/docs/index.html"
+
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights
 	$(BIN)/python -m benchmarks.rotorpy_flights
@@ -103,6 +109,11 @@ $(SETUP): pyproject.toml constraints.txt
 $(SETUP_TEST): pyproject.toml constraints.txt
 	$(SET_UP)
 	$(PIP_INSTALL) ".[test]"
+	@touch $@ $(SETUP) $(SETUP_DOCS)
+
+$(SETUP_DOCS): pyproject.toml constraints.txt
+	$(SET_UP)
+	$(PIP_INSTALL) ".[docs]"
 	@touch $@ $(SETUP)
 
 $(SETUP_BENCH): pyproject.toml constraints.txt

@@ -2,7 +2,7 @@
 
 The problem of a control step of preset mambo: two free moves along each of two axes, within the tilt limit.
 Both get the same states and compute the gradient from them. One process passes through each set of states
-with each contender in turn. Prints a table; docs/benchmarks.md has it.
+with each contender in turn. Prints a table; docs/evidence/benchmarks.md has it.
 """
 
 import ctypes
@@ -54,7 +54,7 @@ OURS: Final = Ours(
 
 
 def state_sets() -> dict[str, Array]:
-    """Return the states (COUNT, 2, 8) of the sets W, T, F and C of docs/benchmarks.md."""
+    """Return the states (COUNT, 2, 8) of the sets W, T, F and C of docs/evidence/benchmarks.md."""
     random, step_s = np.random.default_rng(_SEED), SETTINGS.horizon.update_period_s
     sets = {}
     for name, (position_m, velocity_m_s) in _WITHIN.items():

@@ -2,7 +2,7 @@
 
 It prints the excess of the plan's cost over the exact optimum (a linear program) by iterations, for the
 peers' model and preset mambo; then the time of an update beside DAQP with slacks, in one process in turns as
-in `benchmarks.times`, and the instructions on a board. docs/benchmarks.md explains the tables.
+in `benchmarks.times`, and the instructions on a board. docs/evidence/benchmarks.md explains the tables.
 """
 
 import os

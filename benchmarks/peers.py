@@ -1,7 +1,7 @@
 """Footprint of the peers' generated C on a Crazyflie, measured like ours, for one problem.
 
-`python -m benchmarks.peers` prints the table of docs/peers.md. The row of a peer that cannot be generated or
-built states the reason. The peers are those of `make bench-peers`; their C needs newlib.
+`python -m benchmarks.peers` prints the table of docs/evidence/peers.md. The row of a peer that cannot be
+generated or built states the reason. The peers are those of `make bench-peers`; their C needs newlib.
 """
 
 import filecmp

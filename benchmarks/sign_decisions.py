@@ -4,7 +4,8 @@ RPROP reads only the signs of a gradient, and a sign can depend on the last bit.
 both scalar types get the same inputs and the same memory, exact in the type of fewer bits, so that decisions
 differ by rounding alone. Flights of Table II with the C show the effect in closed loop.
 
-`python -m benchmarks.sign_decisions` prints the tables of docs/sign-decisions.md; it takes about a minute.
+`python -m benchmarks.sign_decisions` prints the tables of docs/evidence/sign-decisions.md; it takes about a
+minute.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Inputs of the comparison: the sets W, T, F and C of docs/benchmarks.md."""
+"""Inputs of the comparison: the sets W, T, F and C of docs/evidence/benchmarks.md."""
 
 from typing import Any, Final
 

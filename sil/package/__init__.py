@@ -2,7 +2,7 @@
 
     from mambo_nmpc import Controller, DroneState, TargetState, Vehicle, fly
 
-runs the generated C from Python (docs/python.md). `mambo_nmpc.codegen` generates C from settings and
+runs generated C from Python (docs/reference/python.md). `mambo_nmpc.codegen` generates C from settings and
 `mambo_nmpc.templates`; `mambo_nmpc.sil` simulates flights with that C, and tests it.
 """
 

@@ -204,7 +204,7 @@ def load_suite(named: str, vehicle: str | None = None) -> FlightSuite:
         guess = f" (did you mean {near[0]}?)" if near else ""
         raise SourceNotFoundError(
             f"{echo(named)} is neither a shipped suite nor a file{guess}; shipped suites are "
-            f"{', '.join(ours)}, and docs/regress.md shows how to write one"
+            f"{', '.join(ours)}, and docs/how-to/regress.md shows how to write one"
         )
     return _suite(read_as(SuiteFile, found), found.stem, found.parent, echo(named), vehicle)
 

@@ -29,7 +29,7 @@ from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.flight.trajectories import Circle
 from tests.support.one_norm import ONE_NORM
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "python.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 LEVEL = DroneState(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3)))
 AHEAD = TargetState(np.array([[1.0, 0.0], [0.3, -0.2]]), np.zeros((2, 2)))
 AXES: dict[FrameName, NDArray[np.float64]] = {

@@ -56,8 +56,8 @@ def test_a_page_says_how_to_build_to_watch_and_to_go_back(name: str) -> None:
 
 
 def test_the_manual_has_a_section_for_every_target() -> None:
-    """docs/firmware.md: its command, and a row in its table with the preset."""
-    manual = (Path(__file__).parents[2] / "docs" / "firmware.md").read_text("utf-8")
+    """docs/how-to/firmware.md: its command, and a row in its table with the preset."""
+    manual = (Path(__file__).parents[2] / "docs" / "how-to" / "firmware.md").read_text("utf-8")
     sections = dict(re.findall(r"^## (\w+)$\n(.*?)(?=^## )", manual, re.MULTILINE | re.DOTALL))
     assert sections.keys() == TARGETS.keys()
     for name, target in TARGETS.items():

@@ -73,7 +73,7 @@ def rise_s(summary: IdentifySummary, name: str, share: float) -> float:
 
 
 def test_the_stock_loops_are_identified(trace: Path) -> None:
-    """Through noise: gain 1, the integrator, and the rise times of docs/plant.md."""
+    """Through noise: gain 1, the integrator, and the rise times of docs/explanation/plant.md."""
     summary = identify(read_logs([trace], {}))[0]
     loops = {"roll": (1.0, 0.245, 0.415), "pitch": (0.77, 0.155, 0.25)}
     for name, (integral_1_s, most_s, nearly_s) in loops.items():

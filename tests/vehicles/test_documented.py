@@ -1,4 +1,4 @@
-"""docs/vehicles.md: its example flies, and it names every key."""
+"""docs/reference/vehicles.md: its example flies, and it names every key."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ from mambo_nmpc.sil.vehicles import presets
 from mambo_nmpc.sil.vehicles.model import form
 from tests.support.command import run
 
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text("utf-8")
+DOCUMENT = (Path(__file__).parents[2] / "docs" / "reference" / "vehicles.md").read_text("utf-8")
 MOST_LINES = 25
 
 

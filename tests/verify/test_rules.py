@@ -69,7 +69,7 @@ def test_an_unlisted_finding_fails(harm: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
 def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Path) -> None:
     """By rule, file and scalar type of preset mambo, as cppcheck finds them."""
-    text = (Path(__file__).parents[2] / "docs" / "c-api.md").read_text("utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "c-api.md").read_text("utf-8")
     rows = re.findall(r"^\| (\d+\.\d+) \| `(\S+)` \| (\d+) \| (\d+) \|$", text, re.MULTILINE)
     column = {"float32": 2, "fixed": 3}[scalar]
     documented = {row[:2]: int(row[column]) for row in rows if row[column] != "0"}
@@ -80,8 +80,8 @@ def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Pat
 
 
 def test_every_deviation_is_in_the_manual() -> None:
-    """The table of docs/c-api.md has the rules and files of the list, no more and no less."""
-    text = (Path(__file__).parents[2] / "docs" / "c-api.md").read_text("utf-8")
+    """The table of docs/reference/c-api.md has the rules and files of the list, no more and no less."""
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "c-api.md").read_text("utf-8")
     table = text[text.index("## MISRA") :].partition("\n## ")[0]
     rows = re.findall(r"^\| (\d+\.\d+) [^|]*\| ([^|]*) \|", table, re.MULTILINE)
     documented = {
