@@ -19,10 +19,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.riccati import Matrix, hold, mp
 from mambo_nmpc.codegen.settings.sections import Damping, Model, Sections
 
-GRAVITY_M_S2: Final = 9.81
 _LEAK_1_S: Final = "0.001"
 """The integral part decays at this rate, so that a loop that never answers has a bounded model."""
 

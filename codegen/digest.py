@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.fixed_point import LARGEST
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.reference import ExactStep, Step, reference_controller
 from mambo_nmpc.codegen.reference.math import Real, rounded
 from mambo_nmpc.codegen.representation import OUTCOME, STATE, InputLimits, Representation
@@ -24,7 +25,6 @@ TICKS: Final = 100
 """Steps of an episode."""
 TICKS_PER_INPUT: Final = 4
 """Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
-HOVER_M_S2: Final = 9.81
 
 _MOST_EPISODES: Final = 1000
 _USUAL_WORK: Final = 100
@@ -72,7 +72,7 @@ def input_scales(design: Design) -> InputScales:
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
     near = 0.25, 0.025, 0.0025
     fixed, most_m_s2 = settings.code.scalar == "fixed", settings.ranges.thrust_acceleration_max_m_s2
-    hover_m_s2 = min(HOVER_M_S2, most_m_s2) if fixed else HOVER_M_S2
+    hover_m_s2 = min(GRAVITY_M_S2, most_m_s2) if fixed else GRAVITY_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
     unit = 1 if fixed else _UNIT
     tracker, motion = design.tracker, 0.0

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.self_test import hover_thrust
+from mambo_nmpc.codegen.gravity import hover_thrust
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
 

@@ -23,9 +23,10 @@ from mambo_nmpc.codegen.flags import (
     proofs,
 )
 from mambo_nmpc.codegen.fmu import fmu_variables
+from mambo_nmpc.codegen.gravity import hover_thrust
 from mambo_nmpc.codegen.infix import infix
 from mambo_nmpc.codegen.representation import ROW, STATE, THRUST, WEIGHTS, Representation
-from mambo_nmpc.codegen.self_test import hover_thrust, self_test
+from mambo_nmpc.codegen.self_test import self_test
 from mambo_nmpc.codegen.settings.controller_toml import to_toml
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
@@ -184,67 +185,64 @@ def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
     settings, numbers = design.settings, design.numbers
     scalar = settings.code.scalar
     own = _quadratic_context(design) if design.is_quadratic else _one_norm_context(design)
-    return (
-        own
-        | {
-            "settings": settings,
-            "spelling": literals.Spelling(scalar, numbers.bits),
-            "parameters": [
-                (f"{section}.{key}", value)
-                for section, values in settings.in_use.items()
-                for key, value in values.items()
-                if key != "prefix"  # every public name shows it
-            ],
-            "version": __version__,
-            "digest": settings.short_digest,
-            "settings_id": _settings_id(settings),
-            "fixed": numbers.formats is not None,
-            "formats": numbers.formats,
-            "sine_bits": SINE_BITS,
-            "scales": _powers(numbers, 1),
-            "units": _powers(numbers, -1),
-            "c_type": literals.C_TYPES[scalar],
-            "shell": "nmpc_float_" if numbers.formats else "nmpc_",
-            "sum_type": literals.SUM_TYPES[scalar],
-            "scalar_bytes": _BYTES[scalar][0],
-            "instance_bytes": instance_bytes(design),
-            "tracker": design.tracker,
-            "feedback": design.feedback_steps is not None,
-            "feedback_steps": design.feedback_steps,
-            "given": design.tracker is not None and design.tracker.is_given,
-            "trigonometry": design.trigonometry,
-            "sine_error": SINE_ERRORS[scalar],
-            "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
-            "yaw_limit_rad": YAW_LIMIT_RAD,
-            "vectors": self_test(design),
-            "episodes": episode_count(settings),
-            "ticks": TICKS,
-            "held": TICKS_PER_INPUT,
-            "self_test_steps": TICKS * episode_count(settings),
-            "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
-            "spread": input_scales(design),
-            "boards": [
-                {
-                    "name": board.name,
-                    "compiler": board.compiler.common,
-                    "flags": " ".join(board.compiler.flags),
-                }
-                for board in map(boards.load, boards.names())
-            ],
-            "hover_thrust_m_s2": hover_thrust(settings),
-            "example_position_m": min(1.0, settings.ranges.position_m / 2),
-            "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
-            "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
-            "compile_flags": " ".join(COMPILE_FLAGS),
-            "warning_flags": " ".join(WARNING_FLAGS),
-            "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
-            "proofs": {
-                name: " ".join((*PROOF_FLAGS, *flags))
-                for name, flags in proofs(scalar, settings.cost.norm).items()
-            },
-            "rule_flags": " ".join(RULE_FLAGS),
-        }
-    )
+    return own | {
+        "settings": settings,
+        "spelling": literals.Spelling(scalar, numbers.bits),
+        "parameters": [
+            (f"{section}.{key}", value)
+            for section, values in settings.in_use.items()
+            for key, value in values.items()
+            if key != "prefix"  # every public name shows it
+        ],
+        "version": __version__,
+        "digest": settings.short_digest,
+        "settings_id": _settings_id(settings),
+        "fixed": numbers.formats is not None,
+        "formats": numbers.formats,
+        "sine_bits": SINE_BITS,
+        "scales": _powers(numbers, 1),
+        "units": _powers(numbers, -1),
+        "c_type": literals.C_TYPES[scalar],
+        "shell": "nmpc_float_" if numbers.formats else "nmpc_",
+        "sum_type": literals.SUM_TYPES[scalar],
+        "scalar_bytes": _BYTES[scalar][0],
+        "instance_bytes": instance_bytes(design),
+        "tracker": design.tracker,
+        "feedback": design.feedback_steps is not None,
+        "feedback_steps": design.feedback_steps,
+        "given": design.tracker is not None and design.tracker.is_given,
+        "trigonometry": design.trigonometry,
+        "sine_error": SINE_ERRORS[scalar],
+        "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
+        "yaw_limit_rad": YAW_LIMIT_RAD,
+        "vectors": self_test(design),
+        "episodes": episode_count(settings),
+        "ticks": TICKS,
+        "held": TICKS_PER_INPUT,
+        "self_test_steps": TICKS * episode_count(settings),
+        "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
+        "spread": input_scales(design),
+        "boards": [
+            {
+                "name": board.name,
+                "compiler": board.compiler.common,
+                "flags": " ".join(board.compiler.flags),
+            }
+            for board in map(boards.load, boards.names())
+        ],
+        "hover_thrust_m_s2": hover_thrust(settings),
+        "example_position_m": min(1.0, settings.ranges.position_m / 2),
+        "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
+        "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
+        "compile_flags": " ".join(COMPILE_FLAGS),
+        "warning_flags": " ".join(WARNING_FLAGS),
+        "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
+        "proofs": {
+            name: " ".join((*PROOF_FLAGS, *flags))
+            for name, flags in proofs(scalar, settings.cost.norm).items()
+        },
+        "rule_flags": " ".join(RULE_FLAGS),
+    }
 
 
 def _one_norm_context(design: Design) -> dict[str, object]:
@@ -254,6 +252,7 @@ def _one_norm_context(design: Design) -> dict[str, object]:
         "backtracking": settings.optimizer.variant == "rprop+",
         "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
         "tables": design.tables,
+        "hover": settings.model.thrust == "hover",
         "tracking_limit": numbers.tracking_limit,
         "effort_limit": numbers.effort_limit,
     }

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.gravity import hover_thrust
 from mambo_nmpc.codegen.literals import SCALARS
 from mambo_nmpc.codegen.reference import (
     ExactReferenceController,
@@ -16,7 +17,6 @@ from mambo_nmpc.codegen.reference import (
     Step,
     reference_controller,
 )
-from mambo_nmpc.codegen.settings.model import Settings
 
 STEPS: Final = 24
 _GOLDEN_RATIO: Final = 0.6180339887498949
@@ -80,13 +80,6 @@ def self_test(design: Design) -> list[SelfTestStep]:
                     thrust = 0.0
         steps.append(_step(controller, state, target, thrust))
     return steps
-
-
-def hover_thrust(settings: Settings, offset_m_s2: float = 0.0) -> float:
-    """Return the thrust acceleration of hover plus the offset, m/s^2, clamped to the range of `settings`."""
-    ranges = settings.ranges
-    thrust = 9.81 + offset_m_s2
-    return min(max(thrust, ranges.thrust_acceleration_min_m_s2), ranges.thrust_acceleration_max_m_s2)
 
 
 def _step(

@@ -6,12 +6,11 @@ All arithmetic is float64 in a fixed order; constants are rounded to the scalar 
 from dataclasses import dataclass
 from typing import Final
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.settings.sections import Sections
 
 JUMP_MARGIN: Final = 1.5
 """A target that accelerates by this factor more than the drone can at its tilt limit has jumped."""
-
-GRAVITY_M_S2: Final = 9.81
 
 
 JERK_SHARE: Final = 0.1

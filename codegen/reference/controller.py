@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.gravity import hover_thrust
 from mambo_nmpc.codegen.reference import cost
 from mambo_nmpc.codegen.reference.arithmetic import arithmetic
 from mambo_nmpc.codegen.reference.inputs import Inputs, Status, choose
@@ -139,13 +140,11 @@ class ReferenceController:
         good = status == Status.OK
         zero = self._numbers.computed(0)
         states, targets = (np.where(good[:, None], given, zero) for given in (states, targets))
+        thrusts = np.where(good, thrusts, self._inputs.limits.thrust_least)
+        if self.settings.model.thrust == "hover":
+            thrusts = np.full_like(thrusts, self._numbers.constant(hover_thrust(self.settings), "thrust"))
         motion = self._track(targets)
-        searched = self._search(
-            states,
-            targets,
-            np.where(good, thrusts, self._inputs.limits.thrust_least),
-            motion.acceleration_m_step2,
-        )
+        searched = self._search(states, targets, thrusts, motion.acceleration_m_step2)
         new = replace(
             self.memory,
             command_rad=searched.moves_rad[:, 0],

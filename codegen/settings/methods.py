@@ -6,7 +6,7 @@ from mambo_nmpc.codegen.settings.sections import Sections
 
 _ONE_NORM: Final = {
     "horizon": {"prediction", "control", "prediction_step_s"},
-    "model": {"position_update", "yaw_convention"},
+    "model": {"position_update", "yaw_convention", "thrust"},
     "cost": {"tracking_weight", "effort_weight"},
     "optimizer": {
         "variant",

@@ -55,13 +55,16 @@ class Settings(Sections):
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the C depends on, by section.
 
-        Without [target], and with a 1-norm without cost.norm and [damping], if they are the defaults.
+        Without [target], and with a 1-norm without cost.norm, model.thrust and [damping], if they are the
+        defaults.
         """
         values = used_values(self)
         if self.cost.norm == "1-norm":
             del values["cost"]["norm"]
             if self.damping == Damping():
                 del values["damping"]
+            if self.model.thrust == "measured":
+                del values["model"]["thrust"]
         if self.target == Target():
             del values["target"]
         return values

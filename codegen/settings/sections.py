@@ -77,6 +77,11 @@ class Model(SettingsSection):
         '(eq 3, NED); "printed" takes those that eq 8 prints, with which the drone is lost at 45 degrees of '
         "yaw.",
     )
+    thrust: Literal["measured", "hover"] = Field(
+        "measured",
+        description='Thrust over mass u_1/m in eq 8: "measured" takes that of the control step, as the paper '
+        'does; "hover" takes 9.81 m/s^2 in every step, for a drone whose thrust is not known or is noisy.',
+    )
     roll_lag_s: Lag = Field(
         0.0,
         description="Time constant of the first-order lag from commanded to predicted roll phi, in seconds; "

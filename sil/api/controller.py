@@ -6,13 +6,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.reference import ExactStep, Step
 from mambo_nmpc.codegen.settings import controller_toml, presets
 from mambo_nmpc.codegen.settings.keys import spell
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.api.states import DroneState, TargetState
 from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 
 
 class Controller:

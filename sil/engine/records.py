@@ -7,10 +7,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.engine.build import record_type
 from mambo_nmpc.sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
 from mambo_nmpc.sil.plant import gusts, loops
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, airframe_of
+from mambo_nmpc.sil.plant.airframe import airframe_of
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.first_order import FirstOrderDrone
 from mambo_nmpc.sil.plant.rotors import wrench_per_command

@@ -13,9 +13,9 @@ import numpy as np
 
 from mambo_nmpc.codegen.atomic import put
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.errors import TrajectoryError
 from mambo_nmpc.sil.identify.signals import DEGREE
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 SIZE_M: Final = 0.8

@@ -14,9 +14,9 @@ from typing import Final
 
 import numpy as np
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.identify.response import NORMAL_95, WIDENING, Interval, newey_west
 from mambo_nmpc.sil.identify.segments import PERIOD_S, Segment
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 SPAN_S: Final = 0.5

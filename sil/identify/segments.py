@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.identify.signals import (
     COMMANDS,
     HEIGHT,
@@ -19,7 +20,6 @@ from mambo_nmpc.sil.identify.signals import (
     FlightLog,
     Signal,
 )
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 PERIOD_S: Final = 0.01

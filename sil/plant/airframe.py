@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import PerFlight
-from mambo_nmpc.sil.vehicles import model, presets
+from mambo_nmpc.sil.vehicles import presets
 from mambo_nmpc.sil.vehicles.model import VehicleFile
-
-GRAVITY_M_S2: Final = model.GRAVITY_M_S2
 
 
 @dataclass(frozen=True, eq=False)

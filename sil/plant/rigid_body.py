@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.elementary import sine_cosine
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.errors import LogError
@@ -33,7 +34,6 @@ SIGNALS: Final = {
 }
 """Known columns of each signal; the commands are those of the controller itself."""
 
-HOVER_M_S2: Final = 9.81
 _SAME_PERIOD: Final = 0.1
 """Share by which the period of a log may differ from the update period, and its rows be the updates."""
 
@@ -78,7 +78,7 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
     inputs = _interpolated if resampled else _held
     state, target = inputs(log, STATE, time_s), inputs(log, tuple(TARGET), time_s)
     thrust_m_s2 = (
-        _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), HOVER_M_S2)
+        _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), GRAVITY_M_S2)
     )
     controller = CompiledController(settings)
     steps = [controller.step(state[k : k + 1], target[k : k + 1], thrust_m_s2[k]) for k in range(len(time_s))]

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.elementary import arc_sine, arc_tangent, sine_cosine
 from mambo_nmpc.sil.plant.rigid_body import to_body, to_world

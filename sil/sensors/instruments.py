@@ -11,7 +11,8 @@ from typing import Final, cast
 
 import numpy as np
 
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, NOMINAL
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.arrays import FloatArray, PerFlight
 from mambo_nmpc.sil.plant.elementary import exponential, sine_cosine
 from mambo_nmpc.sil.plant.randomness import Draws, Purpose

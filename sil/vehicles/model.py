@@ -7,6 +7,7 @@ from typing import Any, Final, Self, get_args
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.settings.keys import Form, Key, key_of, spell
 from mambo_nmpc.sil.vehicles.sections import (
     AltitudeGains,
@@ -21,7 +22,6 @@ from mambo_nmpc.sil.vehicles.sections import (
     VehicleSection,
 )
 
-GRAVITY_M_S2: Final = 9.81
 SENSORS_HZ: Final = 200
 """Rate at which the Mambo's sensors and estimators run."""
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_nmpc.codegen.design import Design
+from mambo_nmpc.codegen.gravity import hover_thrust
 from mambo_nmpc.codegen.literals import SCALARS, Scalar
 from mambo_nmpc.codegen.representation import COMMAND, WEIGHTS
-from mambo_nmpc.codegen.self_test import hover_thrust
 from mambo_nmpc.codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.calls import (

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen import __version__
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.campaign.file import Entrant, default, scenario
@@ -21,7 +22,7 @@ from mambo_nmpc.sil.flight.names import PD_NAMES, PdName
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Hover
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, NOMINAL
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.link import NOT_CALLED
 
 TILT_RAD = math.acos(0.063 * GRAVITY_M_S2 / NOMINAL.altitude.thrust_max_n)

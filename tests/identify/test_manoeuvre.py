@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen.errors import FileExistsRefusedError, UnwritableError
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.errors import TrajectoryError
 from mambo_nmpc.sil.flight.trajectories import Waypoints
 from mambo_nmpc.sil.identify.manoeuvre import (
@@ -21,7 +22,6 @@ from mambo_nmpc.sil.identify.manoeuvre import (
     write_manoeuvre,
 )
 from mambo_nmpc.sil.identify.signals import DEGREE
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 
 
 def test_the_figure_tilts_by_more_than_two_degrees() -> None:

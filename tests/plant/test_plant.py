@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.plant import loops
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2, MAMBO, NOMINAL
+from mambo_nmpc.sil.plant.airframe import MAMBO, NOMINAL
 from mambo_nmpc.sil.plant.integrator import NODES, bogacki_shampine
 from mambo_nmpc.sil.plant.rigid_body import RigidBody
 from mambo_nmpc.sil.plant.rotors import Rotors, mix

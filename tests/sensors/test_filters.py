@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.rigid_body import to_body
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.vehicle import STEP_S
 from mambo_nmpc.sil.sensors.estimators import Altitude, Velocity, velocity_gain

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.sil.controllers.pd import PdController
 from mambo_nmpc.sil.flight.loop import Flight, fly
 from mambo_nmpc.sil.flight.names import Start
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.plant.airframe import GRAVITY_M_S2
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.vehicle import STEP_S, Seen
 from mambo_nmpc.sil.sensors import estimators
