@@ -11,7 +11,7 @@ from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, Source, load, sh
 
 def replay(
     log: Annotated[
-        Path, typer.Argument(help="A log in CSV: trace.csv, or that of a Crazyflie.", metavar="LOG")
+        Path, typer.Argument(help="A log: trace.csv, CSV of a Crazyflie, or a .ulg of PX4.", metavar="LOG")
     ],
     source: Source = "mambo",
     *,

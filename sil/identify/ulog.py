@@ -17,14 +17,24 @@ from mambo_nmpc.sil.identify.signals import FlightLog, Signal
 from mambo_nmpc.sil.plant.arrays import FloatArray
 
 SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
+TRAJECTORY: Final = "trajectory_setpoint"
 _MOTION: Final = {"x_m": "x", "y_m": "y", "z_m": "z", "vx_m_s": "vx", "vy_m_s": "vy"}
+_TARGET: Final[dict[str, tuple[str, ...]]] = {
+    "target_x_m": ("position[0]", "x"),
+    "target_y_m": ("position[1]", "y"),
+    "target_vx_m_s": ("velocity[0]", "vx"),
+    "target_vy_m_s": ("velocity[1]", "vy"),
+    "target_ax_m_s2": ("acceleration[0]",),
+    "target_ay_m_s2": ("acceleration[1]",),
+}
+"""Fields of the target, since PX4 1.14 and before; NaN where PX4 was not given the quantity."""
 _ANGLES: Final = ("roll", "pitch", "yaw")
 _CLOCK: Final = "timestamp"
 _FASTER: Final = "log at 50 Hz or more (SDLOG_PROFILE, high rate)"
 
 
 def read_ulog(path: Path) -> FlightLog:
-    """Read commanded and measured angles, position and velocity; PX4 has the frames of this project.
+    """Read commanded and measured angles, motion and target; PX4 has the frames of this project.
 
     Raises LogError for a file that is no ULog or lacks a topic, and if pyulog is not installed.
     """
@@ -48,6 +58,11 @@ def read_ulog(path: Path) -> FlightLog:
     for signal, field in _MOTION.items():
         if field in motion:
             signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
+    target = topics.get(TRAJECTORY, {})
+    for signal, fields in _TARGET.items():
+        for field in fields:
+            if field in target and np.isfinite(target[field]).any():
+                signals[signal] = _signal(target, target[field], f"{TRAJECTORY}.{field}")
     empty = [signal for signal, each in signals.items() if not len(each.time_s)]
     if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
         raise LogError(tuple(faults))
@@ -66,7 +81,7 @@ def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
         if path.stat().st_size > LARGEST_FILE_BYTES:
             raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
         with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints its errors
-            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION])
+            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY])
     except OSError as error:
         raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
     except Exception as error:  # whatever a damaged file makes of the parser

@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.settings.model import Settings
@@ -15,24 +14,32 @@ from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.errors import LogError
 from mambo_nmpc.sil.identify.columns import KNOWN, Column
 from mambo_nmpc.sil.identify.csv_log import read_csv
-from mambo_nmpc.sil.identify.signals import COMMANDS, DEGREE, THRUST, YAW, FlightLog
+from mambo_nmpc.sil.identify.signals import (
+    COMMANDS,
+    DEGREE,
+    TARGET,
+    TARGET_ACCELERATION,
+    THRUST,
+    YAW,
+    FlightLog,
+)
+from mambo_nmpc.sil.identify.ulog import MOTION, TRAJECTORY, read_ulog
 from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
 
 STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
-TARGET: Final[dict[str, tuple[Column, ...]]] = {
+SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
+    **KNOWN,
     "target_x_m": (Column("target_x_m"), Column("ctrltarget.x")),
     "target_y_m": (Column("target_y_m"), Column("ctrltarget.y", -1.0)),
     "target_vx_m_s": (Column("target_vx_m_s"), Column("ctrltarget.vx")),
     "target_vy_m_s": (Column("target_vy_m_s"), Column("ctrltarget.vy", -1.0)),
-}
-"""Known columns of the target: those of trace.csv, and those of the Crazyflie, whose y has the other sign."""
-SIGNALS: Final = {
-    **KNOWN,
-    **TARGET,
+    "target_ax_m_s2": (Column("target_ax_m_s2"), Column("ctrltarget.ax")),
+    "target_ay_m_s2": (Column("target_ay_m_s2"), Column("ctrltarget.ay", -1.0)),
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
 }
-"""Known columns of each signal; the commands are those of the controller itself."""
+"""Known columns of each signal: those of trace.csv, and of the Crazyflie, whose y has the other sign. The
+commands are those of the controller itself."""
 
 _SAME_PERIOD: Final = 0.1
 """Share by which the period of a log may differ from the update period, and its rows be the updates."""
@@ -58,25 +65,14 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
 
     The controller starts level, without an estimate, as after nmpc_init(). Raises LogError.
     """
-    if len(Design(settings).target) != len(TARGET):
-        raise LogError(
-            (f'{echo(str(path))}: no log has the acceleration that target.acceleration = "given" needs',)
-        )
-    if path.suffix.lower() == ".ulg":
-        raise LogError(
-            (f"{echo(str(path))}: PX4's own controller flew it; replay takes CSV with the columns of yours",)
-        )
-    log = read_csv(path, columns, SIGNALS)
-    if missing := [name for name in (*STATE, *TARGET) if name not in log.signals]:
-        known = ", ".join(column.name for column in SIGNALS[missing[0]])
-        raise LogError(
-            (f"{log.name}: has no column for {missing[0]} ({known}); name it: --columns {missing[0]}=COLUMN",)
-        )
+    is_given = settings.target.acceleration == "given"
+    wanted = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
+    log = _read(path, columns, (*STATE, *wanted))
     time_s, resampled = _updates(log, settings.horizon.update_period_s)
     if len(time_s) < 2:
         raise LogError((f"{log.name}: has no two updates of {settings.horizon.update_period_s:g} s",))
     inputs = _interpolated if resampled else _held
-    state, target = inputs(log, STATE, time_s), inputs(log, tuple(TARGET), time_s)
+    state, target = inputs(log, STATE, time_s), inputs(log, wanted, time_s)
     thrust_m_s2 = (
         _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), GRAVITY_M_S2)
     )
@@ -90,6 +86,31 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         resampled,
         log.remarks,
     )
+
+
+def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...]) -> FlightLog:
+    """Return the log, which has the signals `wanted`; raises LogError."""
+    is_ulog = path.suffix.lower() == ".ulg"
+    if is_ulog and columns:
+        raise LogError((f"{echo(str(path))}: --columns is for CSV files; a ULog needs none",))
+    known = {
+        name: each for name, each in SIGNALS.items() if name in wanted or name not in TARGET_ACCELERATION
+    }
+    log = read_ulog(path) if is_ulog else read_csv(path, columns, known)
+    missing = [name for name in wanted if name not in log.signals]
+    if missing and is_ulog:
+        raise LogError(
+            (
+                f"{log.name}: has no {missing[0]}; log {MOTION} and {TRAJECTORY} (SDLOG_PROFILE, high rate), "
+                "and give PX4 position and velocity of the target",
+            )
+        )
+    if missing:
+        names = ", ".join(column.name for column in SIGNALS[missing[0]])
+        raise LogError(
+            (f"{log.name}: has no column for {missing[0]} ({names}); name it: --columns {missing[0]}=COLUMN",)
+        )
+    return log
 
 
 def _updates(log: FlightLog, period_s: float) -> tuple[FloatArray, bool]:

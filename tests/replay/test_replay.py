@@ -7,9 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.identify.signals import TARGET, TARGET_ACCELERATION
 from tests.support.command import run
+from tests.support.logs import ulog
 
 FLOWN = ("fly", "--duration-s", "4", "--no-pictures")
 
@@ -119,6 +124,59 @@ def test_a_crazyflie_log_is_replayed_without_options(commands: str, tmp_path: Pa
     assert 'aria-label="Roll and pitch command over time' in page
 
 
+def trace_columns() -> dict[str, NDArray[np.float64]]:
+    """Return the columns of the last flight, with the acceleration of its target, the eight."""
+    rows = trace_rows()
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    acceleration = Bernoulli(2.0, 0.5).acceleration(columns["time_s"])
+    return columns | {name: acceleration[:, k] for k, name in enumerate(TARGET_ACCELERATION)}
+
+
+@pytest.mark.parametrize(
+    ("source", "target"), [("mambo", TARGET), ("given.toml", (*TARGET, *TARGET_ACCELERATION))]
+)
+def test_a_ulog_is_replayed(source: str, target: tuple[str, ...]) -> None:
+    """Single precision and a quaternion cost the last digits; an acceleration is read if it is given."""
+    write_given()
+    run(*FLOWN, source, "--wind", "0.3,0.2")
+    Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=False, target=target))
+    summary = replayed("flight.ulg", source)
+    assert (summary["steps"], summary["resampled"]) == (401, False)
+    assert min(summary["explained"]) > 0.9999
+
+
+def test_a_given_acceleration_is_read_from_a_table() -> None:
+    """In the columns that no trace has; without them the log is refused."""
+    write_given()
+    run(*FLOWN, "given.toml")
+    columns = trace_columns()
+    rows = np.stack(list(columns.values()), axis=1).tolist()
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    Path("flight.csv").write_text("\n".join(lines), "utf-8")
+    summary = replayed("flight.csv", "given.toml")
+    assert summary["equal_steps"] == summary["steps"] == 401
+    message = "has no column for target_ax_m_s2 (target_ax_m_s2, ctrltarget.ax); name it"
+    assert message in run("replay", "flight/trace.csv", "given.toml", code=2)[1]
+
+
+def test_a_ulog_without_the_target_is_refused() -> None:
+    """PX4 may be given a position alone; and a ULog has no columns to name."""
+    run(*FLOWN)
+    missing: dict[str, tuple[str, ...]] = {"target_x_m": (), "target_vx_m_s": TARGET[:2]}
+    for name, target in missing.items():
+        message = f"has no {name}; log vehicle_local_position and trajectory_setpoint"
+        Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=True, target=target))
+        assert message in run("replay", "flight.ulg", code=2)[1]
+    assert "a ULog needs none" in run("replay", "flight.ulg", "--columns", "x_m=x", code=2)[1]
+
+
+def write_given() -> None:
+    """Write preset mambo with the target's acceleration given to given.toml."""
+    run("init", "-o", "given.toml")
+    text = Path("given.toml").read_text("utf-8")
+    Path("given.toml").write_text(text.replace('= "tracked"', '= "given"'), "utf-8")
+
+
 def test_a_log_of_another_rate_is_interpolated() -> None:
     """Every second row: the controller runs at its own rate."""
     run(*FLOWN)
@@ -138,11 +196,7 @@ def test_a_log_of_another_rate_is_interpolated() -> None:
             ["short.csv"],
             "short.csv: has no column for target_x_m (target_x_m, ctrltarget.x); name it: --columns",
         ),
-        (["flight.ulg"], "flight.ulg: PX4's own controller flew it; replay takes CSV"),
-        (
-            ["short.csv", "given.toml"],
-            'short.csv: no log has the acceleration that target.acceleration = "given"',
-        ),
+        (["flight.ulg"], "flight.ulg: is no ULog"),
         (["short.csv", "--columns", "targt_x_m=x"], "must begin with target_x_m"),
     ],
 )
@@ -150,9 +204,6 @@ def test_a_log_that_cannot_be_replayed_is_refused(arguments: list[str], message:
     """Exit 2, and nothing is written."""
     (tmp_path / "short.csv").write_text("time_s,roll_command_rad\n0,0\n", "utf-8")
     (tmp_path / "flight.ulg").write_bytes(b"ULog")
-    run("init", "-o", "given.toml")
-    text = (tmp_path / "given.toml").read_text("utf-8")
-    (tmp_path / "given.toml").write_text(text.replace('= "tracked"', '= "given"'), "utf-8")
     before = sorted(tmp_path.iterdir())
     assert message in run("replay", *arguments, code=2)[1]
     assert sorted(tmp_path.iterdir()) == before

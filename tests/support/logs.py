@@ -5,7 +5,7 @@ sines on top. All arrays are (k,) or (k, n) for n flights at once.
 """
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,7 @@ from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
 
 from mambo_nmpc.sil.identify.signals import FlightLog, Signal
+from mambo_nmpc.sil.identify.ulog import TRAJECTORY
 
 Array = NDArray[np.float64]
 
@@ -167,8 +168,11 @@ def crazyflie_columns(columns: Mapping[str, Array]) -> dict[str, Array]:
     return found | {name: factor * columns[key] for key, (name, factor) in names.items()}
 
 
-def ulog(columns: Mapping[str, Array], *, quaternion: bool) -> bytes:
-    """Return a log in PX4's format ULog; `quaternion` is for a set-point without roll_body and pitch_body."""
+def ulog(columns: Mapping[str, Array], *, quaternion: bool, target: Sequence[str] = ()) -> bytes:
+    """Return a log in PX4's format ULog; `quaternion` is for a set-point without roll_body and pitch_body.
+
+    `target` names the columns of position, velocity and acceleration of the target, as far as it has them.
+    """
     setpoint = "float[4] q_d" if quaternion else "float roll_body;float pitch_body"
     formats = {
         "vehicle_attitude_setpoint": f"uint64_t timestamp;{setpoint};",
@@ -184,6 +188,13 @@ def ulog(columns: Mapping[str, Array], *, quaternion: bool) -> bytes:
         _quaternion(roll, pitch, yaw),
         motion,
     ]
+    if target:
+        formats[TRAJECTORY] = "uint64_t timestamp;float[3] position;float[3] velocity;float[3] acceleration;"
+        nothing = np.full_like(roll, np.nan)
+        given = [columns[name] for name in target] + [nothing] * (6 - len(target))
+        topics.append(
+            [each for x, y in zip(given[::2], given[1::2], strict=True) for each in (x, y, nothing)]
+        )
 
     def message(kind: bytes, content: bytes) -> bytes:
         return struct.pack("<Hc", len(content), kind) + content
