@@ -74,7 +74,7 @@ def clamp(values: Real, limit: Any) -> Real:
 
 
 def sign(value: Real) -> Real:
-    """Return -1, 0 or 1 in the type of `value`; 0 for +0 and -0 (departure 14 of docs/paper.md)."""
+    """Return -1, 0 or 1 in the type of `value`; 0 for +0 and -0 (departure 14, docs/explanation/paper.md)."""
     scalar = value.dtype.type
     signs: Real = np.where(value > 0, scalar(1), np.where(value < 0, scalar(-1), scalar(0)))
     return signs

@@ -1,8 +1,8 @@
 """The paper in NumPy: eqs 8-12 and RPROP for one drone, written to be read, with the paper's symbols.
 
-What the paper leaves open, or prints in a way that does not fly, is decided in `docs/paper.md`; "(3)" is
-departure 3 there. The generated C computes the same up to rounding, in fewer operations, as `docs/kernel.md`
-derives.
+What the paper leaves open, or prints in a way that does not fly, is decided in `docs/explanation/paper.md`;
+"(3)" is departure 3 there. The generated C computes the same up to rounding, in fewer operations, as
+`docs/explanation/kernel.md` derives.
 """
 
 from dataclasses import dataclass

@@ -13,7 +13,8 @@
  *   nmpc_tracker.h    an estimate of the target's acceleration,
  *   nmpc_optimizer.h  along each axis of the heading.
  *
- * The documentation of mambo-nmpc, docs/kernel.md, derives the method and measures what each part is worth.
+ * The documentation of mambo-nmpc, docs/explanation/kernel.md, derives the method and measures what each part is
+ * worth.
  *
  * Frame: world, north-east-down; thrust acts along minus z of the body; attitude in 3-2-1 Euler angles.
  * Memory: one nmpc_t, owned by the caller. No heap, no globals, no recursion; every loop has a constant bound. Of

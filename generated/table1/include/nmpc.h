@@ -8,7 +8,7 @@
  * symbols cited in this library are the paper's.
  *
  * Departures from the paper, and choices where it is silent, with these settings (measured in the
- * documentation of mambo-nmpc, docs/paper.md):
+ * documentation of mambo-nmpc, docs/explanation/paper.md):
  *   eq 8       both sin psi have the opposite sign, as eqs 3 and 6 give it.
  *   eq 8       u_1/m is an argument of nmpc_step(); it and psi are constant over the horizon.
  *   eq 9       tau^2/2, the double integral of the acceleration, where tau/2 is printed.
