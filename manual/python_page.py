@@ -1,0 +1,20 @@
+"""The page of the Python API: the docstrings of the public names of `mambo_nmpc`."""
+
+from typing import Final
+
+import mambo_nmpc
+
+INTRODUCTION: Final = """\
+# Python API
+
+All public names of `mambo_nmpc`; [From Python](python.md) shows them at work. The arrays have the drones
+along the first axis. `mambo_nmpc.codegen` and `mambo_nmpc.sil` are importable too, but may change with any
+version.
+"""
+
+
+def python_page() -> str:
+    """Return the page: for mkdocstrings the place of each public name, in the folders of the repository."""
+    homes = {name: getattr(mambo_nmpc, name).__module__ for name in mambo_nmpc.__all__}
+    blocks = [f"::: {home.removeprefix('mambo_nmpc.')}.{name}\n" for name, home in homes.items()]
+    return "\n".join([INTRODUCTION, *blocks])

@@ -1,0 +1,93 @@
+"""The pages of controller.toml and vehicle.toml, from the models that check those files."""
+
+from collections.abc import Iterable
+from typing import Final
+
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key, spell
+from mambo_nmpc.codegen.settings.methods import is_used
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.vehicles.model import form
+from manual.tables import code, plain, table
+
+UNITS: Final = {"_m_s2": "m/s^2", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_m": "m", "_s": "s"}
+"""The unit that the end of a setting's name stands for; the first end that fits counts."""
+
+CONTROLLER: Final = """\
+# Settings: controller.toml
+
+`mambo-nmpc init` writes such a file with the explanation of every key. A missing key has its default, which
+is preset `table1`; an unknown key, a value out of range, and a value that would have no effect are refused
+with the rule and the fix. `mambo-nmpc schema` prints the JSON schema, with which editors check and complete
+the file.
+
+The method is `cost.norm`. A key that only one method uses says so.
+"""
+
+VEHICLE: Final = """\
+# Drones: vehicle.toml
+
+`mambo-nmpc vehicles generic` prints such a file, with the source of every value; [Vehicles](vehicles.md)
+explains what the sections do, and has a short example. The unit is in the name of a key, in SI. `mambo-nmpc
+vehicles --schema` prints the JSON schema, with which editors check and complete the file.
+"""
+
+
+def controller_page() -> str:
+    """Return the page of controller.toml: a table for each section."""
+    quadratic, one_norm = presets.preset("mambo"), presets.preset("mambo-1norm")
+    defaults = Settings().model_dump()
+    parts = [CONTROLLER]
+    for section, description in SECTIONS.items():
+        rows = []
+        for key in (key for key in KEYS.values() if key.path.startswith(f"{section}.")):
+            name = key.path.removeprefix(f"{section}.")
+            by_quadratic, by_one_norm = (
+                is_used(settings, section, name) for settings in (quadratic, one_norm)
+            )
+            only = (
+                ""
+                if by_quadratic and by_one_norm
+                else f"{'Quadratic cost' if by_quadratic else '1-norm'} only. "
+            )
+            preset = spell(quadratic.model_dump()[section][name]) if by_quadratic else ""
+            value = spell(defaults[section][name])
+            meaning = only + plain(key.description)
+            rows.append([code(name), _unit(key), _domain(key), code(value), code(preset), meaning])
+        head = ["key", "unit", "allowed", "default", "preset `mambo`", "meaning"]
+        parts += [f"\n## [{section}]\n", plain(description) + "\n", table(head, rows)]
+    return "\n".join(parts) + "\n"
+
+
+def vehicle_page() -> str:
+    """Return the page of vehicle.toml: a table for each section, and for each of its kinds."""
+    parts = [VEHICLE]
+    shown: set[str] = set()
+    for attitude, sensors in (("cascade", "mambo"), ("first_order", "mocap"), ("mambo", "none")):
+        found = form(attitude, sensors)
+        kinds = {"attitude": attitude, "sensors": sensors}
+        for section, description in found.sections.items():
+            kind = kinds.get(section.partition(".")[0])
+            title = f"[{section}]" + (f", kind {kind}" if kind else "")
+            keys = [key for key in found.keys.values() if key.path.rpartition(".")[0] == section]
+            if title not in shown and keys:
+                shown.add(title)
+                parts += [f"\n## {title}\n", plain(description) + "\n", _vehicle_table(section, keys)]
+    return "\n".join(parts) + "\n"
+
+
+def _vehicle_table(section: str, keys: Iterable[Key]) -> str:
+    rows = []
+    for key in keys:
+        name = key.path.removeprefix(f"{section}.")
+        rows.append([code(name), _domain(key), plain(key.description or "")])
+    return table(["key", "allowed", "meaning"], rows)
+
+
+def _domain(key: Key) -> str:
+    return plain(f"{key.kind} {key.domain}" if key.kind == "whole number" else key.domain)
+
+
+def _unit(key: Key) -> str:
+    """Return the unit in the name of a setting, or nothing."""
+    return next((unit for end, unit in UNITS.items() if key.path.endswith(end) and key.low is not None), "")
