@@ -74,7 +74,7 @@ generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1
 
 docs: $(SETUP_DOCS)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	@echo "the manual: build/docs/index.html"
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)

@@ -1,6 +1,6 @@
 """The parameters that vary from flight to flight: domain, and distribution in the default campaign.
 
-docs/evidence/campaign.md gives the sources of the default ranges.
+docs/reference/campaign-toml.md gives the sources of the default ranges.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Derive the settings of a controller with a quadratic cost from a drone, with a reason for each.
 
-Thresholds and factors are measured: docs/how-to/design.md.
+Thresholds and factors are measured: docs/explanation/design.md.
 """
 
 import math

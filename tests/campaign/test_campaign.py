@@ -414,14 +414,14 @@ def test_statistics_are_reproducible() -> None:
 
 
 def test_every_parameter_is_documented() -> None:
-    """docs/evidence/campaign.md names every parameter."""
-    text = (ROOT / "docs" / "evidence" / "campaign.md").read_text("utf-8")
+    """docs/reference/campaign-toml.md names every parameter."""
+    text = (ROOT / "docs" / "reference" / "campaign-toml.md").read_text("utf-8")
     missing = [name for name in PARAMETERS if f"`{name}`" not in text]
     assert missing == []
 
 
 def documented(text: str) -> tuple[str, list[float]]:
-    """Return kind and numbers of a distribution as docs/evidence/campaign.md writes it."""
+    """Return kind and numbers of a distribution as docs/reference/campaign-toml.md writes it."""
     numbers = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text.partition(" tick")[0])]
     match text.partition(" ")[0].rstrip(","):
         case "uniform":
@@ -435,8 +435,8 @@ def documented(text: str) -> tuple[str, list[float]]:
 
 
 def test_the_documented_defaults_are_those_of_the_default_campaign() -> None:
-    """Each row of [draws] in docs/evidence/campaign.md has kind and numbers of its parameters, in order."""
-    text = (ROOT / "docs" / "evidence" / "campaign.md").read_text("utf-8")
+    """Each row of [draws] in docs/reference/campaign-toml.md has kind and numbers of its parameters."""
+    text = (ROOT / "docs" / "reference" / "campaign-toml.md").read_text("utf-8")
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]+) \| [^|]*\|$", text, re.MULTILINE)
     table = {name: documented(words) for names, words in rows for name in re.findall(r"\w+", names)}
     known = {name: found for name, found in table.items() if name in PARAMETERS}

@@ -52,7 +52,7 @@ def test_a_log_gives_settings_with_two_commands() -> None:
 def test_tune_starts_from_it() -> None:
     """The tune.toml in docs/how-to/design.md holds the values that are derived for its drone."""
     text = (Path(__file__).parents[2] / "docs" / "how-to" / "design.md").read_text("utf-8")
-    Path("tune.toml").write_text(text.split("```toml\n")[1].split("```")[0], "utf-8")
+    Path("tune.toml").write_text(text.split('```toml title="tune.toml"\n')[1].split("```")[0], "utf-8")
     run("design", "crazyflie-flown")
     tuning = read(Path("tune.toml"))
     assert tuning.base == load("controller.toml")

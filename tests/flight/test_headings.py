@@ -17,7 +17,7 @@ model = { roll_lag_s = 0.3037, pitch_lag_s = 0.05266 }
 cost.effort_weight = 2027.0
 optimizer = { iterations = 4, initial_step_rad = 0.01142, warm_start = "plan" }
 """
-"""Settings that fly the figure at heading 0, and away from it at others (docs/how-to/tuning.md)."""
+"""Settings that fly the figure at heading 0, and away from it at others (docs/evidence/tuning.md)."""
 
 
 def largest_errors_m(settings: Settings, headings: int) -> np.ndarray:

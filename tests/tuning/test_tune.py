@@ -285,8 +285,8 @@ def test_no_trial_of_the_default_study_costs_more_than_its_base(tmp_path: Path) 
 
 
 def test_the_documented_study_is_the_default_one(tmp_path: Path) -> None:
-    """The tune.toml in docs/how-to/tuning.md equals the default study."""
-    text = (Path(__file__).parents[2] / "docs" / "how-to" / "tuning.md").read_text("utf-8")
+    """The tune.toml in docs/reference/tune-toml.md equals the default study."""
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "tune-toml.md").read_text("utf-8")
     path = tmp_path / "tune.toml"
     path.write_text(text.split("```toml\n")[1].split("```")[0])
     assert file.read(path) == file.default()

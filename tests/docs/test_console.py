@@ -1,0 +1,68 @@
+"""The tutorials and how-tos, typed in as they stand."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.console import Command, faults, fits, read
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted([*DOCS.glob("tutorials/*.md"), *DOCS.glob("how-to/*.md")])
+RUN = [page for page in PAGES if read(page).steps]
+NAMES = [str(page.relative_to(DOCS)) for page in RUN]
+LONG = {
+    *(f"tutorials/{name}.md" for name in ("crazyflie", "first-flight", "own-drone", "paper")),
+    *(f"how-to/{name}.md" for name in ("campaign", "design", "regress", "report", "tune", "verify")),
+}
+"""Pages whose commands take more than three seconds of an idle core."""
+NOT_RUN = {
+    "how-to/arduino.md": ("needs arduino-cli",),
+    "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
+    "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
+    "how-to/espidf.md": ("needs ESP-IDF",),
+    "how-to/identify.md": ("needs a Crazyflie",),
+    "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
+    "how-to/measure.md": ("needs a board, or QEMU with its firmware",),
+    "how-to/pil.md": ("needs a board; tests of their own fly it in QEMU",),
+    "how-to/platformio.md": ("needs PlatformIO",),
+    "how-to/replay.md": ("needs the log of a Crazyflie",),
+    "how-to/tune.md": ("it installs",),
+    "how-to/verify.md": ("takes minutes; tests of their own run every check",),
+    "tutorials/crazyflie.md": (
+        "needs a Crazyflie",
+        "needs the firmware of Bitcraze, and a Crazyflie",
+        "needs a Crazyflie",
+        "needs the log of a Crazyflie",
+    ),
+    "tutorials/first-flight.md": ("it makes the environment in which they run",),
+}
+"""The console blocks that are not run, by page: the reason, which is in the title of the block."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in NAMES]
+)
+def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: Path) -> None:
+    """In an empty folder, in order, with the files that the page says to save."""
+    found = faults(read(DOCS / name), tmp_path)
+    assert not found, "\n\n".join(found)
+
+
+def test_only_what_needs_hardware_or_much_time_is_not_run() -> None:
+    """All others are."""
+    reasons = {str(page.relative_to(DOCS)): read(page).not_run for page in PAGES}
+    assert {name: found for name, found in reasons.items() if found} == NOT_RUN
+
+
+def test_a_wrong_line_of_output_is_found(tmp_path: Path) -> None:
+    """And a command that fails; `...` stands for text that may differ."""
+    page = tmp_path / "page.md"
+    page.write_text(
+        '```text title="a.txt"\none\ntwo\n```\n\n```console\n$ cat a.txt\none\n2\n$ cat a.txt\n...\ntwo\n'
+        "$ cat b.txt\n$ false\n$ echo $?\n1\n```\n"
+    )
+    found = faults(read(page), tmp_path)
+    assert [fault.partition(":")[0] for fault in found] == ["line 7", "line 13"]
+    assert read(page).steps[1] == Command(7, "cat a.txt", ("one", "2"))
+    assert fits(("a ... c", "..."), "a b c")
+    assert not fits(("a ... c",), "a b c\nd")

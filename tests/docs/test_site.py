@@ -1,0 +1,64 @@
+"""The site that MkDocs builds from docs/ and from the code."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.tools import require_module
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the built manual; a link, an anchor or a page out of the navigation would have failed it."""
+    require_module("mkdocs")
+    require_module("material")
+    require_module("mkdocstrings")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.long
+def test_it_has_the_pages_that_the_code_writes(site: Path) -> None:
+    """Every setting, command and public name is in the reference."""
+    from mambo_nmpc import __all__ as names  # noqa: PLC0415 - beside what they are compared with
+    from mambo_nmpc.codegen.settings.keys import KEYS  # noqa: PLC0415
+
+    settings = (site / "reference" / "settings.html").read_text("utf-8")
+    assert [path for path in KEYS if f"<code>{path.split('.')[1]}</code>" not in settings] == []
+    commands = (site / "reference" / "command-line.html").read_text("utf-8")
+    assert re.findall(r'<h2 id="([\w-]+)"', commands)[:5] == ["init", "presets", "schema", "generate", "fly"]
+    python = (site / "reference" / "python-api.html").read_text("utf-8")
+    assert [name for name in names if f'.{name}"' not in python] == []
+
+
+@pytest.mark.long
+def test_it_loads_nothing_from_a_network(site: Path) -> None:
+    """No script, style, font or picture of another host."""
+    for page in site.rglob("*.html"):
+        text = page.read_text("utf-8")
+        assert not re.findall(r'<(?:script|img|iframe)[^>]*src="(?:https?:)?//', text), page
+        assert not re.findall(
+            r'<link[^>]*rel="(?:stylesheet|preconnect|icon)"[^>]*href="(?:https?:)?//', text
+        )
+
+
+def test_links_of_the_readme_lead_somewhere() -> None:
+    """README, CONTRIBUTING and SECURITY name files that are there, and headings that they have."""
+    for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md"):
+        for link in re.findall(r"\]\(([^)\s]+)\)", (ROOT / name).read_text("utf-8")):
+            path, _, anchor = link.partition("#")
+            if "://" in link:
+                continue
+            assert (ROOT / path).exists(), f"{name}: {link}"
+            if anchor:
+                titles = re.findall(r"^#+ (.*)$", (ROOT / (path or name)).read_text("utf-8"), re.MULTILINE)
+                slugs = {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+                assert anchor in slugs, f"{name}: {link}"
