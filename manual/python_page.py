@@ -4,6 +4,9 @@ from typing import Final
 
 import mambo_nmpc
 
+MEMBERS: Final = {"Vehicle": ["from_preset", "from_file"]}
+"""What is public of a class that has more than a program should use."""
+
 INTRODUCTION: Final = """\
 # Python API
 
@@ -16,5 +19,9 @@ version.
 def python_page() -> str:
     """Return the page: for mkdocstrings the place of each public name, in the folders of the repository."""
     homes = {name: getattr(mambo_nmpc, name).__module__ for name in mambo_nmpc.__all__}
-    blocks = [f"::: {home.removeprefix('mambo_nmpc.')}.{name}\n" for name, home in homes.items()]
+    blocks = [
+        f"::: {home.removeprefix('mambo_nmpc.')}.{name}\n"
+        + (f"    options:\n      members: {MEMBERS[name]}\n" if name in MEMBERS else "")
+        for name, home in homes.items()
+    ]
     return "\n".join([INTRODUCTION, *blocks])

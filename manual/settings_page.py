@@ -53,8 +53,10 @@ def controller_page() -> str:
             preset = spell(quadratic.model_dump()[section][name]) if by_quadratic else ""
             value = spell(defaults[section][name])
             meaning = only + plain(key.description)
-            rows.append([code(name), _unit(key), _domain(key), code(value), code(preset), meaning])
-        head = ["key", "unit", "allowed", "default", "preset `mambo`", "meaning"]
+            rows.append(
+                [code(name), f"{_domain(key)} {_unit(key)}".strip(), code(value), code(preset), meaning]
+            )
+        head = ["key", "allowed", "default", "preset `mambo`", "meaning"]
         parts += [f"\n## [{section}]\n", plain(description) + "\n", table(head, rows)]
     return "\n".join(parts) + "\n"
 
