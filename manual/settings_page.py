@@ -21,7 +21,7 @@ is preset `table1`; an unknown key, a value out of range, and a value that would
 with the rule and the fix. `mambo-nmpc schema` prints the JSON schema, with which editors check and complete
 the file.
 
-The method is `cost.norm`. A key that only one method uses says so.
+The method is `cost.norm`. A key that only one method uses says so. The last column is preset `mambo`.
 """
 
 VEHICLE: Final = """\
@@ -35,30 +35,28 @@ vehicles --schema` prints the JSON schema, with which editors check and complete
 
 def controller_page() -> str:
     """Return the page of controller.toml: a table for each section."""
-    quadratic, one_norm = presets.preset("mambo"), presets.preset("mambo-1norm")
-    defaults = Settings().model_dump()
     parts = [CONTROLLER]
     for section, description in SECTIONS.items():
-        rows = []
-        for key in (key for key in KEYS.values() if key.path.startswith(f"{section}.")):
-            name = key.path.removeprefix(f"{section}.")
-            by_quadratic, by_one_norm = (
-                is_used(settings, section, name) for settings in (quadratic, one_norm)
-            )
-            only = (
-                ""
-                if by_quadratic and by_one_norm
-                else f"{'Quadratic cost' if by_quadratic else '1-norm'} only. "
-            )
-            preset = spell(quadratic.model_dump()[section][name]) if by_quadratic else ""
-            value = spell(defaults[section][name])
-            meaning = only + plain(key.description)
-            rows.append(
-                [code(name), f"{_domain(key)} {_unit(key)}".strip(), code(value), code(preset), meaning]
-            )
-        head = ["key", "allowed", "default", "preset `mambo`", "meaning"]
+        rows = [_row(section, key) for path, key in KEYS.items() if path.startswith(f"{section}.")]
+        head = ["key", "meaning", "allowed", "default", "`mambo`"]
         parts += [f"\n## [{section}]\n", plain(description) + "\n", table(head, rows)]
     return "\n".join(parts) + "\n"
+
+
+def _row(section: str, key: Key) -> list[str]:
+    """Return the cells of a setting; the last is empty where preset mambo does not use it."""
+    quadratic, one_norm = presets.preset("mambo"), presets.preset("mambo-1norm")
+    name = key.path.removeprefix(f"{section}.")
+    meaning = plain(key.description)
+    if not is_used(one_norm, section, name):
+        meaning = f"Quadratic cost only. {meaning}"
+    value = ""
+    if is_used(quadratic, section, name):
+        value = spell(getattr(getattr(quadratic, section), name))
+    else:
+        meaning = f"1-norm only. {meaning}"
+    default = spell(getattr(getattr(Settings(), section), name))
+    return [code(name), meaning, f"{_domain(key)} {_unit(key)}".strip(), code(default), code(value)]
 
 
 def vehicle_page() -> str:
@@ -82,8 +80,8 @@ def _vehicle_table(section: str, keys: Iterable[Key]) -> str:
     rows = []
     for key in keys:
         name = key.path.removeprefix(f"{section}.")
-        rows.append([code(name), _domain(key), plain(key.description or "")])
-    return table(["key", "allowed", "meaning"], rows)
+        rows.append([code(name), plain(key.description or ""), _domain(key)])
+    return table(["key", "meaning", "allowed"], rows)
 
 
 def _domain(key: Key) -> str:
