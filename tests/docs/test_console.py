@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.console import Command, faults, fits, read
+from tests.support.tools import require, require_module
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted([*DOCS.glob("tutorials/*.md"), *DOCS.glob("how-to/*.md")])
@@ -15,6 +16,15 @@ LONG = {
     *(f"how-to/{name}.md" for name in ("campaign", "design", "regress", "report", "tune", "verify")),
 }
 """Pages whose commands take more than three seconds of an idle core."""
+ARM = ("arm-none-eabi-gcc", "gcc-arm-none-eabi")
+TOOLS = {
+    "how-to/footprint.md": [ARM],
+    "how-to/pil.md": [ARM],
+    "how-to/verify.md": [("cppcheck", "cppcheck"), ("clang", "clang"), ("g++", "g++")],
+    "tutorials/crazyflie.md": [ARM],
+    "tutorials/own-drone.md": [ARM],
+}
+"""What the commands of a page need besides bash, make and a C compiler: tool and Debian package."""
 NOT_RUN = {
     "how-to/arduino.md": ("needs arduino-cli",),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
@@ -44,6 +54,10 @@ NOT_RUN = {
 )
 def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: Path) -> None:
     """In an empty folder, in order, with the files that the page says to save."""
+    for tool, package in [("bash", "bash"), ("cc", "gcc"), ("make", "make"), *TOOLS.get(name, [])]:
+        require(tool, package)
+    if name in {"how-to/design.md", "how-to/tune.md"}:
+        require_module("optuna")
     found = faults(read(DOCS / name), tmp_path)
     assert not found, "\n\n".join(found)
 
