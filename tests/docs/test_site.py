@@ -51,8 +51,8 @@ def test_it_loads_nothing_from_a_network(site: Path) -> None:
 
 
 def test_links_of_the_readme_lead_somewhere() -> None:
-    """README, CONTRIBUTING and SECURITY name files that are there, and headings that they have."""
-    for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md"):
+    """README and its neighbours name files that are there, and headings that they have."""
+    for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "SECURITY.md"):
         for link in re.findall(r"\]\(([^)\s]+)\)", (ROOT / name).read_text("utf-8")):
             path, _, anchor = link.partition("#")
             if "://" in link:
