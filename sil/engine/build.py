@@ -18,6 +18,7 @@ HEADERS: Final = (
     "elementary.h",
     "engine.h",
     "first_order.h",
+    "loop.h",
     "mocap.h",
     "records.h",
     "rigid_body.h",

@@ -3,10 +3,7 @@
  * The closed loop: sil/flight/loop.py for one flight.
  */
 #include "cascade.h"
-#include "first_order.h"
-#include "mocap.h"
-#include "sensors.h"
-#include "world.h"
+#include "loop.h"
 
 /* A number of the trace: all NaN are one, whatever the processor makes of them. */
 static inline double number(double value)
@@ -77,19 +74,24 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
     }
 }
 
-void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
-                const double *times_s, const double *targets, const engine_draws_t *draws,
-                engine_controller_t controller, void *self, const engine_trace_t *trace)
+void engine_start_sensors(const engine_simulation_t *simulation, flying_t *flying)
 {
+    const rotation_t r = rotation(flying->state.body + EULER);
+    const seen_t start = truth(&flying->state, &r);
+
+    if (simulation->captured) {
+        mocap_start(simulation, &start, &flying->mocap);
+    } else {
+        suite_start(simulation, &start, &r, &flying->suite);
+    }
+}
+
+void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
+                  flying_t *flying)
+{
+    const late_t late = { { { 0.0, 0.0 } } };
+    const wire_t wire = { { { 0.0, 0.0 } } };
     vehicle_state_t state;
-    suite_t suite;
-    mocap_t mocap;
-    late_t late = { { { 0.0, 0.0 } } };
-    gusts_t gusts = { 0.0, 0.0, 0.0 };
-    wire_t wire = { { { 0.0, 0.0 } } };
-    double command_rad[2] = { 0.0, 0.0 };
-    int64_t ticks = 0;
-    int64_t update;
     int i;
 
     for (i = 0; i < STATE_ROWS; i++) {
@@ -101,76 +103,94 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
     for (i = 0; i < 9; i++) {
         state.memory[i] = 0.0;
     }
+    flying->state = state;
     if (simulation->sensed) {
-        const rotation_t r = rotation(state.body + EULER);
-        const seen_t start = truth(&state, &r);
-
-        if (simulation->captured) {
-            mocap_start(simulation, &start, &mocap);
-        } else {
-            suite_start(simulation, &start, &r, &suite);
-        }
+        engine_start_sensors(simulation, flying);
     }
     if (simulation->windy) {
-        gusts = gusts_start(draws->gusts);
+        flying->gusts = gusts_start(draws->gusts);
     }
+    flying->late = late;
+    flying->wire = wire;
+    flying->command_rad[0] = 0.0;
+    flying->command_rad[1] = 0.0;
+    flying->ticks = 0;
+}
 
-    for (update = 0; update < simulation->updates; update++) {
-        const double heading_rad = flight->yaw_rad + (flight->yaw_rate_rad_s * maximum(times_s[update], 0.0));
-        int64_t tick;
+void engine_update(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index, int64_t update,
+                   const double *times_s, const double *targets, const engine_draws_t *draws,
+                   engine_controller_t controller, void *self, flying_t *flying, const engine_trace_t *trace)
+{
+    const double heading_rad = flight->yaw_rad + (flight->yaw_rate_rad_s * maximum(times_s[update], 0.0));
+    vehicle_state_t *state = &flying->state;
+    int64_t tick;
 
-        mark_lost(simulation, &state);
-        for (tick = 0; tick < simulation->ticks_per_update; tick++) {
-            const rotation_t r = rotation(state.body + EULER);
-            const int64_t now = simulation->first_tick + ticks;
-            surroundings_t around = { flight->mass_kg, { 0.0, 0.0 } };
-            double thrust_share = 1.0;
-            double thrust_n;
-            double shares[4];
-            double steady_rad_s[4];
-            double arriving_rad[2];
-            seen_t truth_now;
-            seen_t seen;
+    mark_lost(simulation, state);
+    for (tick = 0; tick < simulation->ticks_per_update; tick++) {
+        const rotation_t r = rotation(state->body + EULER);
+        const int64_t ticks = flying->ticks;
+        const int64_t now = simulation->first_tick + ticks;
+        const int64_t row = (update * simulation->ticks_per_update) + tick;
+        surroundings_t around = { flight->mass_kg, { 0.0, 0.0 } };
+        double thrust_share = 1.0;
+        double thrust_n;
+        double shares[4];
+        double steady_rad_s[4];
+        double arriving_rad[2];
+        seen_t truth_now;
+        seen_t seen;
 
-            if (simulation->disturbed) {
-                const double payload_kg = (flight->payload_tick <= now) ? flight->payload_kg : 0.0;
+        if (simulation->disturbed) {
+            const double payload_kg = (flight->payload_tick <= now) ? flight->payload_kg : 0.0;
 
-                if (flight->push_tick == now) {
-                    push(flight, payload_kg, &r, &state);
-                }
-                thrust_share = maximum(1.0 - (flight->battery_sag_1_s * (simulation->step_s * (double)ticks)), 0.0);
-                around.mass_kg = flight->mass_kg + payload_kg;
-                if (simulation->windy) {
-                    blow(simulation, flight, draws->gusts + (3 * (ticks + 1)), &gusts, around.air_m_s);
-                }
+            if (flight->push_tick == now) {
+                push(flight, payload_kg, &r, state);
             }
-            truth_now = truth(&state, &r);
-            seen = truth_now;
-            if (simulation->captured) {
-                seen = capture(simulation, flight, &truth_now, draws->sensors + (6 * ticks), &mocap);
-            } else if (simulation->sensed) {
-                seen = estimate(simulation, flight, &truth_now, &r, draws->sensors + (8 * ticks), &suite);
+            thrust_share = maximum(1.0 - (flight->battery_sag_1_s * (simulation->step_s * (double)ticks)), 0.0);
+            around.mass_kg = flight->mass_kg + payload_kg;
+            if (simulation->windy) {
+                blow(simulation, flight, draws->gusts + (3 * (row + 1)), &flying->gusts, around.air_m_s);
             }
-            thrust_n = (update < simulation->lifting_updates) ? simulation->take_off_thrust_n
-                                                              : altitude_thrust_n(simulation, &seen);
-            if (tick == 0) {
-                call(simulation, flight, index, update, targets, draws, controller, self, &truth_now, &seen,
-                     thrust_n, command_rad, trace);
-            }
-            carry(flight, ticks, command_rad, &wire, arriving_rad);
-            if (simulation->attitude == FIRST_ORDER) {
-                advance(simulation, flight, &around, thrust_share, thrust_n, heading_rad, ticks, arriving_rad, &r,
-                        &late, state.body);
-            } else {
-                if (simulation->attitude == CASCADE) {
-                    cascade_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state.memory, shares);
-                } else {
-                    stock_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state.memory, shares);
-                }
-                commanded_speeds(simulation, shares, steady_rad_s);
-                integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, &state);
-            }
-            ticks++;
         }
+        truth_now = truth(state, &r);
+        seen = truth_now;
+        if (simulation->captured) {
+            seen = capture(simulation, flight, &truth_now, draws->sensors + (6 * row), &flying->mocap);
+        } else if (simulation->sensed) {
+            seen = estimate(simulation, flight, &truth_now, &r, draws->sensors + (8 * row), &flying->suite);
+        }
+        thrust_n = (update < simulation->lifting_updates) ? simulation->take_off_thrust_n
+                                                          : altitude_thrust_n(simulation, &seen);
+        if (tick == 0) {
+            call(simulation, flight, index, update, targets, draws, controller, self, &truth_now, &seen,
+                 thrust_n, flying->command_rad, trace);
+        }
+        carry(flight, ticks, flying->command_rad, &flying->wire, arriving_rad);
+        if (simulation->attitude == FIRST_ORDER) {
+            advance(simulation, flight, &around, thrust_share, thrust_n, heading_rad, ticks, arriving_rad, &r,
+                    &flying->late, state->body);
+        } else {
+            if (simulation->attitude == CASCADE) {
+                cascade_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state->memory, shares);
+            } else {
+                stock_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state->memory, shares);
+            }
+            commanded_speeds(simulation, shares, steady_rad_s);
+            integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, state);
+        }
+        flying->ticks = ticks + 1;
+    }
+}
+
+void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
+                const double *times_s, const double *targets, const engine_draws_t *draws,
+                engine_controller_t controller, void *self, const engine_trace_t *trace)
+{
+    flying_t flying;
+    int64_t update;
+
+    engine_begin(simulation, flight, draws, &flying);
+    for (update = 0; update < simulation->updates; update++) {
+        engine_update(simulation, flight, index, update, times_s, targets, draws, controller, self, &flying, trace);
     }
 }

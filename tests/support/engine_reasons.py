@@ -43,12 +43,8 @@ REASONS: Final[Mapping[Key, str]] = {
         "< -> <=",
     ): "a random number that equals the share",
     **{
-        ("loop.c", "gusts_t gusts = { <real>, <real>, <real> };", change): "read only in wind, which sets it"
-        for change in ("zero -> one", "zero -> one #1", "zero -> one #2")
-    },
-    **{
         ("loop.c", f"{line} = {{ {{ {{ <real>, <real> }} }} }};", change): "the first command replaces it"
-        for line in ("wire_t wire", "late_t late")
+        for line in ("const wire_t wire", "const late_t late")
         for change in ("zero -> one", "zero -> one #1")
     },
     **{
