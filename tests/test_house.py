@@ -36,6 +36,7 @@ WINGS = [
     "replay",
     "derivation",
     "diff",
+    "playground",
     "api",
     "report",
     "cli",

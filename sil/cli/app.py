@@ -20,6 +20,7 @@ from mambo_nmpc.sil.cli.footprint import footprint
 from mambo_nmpc.sil.cli.identify import identify
 from mambo_nmpc.sil.cli.identify_binary import identify_binary
 from mambo_nmpc.sil.cli.options import FlyOptions, command_of
+from mambo_nmpc.sil.cli.playground import playground
 from mambo_nmpc.sil.cli.regress import regress
 from mambo_nmpc.sil.cli.replay_log import replay
 from mambo_nmpc.sil.cli.report import report
@@ -48,6 +49,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
     "replay": replay,
     "diff": diff,
     "identify-binary": identify_binary,
+    "playground": playground,
     "report": report,
 }
 """Commands by name, in the order of the help."""
@@ -108,6 +110,8 @@ mambo-nmpc diff mambo controller.toml
 mambo-nmpc diff controller-old controller-new --vehicle crazyflie -o diff
 mambo-nmpc identify-binary firmware.elf
 mambo-nmpc identify-binary firmware.hex controller.toml controller-old
+mambo-nmpc playground -o play.html
+mambo-nmpc playground pd controller.toml --vehicle crazyflie -o mine.html
 mambo-nmpc report flight
 mambo-nmpc report table2 footprint faults verification -o controller.html
 """

@@ -32,8 +32,6 @@ from mambo_nmpc.sil.sensors.mocap import MotionCapture
 DELAY_TICKS_MAX: Final = 200
 """Longest delay of a command that the engine can hold."""
 
-_PD: Final = ffi.new("engine_pd_t *", (POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M))
-
 EngineController = CompiledController | PdController | PdFeedForwardController
 """Controllers whose step is a C function."""
 
@@ -122,13 +120,20 @@ class _Buffers:
         return self._record
 
 
+def pd_function(controller: PdController | PdFeedForwardController) -> tuple[str, Any]:
+    """Return the name of the engine's function that is the step of a PD, and its record of constants."""
+    if isinstance(controller, PdController):
+        constants = POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M
+        return "engine_pd_step", ffi.new("engine_pd_t *", constants)
+    constants = (*astuple(controller.gains), TILT_LIMIT_RAD)
+    return "engine_pd_feedforward_step", ffi.new("engine_pd_feedforward_t *", constants)
+
+
 def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
     """Return the function of a step, the instances, which the caller keeps, and the bytes of each."""
-    if isinstance(controller, PdController):
-        return engine.engine_pd_step, _PD, 0
-    if isinstance(controller, PdFeedForwardController):
-        gains = ffi.new("engine_pd_feedforward_t *", (*astuple(controller.gains), TILT_LIMIT_RAD))
-        return engine.engine_pd_feedforward_step, gains, 0
+    if not isinstance(controller, CompiledController):
+        name, constants = pd_function(controller)
+        return getattr(engine, name), constants, 0
     step, instances, stride = controller.native
     return _cast("engine_controller_t", step), _cast("char *", instances), stride
 

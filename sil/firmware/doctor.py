@@ -90,6 +90,7 @@ def _needs() -> list[Finding]:
         _need("analyser", "g++", "verify: warnings as C++", "g++"),
         _need("analyser", LIBFUZZER, "verify: fuzzing", "clang", "libclang-rt-14-dev"),
         _need("analyser", "gcov", "make test: which lines of the C run", "gcc"),
+        _need("builder", "wasm-ld", "playground, with clang: links WebAssembly", "lld"),
         _need("builder", "cmake", "make test: build of a bundle with CMake", "cmake"),
     ]
 

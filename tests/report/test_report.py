@@ -401,7 +401,7 @@ def test_colours_are_told_from_the_paper_by_weak_eyes_too() -> None:
     assert len(palettes) == 3
     for palette in palettes:
         colours = dict(re.findall(r"--(\w+): (#\w{6})", palette))
-        for name in ("ink", "quiet", "flown", "other", "good", "bad", "open", "target"):
+        for name in ("ink", "quiet", "flown", "other", "good", "bad", "open", "fourth", "target"):
             low, high = sorted((luminance(colours[name]), luminance(colours["paper"])))
             assert (high + 0.05) / (low + 0.05) >= (3.0 if name == "target" else 4.5), (name, palette)
 

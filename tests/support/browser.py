@@ -15,16 +15,21 @@ _FIRST_HIGH_DESCRIPTOR = 10
 
 
 class Browser:
-    """One tab; `complaints` collects what the page writes to the console, throws or is refused."""
+    """One tab.
+
+    `complaints` collects what the page writes to the console, throws or is refused, `requests` the addresses
+    that it asks for, its own included.
+    """
 
     def __init__(self, commands: BinaryIO, answers: BinaryIO) -> None:
         self.complaints: list[str] = []
+        self.requests: list[str] = []
         self._commands, self._answers = commands, answers
         self._sent = 0
         self._session: str | None = None
         target = self.do("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.do("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log"):
+        for domain in ("Page", "Runtime", "Log", "Network"):
             self.do(f"{domain}.enable")
 
     def do(self, method: str, **parameters: Any) -> dict[str, Any]:
@@ -39,16 +44,16 @@ class Browser:
         assert "error" not in answer, (method, answer)
         return dict(answer["result"])
 
-    def open(self, page: Path, width_px: int, **media: str) -> None:
+    def open(self, page: Path, width_px: int, fragment: str = "", **media: str) -> None:
         """Show a page in a window of this width, with these media features, such as a dark scheme."""
+        self._visit("about:blank")  # lest another fragment stay on the same page
         self.complaints.clear()
+        self.requests.clear()
         features = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items()]
         self.do("Emulation.setEmulatedMedia", features=features)
         size = {"width": width_px, "height": 800, "deviceScaleFactor": 1, "mobile": width_px < 600}
         self.do("Emulation.setDeviceMetricsOverride", **size)
-        self.do("Page.navigate", url=page.as_uri())
-        while self._next().get("method") != "Page.loadEventFired":
-            pass
+        self._visit(page.as_uri() + fragment)
 
     def find(self, expression: str) -> Any:
         """Return the value of a JavaScript expression in the page, awaited."""
@@ -56,11 +61,22 @@ class Browser:
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 
-    def press(self, key: str, code: int, text: str = "") -> None:
+    def press(self, key: str, code: int, text: str = "", *, shift: bool = False) -> None:
         """Press a key of the keyboard and let it go."""
-        names = {"key": key, "code": key, "windowsVirtualKeyCode": code}
+        names = {"key": key, "code": key, "windowsVirtualKeyCode": code, "modifiers": 8 * shift}
         self.do("Input.dispatchKeyEvent", type="keyDown", text=text, **names)
         self.do("Input.dispatchKeyEvent", type="keyUp", **names)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press the mouse at a place of the window, in pixels, move it to another, and let it go."""
+        for kind, (x, y) in (("Pressed", start), ("Moved", end), ("Released", end)):
+            self.do("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", clickCount=1)
+
+    def _visit(self, address: str) -> None:
+        """Show what is at an address, and wait until it is loaded."""
+        self.do("Page.navigate", url=address)
+        while self._next().get("method") != "Page.loadEventFired":
+            pass
 
     def _next(self) -> dict[str, Any]:
         """Return the next answer or event, and note complaints."""
@@ -71,6 +87,8 @@ class Browser:
         message: dict[str, Any] = json.loads(text)
         if message.get("method") in ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded"):
             self.complaints.append(json.dumps(message["params"]))
+        if message.get("method") == "Network.requestWillBeSent":
+            self.requests.append(message["params"]["request"]["url"])
         return message
 
 

@@ -1,0 +1,1 @@
+"""One HTML page in which controllers fly in real time: engine and generated C as WebAssembly."""

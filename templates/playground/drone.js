@@ -1,0 +1,68 @@
+/* One drone on the field: a module and its flight, update by update. */
+const KINDS = { float32: Float32Array, float64: Float64Array, fixed: Int32Array };
+
+class Drone {
+  constructor(module, entry, data) {
+    Object.assign(this, { module, entry, offsets: data.offsets, real: KINDS[entry.scalar], shown: true });
+    this.simulation = module.put(bytesOf(data.simulation));
+    this.flight = module.put(bytesOf(data.flight));
+    this.flying = module.space(module.calls.playground_flying_bytes());
+    [this.time, this.target, this.sensors, this.gusts] =
+      [8, 48, 48 * data.ticks, 24 * (data.ticks + 1)].map((size) => module.space(size));
+    this.draws = module.pointers(this.sensors, this.gusts, 0);
+    const arrays = TRACE_AXES.map((axes) => module.space(8 * axes));
+    this.trace = module.pointers(...arrays);
+    this.weights = module.space(2 * this.real.BYTES_PER_ELEMENT);
+    this.status = module.space(4);
+    this.curve = module.space(48);
+    /* What is read and written at every update; memory must not grow from here on. */
+    [this.position, , this.angles] = arrays.slice(0, 3).map((address) => module.at(address, 3));
+    this.answer = module.at(arrays[5], 1, BigInt64Array);
+    this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
+      module.at(address, [1, 6, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
+    this.setMembers("simulation", { disturbed: [1], windy: [1], sensed: [0], captured: [0] }, BigInt64Array);
+  }
+
+  setMembers(record, members, Kind = Float64Array) {
+    for (const [member, numbers] of Object.entries(members)) {
+      const address = this[record] + this.offsets[record][member];
+      this.module.at(address, numbers.length, Kind).set(Kind === BigInt64Array ? numbers.map(BigInt) : numbers);
+    }
+  }
+
+  setWeights(weights) {
+    this.module.at(this.weights, 2, this.real).set(weights);
+    this.module.calls.nmpc_host_set_weights(this.module.self, 1, this.weights, this.status);
+  }
+
+  /* With sensors from now on, or with the true state. */
+  sense(sensed) {
+    const members = { sensed: [Number(sensed)], captured: [Number(sensed)] };
+    this.setMembers("simulation", members, BigInt64Array);
+    if (sensed) this.module.calls.engine_start_sensors(this.simulation, this.flying);
+  }
+
+  /* Hovers above the target; `draws` starts the gusts. */
+  begin(target, draws) {
+    this.module.reset();
+    this.setMembers("flight", { body_start: [target[0], target[1]] });
+    this.setMembers("flight", { push_tick: [-1] }, BigInt64Array);
+    this.inputs[3].set(draws);
+    this.position.set([target[0], target[1], 0]);
+    this.angles.fill(0);
+    this.module.calls.engine_begin(this.simulation, this.flight, this.draws, this.flying);
+  }
+
+  push(impulse, tick) {
+    this.setMembers("flight", { push_n_s: [...impulse, 0] });
+    this.setMembers("flight", { push_tick: [tick] }, BigInt64Array);
+  }
+
+  update(...inputs) {
+    this.inputs.forEach((place, index) => place.set(inputs[index]));
+    this.module.calls.engine_update(
+      this.simulation, this.flight, 0n, 0n, this.time, this.target, this.draws, this.module.step, this.module.self,
+      this.flying, this.trace,
+    );
+  }
+}

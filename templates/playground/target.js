@@ -1,0 +1,47 @@
+/* The target: on a curve, or on its way to where it was dragged, with a speed and an acceleration that drones have. */
+const SPEED_M_S = 2, ACCELERATION_M_S2 = 2.5, APPROACH_1_S = 1.25, ADJUST_1_S = 5, REACH_M = [2.6, 1.5];
+
+/* Shortens a vector to a length; without Math.hypot, which may differ between browsers. */
+function atMost(length, [x, y]) {
+  const size = Math.sqrt(x * x + y * y);
+  return size > length ? [x * length / size, y * length / size] : [x, y];
+}
+
+class Target {
+  /* The curves are computed in the module of a drone. */
+  constructor(drone, curves, period) {
+    Object.assign(this, { drone, curves, period, kind: "eight", goal: [0, 0] });
+    this.now = new Float64Array(6);
+  }
+
+  /* Stands at its goal, or at the beginning of its curve. */
+  begin() {
+    this.now.set([...this.goal, 0, 0, 0, 0]);
+    this.at(0);
+    if (this.kind !== "hand") this.goal = [this.now[0], this.now[1]];
+  }
+
+  /* Moves to its place at a time: x, y, vx, vy, ax, ay. */
+  at(time) {
+    if (this.kind === "hand") return this.now;
+    const { module, curve } = this.drone, compute = module.calls[`playground_${this.kind}`];
+    compute(...this.curves[this.kind], time, curve);
+    this.now.set(module.at(curve, 6));
+    return this.now;
+  }
+
+  /* Follows its goal for a period, if it is dragged. */
+  move() {
+    if (this.kind !== "hand") return;
+    const [x, y, vx, vy, ax, ay] = this.now, h = this.period;
+    const [px, py, ux, uy] = [x + h * vx + h * h / 2 * ax, y + h * vy + h * h / 2 * ay, vx + h * ax, vy + h * ay];
+    const wanted = atMost(SPEED_M_S, [APPROACH_1_S * (this.goal[0] - px), APPROACH_1_S * (this.goal[1] - py)]);
+    const change = atMost(ACCELERATION_M_S2, [ADJUST_1_S * (wanted[0] - ux), ADJUST_1_S * (wanted[1] - uy)]);
+    this.now.set([px, py, ux, uy, ...change]);
+  }
+
+  drag(x, y) {
+    this.kind = "hand";
+    this.goal = [x, y].map((value, axis) => Math.min(Math.max(value, -REACH_M[axis]), REACH_M[axis]));
+  }
+}

@@ -1,0 +1,93 @@
+/* All drones with one target, one wind and one clock. The same scenario flies the same bits in every browser. */
+const HISTORY_S = 10, IMPULSE_N_S = 0.04;
+
+/* Numbers in [0, 1) from a seed of 32 bits (mulberry32); the sum of twelve less 6 is nearly normal, and exact. */
+function normals(seed) {
+  let state = seed;
+  function uniform() {
+    state = (state + 0x6d2b79f5) | 0;
+    let mixed = Math.imul(state ^ (state >>> 15), state | 1);
+    mixed ^= mixed + Math.imul(mixed ^ (mixed >>> 7), mixed | 61);
+    return ((mixed ^ (mixed >>> 14)) >>> 0) / 4294967296;
+  }
+  return (count) => Float64Array.from({ length: count }, () => {
+    let sum = -6;
+    for (let n = 0; n < 12; n++) sum += uniform();
+    return sum;
+  });
+}
+
+class World {
+  constructor(drones, data) {
+    Object.assign(this, { drones, data, dials: data.dials.map((dial) => dial.start) });
+    this.target = new Target(drones[0], data.curves, data.period_s);
+    this.begin();
+  }
+
+  begin() {
+    Object.assign(this, { updates: 0, history: [], impulse: null, draw: normals(1) });
+    this.target.begin();
+    const first = this.draw(3);
+    for (const drone of this.drones) {
+      drone.begin(this.target.now, [...first, ...new Float64Array(3 * this.data.ticks)]);
+    }
+    this.dials.forEach((place, index) => this.turn(index, place));
+    this.record();
+  }
+
+  /* Sets a slider. */
+  turn(index, place) {
+    const dial = this.data.dials[index];
+    this.dials[index] = place;
+    for (const drone of dial.drone === null ? this.drones : [this.drones[dial.drone]]) {
+      if (dial.drone !== null) {
+        drone.setWeights(dial.members.weights[place]);
+        continue;
+      }
+      const rows = Object.entries(dial.members).map(([member, values]) => [member, values[place]]);
+      drone.setMembers("flight", Object.fromEntries(rows));
+      if (dial.key === "noise") drone.sense(dial.values[place] > 0);
+    }
+  }
+
+  /* Pushes every drone with the same impulse, in N s, at the next update. */
+  push(impulse) {
+    this.impulse = impulse;
+  }
+
+  get time() {
+    return this.updates * this.data.period_s;
+  }
+
+  advance(updates) {
+    for (let n = 0; n < updates; n++) {
+      const target = this.target.at(this.time), { ticks } = this.data;
+      const draws = [this.draw(6 * ticks), this.draw(3 * (ticks + 1))];
+      for (const drone of this.drones) {
+        if (this.impulse) drone.push(this.impulse, this.updates * ticks);
+        drone.update([this.time], target, ...draws);
+      }
+      this.impulse = null;
+      this.record();
+      this.updates++;
+      this.target.move();
+    }
+  }
+
+  /* Keeps the last seconds for trails and plots: time, target, and of each drone x, y, roll, pitch. */
+  record() {
+    const { now } = this.target;
+    const states = this.drones.flatMap(({ position: [x, y], angles: [roll, pitch] }) => [x, y, roll, pitch]);
+    this.history.push([this.time, now[0], now[1], ...states]);
+    if (this.history.length > HISTORY_S / this.data.period_s) this.history.shift();
+  }
+}
+
+const PER_DRONE = 4;
+
+/* Of a row of the history: distance of a drone to the target in m, and its tilt in degrees; NaN if it is lost. */
+const errorOf = (row, drone) => Math.hypot(row[3 + PER_DRONE * drone] - row[1], row[4 + PER_DRONE * drone] - row[2]);
+const tiltOf = (row, drone) => {
+  const [roll, pitch] = row.slice(5 + PER_DRONE * drone, 7 + PER_DRONE * drone);
+  return Math.acos(Math.cos(roll) * Math.cos(pitch)) * 180 / Math.PI;
+};
