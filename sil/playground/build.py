@@ -13,7 +13,7 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.build import glue, with_default_prefix
 from mambo_nmpc.sil.controllers.pd import pd_controller
-from mambo_nmpc.sil.engine.build import SOURCES, texts
+from mambo_nmpc.sil.engine.build import texts
 from mambo_nmpc.sil.engine.simulate import pd_function
 from mambo_nmpc.sil.files.cache import build_cached
 from mambo_nmpc.sil.playground.controllers import PageController

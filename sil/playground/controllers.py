@@ -45,12 +45,12 @@ def page_controllers(sources: Sequence[str]) -> tuple[PageController, ...]:
     if twice is not None:
         raise FlightError(f"playground: {echo(twice)} is named twice; name each controller once")
     found = tuple(_page_controller(source) for source in sources)
-    first, *others = [one for one in found if isinstance(one.kind, Settings)] or [None]
-    for other in others:
-        if first is not None and other is not None and period_s((other,)) != period_s((first,)):
+    generated = [one for one in found if isinstance(one.kind, Settings)]
+    for other in generated[1:]:
+        if period_s([other]) != period_s(generated):
             raise FlightError(
-                f"{echo(other.source)}: horizon.update_period_s = {period_s((other,)):g} must be that of "
-                f"{echo(first.source)}, {period_s((first,)):g}: all drones of a page have one clock"
+                f"{echo(other.source)}: horizon.update_period_s = {period_s([other]):g} must be that of "
+                f"{echo(generated[0].source)}, {period_s(generated):g}: all drones of a page have one clock"
             )
     return found
 

@@ -11,7 +11,6 @@ from mambo_nmpc.codegen.representation import WEIGHTS
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.engine.records import flight_records
 from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.plant.disturbances import Disturbances
 from mambo_nmpc.sil.sensors.mocap import MotionCapture
 from mambo_nmpc.sil.vehicles.sections import FirstOrderAttitude
@@ -38,22 +37,37 @@ class Dial:
 
 
 def dials(flight: Flight) -> list[Dial]:
-    """Return the sliders of wind, sensor noise and motor lag for a drone that flies as `flight`."""
-    speeds, degrees = np.arange(0.0, 10.5, 0.5), np.arange(0.0, 360.0, 15.0)
+    """Return the sliders of wind, sensor noise and motor lag for a drone that flies as `flight`.
+
+    Without sensor noise the page gives the controllers the true state.
+    """
+    sensors, vehicle = flight.sensors, flight.vehicle
+    assert isinstance(sensors, MotionCapture)
+    steps, degrees, own_s = np.arange(0.0, 10.5, 0.5), np.arange(0.0, 360.0, 15.0), vehicle.drone.motor_lag_s
+    lags_s = np.union1d(np.arange(0, 21) / 200.0, own_s)
+    windy, heading = Disturbances(steps), Disturbances(0.0, np.radians(degrees))
+    noisy, lagging = replace(sensors, noise_scale=steps), replace(vehicle, motor_lag_s=lags_s)
+    direction = "Wind direction (0\N{DEGREE SIGN} right, 90\N{DEGREE SIGN} down)"
+    noise, times = "Sensor noise (motion capture)", "\N{MULTIPLICATION SIGN}"
+    own = int(np.searchsorted(lags_s, own_s))
+
+    def members(count: int, names: Sequence[str], **changes: Any) -> dict[str, list[Any]]:
+        """Return members of the records of flights that differ from `flight`."""
+        records = flight_records(replace(flight, flights=count, seeds=None, **changes), np.zeros((count, 4)))
+        return {name: records[name].reshape(count, -1).tolist() for name in names}
+
     found = [
-        _dial("wind", "Wind", "m/s", speeds, 0, _records(flight, _WIND, wind_speed_m_s=speeds)),
-        _dial(
-            "towards",
-            "Wind direction (0\N{DEGREE SIGN} right, 90\N{DEGREE SIGN} down)",
-            "\N{DEGREE SIGN}",
-            degrees,
-            6,
-            _records(flight, ("gust_heading",), wind_direction_rad=np.radians(degrees)),
+        Dial("wind", "Wind", "m/s", steps.tolist(), 0, members(len(steps), _WIND, disturbances=windy)),
+        Dial(
+            *("towards", direction, "\N{DEGREE SIGN}", degrees.tolist(), 6),
+            members(len(degrees), ("gust_heading",), disturbances=heading),
         ),
-        _noise_dial(flight),
+        Dial("noise", noise, times, steps.tolist(), 0, members(len(steps), ("noise",), sensors=noisy)),
     ]
-    if not isinstance(flight.vehicle.drone.attitude, FirstOrderAttitude):
-        found.append(_lag_dial(flight))
+    if not isinstance(vehicle.drone.attitude, FirstOrderAttitude):
+        lags_ms = [round(float(1000.0 * lag_s), 6) for lag_s in lags_s]
+        decays = members(len(lags_s), ("rotor_decay",), vehicle=lagging)
+        found.append(Dial("lag", "Motor lag", "ms", lags_ms, own, decays))
     return found
 
 
@@ -74,54 +88,3 @@ def weight_dial(settings: Settings, title: str, drone: int) -> Dial:
         {"weights": weights.tolist()},
         drone,
     )
-
-
-def _noise_dial(flight: Flight) -> Dial:
-    """Return the slider of sensor noise; at 0 controllers receive the true state."""
-    assert isinstance(flight.sensors, MotionCapture)
-    scales = np.arange(0.0, 10.5, 0.5)
-    noisy = replace(
-        flight, flights=len(scales), sensors=replace(flight.sensors, noise_scale=scales), seeds=None
-    )
-    return _dial(
-        "noise",
-        "Sensor noise (motion capture)",
-        "\N{MULTIPLICATION SIGN}",
-        scales,
-        0,
-        _members(noisy, ("noise",)),
-    )
-
-
-def _lag_dial(flight: Flight) -> Dial:
-    """Return the slider of the motor lag; it starts at that of the drone."""
-    own_s = flight.vehicle.drone.motor_lag_s
-    lags_s = np.union1d(np.arange(0, 21) / 200.0, own_s)
-    vehicle = replace(flight.vehicle, motor_lag_s=lags_s)
-    lagging = replace(flight, flights=len(lags_s), vehicle=vehicle, seeds=None)
-    return _dial(
-        "lag",
-        "Motor lag",
-        "ms",
-        1000.0 * lags_s,
-        int(np.searchsorted(lags_s, own_s)),
-        _members(lagging, ("rotor_decay",)),
-    )
-
-
-def _records(flight: Flight, members: Sequence[str], **disturbances: FloatArray) -> dict[str, list[Any]]:
-    """Return members of the records of flights with these disturbances."""
-    count = len(next(iter(disturbances.values())))
-    windy = replace(flight, flights=count, disturbances=Disturbances(**disturbances), seeds=None)
-    return _members(windy, members)
-
-
-def _members(flight: Flight, members: Sequence[str]) -> dict[str, list[Any]]:
-    records = flight_records(flight, np.zeros((flight.flights, 4)))
-    return {member: records[member].reshape(flight.flights, -1).tolist() for member in members}
-
-
-def _dial(
-    key: str, label: str, unit: str, values: FloatArray, start: int, members: dict[str, list[Any]]
-) -> Dial:
-    return Dial(key, label, unit, [round(float(value), 6) for value in values], start, members)

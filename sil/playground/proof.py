@@ -1,4 +1,4 @@
-"""The flight that shows the same bits: flown by the engine of this machine, and by every page when it loads."""
+"""The flight that proves the bits: the engine of this machine flies it, and every page when it loads."""
 
 from dataclasses import dataclass, replace
 from typing import Final
@@ -89,5 +89,5 @@ def calm(flight: Flight) -> Flight:
 
 
 def native_digest(flight: Flight, one: PageController) -> str:
-    """Return the SHA-256 of the trace that the engine of this machine flies; raises BuildError, CacheError."""
+    """Return the SHA-256 of the trace on this machine; raises BuildError, CacheError."""
     return fly(flight, one.controller()).digest()

@@ -41,7 +41,7 @@ class Field {
   }
 
   draw(palette) {
-    const [context, width, height] = fit(this.canvas), { world } = this, now = world.history.at(-1);
+    const [context, width, height] = fit(this.canvas), { world } = this, rows = world.drawn, now = rows.at(-1);
     context.lineJoin = context.lineCap = "round";
     this.grid(context, width, height, palette);
     this.wind(context, palette);
@@ -52,9 +52,9 @@ class Field {
       points.forEach(([x, y]) => context.lineTo(...this.pixels(x, y)));
       context.stroke();
     };
-    stroke(world.history.map((row) => [row[1], row[2]]), palette.target, 4);
+    stroke(rows.map((row) => [row[1], row[2]]), palette.target, 4);
     this.target(context, palette, now);
-    const recent = world.history.slice(-Math.round(TRAIL_S / world.data.period_s));
+    const recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
     world.drones.forEach((drone, index) => {
       if (!drone.shown) return;
       const first = 3 + PER_DRONE * index, colour = palette.hues[drone.entry.hue];

@@ -8,10 +8,10 @@ class Plot {
   }
 
   draw(palette) {
-    const [context, width, height] = fit(this.canvas), { history, drones } = this.world;
-    const bottom = height - BOTTOM_PX, last = history.at(-1)[0], first = Math.max(last, HISTORY_S) - HISTORY_S;
+    const [context, width, height] = fit(this.canvas), { drawn: rows, drones } = this.world;
+    const bottom = height - BOTTOM_PX, last = rows.at(-1)[0], first = Math.max(last, HISTORY_S) - HISTORY_S;
     const shown = drones.map((drone, index) => index).filter((index) => drones[index].shown);
-    const lines = shown.map((index) => [index, history.map((row) => this.value(row, index))]);
+    const lines = shown.map((index) => [index, rows.map((row) => this.value(row, index))]);
     const highest = lines.reduce((most, [, values]) => values.reduce((a, b) => (b > a ? b : a), most), 0);
     const limit = this.limits.find((one) => one >= highest) ?? this.limits.at(-1);
     const x = (time) => LEFT_PX + (time - first) / HISTORY_S * (width - LEFT_PX - 2);
@@ -32,7 +32,7 @@ class Plot {
       Object.assign(context, { strokeStyle: palette.hues[drones[index].entry.hue], lineWidth: 1.8, lineJoin: "round" });
       context.setLineDash(drones[index].entry.dash);
       context.beginPath();
-      values.forEach((value, row) => { if (value === value) context.lineTo(x(history[row][0]), y(value)); });
+      values.forEach((value, row) => { if (value === value) context.lineTo(x(rows[row][0]), y(value)); });
       context.stroke();
     }
     context.setLineDash([]);

@@ -74,6 +74,12 @@ class World {
     }
   }
 
+  /* The rows that are drawn: every fourth, the same ones from picture to picture, and the last. */
+  get drawn() {
+    const last = this.history.length - 1, first = this.updates - last;
+    return this.history.filter((_, place) => (first + place) % 4 === 0 || place === last);
+  }
+
   /* Keeps the last seconds for trails and plots: time, target, and of each drone x, y, roll, pitch. */
   record() {
     const { now } = this.target;
