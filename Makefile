@@ -75,6 +75,7 @@ generated: $(SETUP)
 
 docs: $(SETUP_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+	$(BIN)/mambo-nmpc playground -o build/docs/play.html
 	@echo "the manual: build/docs/index.html; its search wants a server: python3 -m http.server -d build/docs"
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
