@@ -18,7 +18,7 @@ typedef struct {
 } mocap_t;
 
 /* The first tick sets the position, and the latest of the late ones. */
-static void mocap_start(const engine_simulation_t *simulation, const seen_t *start, mocap_t *mocap)
+static inline void mocap_start(const engine_simulation_t *simulation, const seen_t *start, mocap_t *mocap)
 {
     int64_t k;
     int i;

@@ -66,8 +66,8 @@ static inline void measure_flow(const engine_simulation_t *simulation, const see
     flow_m_s[1] = body_m_s[1] + (lever * truth_now->rates_rad_s[0]);
 }
 
-static void suite_start(const engine_simulation_t *simulation, const seen_t *start, const rotation_t *r,
-                        suite_t *suite)
+static inline void suite_start(const engine_simulation_t *simulation, const seen_t *start, const rotation_t *r,
+                               suite_t *suite)
 {
     double body_m_s[3];
     int i;

@@ -33,7 +33,7 @@ _INCLUDES: Final = ("-I.", "-Iinclude", "-Isrc")
 
 def module(one: PageController) -> bytes:
     """Return the WebAssembly of one drone; raises BuildError and CacheError."""
-    files, calls, step = _program(one)
+    files, calls, step = program(one)
     exports = [f"-Wl,--export={name}" for name in calls]
     units = sorted(path for path in files if path.endswith(".c"))
     arguments = [*_FLAGS, *_INCLUDES, f"-DCONTROLLER={step}", *exports, *units, "-o", "drone.wasm"]
@@ -61,7 +61,7 @@ def _compiler() -> Toolchain:
     return Toolchain(("clang",))
 
 
-def _program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
+def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
     """Return the C by path, the functions that the page calls, and the step of the controller."""
     files = texts() | {
         "playground.c": _text("playground", "playground.c"),

@@ -39,12 +39,14 @@ class Drone {
   sense(sensed) {
     const members = { sensed: [Number(sensed)], captured: [Number(sensed)] };
     this.setMembers("simulation", members, BigInt64Array);
-    if (sensed) this.module.calls.engine_start_sensors(this.simulation, this.flying);
+    if (sensed && !this.sensed) this.module.calls.engine_start_sensors(this.simulation, this.flying);
+    this.sensed = sensed;
   }
 
   /* Hovers above the target; `draws` starts the gusts. */
   begin(target, draws) {
     this.module.reset();
+    this.sensed = false;
     this.setMembers("flight", { body_start: [target[0], target[1]] });
     this.setMembers("flight", { push_tick: [-1] }, BigInt64Array);
     this.inputs[3].set(draws);

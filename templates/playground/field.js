@@ -55,14 +55,12 @@ class Field {
     stroke(rows.map((row) => [row[1], row[2]]), palette.target, 4);
     this.target(context, palette, now);
     const recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
-    world.drones.forEach((drone, index) => {
-      if (!drone.shown) return;
-      const first = 3 + PER_DRONE * index, colour = palette.hues[drone.entry.hue];
+    const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
+    for (const index of shown) { /* the first one on top */
+      const first = 3 + PER_DRONE * index, colour = palette.hues[world.drones[index].entry.hue];
       stroke(recent.filter((row) => Number.isFinite(row[first])).map((row) => [row[first], row[first + 1]]), colour, 1.5);
-    });
-    world.drones.forEach((drone, index) => {
-      if (drone.shown) this.drone(context, palette, now, index, stroke);
-    });
+    }
+    for (const index of shown) this.drone(context, palette, now, index, stroke);
     if (this.arrow) stroke(this.arrow, palette.ink, 2.5, [2, 5]);
   }
 

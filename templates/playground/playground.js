@@ -5,7 +5,7 @@ const still = matchMedia("(prefers-reduced-motion: reduce)"), dark = matchMedia(
 /* Advances the world with the clock of the display, by a bounded number of updates a picture. */
 class Player {
   constructor(world, views) {
-    Object.assign(this, { world, views, playing: false, before: null, owed: 0, drawn: -Infinity, told: -Infinity });
+    Object.assign(this, { world, views, playing: false, before: null, owed: 0, request: 0, drawn: -Infinity, told: -Infinity });
     this.palette = colours();
     dark.addEventListener("change", () => { this.palette = colours(); this.redraw(); });
     addEventListener("resize", () => this.redraw());
@@ -16,11 +16,11 @@ class Player {
   }
 
   play(on) {
-    const began = on && !this.playing;
     Object.assign(this, { playing: on, before: null });
     find("pause").textContent = on ? "Pause" : "Fly";
     say(on ? "Flying." : "Paused.");
-    if (began) requestAnimationFrame((now) => this.frame(now));
+    cancelAnimationFrame(this.request);
+    if (on) this.request = requestAnimationFrame((now) => this.frame(now));
   }
 
   /* One picture of the display at a time in ms. With reduced motion it is drawn once a second. */
@@ -40,7 +40,7 @@ class Player {
       this.told = now;
       this.controls.numbers();
     }
-    requestAnimationFrame((next) => this.frame(next));
+    this.request = requestAnimationFrame((next) => this.frame(next));
   }
 }
 

@@ -10,7 +10,7 @@ class Plot {
   draw(palette) {
     const [context, width, height] = fit(this.canvas), { drawn: rows, drones } = this.world;
     const bottom = height - BOTTOM_PX, last = rows.at(-1)[0], first = Math.max(last, HISTORY_S) - HISTORY_S;
-    const shown = drones.map((drone, index) => index).filter((index) => drones[index].shown);
+    const shown = drones.map((drone, index) => index).filter((index) => drones[index].shown).reverse();
     const lines = shown.map((index) => [index, rows.map((row) => this.value(row, index))]);
     const highest = lines.reduce((most, [, values]) => values.reduce((a, b) => (b > a ? b : a), most), 0);
     const limit = this.limits.find((one) => one >= highest) ?? this.limits.at(-1);

@@ -7,16 +7,19 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.presets import preset
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.engine.build import SOURCES
 from mambo_nmpc.sil.engine.records import flight_records
-from mambo_nmpc.sil.playground.build import module
+from mambo_nmpc.sil.playground.build import module, program
 from mambo_nmpc.sil.playground.controllers import DEFAULTS, page_controllers
 from mambo_nmpc.sil.playground.dials import dials, weight_dial
 from mambo_nmpc.sil.playground.proof import calm, proof_flight
 from mambo_nmpc.sil.vehicles import presets as vehicles
 from tests.support import command
 from tests.support.one_norm import ONE_NORM
-from tests.support.tools import only, require
+from tests.support.tools import only, require, toolchain
 
 SLOW = "[horizon]\nupdate_period_s = 0.02\n"
 MAMBO, CRAZYFLIE = vehicles.preset("mambo"), vehicles.preset("crazyflie")
@@ -104,6 +107,16 @@ def test_a_missing_tool_is_named(
         module(page_controllers(["pd"])[0])
 
 
+def test_the_c_of_the_page_compiles_without_a_warning(tmp_path: Path) -> None:
+    """Without a C library, for WebAssembly."""
+    files, _, step = program(page_controllers(["pd"])[0])
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    warnings = ["-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Wundef", "-Wmissing-prototypes", "-Werror"]
+    flags = ["--target=wasm32", "-ffreestanding", "-std=c99", "-O2", "-I.", f"-DCONTROLLER={step}"]
+    toolchain("clang").run([*flags, *warnings, "-c", "playground.c", *SOURCES], tmp_path)
+
+
 def test_a_slider_writes_what_a_flight_with_its_value_has() -> None:
     """Each position of the slider of the motor lag, and the one where it starts."""
     flight = calm(proof_flight(MAMBO, 0.01))
@@ -126,6 +139,25 @@ def test_the_slider_of_the_weight_starts_at_the_settings() -> None:
     assert dial.drone == 2
     assert {row[0] for row in dial.members["weights"]} == {ONE_NORM.cost.tracking_weight}
     assert [row[1] for row in dial.members["weights"]] == pytest.approx(dial.values)
+
+
+@pytest.mark.parametrize("scalar", ["float32", "fixed"])
+def test_the_controller_takes_every_weight_of_the_slider(scalar: str) -> None:
+    """None is refused, in any scalar type."""
+    settings = with_option(ONE_NORM, "code.scalar", scalar, "test")
+    dial = weight_dial(settings, "mine", 0)
+    controller, tracking = CompiledController(settings), settings.cost.tracking_weight
+    assert [controller.set_weights([[tracking, value]])[0] for value in dial.values] == [0] * len(dial.values)
+
+
+def test_a_hostile_name_is_text() -> None:
+    """A file may be called anything; on the page it is its name."""
+    demand_tools()
+    Path("<img src=x>.toml").write_text("", "utf-8")
+    run("<img src=x>.toml")
+    page = Path("play.html").read_text("utf-8")
+    assert "<img" not in page
+    assert "&lt;img src=x&gt;.toml" in page
 
 
 def test_every_default_is_a_source() -> None:

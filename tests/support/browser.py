@@ -72,6 +72,12 @@ class Browser:
         for kind, (x, y) in (("Pressed", start), ("Moved", end), ("Released", end)):
             self.do("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, button="left", clickCount=1)
 
+    def swipe(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Put a finger on a place of the window, in pixels, move it to another, and lift it."""
+        for kind, places in (("Start", [start]), ("Move", [end]), ("End", [])):
+            points = [{"x": x, "y": y} for x, y in places]
+            self.do("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
+
     def _visit(self, address: str) -> None:
         """Show what is at an address, and wait until it is loaded."""
         self.do("Page.navigate", url=address)
