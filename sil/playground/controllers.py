@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 from mambo_nmpc.codegen.errors import echo
@@ -26,8 +27,8 @@ class PageController:
 
     @property
     def title(self) -> str:
-        """The name on the page."""
-        return PD_TITLES.get(self.source, echo(self.source))
+        """The name on the page: of a file or folder without the folders above it."""
+        return PD_TITLES.get(self.source, echo(Path(self.source).resolve().name))
 
     def controller(self) -> CompiledController | PdController | PdFeedForwardController:
         """Return the controller for this machine; raises BuildError, CacheError."""

@@ -70,7 +70,7 @@ async function start() {
   const drones = await Promise.all(data.drones.map(async (entry) => new Drone(await Module.load(entry), entry, data)));
   const world = new World(drones, data), field = new Field(find("field"), world);
   const plots = [
-    new Plot(find("errors"), world, errorOf, [0.5, 1, 2, 5, 10, 100]),
+    new Plot(find("errors"), world, errorOf, [0.5, 1, 2, 5, 10, 20, 50, 100]),
     new Plot(find("tilts"), world, tiltOf, [10, 20, 40, 90, 180]),
   ];
   const player = new Player(world, [field, ...plots]);

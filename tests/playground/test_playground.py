@@ -160,6 +160,17 @@ def test_a_hostile_name_is_text() -> None:
     assert "&lt;img src=x&gt;.toml" in page
 
 
+def test_a_page_does_not_tell_where_its_sources_were(tmp_path: Path) -> None:
+    """A file in a folder is called by its own name."""
+    demand_tools()
+    Path("folder").mkdir()
+    Path("folder/mine.toml").write_text("", "utf-8")
+    run(str(tmp_path / "folder" / "mine.toml"))
+    page = Path("play.html").read_text("utf-8")
+    assert "mine.toml" in page
+    assert "folder/" not in page
+
+
 def test_every_default_is_a_source() -> None:
     """In the order of the page."""
     assert [one.title for one in page_controllers(DEFAULTS)] == [
