@@ -7,7 +7,7 @@ import typer
 
 from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.digest import TICKS
-from mambo_nmpc.codegen.errors import echo
+from mambo_nmpc.codegen.errors import BuildError, echo
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import host_toolchain
 from mambo_nmpc.sil.cli.flight import (
@@ -24,12 +24,14 @@ from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import digest_compiled
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.files.folders import new_results
+from mambo_nmpc.sil.firmware.elf import FootprintError
 from mambo_nmpc.sil.flight.loop import fly as simulate
+from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.controller import BoardController
 from mambo_nmpc.sil.pil.pace import Pace
 from mambo_nmpc.sil.pil.port import open_port
-from mambo_nmpc.sil.pil.report import BoardFlightSummary, board_fields, board_text
+from mambo_nmpc.sil.pil.report import BoardFlightSummary, EmulatedCount, board_fields, board_text
 from mambo_nmpc.sil.vehicles import presets as vehicles
 
 EPISODES = 4
@@ -62,6 +64,7 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
                 trace = simulate(flight, controller, progress)
         write_flight(trace, options, folder)
         fields = summary_fields(options, settings, drone, flight, trace) | board_fields(board, controller)
+        fields |= _emulated(settings, board.greeting.board)
         summary = BoardFlightSummary(
             **fields
             | {
@@ -73,7 +76,20 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
             }
         )
         summary.write(folder)
-    text = board_text(summary)
-    if boards.called(board.greeting.board):
-        text += "\n  emulated count     mambo-nmpc footprint --port shows it beside the cycles"
-    finish(summary, text, options, written(options))
+    finish(summary, board_text(summary), options, written(options))
+
+
+def _emulated(settings: Settings, says: str) -> dict[str, object]:
+    """Return what is counted on the emulated core of the board that `says` names, for the summary."""
+    named = boards.called(says)
+    if not named:
+        return {}
+    try:
+        footprint = measure_footprint(settings, named[0])
+    except (BuildError, FootprintError) as error:
+        return {"not_emulated": str(error)}
+    counts = footprint.counts
+    if counts is None:
+        return {"not_emulated": footprint.uncounted}
+    count = EmulatedCount(board=named[0].name, least=counts.least, mean=counts.mean, most_met=counts.most_met)
+    return {"emulated": count}

@@ -28,6 +28,17 @@ class Spread(BaseModel):
         return cls(least=min(values), median=statistics.median(values), most=max(values))
 
 
+class EmulatedCount(BaseModel):
+    """Instructions of a step on an emulated core, over the flight that `footprint` counts."""
+
+    model_config = ConfigDict(frozen=True)
+
+    board: str
+    least: int
+    mean: float
+    most_met: int
+
+
 class BoardFlightSummary(FlySummary):
     """The results of `fly --port`."""
 
@@ -48,6 +59,10 @@ class BoardFlightSummary(FlySummary):
     first_different_step: int | None
     cycles: Spread
     """Of `nmpc_step`, at `clock_hz`."""
+    emulated: EmulatedCount | None = None
+    """None for a board that `footprint` does not know, or if it cannot be built for or emulated here."""
+    not_emulated: str = ""
+    """Why, if `footprint` knows the board."""
     stack_bytes: int
     round_trip_s: Spread | None
     """From request to reply, of the steps that were not repeated."""
@@ -87,6 +102,17 @@ def difference(summary: BoardFlightSummary) -> str | None:
     return None
 
 
+def emulated_text(summary: BoardFlightSummary) -> str:
+    """Say how many instructions a step takes on the emulated core, or why they were not counted."""
+    count = summary.emulated
+    if count is None:
+        return f"not counted: {summary.not_emulated}"
+    return (
+        f"{count.least} / {count.mean:.0f} / {count.most_met} instructions (least, mean, most met), "
+        f"{summary.cycles.median / count.mean:.3g} cycles each"
+    )
+
+
 def link_text(summary: BoardFlightSummary) -> str:
     """Say what went wrong on the link."""
     faults = [f"{count} {name}" for name, count in sorted(summary.link_faults.items()) if count]
@@ -115,8 +141,10 @@ def board_text(summary: BoardFlightSummary) -> str:
         f"  cycles a step      {cycles.least:.0f} / {cycles.median:.0f} / {cycles.most:.0f} "
         f"(least, median, most), {1e6 * cycles.median / summary.clock_hz:.3g} us at "
         f"{summary.clock_hz / 1e6:g} MHz",
-        f"  stack of a step    {summary.stack_bytes} B",
     ]
+    if summary.emulated is not None or summary.not_emulated:
+        lines.append(f"  emulated           {emulated_text(summary)}")
+    lines.append(f"  stack of a step    {summary.stack_bytes} B")
     if trip is not None:
         milliseconds = " / ".join(f"{1e3 * value:.3g}" for value in (trip.least, trip.median, trip.most))
         lines.append(f"  request to reply   {milliseconds} ms")

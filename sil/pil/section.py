@@ -3,7 +3,13 @@
 from pathlib import Path
 
 from mambo_nmpc.sil.flight.section import flown_section
-from mambo_nmpc.sil.pil.report import BoardFlightSummary, difference, link_text, real_time_text
+from mambo_nmpc.sil.pil.report import (
+    BoardFlightSummary,
+    difference,
+    emulated_text,
+    link_text,
+    real_time_text,
+)
 from mambo_nmpc.sil.show.section import Section
 
 
@@ -19,6 +25,8 @@ def board_section(folder: Path, summary: BoardFlightSummary) -> Section:
         "link": link_text(summary)
         + ("" if trip is None else f"; request to reply {1e3 * trip.median:.3g} ms (median)"),
     }
+    if summary.emulated is not None:
+        facts["emulated"] = emulated_text(summary)
     if summary.deadlines is not None:
         facts["real time"] = real_time_text(summary.deadlines, summary.steps)
     return flown_section(folder, summary, facts, [] if found is None else [found])

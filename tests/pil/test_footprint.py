@@ -11,7 +11,7 @@ from mambo_nmpc.sil.errors import BoardError
 from mambo_nmpc.sil.footprint.on_board import choose_board
 from tests.support.command import run
 from tests.support.serial_line import Faults, build_firmware, serial_line
-from tests.support.tools import board_builder, require_module
+from tests.support.tools import board_builder, only, require_module
 
 SETTINGS = presets.preset("mambo")
 ALL = [boards.load(name) for name in boards.names()]
@@ -52,13 +52,33 @@ def test_the_firmware_names_the_board_and_measures_the_counted_steps(tmp_path: P
         assert all(row in shown for row in rows)
 
 
-def test_a_flight_on_a_known_board_tells_where_the_count_is(tmp_path: Path) -> None:
-    """Of a board that footprint does not know there is no count."""
-    told = "mambo-nmpc footprint --port shows it"
+def test_a_flight_on_a_known_board_has_the_count_beside_the_cycles(tmp_path: Path) -> None:
+    """That of `footprint`; of a board that footprint does not know there is none."""
+    board_builder("crazyflie")
+    run("footprint", "--board", "crazyflie", "-o", "counted")
+    (counted,) = json.loads(Path("counted/summary.json").read_text("utf-8"))["boards"]
     for board, known in (("crazyflie", True), ("host", False)):
         with serial_line(build_firmware(SETTINGS, board, tmp_path / board)) as line:
-            said, _ = run("fly", "--port", line.port, "--duration-s", "0.1", "--no-pictures")
-        assert (told in said) == known
+            said, _ = run(
+                "fly", "--port", line.port, "--duration-s", "0.1", "--no-pictures", "-o", f"on-{board}"
+            )
+        emulated = json.loads(Path(f"on-{board}/summary.json").read_text("utf-8"))["emulated"]
+        assert ("instructions (least, mean, most met)" in said) == known
+        if known:
+            counts = {name: counted["instructions"][name] for name in ("least", "mean", "most_met")}
+            assert emulated == {"board": "crazyflie", **counts}
+        else:
+            assert emulated is None
+
+
+def test_a_flight_says_why_there_is_no_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the compiler of the board it flies all the same."""
+    board_builder("crazyflie")
+    with serial_line(build_firmware(SETTINGS, "crazyflie", tmp_path / "pil")) as line:
+        (tmp_path / "bin").mkdir()
+        monkeypatch.setenv("PATH", only(tmp_path / "bin", "gcc", "cc", "as", "ld"))
+        said, _ = run("fly", "--port", line.port, "--duration-s", "0.1", "--no-pictures")
+    assert "emulated           not counted: no compiler for " in said
 
 
 def test_a_process_needs_the_name_of_a_board(tmp_path: Path) -> None:
