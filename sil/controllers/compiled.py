@@ -103,7 +103,7 @@ class CompiledController:
         self._design = Design(settings)
         self._numbers = self._design.numbers
         self.scalar = self._numbers.scalar
-        self._n = n
+        self.n = n
         self._library = library or build_library(settings, host_toolchain())
         self._instance_bytes: int = self._library.nmpc_batch_instance_bytes()
         self._controllers = ffi.new("char[]", DIRT * (n * self._instance_bytes))
@@ -114,11 +114,19 @@ class CompiledController:
         """The function `nmpc_host_step`, the address of the first controller, and the bytes to the next."""
         return ffi.addressof(self._library, "nmpc_host_step"), self._controllers, self._instance_bytes
 
+    def native_reset(self, command_rad: ArrayLike) -> tuple[Any, NDArray[Any]]:
+        """Return the function `nmpc_host_reset`, and `command_rad` (n, 2) as it reads them."""
+        return self._native_set("nmpc_host_reset", command_rad, COMMAND)
+
+    def native_set_weights(self, weights: ArrayLike) -> tuple[Any, NDArray[Any]]:
+        """Return the function `nmpc_host_set_weights`, and `weights` (n, 2) as it reads them; of a 1-norm."""
+        return self._native_set("nmpc_host_set_weights", weights, WEIGHTS)
+
     @property
     def instances(self) -> NDArray[np.uint8]:
         """The memory (n, bytes) of the controllers, itself and no copy."""
         whole = np.frombuffer(memoryview(ffi.buffer(self._controllers)), np.uint8)
-        return whole[: self._n * self._instance_bytes].reshape(self._n, -1)
+        return whole[: self.n * self._instance_bytes].reshape(self.n, -1)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
@@ -140,16 +148,22 @@ class CompiledController:
 
         Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
         """
-        inputs = as_arrays(self._design, self._n, state, target, thrust_acceleration_m_s2)
-        outcome = empty_outcome(self._design, self._n, np.intc)
+        inputs = as_arrays(self._design, self.n, state, target, thrust_acceleration_m_s2)
+        outcome = empty_outcome(self._design, self.n, np.intc)
         addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
-        self._library.nmpc_batch_step(self._controllers, self._n, *map(_address, inputs), addresses)
+        self._library.nmpc_batch_step(self._controllers, self.n, *map(_address, inputs), addresses)
         return as_step(self._design, outcome)
 
+    def _native_set(
+        self, name: str, values: ArrayLike, quantities: Sequence[str]
+    ) -> tuple[Any, NDArray[Any]]:
+        array = as_array(self._numbers, values, quantities, np.shape(values))
+        return ffi.addressof(self._library, name), array
+
     def _set_each(self, function: Any, values: ArrayLike, quantities: Sequence[str]) -> NDArray[np.int64]:
-        array = as_array(self._numbers, values, quantities, (self._n, 2))
-        status = np.empty(self._n, np.intc)
-        function(self._controllers, self._n, _address(array), ffi.cast("int *", _address(status)))
+        array = as_array(self._numbers, values, quantities, (self.n, 2))
+        status = np.empty(self.n, np.intc)
+        function(self._controllers, self.n, _address(array), ffi.cast("int *", _address(status)))
         return status.astype(np.int64)
 
 

@@ -188,3 +188,64 @@ typedef struct {
 
 int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,
                                    double thrust_acceleration_m_s2, double *command_rad);
+
+/* A controller with a fault: sil/faults/fault.py. Initially update is 0 and computed_rad is 0. */
+typedef struct {
+    engine_controller_t controller;
+    void *self;
+    int64_t effect;
+    double values[7];
+    int64_t columns[2];
+    int64_t on;
+    int64_t of;
+    int64_t begin;            /* update */
+    int64_t end;              /* update */
+    int64_t drop_every;
+    int64_t late_updates;
+    char *memory;             /* of the controller, which a dropped update leaves as it is; NULL if it has none */
+    char *saved;              /* as long as memory */
+    int64_t memory_bytes;
+    double *computed_rad;     /* (late_updates + 1, 2): the last commands, at the remainder of their update */
+    double began[7];          /* state at the onset */
+    int64_t update;
+} engine_faulty_t;
+
+int64_t engine_faulty_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                           double *command_rad);
+
+/* nmpc_host_reset or nmpc_host_set_weights of a generated controller. */
+typedef void (*engine_setter_t)(void *controllers, int n, const void *values, int *status);
+
+/* A caller that commands zero tilt after `patience` rejected steps: LevellingCaller. */
+typedef struct {
+    engine_controller_t controller;
+    void *self;
+    engine_setter_t reset;
+    void *memory;             /* of the generated controller */
+    const void *level;        /* zero tilt in its numbers */
+    int64_t patience;
+    int64_t refused;
+} engine_levelling_t;
+
+int64_t engine_levelling_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                              double *command_rad);
+
+/* Weights in the numbers of a generated controller, and the status with which it answers. */
+typedef struct {
+    int64_t update;
+    const void *weights;
+    int64_t *status;
+} engine_weight_change_t;
+
+/* A generated controller whose weights change: ReweightedController. */
+typedef struct {
+    engine_controller_t controller;
+    void *memory;
+    engine_setter_t set_weights;
+    const engine_weight_change_t *changes;
+    int64_t count;
+    int64_t update;
+} engine_reweighted_t;
+
+int64_t engine_reweighted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                               double *command_rad);

@@ -2,24 +2,14 @@
 
 import warnings
 from collections.abc import Callable
-from dataclasses import astuple
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.build import ffi as controller_ffi
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import (
-    ERROR_LIMIT_M,
-    POSITION_D_RAD_S_M,
-    POSITION_P_RAD_M,
-    TILT_LIMIT_RAD,
-    PdController,
-    PdFeedForwardController,
-)
 from mambo_nmpc.sil.engine.build import ffi, load, pointer
+from mambo_nmpc.sil.engine.native import is_native, native
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, allocate_trace
@@ -31,9 +21,6 @@ from mambo_nmpc.sil.sensors.mocap import MotionCapture
 
 DELAY_TICKS_MAX: Final = 200
 """Longest delay of a command that the engine can hold."""
-
-EngineController = CompiledController | PdController | PdFeedForwardController
-"""Controllers whose step is a C function."""
 
 Progress = Callable[[float], None]
 
@@ -52,7 +39,7 @@ def fly(
     UnwritableError if the engine cannot be built for want of a folder or space.
     """
     delay_ticks = int(np.max(flight.link.delay_ticks))
-    if engine == "c" and isinstance(controller, EngineController) and delay_ticks <= DELAY_TICKS_MAX:
+    if engine == "c" and is_native(controller) and delay_ticks <= DELAY_TICKS_MAX:
         try:
             compiled = load(host_toolchain())
         except BuildError as error:
@@ -63,16 +50,16 @@ def fly(
 
 
 def fly_compiled(
-    engine: Any, flight: Flight, controller: EngineController, progress: Progress | None = None
+    engine: Any, flight: Flight, controller: PositionController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate the flights in a library of `build.load`, one after the other."""
+    """Simulate the flights in a library of `build.load`, one after the other, with a controller in C."""
     times_s, targets = flight.times_s(), flight.given_targets()
     simulation = simulation_record(flight, times_s)
     flights = flight_records(flight, targets[0])
     trace = allocate_trace(times_s, targets[..., :4], sensed=flight.sensors is not None)
     ticks = len(times_s) * flight.ticks_per_update
     draws = _Buffers(flight, len(times_s), ticks)
-    step, instances, stride = _native(engine, controller)
+    called = native(engine, controller)
     record = ffi.new(
         "engine_trace_t *",
         {
@@ -88,8 +75,8 @@ def fly_compiled(
             pointer("double *", times_s),
             pointer("double *", targets),
             draws.draw(seed),
-            step,
-            ffi.cast("char *", instances) + index * stride,
+            called.step,
+            called.instance(index),
             record,
         )
         if progress is not None:
@@ -118,26 +105,3 @@ class _Buffers:
         if self.drops is not None:
             generators((seed,), Purpose.DROPS)[0].random(out=self.drops)
         return self._record
-
-
-def pd_function(controller: PdController | PdFeedForwardController) -> tuple[str, Any]:
-    """Return the name of the engine's function that is the step of a PD, and its record of constants."""
-    if isinstance(controller, PdController):
-        constants = POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M
-        return "engine_pd_step", ffi.new("engine_pd_t *", constants)
-    constants = (*astuple(controller.gains), TILT_LIMIT_RAD)
-    return "engine_pd_feedforward_step", ffi.new("engine_pd_feedforward_t *", constants)
-
-
-def _native(engine: Any, controller: EngineController) -> tuple[Any, Any, int]:
-    """Return the function of a step, the instances, which the caller keeps, and the bytes of each."""
-    if not isinstance(controller, CompiledController):
-        name, constants = pd_function(controller)
-        return getattr(engine, name), constants, 0
-    step, instances, stride = controller.native
-    return _cast("engine_controller_t", step), _cast("char *", instances), stride
-
-
-def _cast(kind: str, address: Any) -> Any:
-    """Return a pointer of another cffi interface as one of the engine's."""
-    return ffi.cast(kind, int(controller_ffi.cast("intptr_t", address)))

@@ -16,19 +16,16 @@ from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.faults.injection import (
-    Fault,
-    FaultyController,
-    LevellingCaller,
-    ReweightedController,
-    WeightChange,
-)
+from mambo_nmpc.sil.faults.fault import Fault, WeightChange
+from mambo_nmpc.sil.faults.injection import FaultyController, LevellingCaller, ReweightedController
 from mambo_nmpc.sil.faults.scenarios import TO_THE_END, FaultScenario, scenarios
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.crashes import crash_tilt_rad
-from mambo_nmpc.sil.flight.loop import Flight, fly
+from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, horizontal_error_m, saturated_share
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import Hover, Trajectories, Trajectory
 from mambo_nmpc.sil.paper.table2 import CASES
@@ -134,6 +131,7 @@ def fly_faults(
     chosen: Sequence[FaultScenario] | None = None,
     *,
     drone: VehicleFile = NOMINAL,
+    engine: EngineName = "c",
 ) -> tuple[Verdict, ...]:
     """Fly every fault, or those `chosen`, on every course with every onset; return verdicts course by course.
 
@@ -146,11 +144,12 @@ def fly_faults(
     compiled = controller(len(sorties))
     reweighted = ReweightedController(compiled, len(sorties), _weight_changes(sorties, settings))
     patience = np.array([PATIENCE if sortie.scenario.levelled else NEVER for sortie in sorties])
-    caller = LevellingCaller(reweighted, compiled.reset, patience)
+    caller = LevellingCaller(reweighted, compiled, patience)
     faults = [
-        Fault(s.begin, s.end, s.scenario.alter, s.scenario.drop, s.scenario.late_updates) for s in sorties
+        Fault(s.begin, s.end, s.scenario.alter, s.scenario.drop_every, s.scenario.late_updates)
+        for s in sorties
     ]
-    trace = fly(flight, FaultyController(caller, faults, compiled.instances), progress)
+    trace = fly(flight, FaultyController(caller, faults, compiled.instances), progress, engine=engine)
     healthy = [not sortie.end for sortie in sorties]
     if (trace.status[:, healthy] == Status.BAD_TARGET).any():
         raise FlightError(

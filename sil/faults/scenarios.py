@@ -6,12 +6,8 @@ from typing import Final
 
 from mambo_nmpc.codegen.reference import Status
 from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.faults.injection import (
-    Alter,
-    Drop,
-    drop_all,
-    drop_every,
-    drop_none,
+from mambo_nmpc.sil.faults.fault import (
+    Alteration,
     freeze_state,
     keep_inputs,
     move_target,
@@ -39,8 +35,8 @@ class FaultScenario:
 
     name: str
     duration_s: float
-    alter: Alter = keep_inputs
-    drop: Drop = drop_none
+    alter: Alteration = keep_inputs
+    drop_every: int = 0
     late_updates: int = 0
     weights: tuple[float, float] | None = None
     answers: frozenset[int] | None = None
@@ -83,11 +79,9 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario("x infinite, 1 s", 1.0, set_state(0, math.inf), answers=bad_state),
         FaultScenario("vy minus infinite, 1 s", 1.0, set_state(3, -math.inf), answers=bad_state),
         *(FaultScenario(f"state frozen, {span_s:g} s", span_s, freeze_state) for span_s in (0.2, 1.0, 5.0)),
-        FaultScenario(
-            "every 2nd tick dropped, 5 s", 5.0, drop=drop_every(2), answers=_only(Status.OK, NOT_CALLED)
-        ),
-        FaultScenario("all ticks dropped, 0.2 s", 0.2, drop=drop_all, answers=_only(NOT_CALLED)),
-        FaultScenario("all ticks dropped, 1 s", 1.0, drop=drop_all, answers=_only(NOT_CALLED)),
+        FaultScenario("every 2nd tick dropped, 5 s", 5.0, drop_every=2, answers=_only(Status.OK, NOT_CALLED)),
+        FaultScenario("all ticks dropped, 0.2 s", 0.2, drop_every=1, answers=_only(NOT_CALLED)),
+        FaultScenario("all ticks dropped, 1 s", 1.0, drop_every=1, answers=_only(NOT_CALLED)),
         *(FaultScenario(f"commands {late} ticks late, 5 s", 5.0, late_updates=late) for late in (2, 5, 20)),
         *(
             FaultScenario(f"target {jump_m:g} m off, {span_s:g} s", span_s, jump)
@@ -123,6 +117,6 @@ def _only(*statuses: int) -> frozenset[int]:
     return frozenset(int(status) for status in statuses)
 
 
-def _scaled(position: float, attitude: float) -> Alter:
+def _scaled(position: float, attitude: float) -> Alteration:
     """Scale position and velocity by one factor, roll, pitch and yaw by another."""
     return scale_state([position] * 4 + [attitude] * 3)

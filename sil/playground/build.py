@@ -14,7 +14,7 @@ from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.build import glue, with_default_prefix
 from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.build import texts
-from mambo_nmpc.sil.engine.simulate import pd_function
+from mambo_nmpc.sil.engine.native import pd_function
 from mambo_nmpc.sil.files.cache import build_cached
 from mambo_nmpc.sil.playground.controllers import PageController
 
@@ -62,8 +62,12 @@ def _compiler() -> Toolchain:
 
 
 def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
-    """Return the C by path, the functions that the page calls, and the step of the controller."""
-    files = texts() | {
+    """Return the C by path, the functions that the page calls, and the step of the controller.
+
+    No page injects faults, whose C wants the standard library.
+    """
+    engine = {path: text for path, text in texts().items() if path != "faults.c"}
+    files = engine | {
         "playground.c": _text("playground", "playground.c"),
         "math.h": _text("playground", "math.h"),
         "freestanding.c": _text("firmware", "freestanding.c"),

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.build import ffi, record_type
-from mambo_nmpc.sil.engine.simulate import pd_function
+from mambo_nmpc.sil.engine.native import pd_function
 from mambo_nmpc.sil.files.summary import Summary
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.playground import proof

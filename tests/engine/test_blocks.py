@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mambo_nmpc.sil.engine.build import texts
+from mambo_nmpc.sil.faults.injection import Applied, FaultyController
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.trajectories import Hover
 from mambo_nmpc.sil.plant import elementary
@@ -15,7 +16,8 @@ from mambo_nmpc.sil.plant.randomness import Purpose, generators
 from mambo_nmpc.sil.plant.vehicle import Seen
 from mambo_nmpc.sil.sensors.estimators import Suite
 from mambo_nmpc.sil.sensors.instruments import NOISES, Sensors
-from tests.support.engines import NUMBERS, TICKS, build, estimates, tabulate, truths
+from tests.support.engines import NUMBERS, TICKS, build, estimates, injected, tabulate, truths
+from tests.support.faults import SHOWN, any_inputs
 
 
 @pytest.fixture(scope="module")
@@ -54,3 +56,30 @@ def test_sensors_and_estimators(
     draws = generators((5,), Purpose.SENSORS)[0].standard_normal((TICKS, NOISES))
     found = estimates(engine, Flight(Hover(), duration_s=1.0, sensors=sensors), given, draws)
     assert unified(found) == unified(expected.reshape(TICKS, 12))
+
+
+class Probe:
+    """The controller `record` of the blocks in Python, with the memory (1, 8) of its calls."""
+
+    def __init__(self) -> None:
+        self.memory = np.zeros((1, 8), np.uint8)
+        self.inputs: list[FloatArray] = []
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
+        """Record the inputs and count the call."""
+        calls = self.memory.view(np.int64)[0]
+        calls += 1
+        self.inputs.append(np.concatenate([state[0], target[0], thrust_acceleration_m_s2]))
+        return Applied(np.array([[1.0, -2.0]]) * calls, np.where(calls % 3 == 0, 1, 0))
+
+
+@pytest.mark.parametrize("number", range(len(SHOWN)))
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_faults(engine: Path, number: int) -> None:
+    """What the controller receives, the command that reaches the drone, and the status."""
+    probe, inputs = Probe(), any_inputs()
+    faulty = FaultyController(probe, [SHOWN[number]], probe.memory)
+    applied = [faulty.step(row[:, :7], row[:, 7:13], row[:, 13]) for row in inputs[:, np.newaxis]]
+    outputs = [np.concatenate([one.command_rad[0], one.status]) for one in applied]
+    expected = np.concatenate([np.array(probe.inputs), np.array(outputs)], axis=1)
+    assert unified(injected(engine, SHOWN[number], inputs)) == unified(expected)

@@ -27,7 +27,16 @@ from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.trajectories import Hover
 from mambo_nmpc.sil.sensors.instruments import NOISES, Sensors
 from tests.support.engine_reasons import reason
-from tests.support.engines import TICKS, build, estimates, tabulate, truths
+from tests.support.engines import TICKS, build, estimates, injected, tabulate, truths
+from tests.support.faults import (
+    CHANGES,
+    FAULTS,
+    PATIENCE,
+    SHOWN,
+    any_inputs,
+    faulty_controller,
+    faulty_flight,
+)
 from tests.support.mutants import Mutant, mutants
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES
@@ -54,10 +63,14 @@ def digests(path: Path) -> list[str]:
     traces += [
         fly_compiled(engine, flight, CompiledController(settings, flight.flights)) for flight in flights[:2]
     ]
+    faulty, reweighted = faulty_controller(settings, FAULTS, CHANGES, PATIENCE)
+    traces.append(fly_compiled(engine, faulty_flight(FAULTS), faulty))
     found = [trace.digest(index) for trace in traces for index in range(trace.flights)]
     sensed = Flight(Hover(), duration_s=1.0, sensors=Sensors(derotated=True))
     draws = np.random.default_rng(1).standard_normal((TICKS, NOISES))
     blocks = [tabulate(path), *(estimates(path, sensed, truths(kind), draws) for kind in ("gates", "wild"))]
+    blocks += [injected(path, fault, any_inputs()) for fault in SHOWN]
+    found.append(str(reweighted.answers))
     return [*found, *(hashlib.sha256(block.tobytes()).hexdigest() for block in blocks)]
 
 

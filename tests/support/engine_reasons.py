@@ -54,6 +54,15 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("zero -> one", "zero -> one #1")
     },
     **{
+        ("faults.c", line, change): _BESIDE
+        for line, changes in (
+            ("for (i = 0; i < 7; i++) {", ("< -> <= #1", "7 -> 8 #1", "< -> <= #2", "7 -> 8 #2")),
+            ("for (i = 0; i < 6; i++) {", ("0 -> (-1)", "< -> <=", "6 -> 7")),
+        )
+        for change in changes
+    },
+    ("faults.c", "break;", "left out #6"): "the last case",
+    **{
         ("loop.c", "double thrust_share = <real>;", change): "read only with disturbances, which set it"
         for change in ("negative", "next number")
     },

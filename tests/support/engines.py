@@ -8,8 +8,11 @@ from typing import Any, Final, Literal
 import cffi
 import numpy as np
 
-from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, pointer
+from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, ffi, pointer
+from mambo_nmpc.sil.engine.native import Native
 from mambo_nmpc.sil.engine.records import flight_records, simulation_record
+from mambo_nmpc.sil.faults.fault import Fault
+from mambo_nmpc.sil.faults.native import native_faulty
 from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -58,6 +61,36 @@ void run_suite(const engine_simulation_t *simulation, const engine_flight_t *fli
     }
 }
 
+static double *recorded;
+
+/* A controller whose memory is the number of its calls; records its inputs, refuses every third call. */
+int64_t record(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+               double *command_rad)
+{
+    int64_t *calls = self;
+    int i;
+
+    for (i = 0; i < 14; i++) {
+        recorded[i] = (i < 7) ? state[i] : ((i < 13) ? target[i - 7] : thrust_acceleration_m_s2);
+    }
+    (*calls)++;
+    command_rad[0] = (double)*calls;
+    command_rad[1] = -2.0 * (double)*calls;
+    return ((*calls % 3) == 0) ? 1 : 0;
+}
+
+void run_faulty(void *faulty, const double *inputs, double *found, int n)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        const double *row = &inputs[14 * i];
+
+        recorded = &found[17 * i];
+        recorded[16] = (double)engine_faulty_step(faulty, row, row + 7, row[13], recorded + 14);
+    }
+}
+
 void tabulate(const double *x, double *y, int n)
 {
     int i;
@@ -72,6 +105,9 @@ void tabulate(const double *x, double *y, int n)
 _INTERFACE: Final = cffi.FFI()
 _INTERFACE.cdef("""
     void tabulate(const double *x, double *y, int n);
+    int64_t record(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                   double *command_rad);
+    void run_faulty(void *faulty, const double *inputs, double *found, int n);
     void run_suite(const void *simulation, const void *flight, const double *truths, const double *draws,
                    double *found, int n);
 """)
@@ -146,4 +182,23 @@ def tabulate(path: Path) -> FloatArray:
     found = np.empty((len(NUMBERS), 4))
     engine: Any = _INTERFACE.dlopen(str(path))
     engine.tabulate(*(pointer("double *", array) for array in (NUMBERS, found)), len(NUMBERS))
+    return found
+
+
+def injected(path: Path, fault: Fault, inputs: FloatArray) -> FloatArray:
+    """Return what a fault makes of inputs (k, 14) in the engine at `path`, as (k, 17).
+
+    The columns are state, target and thrust of the controller, the command, and the status.
+    """
+    found = np.empty((len(inputs), 17))
+    engine: Any = _INTERFACE.dlopen(str(path))
+    memory = np.zeros((1, 8), np.uint8)
+    address = int(_INTERFACE.cast("intptr_t", _INTERFACE.addressof(engine, "record")))
+    inner = Native(ffi.cast("engine_controller_t", address), pointer("char *", memory), 0)
+    faulty = native_faulty(ffi.dlopen(str(path)), inner, [fault], memory)
+    engine.run_faulty(
+        _INTERFACE.cast("void *", int(ffi.cast("intptr_t", faulty.instance(0)))),
+        *(pointer("double *", array) for array in (inputs, found)),
+        len(inputs),
+    )
     return found

@@ -1,0 +1,110 @@
+"""Flights with every effect of a fault, which use every line of the wrappers in the engine."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from mambo_nmpc.codegen.settings.model import Settings
+from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_nmpc.sil.faults.fault import (
+    Alteration,
+    Fault,
+    WeightChange,
+    freeze_state,
+    keep_inputs,
+    move_target,
+    report_thrust,
+    scale_state,
+    set_state,
+    shift_yaw,
+    wrap_yaw,
+)
+from mambo_nmpc.sil.faults.injection import FaultyController, LevellingCaller, ReweightedController
+from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.plant.arrays import FloatArray
+
+UPDATES: Final = 101
+
+ALTERATIONS: Final[tuple[Alteration, ...]] = (
+    keep_inputs,
+    freeze_state,
+    set_state(slice(0, 7), math.nan, on=3, of=10),
+    set_state(3, -math.inf),
+    set_state(slice(4, 6), 0.05, on=2, of=3),
+    scale_state([0.9, 1.1, 0.8, 1.2, 0.7, 1.3, 1.4]),
+    shift_yaw(math.pi),
+    Alteration(shift_yaw(0.0).effect, (0.1, 0.2, -0.3, 0.4, -0.05, 0.06, 0.7)),
+    wrap_yaw,
+    move_target(0.5),
+    Alteration(move_target(0.0).effect, (0.1, 0.2, -0.3, 0.4, -0.5, 0.6)),
+    report_thrust(5.0),
+    report_thrust(math.nan),
+)
+"""Every effect; on every number that it changes."""
+
+FAULTS: Final[tuple[Fault | None, ...]] = (
+    None,
+    *(Fault(20, 60, alter) for alter in ALTERATIONS),
+    Fault(0, 30, freeze_state),
+    Fault(20, 60, drop_every=1),
+    Fault(20, 60, drop_every=3),
+    Fault(20, 60, late_updates=1),
+    Fault(20, 60, late_updates=7),
+    Fault(3, 90, late_updates=20),
+    Fault(20, 60, set_state(0, math.nan), 4, 5),
+)
+"""Faults of the inputs, from the first update on, missing updates, late commands, and all of these."""
+
+CHANGES: Final = (
+    WeightChange(1, 10, (math.nan, 1.0)),
+    WeightChange(4, 0, (0.0, 0.0)),
+    WeightChange(1, 30, (1.0, 0.5)),
+)
+"""New weights of a 1-norm, of which the first are refused."""
+
+PATIENCE: Final = tuple(1 + row % 4 if row % 2 else 2**31 for row in range(len(FAULTS)))
+
+SHOWN: Final = tuple(
+    fault if any(fault.alter.columns) else replace(fault, alter=replace(fault.alter, columns=(2, 5)))
+    for fault in FAULTS
+    if fault is not None
+)
+"""The same for inputs of any numbers; columns that an effect does not use are there."""
+
+
+def any_inputs() -> FloatArray:
+    """Return states, targets and thrusts (UPDATES, 14) of any numbers, NaN and infinity among them."""
+    rng = np.random.default_rng(3)
+    inputs = rng.normal(0.0, 4.0, (UPDATES, 14))
+    inputs[rng.random(inputs.shape) < 0.05] *= 1e3
+    for number in (np.nan, np.inf, -np.inf, 0.0, -0.0, np.pi, -np.pi):
+        inputs[rng.random(inputs.shape) < 0.01] = number
+    return inputs
+
+
+def faulty_flight(faults: Sequence[Fault | None]) -> Flight:
+    """Return turning flights, one for each fault, whose heading passes south."""
+    return Flight(
+        Bernoulli(2.0, 0.5),
+        duration_s=0.01 * (UPDATES - 1),
+        flights=len(faults),
+        yaw_rad=np.linspace(2.8, 3.0, len(faults)),
+        yaw_rate_rad_s=2.0,
+    )
+
+
+def faulty_controller(
+    settings: Settings,
+    faults: Sequence[Fault | None],
+    changes: Sequence[WeightChange],
+    patience: Sequence[int],
+) -> tuple[FaultyController, ReweightedController]:
+    """Return controllers with all wrappers, and that of them which has the answers to new weights."""
+    compiled = CompiledController(settings, len(faults))
+    reweighted = ReweightedController(compiled, len(faults), changes)
+    caller = LevellingCaller(reweighted, compiled, np.array(patience))
+    return FaultyController(caller, faults, compiled.instances), reweighted
