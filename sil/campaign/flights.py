@@ -21,6 +21,7 @@ from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.metrics import Metrics, measure, saturated_share
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.plant.link import NOT_CALLED
@@ -51,7 +52,11 @@ def columns(names: Sequence[str], *, sensed: bool) -> tuple[str, ...]:
 
 
 def fly_batch(
-    version: str, entrants: Sequence[dict[str, Any]], flight: dict[str, Any], drawn: Sequence[Draw]
+    version: str,
+    entrants: Sequence[dict[str, Any]],
+    flight: dict[str, Any],
+    drawn: Sequence[Draw],
+    engine: EngineName = "c",
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
@@ -63,10 +68,12 @@ def fly_batch(
             f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
         )
     scenarios = [scenario(flight, one) for one in drawn]
-    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios)
+    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios, engine)
 
 
-def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) -> list[Row]:
+def fly_scenarios(
+    entrants: Sequence[Entrant], scenarios: Sequence[Scenario], engine: EngineName = "c"
+) -> list[Row]:
     """Fly flights together with every controller; return one row per flight, in order.
 
     Tells the worker's pool how far it is. Raises BuildError if there is no compiler, FlightError for flights
@@ -75,7 +82,8 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     rows: list[Row] = [{} for _ in scenarios]
     for number, entrant in enumerate(entrants):
         flight = flight_of(scenarios, entrant.settings.horizon.update_period_s)
-        trace = fly(flight, _controller(entrant, flight), partial(_report_part, number, len(entrants)))
+        report = partial(_report_part, number, len(entrants))
+        trace = fly(flight, _controller(entrant, flight), report, engine=engine)
         for key, values in _evaluate(
             trace, Design(entrant.settings).tilt_limit_rad, scenarios[0].vehicle
         ).items():

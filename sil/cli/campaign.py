@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
+from mambo_nmpc.sil.cli.options import AsJson, Engine, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
     from mambo_nmpc.sil.campaign.report import CampaignSummary
     from mambo_nmpc.sil.cli.progress import Bar
+    from mambo_nmpc.sil.flight.names import EngineName
 
 
 def campaign(
@@ -31,6 +32,7 @@ def campaign(
         str | None,
         typer.Option(help="Address of a running Dask scheduler; its workers fly, not this machine."),
     ] = None,
+    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
@@ -39,7 +41,9 @@ def campaign(
     from mambo_nmpc.sil.cli.progress import counting_bar
 
     with counting_bar("starting", "flights", flights) as bar:
-        summary = _run(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
+        summary = _run(
+            source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler, engine=engine
+        )
     from mambo_nmpc.sil.campaign.report import PICTURE, RECORDS, campaign_text
     from mambo_nmpc.sil.campaign.store import TABLE
     from mambo_nmpc.sil.files.folders import SUMMARY
@@ -57,6 +61,7 @@ def _run(
     *,
     workers: int | None,
     scheduler: str | None,
+    engine: "EngineName",
 ) -> "CampaignSummary":
     """Fly the missing flights and write the results; if interrupted print how many are finished."""
     from mambo_nmpc.sil.campaign import file
@@ -72,7 +77,7 @@ def _run(
                 pool = processes(workers or os.cpu_count() or 1) if scheduler is None else cluster(scheduler)
                 with pool as open_pool:
                     bar.stage("flying")
-                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running)
+                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running, engine=engine)
             return finish(chosen, store, bar.stage)
         except KeyboardInterrupt:
             with contextlib.suppress(OSError):

@@ -64,6 +64,13 @@ PortName = Annotated[
 ]
 Baud = Annotated[int, typer.Option(help="Rate of the serial port.", min=1)]
 
+Engine = Annotated[
+    EngineName,
+    typer.Option(
+        "--engine", help="Simulate in compiled C, or in NumPy: some hundred times slower, the same bits."
+    ),
+]
+
 Options = TypeVar("Options")
 
 
@@ -136,10 +143,7 @@ class FlyOptions:
             help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
         ),
     ] = None
-    engine: Annotated[
-        EngineName,
-        typer.Option(help="Simulate in compiled C, or in NumPy: some hundred times slower, the same bits."),
-    ] = "c"
+    engine: Engine = "c"
     pictures: Annotated[bool, typer.Option(help="Draw the flight, which takes most of the time.")] = True
     as_json: AsJson = False
 

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, OtherDrone, Results, show
+from mambo_nmpc.sil.cli.options import AsJson, Engine, OtherDrone, Results, show
 
 if TYPE_CHECKING:
     from mambo_nmpc.sil.campaign.file import Entrant
     from mambo_nmpc.sil.campaign.flights import Row
+    from mambo_nmpc.sil.flight.names import EngineName
     from mambo_nmpc.sil.regress.file import FlightSuite
 
 
@@ -26,6 +27,7 @@ def regress(
     update: Annotated[
         bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.", metavar="")
     ] = False,
+    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline."""
@@ -59,7 +61,7 @@ def regress(
         demand_replaceable(path)
     baseline = None if update else read_baseline(chosen, entrant.name)
     with new_results(output, RegressSummary.command, (*PICTURES, JUNIT, f"{RECORDS}/")) as folder:
-        rows = _fly(chosen, entrant)
+        rows = _fly(chosen, entrant, engine)
         summary = judge(chosen, entrant, rows, baseline, path)
         write_records(summary, chosen, entrant, rows, folder)
         (folder / JUNIT).write_bytes(junit_xml(summary))
@@ -75,7 +77,7 @@ def regress(
         raise typer.Exit(1)
 
 
-def _fly(suite: "FlightSuite", entrant: "Entrant") -> "list[Row]":
+def _fly(suite: "FlightSuite", entrant: "Entrant", engine: "EngineName") -> "list[Row]":
     """Fly the suite on all processors; show the progress."""
     from mambo_nmpc.sil.campaign.executors import processes
     from mambo_nmpc.sil.cli.progress import counting_bar
@@ -85,4 +87,4 @@ def _fly(suite: "FlightSuite", entrant: "Entrant") -> "list[Row]":
         counting_bar("flying", "flights", len(suite.flights)) as progress,
         processes(os.cpu_count() or 1) as pool,
     ):
-        return fly_suite(suite, entrant, pool, progress)
+        return fly_suite(suite, entrant, pool, progress, engine=engine)

@@ -1,12 +1,15 @@
 """The command `table2`: fly the cases of Table II of the paper."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, Results, Scalar, load, show
+from mambo_nmpc.sil.cli.options import AsJson, Engine, Results, Scalar, load, show
+
+if TYPE_CHECKING:
+    from mambo_nmpc.sil.flight.names import EngineName
 
 PICTURES = ("figure3.png", "figure3.svg")
 SENSED_TABLE = "sensors.md"
@@ -22,6 +25,7 @@ def table2(
         ),
     ] = False,
     scalar: Scalar = None,
+    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims."""
@@ -33,13 +37,13 @@ def table2(
     from mambo_nmpc.sil.paper.table2 import PRESETS, Table2Summary, fly_table2, judge_table2, table2_text
 
     if sensors:
-        _fly_with_sensors(output, scalar, as_json=as_json)
+        _fly_with_sensors(output, scalar, engine, as_json=as_json)
         return
     settings = {name: load(name, scalar) for name in PRESETS}
     files = {name: f"{name.lower()}.npz" for name in (*PD_TITLES.values(), *settings)}
     with new_results(output, Table2Summary.command, (*files.values(), *PICTURES)) as folder:
         with progress_bar("flying Table II") as progress:
-            traces = fly_table2(settings, progress)
+            traces = fly_table2(settings, progress, engine=engine)
         for name, trace in traces.items():
             write_npz(trace, folder / files[name])
         drawn = {name: traces[name] for name in PD_TITLES.values()} | {"NMPC, mambo": traces["mambo"]}
@@ -50,7 +54,7 @@ def table2(
     typer.echo(f"{echo(str(output))}: {', '.join(PICTURES)} and the traces", err=True)
 
 
-def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
+def _fly_with_sensors(output: Path, scalar: str | None, engine: "EngineName", *, as_json: bool) -> None:
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
     from mambo_nmpc.sil.paper.sensed import PRESETS, SensedSummary, fly_sensed, text
@@ -58,7 +62,7 @@ def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> Non
     settings = {name: load(name, scalar) for name in PRESETS}
     with new_results(output, SensedSummary.command, (SENSED_TABLE,)) as folder:
         with progress_bar("flying Table II with sensors") as progress:
-            summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
+            summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress, engine=engine))
         table = text(summary.rows)
         (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
         summary.write(folder)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
+from mambo_nmpc.sil.cli.options import AsJson, Engine, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
     from optuna import Study
 
     from mambo_nmpc.sil.cli.progress import Bar
+    from mambo_nmpc.sil.flight.names import EngineName
     from mambo_nmpc.sil.tuning.file import Tuning
     from mambo_nmpc.sil.tuning.report import TuneSummary
 
@@ -34,15 +35,15 @@ def tune(
         str | None,
         typer.Option(help="URL of a database that several machines share, instead of a file in the folder."),
     ] = None,
+    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Search for settings that track well with calm commands; continue an interrupted search."""
     from mambo_nmpc.sil.cli.progress import counting_bar
 
     with counting_bar("starting", "trials", trials) as bar:
-        summary = _run(
-            source, vehicle, output, trials, bar, workers=workers or os.cpu_count() or 1, storage=storage
-        )
+        count = workers or os.cpu_count() or 1
+        summary = _run(source, vehicle, output, trials, bar, workers=count, storage=storage, engine=engine)
     from mambo_nmpc.sil.files.folders import SUMMARY
     from mambo_nmpc.sil.tuning.report import CONTROLLER, FRONT, tune_text
 
@@ -60,6 +61,7 @@ def _run(
     *,
     workers: int,
     storage: str | None,
+    engine: "EngineName",
 ) -> "TuneSummary":
     """Run the missing trials and write the results."""
     from mambo_nmpc.sil.campaign.store import claim, convert_os_errors
@@ -83,14 +85,23 @@ def _run(
                 raise
             bar(len(finished_trials(study)))
             if len(finished_trials(study)) < trials:
-                _search(tuning, study, owner_of(output, storage), trials, bar, workers=workers, folder=output)
+                owner = owner_of(output, storage)
+                _search(tuning, study, owner, trials, bar, workers=workers, folder=output, engine=engine)
             found = finished_trials(study)
         bar.stage("drawing the front")
         return finish(tuning, found, output)
 
 
 def _search(
-    tuning: "Tuning", study: "Study", owner: str, trials: int, bar: "Bar", *, workers: int, folder: Path
+    tuning: "Tuning",
+    study: "Study",
+    owner: str,
+    trials: int,
+    bar: "Bar",
+    *,
+    workers: int,
+    folder: Path,
+    engine: "EngineName",
 ) -> None:
     """Search until `trials` are finished; if interrupted print how many are."""
     from mambo_nmpc.sil.campaign.executors import processes
@@ -99,7 +110,7 @@ def _search(
     bar.stage("tuning")
     try:
         with processes(workers) as pool:
-            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
+            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running, engine=engine)
     except KeyboardInterrupt:
         with contextlib.suppress(OSError):
             typer.echo(

@@ -13,6 +13,7 @@ from mambo_nmpc.sil.files.summary import Number
 from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import horizontal_error_m, measure
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import STEP_TIME_S, Bernoulli, PositionStep, Trajectories
 from mambo_nmpc.sil.plant.arrays import FloatArray
@@ -57,7 +58,7 @@ class Answers:
     eight: EightAnswer
 
 
-def answers(settings: Settings, drone: VehicleFile) -> Answers:
+def answers(settings: Settings, drone: VehicleFile, *, engine: EngineName = "c") -> Answers:
     """Fly steps and eight with the compiled controller, without disturbance or sensor noise.
 
     Raises FlightError, and the errors of building the C.
@@ -72,8 +73,8 @@ def answers(settings: Settings, drone: VehicleFile) -> Answers:
         update_period_s=period_s,
     )
     eight = Flight(Bernoulli(2.0, 0.5), vehicle=vehicle, update_period_s=period_s)
-    steps = fly(step, CompiledController(settings, 2))
-    flown = fly(eight, CompiledController(settings))
+    steps = fly(step, CompiledController(settings, 2), engine=engine)
+    flown = fly(eight, CompiledController(settings), engine=engine)
     metrics = measure(flown)
     return Answers(
         steps,

@@ -11,6 +11,7 @@ from mambo_nmpc.sil.diff.plots import draw_steps
 from mambo_nmpc.sil.diff.record import PICTURES, DiffSummary, differences, figures
 from mambo_nmpc.sil.errors import FlightError
 from mambo_nmpc.sil.files.folders import new_results
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 Side = tuple[str, Settings]
@@ -18,7 +19,13 @@ Side = tuple[str, Settings]
 
 
 def compare(
-    a: Side, b: Side, drone: VehicleFile, folder: Path | None, progress: Callable[[float], None]
+    a: Side,
+    b: Side,
+    drone: VehicleFile,
+    folder: Path | None,
+    progress: Callable[[float], None],
+    *,
+    engine: EngineName = "c",
 ) -> DiffSummary:
     """Return the comparison of two controllers on a drone; write it and its picture to `folder`.
 
@@ -35,9 +42,9 @@ def compare(
     with contextlib.ExitStack() as stack:
         place = folder and stack.enter_context(new_results(folder, DiffSummary.command, PICTURES))
         if not summary.same:
-            first = _answers(a, drone)
+            first = _answers(a, drone, engine)
             progress(0.5)
-            second = _answers(b, drone)
+            second = _answers(b, drone, engine)
             found = {"figures_a": figures(a[1], first), "figures_b": figures(b[1], second)}
             summary = summary.model_copy(update=found)
             if place is not None:
@@ -47,8 +54,8 @@ def compare(
     return summary
 
 
-def _answers(side: Side, drone: VehicleFile) -> Answers:
+def _answers(side: Side, drone: VehicleFile, engine: EngineName) -> Answers:
     try:
-        return answers(side[1], drone)
+        return answers(side[1], drone, engine=engine)
     except FlightError as error:
         raise FlightError(f"{echo(side[0])}: {error}") from error

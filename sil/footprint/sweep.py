@@ -16,6 +16,7 @@ from mambo_nmpc.sil.errors import WorkerError
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.metrics import measure
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.paper.table2 import CASES
 from mambo_nmpc.sil.plant.airframe import NOMINAL
@@ -83,13 +84,14 @@ def measure_grid(
     progress: Callable[[int], None],
     *,
     drone: VehicleFile = NOMINAL,
+    engine: EngineName = "c",
 ) -> list[Point]:
     """Return the points of the grid in order; `run` measures them, in any order.
 
     Calls `progress` with the number of measured points. Raises WorkerError if a worker fails.
     """
     documents = settings.model_dump(), board.model_dump(), drone.model_dump()
-    jobs = [((*documents, *point),) for point in grid.points()]
+    jobs = [((*documents, *point), engine) for point in grid.points()]
     found: dict[int, Point] = {}
     progress(0)
     try:
@@ -125,7 +127,9 @@ def write_points(points: Sequence[Point], path: Path) -> None:
         writer.writerows(asdict(point) for point in points)
 
 
-def _measure_point(job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int]) -> Point:
+def _measure_point(
+    job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int], engine: EngineName
+) -> Point:
     """Measure one point in a worker process; `job` is plain data, since generic models do not pickle."""
     document, board_document, drone, prediction, control, iterations = job
     board = Board.model_validate(board_document)
@@ -136,7 +140,7 @@ def _measure_point(job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], in
     case = next(iter(CASES.values()))
     vehicle = Vehicle.of(VehicleFile.model_validate(drone))
     flight = Flight(case, vehicle=vehicle, update_period_s=chosen.horizon.update_period_s)
-    metrics = measure(fly(flight, CompiledController(chosen)))
+    metrics = measure(fly(flight, CompiledController(chosen), engine=engine))
     return Point(
         prediction=prediction,
         control=control,

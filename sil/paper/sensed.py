@@ -13,7 +13,7 @@ from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.files.summary import Number, Summary
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
 from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES
+from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES, EngineName
 from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
 from mambo_nmpc.sil.paper.table2 import (
     CASES,
@@ -77,6 +77,7 @@ def fly_sensed(
     *,
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
+    engine: EngineName = "c",
 ) -> list[SensedRow]:
     """Fly the case with both PDs and the compiled C of `settings` by name, each with every one of `VIEWS`.
 
@@ -93,7 +94,7 @@ def fly_sensed(
         controller: PositionController = (
             pd_controller(pds[name]) if name in pds else CompiledController(settings[name], n)
         )
-        trace = fly(flight, controller, report_part(progress, index, len(jobs)))
+        trace = fly(flight, controller, report_part(progress, index, len(jobs)), engine=engine)
         rows.append(_judge(name, view, trace))
     return rows
 

@@ -8,6 +8,7 @@ from mambo_nmpc.sil.campaign.file import Entrant
 from mambo_nmpc.sil.campaign.flights import Row, fly_scenarios
 from mambo_nmpc.sil.campaign.run import MOST_IN_A_BATCH
 from mambo_nmpc.sil.errors import FlightError, WorkerError
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, flight_of
 from mambo_nmpc.sil.regress.file import FlightSuite
 
@@ -25,14 +26,21 @@ def demand_flyable(suite: FlightSuite, entrant: Entrant, place: str) -> None:
             raise InvalidSettingsError((f"{place}: flights.{one.group}: {error}",)) from None
 
 
-def fly_suite(suite: FlightSuite, entrant: Entrant, pool: Pool, progress: Callable[[int], None]) -> list[Row]:
+def fly_suite(
+    suite: FlightSuite,
+    entrant: Entrant,
+    pool: Pool,
+    progress: Callable[[int], None],
+    *,
+    engine: EngineName = "c",
+) -> list[Row]:
     """Fly all flights of a suite and return their results by metric, in order.
 
     Calls `progress` with the number of finished flights. Raises WorkerError if a worker fails, BuildError if
     there is no compiler.
     """
     batches = list(_batches(suite, pool.workers))
-    tasks = [([entrant], [suite.flights[number].scenario for number in batch]) for batch in batches]
+    tasks = [([entrant], [suite.flights[number].scenario for number in batch], engine) for batch in batches]
     rows: dict[int, Row] = {}
     progress(0)
     try:

@@ -25,6 +25,7 @@ from mambo_nmpc.sil.campaign.executors import Pool
 from mambo_nmpc.sil.campaign.file import Entrant
 from mambo_nmpc.sil.campaign.flights import CRASHED, Row, fly_batch
 from mambo_nmpc.sil.errors import StudyError
+from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.tuning.file import Tuning
 
 if TYPE_CHECKING:
@@ -122,6 +123,7 @@ def search(
     pool: Pool,
     progress: Callable[[int], None],
     running: Callable[[float], None] = lambda _: None,
+    engine: EngineName = "c",
 ) -> None:
     """Run trials until the study has `trials` finished ones.
 
@@ -138,10 +140,8 @@ def search(
         for _ in range(min(room, trials - finished - len(waiting))):
             study.add_trial(propose(tuning, study, owner))
         flown = _find_unfinished(study, owner)
-        tasks = [
-            (__version__, [Entrant(_NAME, "nmpc", tuning.settings(values)).document()], flight, drawn)
-            for values in flown.values()
-        ]
+        entrants = [Entrant(_NAME, "nmpc", tuning.settings(values)) for values in flown.values()]
+        tasks = [(__version__, [entrant.document()], flight, drawn, engine) for entrant in entrants]
         numbers = list(flown)
         for task, rows in pool.run(fly_batch, tasks, running):
             crashed, means = judge(rows, tuning.file.flight.duration_s, tuning.base.limits.tilt_rad)
