@@ -32,10 +32,13 @@ CONSTANTS: Final = (
 )
 """Names of the constants in sil/plant/elementary.py that the engine uses."""
 FLAGS: Final = (
-    *("-std=c99", "-O2", "-ffp-contract=off"),
+    *("-std=c99", "-O3", "-ffp-contract=off"),
     *(("-mno-fma",) if platform.machine() in ("x86_64", "AMD64", "i686") else ()),
 )
-"""gcc 12 fuses operations in spite of -ffp-contract=off if CC has -mfma or -march=native."""
+"""gcc 12 fuses operations in spite of -ffp-contract=off if CC has -mfma or -march=native.
+
+With -O3 a flight takes four fifths of the time with -O2; -mavx2 gains nothing.
+"""
 LIBRARIES: Final = ("-lm",)
 
 ffi: Final = cffi.FFI()
