@@ -80,6 +80,7 @@ docs: $(SETUP_DOCS)
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights
+	$(BIN)/python -m benchmarks.commands
 	$(BIN)/python -m benchmarks.rotorpy_flights
 	$(BIN)/python -m benchmarks.times
 	$(BIN)/python -m benchmarks.exact_times

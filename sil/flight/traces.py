@@ -1,6 +1,5 @@
 """The trace of a simulation: its arrays, digest, CSV and NPZ files."""
 
-import csv
 import hashlib
 import zipfile
 from dataclasses import dataclass, fields, replace
@@ -110,14 +109,14 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
 
     Every number is spelled so that it reads back to the same bits.
     """
-    rows = [[time_s] for time_s in trace.time_s.tolist()]
+    columns = [trace.time_s.tolist()]
     for name in (field.name for field in fields(trace) if field.name != "time_s"):
-        for row, values in zip(rows, getattr(trace, name)[:, flight].tolist(), strict=True):
-            row.extend(values if isinstance(values, list) else [values])
+        columns += getattr(trace, name)[:, flight].reshape(len(trace.time_s), -1).T.tolist()
+    names = CSV_COLUMNS + (SEEN_COLUMNS if isinstance(trace, SensedTrace) else ())
+    spelled = zip(*(map(repr, column) for column in columns), strict=True)
+    lines = (",".join(names), *map(",".join, spelled), "")
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow((*CSV_COLUMNS, *(SEEN_COLUMNS if isinstance(trace, SensedTrace) else ())))
-        writer.writerows(rows)
+        file.write("\n".join(lines))
 
 
 def write_npz(trace: Trace, path: Path) -> None:
