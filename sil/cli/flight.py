@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import typer
 
-from mambo_nmpc.codegen import boards
 from mambo_nmpc.codegen.design import Design
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.reference import reference_controller
@@ -164,6 +163,7 @@ def _controller(options: FlyOptions, settings: Settings) -> PositionController:
 
 def _on_board(options: FlyOptions, settings: Settings) -> PositionController:
     """Build the C for a board, and load it into the board's emulated core."""
+    from mambo_nmpc.codegen import boards
     from mambo_nmpc.sil.controllers.emulated import (  # unicorn is slow to import
         EmulatedController,
         build_guest,

@@ -14,7 +14,6 @@ from typing import Any, Final
 import cffi
 
 from mambo_nmpc.codegen.flags import COMPILE_FLAGS
-from mambo_nmpc.codegen.render import render
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.toolchain import Toolchain
@@ -64,8 +63,14 @@ def build_library(settings: Settings, toolchain: Toolchain) -> Any:
     Raises BuildError, CacheError.
     """
     settings = with_default_prefix(settings)
+
+    def files() -> dict[str, str]:
+        from mambo_nmpc.codegen.render import render  # noqa: PLC0415 - slow to import, and mostly cached
+
+        return render(settings, with_digest=False)
+
     key = ("settings", _generator_digest(), settings.model_dump_json())
-    return _load(key, lambda: render(settings, with_digest=False), toolchain)
+    return _load(key, files, toolchain)
 
 
 def load_library(files: dict[str, str], toolchain: Toolchain) -> Any:
