@@ -1,5 +1,6 @@
 """Blocks of the engine have the bits of NumPy on any numbers, also on those that no flight brings."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -8,16 +9,31 @@ import pytest
 
 from mambo_nmpc.sil.engine.build import texts
 from mambo_nmpc.sil.faults.injection import Applied, FaultyController
-from mambo_nmpc.sil.flight.loop import Flight
+from mambo_nmpc.sil.flight.loop import HEIGHT_REFERENCE_M, Flight
 from mambo_nmpc.sil.flight.trajectories import Hover
-from mambo_nmpc.sil.plant import elementary
+from mambo_nmpc.sil.plant import elementary, loops
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_nmpc.sil.plant.disturbances import Disturbances
+from mambo_nmpc.sil.plant.first_order import FirstOrderDrone
 from mambo_nmpc.sil.plant.randomness import Purpose, generators
-from mambo_nmpc.sil.plant.vehicle import Seen
+from mambo_nmpc.sil.plant.vehicle import Moment, Seen, Vehicle, VehicleState, truth
 from mambo_nmpc.sil.sensors.estimators import Suite
 from mambo_nmpc.sil.sensors.instruments import NOISES, Sensors
-from tests.support.engines import NUMBERS, TICKS, build, estimates, injected, tabulate, truths
+from mambo_nmpc.sil.vehicles.model import VehicleFile
+from tests.support.engines import (
+    NUMBERS,
+    TICKS,
+    any_states,
+    build,
+    estimates,
+    injected,
+    tabulate,
+    ticked,
+    truths,
+)
 from tests.support.faults import SHOWN, any_inputs
+from tests.support.scenarios import LATE, LIMITED
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +72,34 @@ def test_sensors_and_estimators(
     draws = generators((5,), Purpose.SENSORS)[0].standard_normal((TICKS, NOISES))
     found = estimates(engine, Flight(Hover(), duration_s=1.0, sensors=sensors), given, draws)
     assert unified(found) == unified(expected.reshape(TICKS, 12))
+
+
+@pytest.mark.parametrize("drone", [NOMINAL, LIMITED, LATE], ids=lambda drone: drone.attitude.kind)
+def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
+    """Inner loops, mixer, rotors, rigid body and integrator from states that no flight has."""
+    rows = any_states()
+    body, rotors, memory, command, thrust_n, heading, payload, air, share = np.split(
+        rows.T, [12, 16, 25, 27, 28, 29, 30, 32]
+    )
+    vehicle = replace(Vehicle.of(drone), wind_m_s2=(0.5, -0.2))
+    first_order = isinstance(vehicle.loop, FirstOrderDrone)
+    known = np.resize(memory[:2], (vehicle.loop.rows, TICKS)) if first_order else memory[: vehicle.loop.rows]
+    before = VehicleState(body, rotors, known)
+    with np.errstate(all="ignore"):
+        seen = truth(before)
+        moment = Moment(share[0], payload[0], (air[0], air[1]))
+        after = vehicle.step(before, command, thrust_n[0], heading[0], seen=seen, moment=moment)
+        demanded_n = loops.altitude_thrust(
+            drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
+        )
+    kept = memory.copy()
+    if not first_order:
+        kept[: vehicle.loop.rows] = after.memory
+    expected = np.concatenate(
+        [after.body, after.rotor_speed_rad_s, kept, demanded_n[np.newaxis], seen.velocity_m_s]
+    )
+    flight = Flight(Hover(), duration_s=1.0, vehicle=vehicle, disturbances=Disturbances(wind_speed_m_s=1.0))
+    assert unified(ticked(engine, flight, rows)) == unified(expected.T)
 
 
 class Probe:

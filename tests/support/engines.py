@@ -19,6 +19,10 @@ from mambo_nmpc.sil.plant.arrays import FloatArray
 from tests.support.tools import toolchain
 
 _BLOCKS: Final = """\
+#include <string.h>
+
+#include "cascade.h"
+#include "first_order.h"
 #include "sensors.h"
 
 /* Each block is a static function of a header. */
@@ -57,6 +61,49 @@ void run_suite(const engine_simulation_t *simulation, const engine_flight_t *fli
             found[(12 * i) + 3 + k] = seen.velocity_m_s[k];
             found[(12 * i) + 6 + k] = seen.euler_rad[k];
             found[(12 * i) + 9 + k] = seen.rates_rad_s[k];
+        }
+    }
+}
+
+/* A tick from any state; without motors the last commands were all the same two. */
+void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flight, double *rows, int n)
+{
+    int i;
+    int k;
+
+    for (i = 0; i < n; i++) {
+        double *row = &rows[33 * i];
+        surroundings_t around = { flight->mass_kg + row[29], { row[30], row[31] } };
+        vehicle_state_t state;
+        late_t late;
+        double shares[4];
+        double steady_rad_s[4];
+        rotation_t r;
+        seen_t seen;
+
+        memcpy(&state, row, sizeof state);
+        r = rotation(state.body + EULER);
+        seen = truth(&state, &r);
+        if (simulation->attitude == FIRST_ORDER) {
+            for (k = 0; k < LATE_TICKS_MAX + 2; k++) {
+                late.sent_rad[k][0] = row[16];
+                late.sent_rad[k][1] = row[17];
+            }
+            advance(simulation, flight, &around, row[32], row[27], row[28], 3, &row[25], &r, &late,
+                    state.body);
+        } else {
+            if (simulation->attitude == CASCADE) {
+                cascade_shares(simulation, &seen, &row[25], row[27], row[28], state.memory, shares);
+            } else {
+                stock_shares(simulation, &seen, &row[25], row[27], row[28], state.memory, shares);
+            }
+            commanded_speeds(simulation, shares, steady_rad_s);
+            integrate(simulation, flight, &around, row[32], &r, steady_rad_s, &state);
+        }
+        memcpy(row, &state, sizeof state);
+        row[25] = altitude_thrust_n(simulation, &seen);
+        for (k = 0; k < 3; k++) {
+            row[26 + k] = seen.velocity_m_s[k];
         }
     }
 }
@@ -107,6 +154,7 @@ _INTERFACE.cdef("""
     void tabulate(const double *x, double *y, int n);
     int64_t record(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
                    double *command_rad);
+    void run_tick(const void *simulation, const void *flight, double *rows, int n);
     void run_faulty(void *faulty, const double *inputs, double *found, int n);
     void run_suite(const void *simulation, const void *flight, const double *truths, const double *draws,
                    double *found, int n);
@@ -175,6 +223,39 @@ def estimates(path: Path, flight: Flight, truths: FloatArray, draws: FloatArray)
         len(truths),
     )
     return found
+
+
+def ticked(path: Path, flight: Flight, rows: FloatArray) -> FloatArray:
+    """Return what a tick makes of `any_states` in the engine at `path`, as (k, 29).
+
+    The columns are body, rotor speeds, memory, and before the tick the thrust that the altitude loop demands
+    and the velocity in the world.
+    """
+    found = rows.copy()
+    records = simulation_record(flight, flight.times_s()), flight_records(flight, np.zeros((1, 4)))
+    engine: Any = _INTERFACE.dlopen(str(path))
+    pointers = (pointer("void *", record) for record in records)
+    engine.run_tick(*pointers, pointer("double *", found), len(found))
+    return found[:, :29]
+
+
+def any_states() -> FloatArray:
+    """Return states and what acts on them (TICKS, 33), as no flight has them; the last with infinity and NaN.
+
+    The columns are body, rotor speeds, memory (9), command, thrust, heading, payload, air velocity, share of
+    the thrust.
+    """
+    rng = np.random.default_rng(11)
+    scales = np.repeat(
+        [2.0, 2.0, 1.0, 3.0, 100.0, 0.02, 0.3, 1.0, 0.01, 3.0, 0.1], [3, 3, 3, 3, 4, 9, 2, 2, 1, 2, 1]
+    )
+    rows = rng.normal(0.0, scales, (TICKS, len(scales)))
+    rows[:, 12:16] += 250.0
+    rows[:, [27, 32]] += 0.7
+    rows[rng.random(rows.shape) < 0.002] *= 1e3
+    for number in (np.inf, -np.inf, np.nan, 0.0, -0.0):
+        rows[-500:][rng.random((500, rows.shape[1])) < 0.003] = number
+    return rows
 
 
 def tabulate(path: Path) -> FloatArray:
