@@ -42,8 +42,8 @@ from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES
 
 PERIOD_S: Final = 0.01
-STRIDE: Final = 8
-"""The test tries one fault in so many; all of them take ten minutes."""
+STRIDE: Final = 12
+"""The test tries one fault in so many; all of them take twenty minutes."""
 LIMIT_S: Final = 2
 """Processor time of a mutant; the flights take a tenth of a second."""
 FLAGS: Final = (
