@@ -29,7 +29,6 @@ COMMANDS = (
         for line in (
             "faults",
             "table2",
-            "table2 --sensors",
             "diff table1 mambo-1norm",
             "sweep --prediction 5 --control 1 --iterations 3",
         )
