@@ -48,6 +48,8 @@ class Table2Row:
     measured: Four
     improvement: Four | None
     """Ratio of the paper's PD's index to this controller's, for each index; None for that PD itself."""
+    command_variation_rad: Number
+    """Chatter: the mean 1-norm of the change of the command from update to update."""
 
 
 @dataclass(frozen=True)
@@ -103,15 +105,17 @@ def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summa
 
 def table2_text(summary: Table2Summary) -> str:
     """Return Table II as text: a block for each case, printed above measured, then the claims."""
-    lines = [f"{'':68}  PD over this"]
+    lines = [f"{'':68}{'  PD over this':36}{'chatter':>11}"]
     for case in CASES:
         lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
-        lines[-1] += "".join(f"{index:>9}" for index in INDICES)
+        lines[-1] += "".join(f"{index:>9}" for index in INDICES) + f"{'rad':>11}"
         if case == next(iter(CASES)):
-            lines += [_line("printed PD", PRINTED_PD, None)]
-            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
+            lines += [_line("printed PD", PRINTED_PD, None, "")]
+            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT, "")]
         lines += [
-            _line(f"flown {row.controller}", row.measured, row.improvement)
+            _line(
+                f"flown {row.controller}", row.measured, row.improvement, f"{row.command_variation_rad:.4f}"
+            )
             for row in summary.rows
             if row.case == case
         ]
@@ -124,19 +128,22 @@ def table2_text(summary: Table2Summary) -> str:
     return "\n".join(lines)
 
 
-def _line(name: str, values: Four, improvement: Four | None) -> str:
+def _line(name: str, values: Four, improvement: Four | None, chatter: str) -> str:
     ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
-    return f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values) + ratios
+    line = f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values)
+    return f"{line}{ratios:36}{chatter:>11}".rstrip()
 
 
 def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:
-    indices = {name: measure(trace).table2 for name, trace in traces.items()}
+    measured = {name: measure(trace) for name, trace in traces.items()}
+    indices = {name: found.table2 for name, found in measured.items()}
     return [
         Table2Row(
             case=case,
             controller=name,
             measured=four(values[:, column]),
             improvement=None if name == PD else four(indices[PD][:, column] / values[:, column]),
+            command_variation_rad=float(measured[name].command_variation_rad[column]),
         )
         for column, case in enumerate(CASES)
         for name, values in indices.items()

@@ -48,12 +48,15 @@ def test_table2_refuses_an_unknown_scalar_type(sensors: list[str], tmp_path: Pat
 
 def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     """Ratios are named, and a claim that does not hold is the paper's."""
-    row = Table2Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0))
+    row = Table2Row("Bernoulli 0.5 rad/s", "mambo", (1.0, 2.0, 3.0, 4.0), (5.0, 6.0, 7.0, 8.0), 0.0123)
     claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
     text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
     above, header = text.splitlines()[:2]
     assert above.index("PD over this") > header.index("ITAE")
-    assert header.split()[3:] == ["IAE", "ISE", "ITSE", "ITAE"] * 2
+    assert header.split()[3:] == [*["IAE", "ISE", "ITSE", "ITAE"] * 2, "rad"]
+    flown = next(line for line in text.splitlines() if line.startswith("  flown mambo"))
+    assert len(flown) == len(header) == len(above)
+    assert flown.endswith("  0.0123")
     assert text.endswith(
         "the paper's claims, as flown here:\n  holds          it flies: 1 %\n  does not hold  it lands: 90 %"
     )
