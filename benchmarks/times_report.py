@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 from benchmarks.markdown import table
 from benchmarks.peers_setups import Peer
 from benchmarks.programs import Program
-from mambo_nmpc.sil.show.plots import save, style
+from mambo_nmpc.sil.show.plots import save
+from mambo_nmpc.sil.show.style import BLUE, ORANGE, PAGE_INCHES, QUIET, THIN, style
 
 FLAGS: Final = ("-O2", "-O3 -march=native")
 SETS: Final = ("W", "T", "F", "C")
 COLD: Final = "C, cold"
 OURS: Final = "ours"
 """The row that the others are compared with."""
-_COLOURS: Final = {"ours": "#0072B2", "others, 1-norm": "#E69F00", "others, quadratic": "#7f7f7f"}
+_COLOURS: Final = {"ours": BLUE, "others, 1-norm": ORANGE, "others, quadratic": QUIET}
 _MARKERS: Final = {"W": "o", "T": "s", "F": "^", "C": "D"}
 
 
@@ -128,7 +129,7 @@ def write_report(
 def _draw(rows: list[Row], stem: Path) -> None:
     """Draw a panel for each build: a row for each contender, a marker for each set, a common time axis."""
     with style():
-        figure = Figure(figsize=(10.5, 0.32 * len(rows) + 1.6), layout="constrained")
+        figure = Figure(figsize=(PAGE_INCHES, 0.24 * len(rows) + 1.3), layout="constrained")
         panels = figure.subplots(1, len(FLAGS), sharey=True, sharex=True)
         for axes, flags in zip(panels, FLAGS, strict=True):
             _draw_panel(axes, rows, flags)
@@ -137,7 +138,7 @@ def _draw(rows: list[Row], stem: Path) -> None:
         panels[0].invert_yaxis()
         handles, _ = panels[0].get_legend_handles_labels()
         patches = [Patch(color=colour, label=kind) for kind, colour in _COLOURS.items()]
-        figure.legend(handles=[*patches, *handles], loc="outside lower center", ncols=8)
+        figure.legend(handles=[*patches, *handles], loc="outside lower center", ncols=4)
         save(figure, stem)
 
 
@@ -148,10 +149,10 @@ def _draw_panel(axes: Axes, rows: list[Row], flags: str) -> None:
         colour, times = _COLOURS[kind], row.times[flags]
         for name, marker in _MARKERS.items():
             median, most = times[name]
-            axes.plot([median, most], [place, place], color=colour, linewidth=0.8, alpha=0.5)
+            axes.plot([median, most], [place, place], color=colour, linewidth=THIN, alpha=0.5)
             label = f"set {name}" if place == 0 else None
-            axes.plot(median, place, marker, color=colour, markersize=5, linestyle="none", label=label)
+            axes.plot(median, place, marker, color=colour, linestyle="none", label=label)
         label = "C, cold caches" if place == 0 else None
-        axes.plot(times[COLD][0], place, "x", color=colour, markersize=5, linestyle="none", label=label)
+        axes.plot(times[COLD][0], place, "x", color=colour, linestyle="none", label=label)
     axes.set_xscale("log")
     axes.set_xlabel("ns per update: median, and line to the 99th percentile")

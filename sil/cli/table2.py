@@ -32,8 +32,8 @@ def table2(
     from mambo_nmpc.sil.cli.progress import progress_bar
     from mambo_nmpc.sil.files.folders import new_results
     from mambo_nmpc.sil.flight.names import PD_TITLES
-    from mambo_nmpc.sil.flight.plots import draw_flights
     from mambo_nmpc.sil.flight.traces import write_npz
+    from mambo_nmpc.sil.paper.plots import DRAWN, draw_figure3
     from mambo_nmpc.sil.paper.table2 import PRESETS, Table2Summary, fly_table2, judge_table2, table2_text
 
     if sensors:
@@ -46,8 +46,7 @@ def table2(
             traces = fly_table2(settings, progress, engine=engine)
         for name, trace in traces.items():
             write_npz(trace, folder / files[name])
-        drawn = {name: traces[name] for name in PD_TITLES.values()} | {"NMPC, mambo": traces["mambo"]}
-        draw_flights(drawn, folder / "figure3")
+        draw_figure3({name: traces[name] for name in DRAWN}, folder / "figure3")
         summary = judge_table2(traces, scalar)
         summary.write(folder)
     show(summary, table2_text(summary), as_json=as_json)

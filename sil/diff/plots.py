@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from mambo_nmpc.sil.diff.flights import STEP_M, along_step_m
 from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.flight.trajectories import STEP_TIME_S
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, TARGET, save, style
+from mambo_nmpc.sil.show.plots import save
+from mambo_nmpc.sil.show.style import COLUMN_INCHES, COMMAND, FLOWN, TARGET, style
 
 _SHOWN_S = (-0.2, 5.0)
 
@@ -20,7 +21,7 @@ def draw_steps(a: Trace, b: Trace, names: tuple[str, str], stem: Path) -> tuple[
 
 
 def _figure(a: Trace, b: Trace, names: tuple[str, str]) -> Figure:
-    figure = Figure(figsize=(2.2 * PANEL_INCHES, 4.6), layout="constrained")
+    figure = Figure(figsize=(2.2 * COLUMN_INCHES, 4.6), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(3, 2))
     looks = ((FLOWN, "solid"), (COMMAND, (0, (4, 1.5))))
     for axis, (positions, commands) in enumerate(panels.T):

@@ -2,32 +2,39 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from matplotlib.figure import Figure
 
 from mambo_nmpc.sil.faults.flights import COURSES, STRAY_M, Verdict
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, save, style
+from mambo_nmpc.sil.show.plots import PlainLogFormatter, save
+from mambo_nmpc.sil.show.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
+
+_LEAST_M: Final = 1e-3
+"""Smaller errors are drawn at the left edge."""
 
 
 def draw_faults(verdicts: Sequence[Verdict], stem: Path) -> tuple[Path, Path]:
-    """Draw largest error and recovery time, one row per fault, one colour per course.
+    """Draw largest error and recovery time, one row per fault, one marker per course.
 
     Writes stem.png and stem.svg. A flight that does not recover has no dot on the right.
     """
     faults = list(dict.fromkeys(verdict.fault for verdict in verdicts))
     with style():
-        figure = Figure(figsize=(9.0, 1.0 + 0.22 * len(faults)), layout="constrained")
+        figure = Figure(figsize=(PAGE_INCHES, 0.8 + 0.17 * len(faults)), layout="constrained")
         errors, times = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
-        for course, colour in zip(COURSES, (FLOWN, COMMAND), strict=True):
+        for course, look in zip(COURSES, LOOKS[:2], strict=True):
             chosen = [verdict for verdict in verdicts if verdict.course == course]
             rows = [faults.index(verdict.fault) for verdict in chosen]
-            dots = {"marker": "o", "linestyle": "none", "markersize": 4.5, "color": colour}
-            errors.plot([verdict.largest_error_m for verdict in chosen], rows, label=course, **dots)
-            times.plot([verdict.recovery_s for verdict in chosen], rows, **dots)
-        errors.axvline(STRAY_M, color="#444444", linewidth=0.8)
-        errors.set(xscale="log", xlabel=f"largest error, m; line: {STRAY_M:g} m", yticks=range(len(faults)))
+            shown_m = [max(verdict.largest_error_m, _LEAST_M) for verdict in chosen]
+            errors.plot(shown_m, rows, label=course, clip_on=False, **look.dots)
+            times.plot([verdict.recovery_s for verdict in chosen], rows, clip_on=False, **look.dots)
+        errors.axvline(STRAY_M, color=QUIET, linewidth=THIN)
+        errors.set(xscale="log", xlabel=f"largest error, m (line: {STRAY_M:g} m)", yticks=range(len(faults)))
+        errors.set_xlim(left=_LEAST_M)
+        errors.xaxis.set_major_formatter(PlainLogFormatter())
         errors.set_yticklabels(faults, parse_math=False)
         errors.set_ylim(len(faults) - 0.5, -0.5)
-        errors.legend(loc="lower right", frameon=True)
-        times.set_xlabel("back after, s")
+        figure.legend(loc="outside upper center", ncols=len(COURSES))
+        times.set(xlabel="back after, s", xlim=(0.0, None))
         return save(figure, stem)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mambo_nmpc.sil.flight.metrics import horizontal_error_m
 from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, TARGET, inline, save, style
+from mambo_nmpc.sil.show.plots import inline, save
+from mambo_nmpc.sil.show.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, TARGET, THIN, style
 
 _LABELS: Final = ("y (east), m", "error, m", "roll, rad", "pitch, rad")
 
@@ -22,7 +23,7 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
     Writes stem.png and stem.svg.
     """
     with style():
-        figure = Figure(figsize=(PANEL_INCHES * len(flights), 8.2), layout="constrained")
+        figure = Figure(figsize=(COLUMN_INCHES * len(flights), 7.2), layout="constrained")
         rows = figure.subplots(4, len(flights), squeeze=False, sharey="row", height_ratios=(1.9, 1, 1, 1))
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
             _draw_column(column, trace, title)
@@ -38,15 +39,17 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
     Target and commands are broad lines below the flown ones, so that both stay visible.
     """
     path, error, *angles = column
-    path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=4, label="target")
+    path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=BROAD, label="target")
     path.plot(*trace.position_m[:, 0, :2].T, color=FLOWN, label="flown")
-    path.set_title(title, loc="left", pad=24, parse_math=False)  # above the legend
+    path.set_title(title, loc="left", pad=20, parse_math=False)  # above the legend
     path.set(xlabel="x (north), m", aspect="equal")
     error.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
     error.set_ylim(0, None)
     for axis, axes in enumerate(angles):
-        axes.plot(trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=2, label="command")
-        axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=0.9, label="flown")
+        axes.plot(
+            trace.time_s, trace.command_rad[:, 0, axis], color=COMMAND, linewidth=BROAD, label="command"
+        )
+        axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=THIN, label="flown")
     angles[-1].set_xlabel("time, s")
 
 
@@ -72,10 +75,10 @@ def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:
 
 
 def _column(title: str, trace: Trace) -> Figure:
-    figure = Figure(figsize=(PANEL_INCHES, 7.6), layout="constrained")
+    figure = Figure(figsize=(COLUMN_INCHES, 6.6), layout="constrained")
     column = figure.subplots(len(_LABELS), 1, height_ratios=(1.9, 1, 1, 1))
     _draw_column(column, trace, "")
-    figure.suptitle(title, fontsize=10, parse_math=False)  # above the legend, whatever the path's shape
+    figure.suptitle(title, parse_math=False)  # above the legend, whatever the path's shape
     _label_column(column)
     return figure
 

@@ -15,7 +15,8 @@ from matplotlib.ticker import FixedLocator
 from mambo_nmpc.codegen.boards import Board
 from mambo_nmpc.sil.footprint.measure import Footprint
 from mambo_nmpc.sil.footprint.sweep import Point, budgets
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, PlainLogFormatter, inline, save, style
+from mambo_nmpc.sil.show.plots import PlainLogFormatter, inline, save
+from mambo_nmpc.sil.show.style import COLUMN_INCHES, COMMAND, FLOWN, PAGE_INCHES, QUIET, SMALL, THIN, style
 
 _SWEPT: Final = {
     "flash_bytes": "flash, B",
@@ -29,7 +30,7 @@ _SWEPT: Final = {
 def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, Path]:
     """Draw every measured value as a share of its budget, a bar each; write stem.png and stem.svg."""
     with style(), mpl.rc_context({"text.parse_math": False}):  # a board's name is no formula
-        figure = Figure(figsize=(7.2, 1.2 + 1.0 * len(footprints)), layout="constrained")
+        figure = Figure(figsize=(PAGE_INCHES, 0.8 + 0.8 * len(footprints)), layout="constrained")
         axes = figure.subplots()
         labels, shares, colours, texts = [], [], [], []
         for footprint in reversed(footprints):
@@ -39,8 +40,8 @@ def draw_footprints(footprints: Sequence[Footprint], stem: Path) -> tuple[Path, 
                 colours.append(FLOWN if limit.share <= 1 else COMMAND)
                 texts.append(f" {_format(limit.value)} of {_format(limit.budget)} {limit.unit}")
         bars = axes.barh(labels, shares, color=colours, zorder=2)
-        axes.bar_label(bars, texts, fontsize=7)
-        axes.axvline(100, color="#444444", linewidth=0.8)
+        axes.bar_label(bars, texts, fontsize=SMALL)
+        axes.axvline(100, color=QUIET, linewidth=THIN)
         axes.set(
             xlabel="share of the budget, %",
             xlim=(0, 1.35 * max(100, *shares)),
@@ -61,12 +62,12 @@ def draw_sweep(
     Colour: control horizon. Line style: iterations. Dots: within budget. Dashed grey line: the budget.
     """
     with style():
-        figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+        figure = Figure(figsize=(PAGE_INCHES, 5.6), layout="constrained")
         limits = budgets(board, update_period_s)
         for axes, quantity in zip(figure.subplots(2, 2).flat, _SWEPT, strict=True):
             _draw_swept(axes, points, quantity, limits.get(quantity))
         handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
         figure.suptitle(board.title, parse_math=False)
         return save(figure, stem)
 
@@ -82,9 +83,9 @@ def _draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float
         label = f"{control} {'move' if control == 1 else 'moves'}, {count} iterations"
         axes.plot(x, y, color=colour, linestyle=dashes, label=label)
         fits = [(p.prediction, getattr(p, quantity)) for p in line if p.fits]
-        axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour, markersize=3.5)
+        axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour)
     if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
-        axes.axhline(limit, color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
+        axes.axhline(limit, color=QUIET, linestyle=(0, (6, 3)), linewidth=THIN)
     axes.set(xlabel="prediction horizon", ylabel=_SWEPT[quantity])
     axes.xaxis.set_major_locator(FixedLocator(_ticks(sorted({point.prediction for point in points}))))
     if quantity in ("iae_m_s", "time_ms"):
@@ -105,11 +106,11 @@ def sweep_panels(points: Sequence[Point], budgets: Mapping[str, float]) -> list[
         for quantity, label in _SWEPT.items():
             if all(math.isnan(getattr(point, quantity)) for point in points):
                 continue
-            figure = Figure(figsize=(PANEL_INCHES, 3.4), layout="constrained")
+            figure = Figure(figsize=(COLUMN_INCHES, 2.9), layout="constrained")
             axes = figure.subplots()
             _draw_swept(axes, points, quantity, budgets.get(quantity))
             if not pictures:
-                figure.legend(loc="outside lower center", ncols=2, fontsize=7, handlelength=2.6)
+                figure.legend(loc="outside lower center", ncols=2)
             pictures.append(
                 inline(figure, f"{label} against the prediction horizon; the table has the values")
             )

@@ -15,7 +15,8 @@ from mambo_nmpc.sil.identify.record import IdentifySummary
 from mambo_nmpc.sil.identify.report import CURVE_COLUMNS
 from mambo_nmpc.sil.identify.signals import DEGREE
 from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, TARGET, inline, save, style
+from mambo_nmpc.sil.show.plots import inline, save
+from mambo_nmpc.sil.show.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, GRID, INK, TARGET, style
 
 SHOWN_S: Final = 6.0
 """Time shown before and after the split."""
@@ -24,14 +25,14 @@ SHOWN_S: Final = 6.0
 def draw_fit(curves: Path, summary: IdentifySummary, stem: Path) -> tuple[Path, Path]:
     """Draw the curves of a fit.csv; write stem.png and stem.svg. Raises ResultsError."""
     with style():
-        return save(_figure(read_curves(curves), summary, 2.4 * PANEL_INCHES), stem)
+        return save(_figure(read_curves(curves), summary, 2.4 * COLUMN_INCHES), stem)
 
 
 def fit_panel(curves: Path, summary: IdentifySummary) -> Markup:
     """Return the same picture for a page; raises ResultsError."""
     with style():
         return inline(
-            _figure(read_curves(curves), summary, 2.0 * PANEL_INCHES),
+            _figure(read_curves(curves), summary, 2.0 * COLUMN_INCHES),
             "Roll and pitch over time: commanded, measured and modelled, on fitted and on held-out samples",
         )
 
@@ -65,15 +66,19 @@ def _figure(curves: dict[str, FloatArray], summary: IdentifySummary, width: floa
 
 
 def _draw_axis(axes: Axes, curves: dict[str, FloatArray], name: str, split_s: float) -> None:
-    """Draw one axis in degrees; the model is orange where its samples were fitted, dashed where held out."""
+    """Draw one axis in degrees; the model is dashed where its samples were fitted, dotted where held out."""
     time_s = curves["time_s"]
     command, tilt, model = (
         curves[f"{name}{part}"] / DEGREE for part in ("_command_rad", "_rad", "_model_rad")
     )
     held_out = time_s > split_s
-    axes.axvspan(split_s, max(time_s[-1], split_s), color="#e6e6e6", alpha=0.5, linewidth=0)
-    axes.plot(time_s, command, color=TARGET, linewidth=2.5, label="command")
-    axes.plot(time_s, tilt, color=FLOWN, linewidth=1.8, label="measured")
-    axes.plot(time_s, np.where(held_out, np.nan, model), color=COMMAND, label="model, fitted")
-    axes.plot(time_s, np.where(held_out, model, np.nan), color="#000000", label="model, held out")
+    axes.axvspan(split_s, max(time_s[-1], split_s), color=GRID, alpha=0.5, linewidth=0)
+    axes.plot(time_s, command, color=TARGET, linewidth=BROAD, label="command")
+    axes.plot(time_s, tilt, color=FLOWN, label="measured")
+    axes.plot(
+        time_s, np.where(held_out, np.nan, model), color=COMMAND, linestyle="dashed", label="model, fitted"
+    )
+    axes.plot(
+        time_s, np.where(held_out, model, np.nan), color=INK, linestyle="dotted", label="model, held out"
+    )
     axes.set_ylabel("degrees")

@@ -9,7 +9,8 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from mambo_nmpc.sil.regress.report import Check, RegressSummary
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PlainLogFormatter, inline, save, style
+from mambo_nmpc.sil.show.plots import PlainLogFormatter, inline, save
+from mambo_nmpc.sil.show.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
 
 _SHOWN: Final = (1e-2, 1e2)
 """Shares that the picture shows; others are drawn at its edges."""
@@ -32,9 +33,9 @@ def limits_panel(summary: RegressSummary) -> Markup:
 def _limits_figure(summary: RegressSummary) -> Figure:
     """Return a row per group and metric with a dot per flight, at the metric divided by its limit."""
     rows = _rows(summary)
-    figure = Figure(figsize=(9.0, 1.2 + 0.26 * max(len(rows), 1)), layout="constrained")
+    figure = Figure(figsize=(PAGE_INCHES, 0.9 + 0.2 * max(len(rows), 1)), layout="constrained")
     axes = figure.subplots()
-    for holds, colour, label in ((True, FLOWN, "holds"), (False, COMMAND, "fails")):
+    for holds, look, label in ((True, LOOKS[0], "holds"), (False, LOOKS[1], "fails")):
         dots = [
             (share, row)
             for row, checks in enumerate(rows.values())
@@ -43,18 +44,15 @@ def _limits_figure(summary: RegressSummary) -> Figure:
         axes.plot(
             [share for share, _ in dots],
             [row for _, row in dots],
-            linestyle="none",
-            marker="o" if holds else "D",
-            markersize=4.5,
             alpha=0.6,
-            color=colour,
+            **look.dots,
             label=f"{label}: {len(dots)}",
         )
-    axes.axvline(1.0, color="#444444", linewidth=0.8)
+    axes.axvline(1.0, color=QUIET, linewidth=THIN)
     axes.set(xscale="log", xlim=_SHOWN, xlabel="metric over its limit", yticks=range(len(rows)))
     axes.xaxis.set_major_formatter(PlainLogFormatter())
     axes.set_yticklabels(rows, parse_math=False)
-    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
     return figure
 

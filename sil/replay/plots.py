@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from mambo_nmpc.sil.replay.report import AXES, read_curves
-from mambo_nmpc.sil.show.plots import COMMAND, FLOWN, PANEL_INCHES, inline, save, style
+from mambo_nmpc.sil.show.plots import inline, save
+from mambo_nmpc.sil.show.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, THIN, style
 
 
 def draw_replay(curves: Path, stem: Path) -> tuple[Path, Path]:
@@ -27,14 +28,14 @@ def replay_panel(curves: Path) -> Markup:
 
 def _figure(table: FloatArray) -> Figure:
     """Draw the table of `read_curves`: a column an axis."""
-    figure = Figure(figsize=(2.2 * PANEL_INCHES, 4.2), layout="constrained")
+    figure = Figure(figsize=(2.2 * COLUMN_INCHES, 4.2), layout="constrained")
     panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(2, 1))
     time_s, logged_rad, replayed_rad = table[:, 0] - table[0, 0], table[:, 1:3], table[:, 3:]
     for axis, (commands, differences) in enumerate(panels.T):
-        commands.plot(time_s, logged_rad[:, axis], color=COMMAND, linewidth=2, label="logged")
-        commands.plot(time_s, replayed_rad[:, axis], color=FLOWN, linewidth=0.9, label="replayed")
+        commands.plot(time_s, logged_rad[:, axis], color=COMMAND, linewidth=BROAD, label="logged")
+        commands.plot(time_s, replayed_rad[:, axis], color=FLOWN, linewidth=THIN, label="replayed")
         commands.set_title(f"{AXES[axis]} command", loc="left")
-        differences.plot(time_s, replayed_rad[:, axis] - logged_rad[:, axis], color=FLOWN, linewidth=0.9)
+        differences.plot(time_s, replayed_rad[:, axis] - logged_rad[:, axis], color=FLOWN, linewidth=THIN)
         differences.set_xlabel("time, s")
     panels[0, 0].set_ylabel("command, rad")
     panels[1, 0].set_ylabel("difference, rad")

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from mambo_nmpc.sil.show.plots import save, style
+from mambo_nmpc.sil.show.plots import save
+from mambo_nmpc.sil.show.style import COLUMN_INCHES, DOT, FLOWN, INK, SKY, VERMILION, style
 from mambo_nmpc.sil.tuning.front import choose, pareto_front
 from mambo_nmpc.sil.tuning.study import FinishedTrial
 
@@ -20,17 +21,17 @@ def draw_front(
     front = pareto_front(trials)
     best = choose(front)
     with style():
-        figure = Figure(figsize=(7.0, 4.6), layout="constrained")
+        figure = Figure(figsize=(COLUMN_INCHES, 2.8), layout="constrained")
         axes = figure.subplots()
-        for points, form, label in (
-            (trials, ".", "trial"),
-            (front, "o-", "Pareto front"),
-            (base, "s", "base"),
-            ([best], "*", "chosen"),
+        for points, form, colour, label in (
+            (trials, ".", SKY, "trial"),
+            (front, "o-", FLOWN, "Pareto front"),
+            (base, "s", INK, "base"),
+            ([best], "*", VERMILION, "chosen"),
         ):
             moving = [one for one in points if one.command_variation_rad > 0.0]
             x, y = [one.command_variation_rad for one in moving], [one.iae_m_s for one in moving]
-            axes.plot(x, y, form, label=label, markersize=12 if form == "*" else None)
+            axes.plot(x, y, form, color=colour, label=label, markersize=3.0 * DOT if form == "*" else DOT)
         axes.set(xscale="log", yscale="log", xlabel="command variation, rad an update", ylabel="IAE, m s")
         axes.legend()
         return save(figure, stem)

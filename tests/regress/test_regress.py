@@ -430,6 +430,16 @@ def test_a_picture_of_many_groups_has_the_rows_closest_to_their_limits(tmp_path:
     assert "group-139: iae_m_s" not in drawn
 
 
+def test_a_suite_without_bounds_has_a_picture_without_rows(tmp_path: Path) -> None:
+    """Crashed is its only metric with a limit, which is 0 and has no share."""
+    path = tmp_path / "free.toml"
+    path.write_text("[baseline]\n[flights.free]\nduration_s = 10.0\n", "utf-8")
+    found = load_suite(str(path))
+    summary = judge(found, mambo(), [row(1.0)], None, tmp_path / "none")
+    _, svg = draw_regress(summary, tmp_path / "free")
+    assert "holds: 0" in svg.read_text("utf-8")
+
+
 def test_the_picture_shows_shares_of_limits_within_its_edges(tmp_path: Path) -> None:
     """A lost flight, and any excess of a limit of 0, are at the right edge; a count of 0 has no row."""
     found = suite(

@@ -1,0 +1,122 @@
+"""The style of all pictures: colours, dashes, markers, widths and sizes, fit for print.
+
+Colours are those of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers distinguish. In
+grey some are alike: so lines that are to be told apart differ in dashes or width too, dots in their marker.
+"""
+
+import contextlib
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import matplotlib as mpl
+from matplotlib.rcsetup import cycler
+
+BLUE: Final = "#0072B2"
+ORANGE: Final = "#E69F00"
+GREEN: Final = "#009E73"
+VERMILION: Final = "#D55E00"
+PURPLE: Final = "#CC79A7"
+SKY: Final = "#56B4E9"
+
+TARGET, FLOWN, COMMAND = "#c4c4c4", BLUE, ORANGE
+"""Colours of what all pictures of flights show."""
+INK: Final = "#000000"
+QUIET: Final = "#444444"
+"""Limits and other lines to compare with."""
+GRID: Final = "#e6e6e6"
+
+BROAD: Final = 2.5
+"""Width in points of a line that another one covers."""
+THIN: Final = 0.7
+DOT: Final = 3.5
+"""Size of a marker in points."""
+
+COLUMN_INCHES: Final = 3.5
+"""Width of a column of a journal, and of a picture on a page, which shows two side by side."""
+PAGE_INCHES: Final = 7.16
+"""Width of a page of a journal, two columns."""
+SMALL: Final = 7.0
+"""Size of the font beside ticks and in crowded legends."""
+
+Dashes = str | tuple[float, tuple[float, ...]]
+
+_STYLE: Final[dict[Any, Any]] = {
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.prop_cycle": cycler(color=[BLUE, ORANGE, GREEN, VERMILION, PURPLE, SKY, INK]),
+    "grid.color": GRID,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.0,
+    "lines.markersize": DOT,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "legend.frameon": False,
+    "legend.handlelength": 2.6,
+    "savefig.dpi": 220,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "mambo-nmpc",
+}
+
+
+@dataclass(frozen=True)
+class Look:
+    """How one of several lines is drawn."""
+
+    colour: str
+    dashes: Dashes
+    marker: str
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """Arguments of `Axes.plot` for a line."""
+        return {"color": self.colour, "linestyle": self.dashes}
+
+    @property
+    def dots(self) -> dict[str, Any]:
+        """Arguments of `Axes.plot` for dots."""
+        return {"color": self.colour, "linestyle": "none", "marker": self.marker}
+
+
+LOOKS: Final = (
+    Look(BLUE, "solid", "o"),
+    Look(VERMILION, (0.0, (6.0, 1.5, 1.0, 1.5)), "D"),
+    Look(PURPLE, (0.0, (3.0, 1.0, 1.0, 1.0, 1.0, 1.0)), "^"),
+    Look(INK, (0.0, (8.0, 2.0)), "v"),
+    Look(SKY, (0.0, (2.0, 1.0)), "P"),
+)
+"""Looks in the order in which controllers get them, but for those with one of their own."""
+PD_LOOKS: Final = {
+    "pd": Look(ORANGE, (0.0, (1.0, 1.0)), "s"),
+    "pd-feedforward": Look(GREEN, (0.0, (4.0, 1.5)), "X"),
+}
+
+
+def looks(names: Sequence[str]) -> dict[str, Look]:
+    """Return the look of each controller; those of the PDs are theirs alone."""
+    others = [name for name in names if name not in PD_LOOKS]
+    return {
+        name: PD_LOOKS[name] if name in PD_LOOKS else LOOKS[others.index(name) % len(LOOKS)] for name in names
+    }
+
+
+@contextlib.contextmanager
+def style() -> Iterator[None]:
+    """Set the style, independent of the user's matplotlibrc; missing glyphs give no warning."""
+    with mpl.rc_context(), warnings.catch_warnings():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)
+        yield
