@@ -5,6 +5,7 @@
 # make tools      install the compilers and emulators that the tests want, or say which
 # make generated  write the committed bundles in generated/ anew
 # make docs       build the manual; its first page is build/docs/index.html
+# make evidence   fly and measure anew those tables and pictures of docs/evidence that are older than the code
 # make bench      time flights against RotorPy, fly its Crazyflie, time updates against peers; results in build/bench
 # make bench-peers  measure the footprint of what others generate for the same task; wants newlib for Arm
 # make clean      remove build/ and the virtual environment
@@ -38,7 +39,7 @@ CHECKED = tests/test_house.py tests/campaign/test_campaign.py tests/files tests/
     $(filter-out %/test_generations.py %/test_exact_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/plant tests/sensors
 
-.PHONY: fly check test tools generated docs bench bench-peers clean
+.PHONY: fly check test tools generated docs evidence bench bench-peers clean
 
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
@@ -77,6 +78,9 @@ docs: $(SETUP_DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 	$(BIN)/mambo-nmpc playground -o build/docs/play.html
 	@echo "the manual: build/docs/index.html; its search wants a server: python3 -m http.server -d build/docs"
+
+evidence: $(SETUP)
+	$(BIN)/python -m benchmarks.evidence
 
 bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.flights

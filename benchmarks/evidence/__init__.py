@@ -1,0 +1,1 @@
+"""Tables and pictures of the manual: what makes them, and whether they are older than the code."""

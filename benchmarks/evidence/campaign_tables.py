@@ -1,0 +1,118 @@
+"""Tables of campaigns: figures out of results, and Markdown out of figures."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from benchmarks.evidence.item import Figures
+from benchmarks.evidence.tables import Row, summary, three, title
+from benchmarks.markdown import table
+from mambo_nmpc.sil.campaign.statistics import Table, index_values, read_table
+from mambo_nmpc.sil.plant.arrays import FloatArray
+
+MOTOR_LAGS_S: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05)
+
+
+def read_campaign(results: Path) -> Figures:
+    """Return statistics of each controller, improvements, and medians by motor lag."""
+    folder = results / "campaign"
+    found = summary(folder)
+    shown = ("iae_m_s", "seen_iae_m_s", "command_variation_rad")
+    return {
+        "flights": found["flights"],
+        "controllers": {
+            name: {"crashed": one["crashed"], "quantiles": {key: one["quantiles"][key] for key in shown}}
+            for name, one in found["controllers"].items()
+        },
+        "improvements": [one for one in found["improvements"] if not one["index"].startswith("seen_")],
+        "motor_lags": _by_motor_lag(read_table(folder / "flights.csv"), list(found["controllers"])),
+    }
+
+
+def _by_motor_lag(flights: Table, names: Sequence[str]) -> list[Figures]:
+    """Return median IAE and crashes of each controller, and where `mambo` is better, by motor lag."""
+    rows = []
+    for low, high in pairwise(MOTOR_LAGS_S):
+        inside = (flights["motor_lag_s"] >= low) & (flights["motor_lag_s"] < high)
+        if not inside.any():
+            continue
+        iae = {name: index_values(flights, name, "iae_m_s")[inside] for name in names}
+        chatter = {name: index_values(flights, name, "command_variation_rad")[inside] for name in names}
+        rows.append(
+            {
+                "from_s": low,
+                "to_s": high,
+                "flights": int(inside.sum()),
+                "median_iae_m_s": {name: _median(values) for name, values in iae.items()},
+                "crashed": {name: int(np.isinf(values).sum()) for name, values in iae.items()},
+                "mambo_better": {
+                    name: float((iae["mambo"] < values).mean())
+                    for name, values in iae.items()
+                    if name != "mambo"
+                },
+                "median_command_variation_rad": {name: _median(values) for name, values in chatter.items()},
+            }
+        )
+    return rows
+
+
+def _median(values: FloatArray) -> float:
+    """Return the median without interpolation, because values may be infinite."""
+    return float(np.quantile(values, 0.5, method="inverted_cdf"))
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g}"
+
+
+def campaign(figures: Figures) -> str:
+    """Return crashes and quantiles of each controller."""
+    rows: list[Row] = []
+    for name, one in figures["controllers"].items():
+        crashed, quantiles = one["crashed"], one["quantiles"]
+        interval = f"{_percent(crashed['low'])} .. {_percent(crashed['high'])}"
+
+        def shares(index: str, *wanted: str, quantiles: Any = quantiles) -> str:
+            return ", ".join(three(quantiles[index][share]) for share in wanted)
+
+        rows.append(
+            {
+                f"{figures['flights']} flights": title(name),
+                "crashed (95 %)": f"{crashed['count']}, {_percent(crashed['share'])} % ({interval})",
+                "IAE, m s: 5 %, median, 95 % of the flights": shares("iae_m_s", "0.05", "0.5", "0.95"),
+                "as seen by the estimators: median, 95 %": shares("seen_iae_m_s", "0.5", "0.95"),
+                "chatter, rad: median, 95 %": shares("command_variation_rad", "0.5", "0.95"),
+            }
+        )
+    return table(rows)
+
+
+def campaign_ratios(figures: Figures) -> str:
+    """Return the ratio of the PD's indices to each controller's, flight by flight."""
+    head = "PD over this, flight by flight: median (95 %), better in"
+    rows: dict[str, Row] = {}
+    for one in figures["improvements"]:
+        index = one["index"].partition("_")[0].upper()
+        better = f"{_percent(one['better']['share'])} %"
+        interval = f"{three(one['low'])} .. {three(one['high'])}"
+        row = rows.setdefault(index, {head: index})
+        row[title(one["controller"])] = f"{three(one['median'])} ({interval}), {better}"
+    return table(list(rows.values()))
+
+
+def campaign_motor_lag(figures: Figures) -> str:
+    """Return medians and crashes by motor lag."""
+    rows: list[Row] = []
+    for one in figures["motor_lags"]:
+        row = {"motor lag, s": f"{one['from_s']:.2f} .. {one['to_s']:.2f}", "flights": str(one["flights"])}
+        for name, median in one["median_iae_m_s"].items():
+            lost = one["crashed"][name]
+            row[f"{title(name)}: median IAE, m s"] = three(median) + (f", {lost} crashed" if lost else "")
+        row["`mambo` better than PD with feed-forward"] = (
+            f"{_percent(one['mambo_better']['pd-feedforward'])} %"
+        )
+        rows.append(row)
+    return table(rows)

@@ -1,0 +1,144 @@
+"""One item of evidence: its commands, its figures, the tables and pictures in docs/evidence, and its stamp.
+
+The stamp docs/evidence/data/NAME.json holds the figures without rounding, from which the tables are written
+again without a flight, and digests of what the figures depend on.
+"""
+
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.evidence.sources import ROOT, parts
+from mambo_nmpc.sil.files.folders import finite
+
+PAGES: Final = ROOT / "docs" / "evidence"
+DATA: Final = PAGES / "data"
+RESULTS: Final = "build/evidence"
+
+Figures = dict[str, Any]
+"""What JSON can hold; a number that is infinite or NaN is null."""
+
+
+class EvidenceError(Exception):
+    """Figures that cannot be made."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """Tables and pictures that the same commands make.
+
+    commands:    as a user types them at the root of the repository; each writes below build/evidence/NAME.
+    controllers: presets and files whose C flies or is measured, as `mambo` or `mambo --scalar fixed`.
+    modules:     entry points of what computes the figures, and what draws the pictures.
+    data:        patterns of other files that the figures depend on.
+    read:        returns the figures in the folder of the results.
+    tables:      return Markdown of figures, by the name of the file in docs/evidence/data.
+    pictures:    files of the results, by their name in docs/evidence.
+    draw:        draws pictures that no command draws, into the folder of the results.
+    """
+
+    name: str
+    commands: tuple[str, ...]
+    controllers: tuple[str, ...]
+    modules: tuple[str, ...]
+    data: tuple[str, ...]
+    read: Callable[[Path], Figures]
+    tables: Mapping[str, Callable[[Figures], str]]
+    pictures: Mapping[str, str] = field(default_factory=dict)
+    draw: Callable[[Path], None] | None = None
+
+    @property
+    def stamp(self) -> Path:
+        """The file with figures and digests."""
+        return DATA / f"{self.name}.json"
+
+    @property
+    def remake(self) -> str:
+        """The command that makes the item anew."""
+        return f"python -m benchmarks.evidence {self.name}"
+
+    def parts(self) -> dict[str, str]:
+        """Return the digests of what the figures depend on now."""
+        return parts(self.controllers, self.modules, self.data, self.commands)
+
+    def changed(self) -> list[str]:
+        """Return what has changed since the figures were made."""
+        if not self.stamp.is_file():
+            return ["everything: it was never made"]
+        then, now = read_stamp(self)["parts"], self.parts()
+        return [part for part in sorted(then.keys() | now.keys()) if then.get(part) != now.get(part)]
+
+    def texts(self, figures: Figures) -> dict[str, str]:
+        """Return the tables by file name."""
+        return {f"{name}.md": table(figures) + "\n" for name, table in self.tables.items()}
+
+
+def read_stamp(item: Item) -> Figures:
+    """Return the stamp of an item."""
+    stamp: Figures = json.loads(item.stamp.read_text("utf-8"))
+    return stamp
+
+
+def make(item: Item, say: Callable[[str], None]) -> None:
+    """Run the commands of an item; write tables, pictures and the stamp. Raises EvidenceError."""
+    results = ROOT / RESULTS / item.name
+    shutil.rmtree(results, ignore_errors=True)
+    results.mkdir(parents=True)
+    depends = item.parts()  # before the commands, lest a source that is changed meanwhile passes for theirs
+    start, before = time.monotonic(), _processor_time_s()
+    for number, command in enumerate(item.commands):
+        say(f"{item.name}: {command}")
+        printed = run(command)
+        (results / f"printed-{number}.txt").write_text(printed, "utf-8")
+    figures = finite(item.read(results))
+    if item.draw is not None:
+        item.draw(results)
+    for name, source in item.pictures.items():
+        shutil.copyfile(results / source, PAGES / name)
+    stamp = {
+        "commands": list(item.commands),
+        "duration_s": round(time.monotonic() - start),
+        "processor_time_s": round(_processor_time_s() - before),
+        "parts": depends,
+        "figures": figures,
+    }
+    DATA.mkdir(parents=True, exist_ok=True)
+    item.stamp.write_text(json.dumps(stamp, indent=1, allow_nan=False) + "\n", "utf-8")
+    write_tables(item)
+    say(f"{item.name}: {', '.join((*item.texts(figures), *item.pictures))}, {stamp['duration_s']} s")
+
+
+def write_tables(item: Item) -> list[str]:
+    """Write the tables of the figures in the stamp; return the names of those that changed."""
+    changed = []
+    for name, text in item.texts(read_stamp(item)["figures"]).items():
+        path = DATA / name
+        if not path.is_file() or path.read_text("utf-8") != text:
+            path.write_text(text, "utf-8")
+            changed.append(name)
+    return changed
+
+
+def run(command: str) -> str:
+    """Run a command and return what it printed; exit 1, a finding, is no error. Raises EvidenceError."""
+    program, *words = shlex.split(command)
+    modules = {"mambo-nmpc": ["-m", "mambo_nmpc"], "python": []}
+    ran = subprocess.run(
+        [sys.executable, *modules[program], *words], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=False
+    )
+    if ran.returncode not in (0, 1):
+        raise EvidenceError(f"{command}: exit {ran.returncode}")
+    return ran.stdout
+
+
+def _processor_time_s() -> float:
+    spent = os.times()
+    return spent.children_user + spent.children_system

@@ -1,0 +1,196 @@
+"""The list of what is evidence: tables and pictures of the manual, and the commands that make them.
+
+Not in the list are figures that take more than ten minutes, and those that need another machine or package.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import PurePath
+from typing import Final
+
+from benchmarks.evidence.board_tables import (
+    compilers,
+    faults,
+    faults_compared,
+    footprint,
+    footprint_scalars,
+    read_faults,
+    read_footprints,
+)
+from benchmarks.evidence.campaign_tables import campaign, campaign_motor_lag, campaign_ratios, read_campaign
+from benchmarks.evidence.item import RESULTS, Figures, Item
+from benchmarks.evidence.pictures import draw_envelope
+from benchmarks.evidence.tables import (
+    CONTROLLERS,
+    conditions,
+    envelope,
+    read_envelope,
+    read_printed,
+    read_sensors,
+    read_suite,
+    read_table2,
+    sensors,
+    spread,
+    table2,
+    table2_quarter,
+    title,
+    vehicles,
+)
+
+_HERE: Final = "benchmarks/evidence"
+_ONE_NORM: Final = f"{_HERE}/one-norm.toml"
+_MAMBO: Final = "sil/vehicles/data/vehicles/mambo.toml"
+_MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
+_ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
+_FLOWN: Final = ("mambo", "mambo-1norm", "table1")
+
+
+_STYLE: Final = "mambo_nmpc.sil.show.style"
+_FIXED: Final = f"{_HERE}/mambo-1norm-fixed.toml"
+
+
+def _regress(item: str, suite: str, *sources: str) -> tuple[str, ...]:
+    """Return the commands that fly a suite with presets or files, each into the folder of that name."""
+    return tuple(
+        f"mambo-nmpc regress {suite} --controller {source} -o {RESULTS}/{item}/{PurePath(source).stem}"
+        for source in sources
+    )
+
+
+def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], str]]) -> Item:
+    """Return the item of a campaign, NAME.toml beside this file; the first one has pictures."""
+    drawn = name == "campaign"
+    return Item(
+        name=name,
+        commands=(f"mambo-nmpc campaign {_HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
+        controllers=_FLOWN,
+        modules=(
+            "mambo_nmpc.sil.campaign.run",
+            "mambo_nmpc.sil.campaign.statistics",
+            *(("mambo_nmpc.sil.campaign.plots", _STYLE) if drawn else ()),
+        ),
+        data=(_MAMBO, f"{_HERE}/{name}.toml"),
+        read=read_campaign,
+        tables=tables,
+        pictures={f"{name}.{kind}": f"campaign/campaign.{kind}" for kind in ("png", "svg")} if drawn else {},
+    )
+
+
+ITEMS: Final = (
+    Item(
+        name="table2",
+        commands=(f"mambo-nmpc table2 -o {RESULTS}/table2/table2",),
+        controllers=(*_FLOWN, "table1-printed"),
+        modules=("mambo_nmpc.sil.paper.table2", "mambo_nmpc.sil.paper.plots", _STYLE),
+        data=(_MAMBO,),
+        read=read_table2,
+        tables={"table2": table2, "table2-quarter": table2_quarter},
+        pictures={"figure3.png": "table2/figure3.png", "figure3.svg": "table2/figure3.svg"},
+    ),
+    Item(
+        name="sensors",
+        commands=(f"mambo-nmpc table2 --sensors -o {RESULTS}/sensors/sensors",),
+        controllers=("mambo", "table1"),
+        modules=("mambo_nmpc.sil.paper.sensed",),
+        data=(_MAMBO,),
+        read=read_sensors,
+        tables={"sensors": sensors},
+    ),
+    Item(
+        name="conditions",
+        commands=_regress("conditions", f"{_HERE}/conditions.toml", *CONTROLLERS, _ONE_NORM, _FIXED),
+        controllers=(*_FLOWN, _ONE_NORM, _FIXED),
+        modules=("mambo_nmpc.sil.regress.run", "mambo_nmpc.sil.regress.file"),
+        data=(_MAMBO, f"{_HERE}/conditions.toml"),
+        read=read_suite((*CONTROLLERS, "one-norm", "mambo-1norm-fixed")),
+        tables={
+            "conditions": conditions({name: title(name) for name in CONTROLLERS}),
+            "tracker": conditions(
+                {
+                    "one-norm": "without the tracker",
+                    "mambo-1norm": "`mambo-1norm`",
+                    "mambo-1norm-fixed": "`mambo-1norm`, fixed",
+                }
+            ),
+        },
+    ),
+    Item(
+        name="vehicles",
+        commands=_regress("vehicles", f"{_HERE}/vehicles.toml", *_ON_EACH),
+        controllers=_ON_EACH[2:],
+        modules=("mambo_nmpc.sil.regress.run", "mambo_nmpc.sil.regress.file"),
+        data=("sil/vehicles/data/vehicles/*.toml", f"{_HERE}/vehicles.toml"),
+        read=read_suite(_ON_EACH),
+        tables={"vehicles": vehicles},
+    ),
+    Item(
+        name="spread",
+        commands=("python -m benchmarks.spread",),
+        controllers=_FLOWN,
+        modules=("benchmarks.spread",),
+        data=(_MAMBO,),
+        read=read_printed,
+        tables={"spread": spread},
+    ),
+    Item(
+        name="envelope",
+        commands=_regress("envelope", "envelope", *CONTROLLERS),
+        controllers=_FLOWN,
+        modules=(
+            "mambo_nmpc.sil.regress.run",
+            "mambo_nmpc.sil.regress.file",
+            "benchmarks.evidence.pictures",
+            _STYLE,
+        ),
+        data=(_MAMBO, "sil/regress/data/suites/envelope.toml"),
+        read=read_envelope,
+        tables={"envelope": envelope},
+        pictures={"envelope.png": "envelope.png", "envelope.svg": "envelope.svg"},
+        draw=draw_envelope,
+    ),
+    _campaign(
+        "campaign",
+        "",
+        {"campaign": campaign, "campaign-ratios": campaign_ratios, "campaign-motor-lag": campaign_motor_lag},
+    ),
+    _campaign("campaign-older-flow", "--flights 100 ", {"campaign-older-flow": campaign}),
+    _campaign("campaign-quick-motors", "--flights 100 ", {"campaign-quick-motors": campaign}),
+    Item(
+        name="footprint",
+        commands=(
+            f"mambo-nmpc footprint mambo -o {RESULTS}/footprint/float32",
+            f"mambo-nmpc footprint mambo --scalar float64 -o {RESULTS}/footprint/float64",
+            f"mambo-nmpc footprint mambo --scalar fixed -o {RESULTS}/footprint/fixed",
+            f"mambo-nmpc footprint mambo-1norm -o {RESULTS}/footprint/1norm",
+        ),
+        controllers=_MEASURED,
+        modules=("mambo_nmpc.sil.footprint.measure",),
+        data=("codegen/data/boards/*.toml", "codegen/flags.py", "codegen/boards.py", _MAMBO),
+        read=read_footprints(dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))),
+        tables={
+            "footprint": footprint("mambo"),
+            "footprint-float64": footprint("mambo --scalar float64"),
+            "footprint-fixed": footprint("mambo --scalar fixed"),
+            "footprint-1norm": footprint("mambo-1norm"),
+            "footprint-scalars": footprint_scalars,
+            "compilers": compilers,
+        },
+    ),
+    Item(
+        name="faults",
+        commands=(
+            f"mambo-nmpc faults mambo -o {RESULTS}/faults/mambo",
+            f"mambo-nmpc faults mambo-1norm -o {RESULTS}/faults/mambo-1norm",
+            f"mambo-nmpc faults {_ONE_NORM} -o {RESULTS}/faults/one-norm",
+        ),
+        controllers=("mambo", "mambo-1norm", _ONE_NORM),
+        modules=("mambo_nmpc.sil.faults.flights", "mambo_nmpc.sil.faults.plots", _STYLE),
+        data=(_MAMBO,),
+        read=read_faults({"mambo": "mambo", "mambo-1norm": "mambo-1norm", _ONE_NORM: "one-norm"}),
+        tables={
+            "faults": faults("mambo"),
+            "faults-1norm": faults(_ONE_NORM),
+            "faults-compared": faults_compared,
+        },
+        pictures={"faults.png": "mambo/faults.png", "faults.svg": "mambo/faults.svg"},
+    ),
+)

@@ -1,0 +1,236 @@
+"""Tables and pictures of the manual are those of this code, and README says what they say."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.evidence import sources
+from benchmarks.evidence.item import DATA, PAGES, EvidenceError, Item, read_stamp, run
+from benchmarks.evidence.items import ITEMS
+from benchmarks.ours import ONE_NORM
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
+
+ROOT = Path(__file__).parents[2]
+INCLUDE = re.compile(r'--8<-- "evidence/data/([\w-]+\.md)"')
+NAMES = [item.name for item in ITEMS]
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=NAMES)
+def test_figures_are_as_new_as_the_code(item: Item) -> None:
+    """What they depend on has not changed since they were made; if it has, this names the command."""
+    changed = item.changed()
+    assert changed == [], f"older than {', '.join(changed)}; make it anew: {item.remake}"
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=NAMES)
+def test_tables_are_those_of_the_figures(item: Item) -> None:
+    """No table was edited by hand, and all commands of the item are in its stamp."""
+    stamp = read_stamp(item)
+    assert stamp["commands"] == list(item.commands)
+    for name, text in item.texts(stamp["figures"]).items():
+        assert (DATA / name).read_text("utf-8") == text, f"{name}: run python -m benchmarks.evidence"
+    for name in item.pictures:
+        assert (PAGES / name).stat().st_size > 10_000, name
+
+
+def test_every_table_is_on_a_page() -> None:
+    """And every file of data belongs to an item, so that none is left over."""
+    made = {f"{item.name}.json" for item in ITEMS} | {f"{name}.md" for item in ITEMS for name in item.tables}
+    assert {path.name for path in DATA.iterdir()} == made
+    pages = "".join(path.read_text("utf-8") for path in (ROOT / "docs").rglob("*.md"))
+    assert set(INCLUDE.findall(pages)) == {name for name in made if name.endswith(".md")}
+
+
+def test_files_of_settings_are_presets_but_for_what_their_names_say() -> None:
+    """The 1-norm without tracker, as in the other benchmarks, and the preset in fixed point."""
+    fixed = with_option(presets.load("mambo-1norm"), "code.scalar", "fixed")
+    assert presets.load(str(ROOT / "benchmarks/evidence/one-norm.toml")) == ONE_NORM
+    assert presets.load(str(ROOT / "benchmarks/evidence/mambo-1norm-fixed.toml")) == fixed
+
+
+PYTHON = '"""Words."""\n\nX = 1  # words\n\n\ndef f() -> str:\n    """Words."""\n    return "# no comment"\n'
+
+
+@pytest.mark.parametrize("other", ["  # others", '"""Others."""\n\n\n', "\n\n# more\n"])
+def test_words_for_readers_are_no_part_of_python(other: str) -> None:
+    """Comments, docstrings and blank lines may change."""
+    changed = {
+        "  # others": PYTHON.replace("  # words", other),
+        '"""Others."""\n\n\n': PYTHON.replace('"""Words."""\n\n', other),
+        "\n\n# more\n": PYTHON + other,
+    }[other]
+    assert changed != PYTHON
+    assert sources.plain_python(changed) == sources.plain_python(PYTHON)
+    assert sources.plain_python(PYTHON) == 'X = 1\ndef f() -> str:\n    return "# no comment"'
+
+
+@pytest.mark.parametrize(("old", "new"), [("1", "2"), ("# no", "# a"), ("f()", "g()"), ("return", "yield")])
+def test_code_is_part_of_python(old: str, new: str) -> None:
+    """A number, a text, a name, a statement."""
+    assert sources.plain_python(PYTHON.replace(old, new)) != sources.plain_python(PYTHON)
+
+
+C = '/* Words. */\n#define A 1.0f /* more */\n\nconst char *b = "/* no comment */"; // words\n'
+
+
+def test_comments_are_no_part_of_c() -> None:
+    """Neither are spaces; a constant is, and a text that looks like a comment."""
+    plain = sources.plain_c(C)
+    assert plain == '#define A 1.0f\nconst char *b = "/* no comment */";'
+    assert sources.plain_c(C.replace("Words", "Others").replace("A 1", "A   1")) == plain
+    assert sources.plain_c(C.replace("1.0f", "1.5f")) != plain
+    assert sources.plain_c(C.replace("no comment", "comment")) != plain
+
+
+def test_figures_depend_on_what_their_modules_import() -> None:
+    """On the engine in C and on the plant, but not on the command line, on files and on formats."""
+    found = {path.relative_to(ROOT).as_posix() for path in sources.reached(["mambo_nmpc.sil.paper.table2"])}
+    assert {"sil/engine/loop.c", "sil/engine/rigid_body.h", "sil/plant/rotors.py"} <= found
+    assert {"sil/controllers/pd.py", "sil/flight/metrics.py", "sil/paper/table2.py"} <= found
+    assert "codegen/gravity.py" in found
+    inert = ("codegen/settings", "codegen/render", "codegen/__init__", "sil/cli", "sil/files", "sil/show")
+    assert not [path for path in found if path.startswith(inert)]
+    with pytest.raises(ValueError, match="no such module"):
+        sources.reached(["mambo_nmpc.sil.paper.table3"])
+
+
+def test_figures_depend_on_the_generated_c_and_not_on_its_names(tmp_path: Path) -> None:
+    """A weight is part of it; version and settings digest are not."""
+    text = (ROOT / "benchmarks/evidence/one-norm.toml").read_text("utf-8")
+    other, same = tmp_path / "other.toml", tmp_path / "same.toml"
+    other.write_text(text.replace("0.055", "0.056"), "utf-8")
+    same.write_text(f"# The same, in other words.\n{text}", "utf-8")
+    now = sources.generated("benchmarks/evidence/one-norm.toml")
+    assert now == sources.generated(str(same))
+    assert now != sources.generated(str(other))
+    assert ONE_NORM.short_digest not in now
+    assert "nmpc_optimizer_minimize" in now
+    assert sources.generated("mambo") != sources.generated("mambo --scalar fixed")
+
+
+def test_a_change_is_named() -> None:
+    """By the folder or the controller that has changed."""
+    item = next(item for item in ITEMS if item.name == "table2")
+    now = item.parts()
+    assert {"commands", "controller mambo", "sil/engine", "sil/plant"} <= now.keys()
+    assert now == json.loads(json.dumps(now))
+
+
+def test_a_command_that_refuses_is_an_error() -> None:
+    """Exit 1 is a finding, such as a board over its budget."""
+    assert run("python -c 'print(1); raise SystemExit(1)'") == "1\n"
+    with pytest.raises(EvidenceError, match="exit 2"):
+        run("python -c 'raise SystemExit(2)'")
+
+
+def test_an_unknown_item_is_refused() -> None:
+    """With the names of those that there are."""
+    command = [sys.executable, "-m", "benchmarks.evidence", "table3"]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ran.returncode == 2
+    assert ran.stderr.startswith("table3: is no item of evidence; there are table2, ")
+
+
+# README
+
+SUMMARISED = ("table2.md", "campaign.md")
+"""Tables whose figures README repeats."""
+
+
+def cells(line: str) -> list[str]:
+    """Return the cells of a line of a table, links by their text."""
+    return [cell.strip() for cell in re.sub(r"\]\([^)]*\)", "]", line).strip().strip("|").split("|")]
+
+
+def rows(text: str) -> list[list[str]]:
+    """Return the rows of all tables, without heads."""
+    lines = text.splitlines()
+    rules = [number for number, line in enumerate(lines) if re.fullmatch(r"\|[|\s:-]+", line)]
+    heads = {number - 1 for number in rules}
+    return [cells(line) for number, line in enumerate(lines) if line.startswith("|") and number not in heads]
+
+
+def numbers(words: list[str]) -> list[str]:
+    """Return the numbers in cells, without separators of thousands."""
+    return re.findall(r"(?<![\w-])\d+(?:\.\d+)?(?![\w-])", re.sub(r"(?<=\d),(?=\d{3})", "", " ".join(words)))
+
+
+def place(number: str) -> float:
+    """Return the value of the last significant place: 10 of 4300 and 1750, 0.01 of 63.02, 1 of 40."""
+    whole, _, decimals = number.partition(".")
+    if decimals:
+        return 10.0 ** -len(decimals)
+    return 1.0 if len(whole) < 4 else 10.0 ** (len(whole) - len(whole.rstrip("0")))
+
+
+def is_rounded(shorter: str, longer: str) -> bool:
+    """Return whether one number is another, itself rounded, with as many or fewer places."""
+    nearly = abs(float(shorter) - float(longer)) <= 0.5 * (place(shorter) + place(longer)) * (1 + 1e-9)
+    return float(shorter) == float(longer) or (place(shorter) > place(longer) and nearly)
+
+
+def subject(cell: str) -> str:
+    """Return letters and digits of a first cell, as far as it names who flies or what is measured."""
+    named = cell.casefold().removesuffix(", flown").removesuffix(", printed")
+    return re.sub(r"[^a-z0-9]", "", named)
+
+
+def unfounded(text: str) -> list[str]:
+    """Return the figures of tables that have another value, or none, in `SUMMARISED`, with their row."""
+    known: dict[str, list[str]] = {}
+    for name in SUMMARISED:
+        for first, *others in rows((DATA / name).read_text("utf-8")):
+            known.setdefault(subject(first), []).extend(numbers(others))
+    wrong = []
+    for first, *others in rows(text):
+        names = [name for name in known if subject(first).startswith(name)]
+        figures = known.get(max(names, key=len, default=""), [])
+        wrong += [
+            f"{first}: {one}" for one in numbers(others) if not any(is_rounded(one, x) for x in figures)
+        ]
+    return wrong
+
+
+def test_readme_says_what_the_evidence_says() -> None:
+    """Every figure in a table of README is in a row of the same name of the evidence."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert len([row for row in rows(text) if len(numbers(row[1:])) >= 4]) >= 3
+    assert unfounded(text) == []
+
+
+def test_readme_says_what_the_crazyflie_takes() -> None:
+    """Flash, RAM, time and instructions of preset mambo, and those in fixed point on the Mambo."""
+    text = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    takes = r"\*\*([\d.]+) KB of flash, (\d+) bytes of RAM and (\d+) to (\d+) us a step\*\*"
+    found = re.search(rf"{takes}, estimated from (\d+) instructions", text)
+    assert found is not None, "README no longer says it in these words: change this test with it"
+    footprints = read_stamp(next(item for item in ITEMS if item.name == "footprint"))["figures"]
+    board = next(one for one in footprints["mambo"] if one["name"] == "crazyflie")
+    low_us, high_us = (1e6 * time_s for time_s in board["time_s"])
+    assert found.groups() == (
+        f"{board['flash_bytes'] / 1000:.1f}",
+        str(board["ram_bytes"]),
+        f"{low_us:.0f}",
+        f"{high_us:.0f}",
+        f"{board['instructions']['mean']:.0f}",
+    )
+    counts = [
+        next(f"{one['instructions']['mean']:.0f}" for one in footprints[name] if one["name"] == "mambo")
+        for name in ("mambo --scalar fixed", "mambo")
+    ]
+    assert f"[{counts[0]} instructions instead of {counts[1]}]" in text
+
+
+def test_a_wrong_figure_in_readme_is_found() -> None:
+    """A digit, a row under another name, a figure of nobody; fewer digits are none."""
+    head = "| | IAE | ISE |\n|---|---|---|\n"
+    assert unfounded(f"{head}| `mambo`: words | 0.945 | 0.0278 |\n") == []
+    assert unfounded(f"{head}| [`mambo`](page.md#part-2) | 0.94 | 0.028 |\n") == []
+    assert unfounded(f"{head}| `mambo` | 0.946 | 0.0278 |\n") == ["`mambo`: 0.946"]
+    assert unfounded(f"{head}| `table1` | 0.945 | 0.938 |\n") == ["`table1`: 0.945"]
+    assert unfounded(f"{head}| x | 1 | 2 |\n") == ["x: 1", "x: 2"]
