@@ -1,9 +1,12 @@
-"""The hook of MkDocs that adds the pages that the code writes."""
+"""The hooks of MkDocs: pages that the code writes, and tables that `make evidence` writes."""
 
+import re
+from pathlib import Path
 from typing import Final
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
 from manual.command_page import command_page
 from manual.python_page import python_page
@@ -16,9 +19,20 @@ PAGES: Final = {
     "reference/python-api.md": python_page,
 }
 
+_TABLE: Final = re.compile(r"^\[Table: [^\]]+\]\(([^)]+\.md)\)$", re.MULTILINE)
+"""A line that is a link to a table: where Markdown is read without MkDocs, as on GitHub, the link serves."""
+
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the generated pages to the files of the site."""
     for path, write in PAGES.items():
         files.append(File.generated(config, path, content=write()))
     return files
+
+
+def on_page_markdown(markdown: str, /, *, page: Page, **_: object) -> str:
+    """Put each linked table in place of its link; raises OSError for a table that is not there."""
+    if page.file.abs_src_path is None:
+        return markdown
+    folder = Path(page.file.abs_src_path).parent
+    return _TABLE.sub(lambda link: (folder / link[1]).read_text("utf-8"), markdown)

@@ -16,7 +16,7 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.controller_toml import with_option
 
 ROOT = Path(__file__).parents[2]
-INCLUDE = re.compile(r'--8<-- "evidence/data/([\w-]+\.md)"')
+INCLUDE = re.compile(r"^\[Table: [^\]]+\]\([./\w-]*data/([\w-]+\.md)\)$", re.MULTILINE)
 NAMES = [item.name for item in ITEMS]
 
 
