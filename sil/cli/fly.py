@@ -1,10 +1,10 @@
-"""The command `fly`: one simulated flight of the Mambo, or the replay of a recorded one."""
+"""The command `fly`: one simulated flight, or the replay of a recorded one."""
 
 from mambo_nmpc.sil.cli.options import FlyOptions
 
 
 def fly(options: FlyOptions) -> None:
-    """Simulate one flight of the Mambo; write trace, metrics and plots; exit 1 if the drone crashes."""
+    """Simulate one flight; write trace, metrics and plots; exit 1 if the drone crashes."""
     if options.replay is not None:
         from mambo_nmpc.sil.cli.replay import fly_again
 
