@@ -9,7 +9,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-OURS = ("codegen", "sil", "templates", "benchmarks", "manual", "tests")
+OURS = ("codegen", "sil", "templates", "benchmarks", "docs", "tests")
 LONGEST_MODULE = 500
 # A wing of sil imports only wings above it in this list.
 WINGS = [
@@ -59,8 +59,8 @@ ALLOWED = {
     "templates": set(),
     "sil": {"codegen"},
     "benchmarks": {"codegen", "sil"},
-    "manual": {"codegen", "sil", "mambo_nmpc"},
-    "tests": {"codegen", "sil", "templates", "benchmarks", "manual", "mambo_nmpc"},
+    "docs": {"codegen", "sil", "mambo_nmpc"},
+    "tests": {"codegen", "sil", "templates", "benchmarks", "docs", "mambo_nmpc"},
 }
 
 
@@ -186,7 +186,7 @@ def test_every_folder_of_modules_is_installed() -> None:
     folders = [
         "mambo_nmpc" if name == "sil.package" else f"mambo_nmpc.{name}"
         for name, path in modules().items()
-        if path.name == "__init__.py" and not name.startswith(("tests", "benchmarks", "manual"))
+        if path.name == "__init__.py" and not name.startswith(("tests", "benchmarks", "docs"))
     ]
     assert sorted(listed) == sorted(folders)
 

@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from typing import Final
 
+from docs.pages.tables import code, plain, table
 from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key, spell
 from mambo_nmpc.codegen.settings.methods import is_used
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.vehicles.model import form
-from manual.tables import code, plain, table
 
 UNITS: Final = {"_m_s2": "m/s^2", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_m": "m", "_s": "s"}
 """The unit that the end of a setting's name stands for; the first end that fits counts."""

@@ -6,8 +6,8 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
+from docs.pages.tables import code, plain, table
 from mambo_nmpc.sil.cli.app import app
-from manual.tables import code, plain, table
 
 INTRODUCTION: Final = """\
 # Command line

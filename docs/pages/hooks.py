@@ -8,9 +8,9 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
-from manual.command_page import command_page
-from manual.python_page import python_page
-from manual.settings_page import controller_page, vehicle_page
+from docs.pages.command_page import command_page
+from docs.pages.python_page import python_page
+from docs.pages.settings_page import controller_page, vehicle_page
 
 PAGES: Final = {
     "reference/settings.md": controller_page,
