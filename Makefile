@@ -44,7 +44,7 @@ CHECKED = tests/test_house.py tests/campaign/test_campaign.py tests/files tests/
 fly: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o build/mambo
 	$(BIN)/mambo-nmpc table2 -o build/fly
-	@echo "pictures: build/fly/figure3.png and .svg; the C: build/mambo"
+	@echo "pictures: build/fly/figure3.png and .svg; the C: build/mambo; this table, explained: docs/tutorials/paper.md"
 
 check: $(SETUP_TEST)
 	$(STYLE_AND_TYPES)

@@ -29,7 +29,7 @@ def flown_section(folder: Path, summary: FlySummary, facts: dict[str, str], bad:
     name = PD_TITLES.get(summary.controller, f"NMPC, {summary.source}")
     parameters = {
         **_course(summary),
-        "controller": f"{summary.controller}, settings {summary.settings[:16]} of {summary.source}",
+        "controller": _controller(summary.controller, f"{summary.settings[:16]} of {summary.source}"),
         "start": f"{summary.start}, heading {summary.yaw_rad:g} rad",
         "disturbances": "steady acceleration {:g}, {:g} m/s²".format(*summary.wind_m_s2)
         + f"; wind with gusts {summary.wind_speed_m_s:g} m/s; motor lag {summary.motor_lag_s:g} s",
@@ -44,7 +44,7 @@ def replay_section(folder: Path, summary: ReplaySummary) -> Section:
     facts = {
         "record": summary.replay,
         **_course(summary.scenario),
-        "controller": f"{summary.controller}, settings {summary.settings[:16]}",
+        "controller": _controller(summary.controller, summary.settings[:16]),
         "seed": str(summary.scenario.seed),
     }
     bad = ["the trace differs from the recorded one"] if summary.same_bits_as_recorded is False else []
@@ -64,6 +64,11 @@ def pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
         "animation": animate(flights) if flights else None,
         "columns": flight_columns(flights) if flights else [],
     }
+
+
+def _controller(name: str, settings: str) -> str:
+    """Return the controller's name, with its settings if it has any: a PD has none."""
+    return name if name in PD_TITLES else f"{name}, settings {settings}"
 
 
 def _course(flown: FlySummary | Scenario) -> dict[str, str]:
