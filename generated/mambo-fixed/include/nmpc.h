@@ -45,9 +45,10 @@ typedef enum {
     NMPC_BAD_COMMAND = 6   /* the command given to nmpc_reset() or nmpc_set_command() is not finite or out of range */
 } nmpc_status_t;
 
-/* R_k: the measured state of the drone, in the world frame. */
+/* R_k: the measured state of the drone, in the world frame. Roll is positive right side down, pitch nose up, yaw
+ * clockwise seen from above. */
 typedef struct {
-    nmpc_real_t position_m[2];   /* x, y; within +/- NMPC_POSITION_RANGE_M */
+    nmpc_real_t position_m[2];   /* x north, y east; within +/- NMPC_POSITION_RANGE_M */
     nmpc_real_t velocity_m_s[2]; /* v_x, v_y; within +/- NMPC_VELOCITY_RANGE_M_S */
     nmpc_real_t roll_rad;        /* phi; within +/- NMPC_ATTITUDE_RANGE_RAD */
     nmpc_real_t pitch_rad;       /* theta; within +/- NMPC_ATTITUDE_RANGE_RAD */
@@ -60,7 +61,7 @@ typedef struct {
     nmpc_real_t velocity_m_s[2]; /* Tv_k = vx_ref, vy_ref; within +/- NMPC_VELOCITY_RANGE_M_S */
 } nmpc_target_t;
 
-/* u*_k: the set-points of the attitude loop, each angle within +/- NMPC_TILT_LIMIT_RAD. */
+/* u*_k: the set-points of the attitude loop, with the signs of the state, each angle within +/- NMPC_TILT_LIMIT_RAD. */
 typedef struct {
     nmpc_real_t roll_rad;  /* phi* */
     nmpc_real_t pitch_rad; /* theta* */
@@ -92,6 +93,8 @@ nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command);
 
 /* Compute the command of this control step; call it every NMPC_UPDATE_PERIOD_S. `thrust_acceleration_m_s2` is the
  * thrust over the mass; it is checked, but the model takes that of hover.
+ *
+ * Time is not measured: a call counts as one update period, however late it is.
  *
  * Any input may be passed. If one is NaN, infinite or out of range, the status names it. With a bad state the
  * controller flies on by its estimate for NMPC_OUTAGE_STEPS control steps, and then repeats the last command, as it

@@ -54,9 +54,10 @@ typedef enum {
     NMPC_BAD_COMMAND = 6   /* the command given to nmpc_reset() is not finite or out of range */
 } nmpc_status_t;
 
-/* R_k: the measured state of the drone, in the world frame. */
+/* R_k: the measured state of the drone, in the world frame. Roll is positive right side down, pitch nose up, yaw
+ * clockwise seen from above. */
 typedef struct {
-    nmpc_real_t position_m[2];   /* x, y; within +/- NMPC_POSITION_RANGE_M */
+    nmpc_real_t position_m[2];   /* x north, y east; within +/- NMPC_POSITION_RANGE_M */
     nmpc_real_t velocity_m_s[2]; /* v_x, v_y; within +/- NMPC_VELOCITY_RANGE_M_S */
     nmpc_real_t roll_rad;        /* phi; within +/- NMPC_ATTITUDE_RANGE_RAD */
     nmpc_real_t pitch_rad;       /* theta; within +/- NMPC_ATTITUDE_RANGE_RAD */
@@ -69,7 +70,7 @@ typedef struct {
     nmpc_real_t velocity_m_s[2]; /* Tv_k = vx_ref, vy_ref; within +/- NMPC_VELOCITY_RANGE_M_S */
 } nmpc_target_t;
 
-/* u*_k: the set-points of the attitude loop, each angle within +/- NMPC_TILT_LIMIT_RAD. */
+/* u*_k: the set-points of the attitude loop, with the signs of the state, each angle within +/- NMPC_TILT_LIMIT_RAD. */
 typedef struct {
     nmpc_real_t roll_rad;  /* phi* */
     nmpc_real_t pitch_rad; /* theta* */
@@ -98,6 +99,8 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights);
 
 /* Compute the command of this control step; call it every NMPC_UPDATE_PERIOD_S. `thrust_acceleration_m_s2` is
  * the thrust over the mass, u_1/m of eq 8: 9.81 in hover.
+ *
+ * Time is not measured: a call counts as one update period, however late it is.
  *
  * Any input may be passed. If one is NaN, infinite or out of range, the status names it and the command repeats
  * the last one: that of the last good step or of nmpc_reset(); level after nmpc_init(). The next good input is
