@@ -40,7 +40,7 @@ def _by_motor_lag(flights: Table, names: Sequence[str]) -> list[Figures]:
         if not inside.any():
             continue
         iae = {name: index_values(flights, name, "iae_m_s")[inside] for name in names}
-        chatter = {name: index_values(flights, name, "command_variation_rad")[inside] for name in names}
+        variation = {name: index_values(flights, name, "command_variation_rad")[inside] for name in names}
         rows.append(
             {
                 "from_s": low,
@@ -53,7 +53,7 @@ def _by_motor_lag(flights: Table, names: Sequence[str]) -> list[Figures]:
                     for name, values in iae.items()
                     if name != "mambo"
                 },
-                "median_command_variation_rad": {name: _median(values) for name, values in chatter.items()},
+                "median_command_variation_rad": {name: _median(values) for name, values in variation.items()},
             }
         )
     return rows
@@ -84,7 +84,7 @@ def campaign(figures: Figures) -> str:
                 "crashed (95 %)": f"{crashed['count']}, {_percent(crashed['share'])} % ({interval})",
                 "IAE, m s: 5 %, median, 95 % of the flights": shares("iae_m_s", "0.05", "0.5", "0.95"),
                 "as seen by the estimators: median, 95 %": shares("seen_iae_m_s", "0.5", "0.95"),
-                "chatter, rad: median, 95 %": shares("command_variation_rad", "0.5", "0.95"),
+                "variation, rad: median, 95 %": shares("command_variation_rad", "0.5", "0.95"),
             }
         )
     return table(rows)

@@ -51,19 +51,19 @@ def read_table2(results: Path) -> Figures:
 
 def table2(figures: Figures) -> str:
     """Return the Table II case: what the paper prints, and what flies."""
-    (case, *_), ratios, chatter = CASES, "PD over this", "chatter, rad"
+    (case, *_), ratios, varied = CASES, "PD over this", "variation, rad"
     first = f"{case.replace(' 0.5', ', 0.5')}"
     printed: list[Row] = []
     for name, values, factors in (("PD", PRINTED_PD, ()), ("NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)):
         cells = dict(zip(INDICES, map(digits, values), strict=True))
         over = " / ".join(map(str, factors))
-        printed.append({first: f"{name}, printed", **cells, ratios: over, chatter: ""})
+        printed.append({first: f"{name}, printed", **cells, ratios: over, varied: ""})
     flown: list[Row] = []
     for row in figures[case]:
         number = digits if row["controller"] == PD else three_digits
         cells = dict(zip(INDICES, map(number, row["measured"]), strict=True))
         over, variation = slashed(row["improvement"] or ()), f"{row['command_variation_rad']:.4f}"
-        flown.append({first: f"{title(row['controller'])}, flown", **cells, ratios: over, chatter: variation})
+        flown.append({first: f"{title(row['controller'])}, flown", **cells, ratios: over, varied: variation})
     pds = len(PD_NAMES)
     return table([printed[0], *flown[:pds], printed[1], *flown[pds:]])
 
@@ -150,12 +150,12 @@ def _flight(flight: Figures) -> Figures:
 
 
 def conditions(titles: Mapping[str, str]) -> Callable[[Figures], str]:
-    """Return what makes the table of IAE and chatter of each flight, of the controllers with `titles`."""
+    """Return what makes the table of IAE and variation of each flight, of the controllers with `titles`."""
 
     def make(figures: Figures) -> str:
         rows: list[Row] = []
         for group, words in _CONDITIONS.items():
-            row = {"IAE, m s (chatter, rad)": words}
+            row = {"IAE, m s (variation, rad)": words}
             for name, head in titles.items():
                 flight = next(flight for flight in figures[name] if flight["group"] == group)
                 row[head] = f"{three(flight['iae_m_s'])} ({flight['command_variation_rad']:.4f})"
@@ -166,7 +166,7 @@ def conditions(titles: Mapping[str, str]) -> Callable[[Figures], str]:
 
 
 def vehicles(figures: Figures) -> str:
-    """Return IAE and chatter with each drone, seen truly and through its sensors, by controller."""
+    """Return IAE and command variation with each drone, seen truly and through its sensors, by controller."""
     rows: list[Row] = []
     for group in dict.fromkeys(flight["group"] for flight in next(iter(figures.values()))):
         drone = group.removesuffix("-sensors")

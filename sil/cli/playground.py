@@ -40,5 +40,8 @@ def playground(
             text, flown = playground_page(found, drone, bar)
         size = write(text)
     summary = PlaygroundSummary(page=str(output), bytes=size, vehicle=drone, controllers=flown)
-    lines = [f"{one.title}: {made.trace_sha256}" for one, made in zip(found, flown, strict=True)]
+    lines = [
+        f"{one.title}: its proof flight has the SHA-256 {made.trace_sha256}"
+        for one, made in zip(found, flown, strict=True)
+    ]
     show(summary, "\n".join([*lines, f"{echo(str(output))}: {size / 1000:.0f} kB"]), as_json=as_json)

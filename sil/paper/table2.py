@@ -50,7 +50,7 @@ class Table2Row:
     improvement: Four | None
     """Ratio of the paper's PD's index to this controller's, for each index; None for that PD itself."""
     command_variation_rad: Number
-    """Chatter: the mean 1-norm of the change of the command from update to update."""
+    """Command variation: the mean 1-norm of the change of the command from update to update."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,8 @@ def table2_text(summary: Table2Summary) -> str:
     lines = [
         "printed: in the paper; flown: here, 100 s along a figure of eight of 4 m, Bernoulli's or Gerono's;",
         "PD over this: the index of the flown PD, or of the printed one, divided by that of the row;",
-        "chatter: the command variation, the mean change of the command from one update to the next",
-        f"{'':28}" + "".join(f"{unit:>10}" for unit in UNITS) + f"{'  PD over this':36}{'chatter':>11}",
+        "variation: the command variation, the mean change of the command from one update to the next",
+        f"{'':28}" + "".join(f"{unit:>10}" for unit in UNITS) + f"{'  PD over this':36}{'variation':>11}",
     ]
     for case in CASES:
         lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
@@ -134,10 +134,10 @@ def table2_text(summary: Table2Summary) -> str:
     return "\n".join(lines)
 
 
-def _line(name: str, values: Four, improvement: Four | None, chatter: str) -> str:
+def _line(name: str, values: Four, improvement: Four | None, variation: str) -> str:
     ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
     line = f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values)
-    return f"{line}{ratios:36}{chatter:>11}".rstrip()
+    return f"{line}{ratios:36}{variation:>11}".rstrip()
 
 
 def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:

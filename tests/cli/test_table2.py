@@ -52,7 +52,7 @@ def test_table2_reads_as_a_finding_and_not_as_a_failure() -> None:
     claims = [Claim("it flies", True, "1 %"), Claim("it lands", False, "90 %")]
     text = table2_text(Table2Summary(scalar=None, cases=[row.case], rows=[row], claims=claims))
     *legend, above, header = text.splitlines()[:5]
-    assert [line.split(":")[0] for line in legend] == ["printed", "PD over this", "chatter"]
+    assert [line.split(":")[0] for line in legend] == ["printed", "PD over this", "variation"]
     assert above.startswith(" " * 35 + "m s     m^2 s   m^2 s^2     m s^2  PD over this")
     assert above.index("PD over this") > header.index("ITAE")
     assert header.split()[3:] == [*["IAE", "ISE", "ITSE", "ITAE"] * 2, "rad"]
