@@ -16,10 +16,17 @@ _ENDS: Final = ("back", "away", "crashed")
 
 def read_footprints(folders: Mapping[str, str]) -> Callable[[Path], Figures]:
     """Return what reads the boards of `footprint`; `folders` are those of the results, by controller."""
+    return _reader(folders, "boards", _board)
+
+
+def _reader(
+    folders: Mapping[str, str], member: str, record: Callable[[Figures], Figures]
+) -> Callable[[Path], Figures]:
+    """Return what makes a record of every entry of a summary's list `member`, by controller."""
 
     def read(results: Path) -> Figures:
         return {
-            name: [_board(board) for board in summary(results / folder)["boards"]]
+            name: [record(entry) for entry in summary(results / folder)[member]]
             for name, folder in folders.items()
         }
 
@@ -100,14 +107,7 @@ def compilers(figures: Figures) -> str:
 
 def read_faults(folders: Mapping[str, str]) -> Callable[[Path], Figures]:
     """Return what reads the flights of `faults`; `folders` are those of the results, by controller."""
-
-    def read(results: Path) -> Figures:
-        return {
-            name: [_fault(flight) for flight in summary(results / folder)["flights"]]
-            for name, folder in folders.items()
-        }
-
-    return read
+    return _reader(folders, "flights", _fault)
 
 
 def _fault(flight: Figures) -> Figures:

@@ -42,8 +42,6 @@ _MAMBO: Final = "sil/vehicles/data/vehicles/mambo.toml"
 _MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
-
-
 _STYLE: Final = "mambo_nmpc.sil.show.style"
 _FIXED: Final = f"{_HERE}/mambo-1norm-fixed.toml"
 

@@ -159,6 +159,7 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
 def campaign_text(summary: CampaignSummary, folder: str) -> str:
     """Return a summary as text: statistics per controller, improvements, commands to replay the worst."""
     lines: list[str] = []
+    width = max(len(name) for name in summary.controllers)
     for name, found in summary.controllers.items():
         lines.append(f"{name:34}" + "".join(f"{title:>10}" for title in _SHOWN.values()))
         for index, quantiles in found.quantiles.items():
@@ -174,13 +175,15 @@ def campaign_text(summary: CampaignSummary, folder: str) -> str:
         for one in summary.improvements:
             interval = f"{digits(one.low)} .. {digits(one.high)}"
             ratio = f"{digits(one.median):>9}  {interval:20}"
-            lines.append(f"  {one.controller:12} {one.index:18}{ratio}{_spelled(one.better)}")
+            lines.append(f"  {one.controller:{width}} {one.index:18}{ratio}{_spelled(one.better)}")
         lines.append("")
     lines.append("worst flights by IAE, and the commands that replay them:")
     for name, flights in summary.worst.items():
         for flight in flights:
             what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
-            lines.append(f"  {name:12} {what:>12}  mambo-nmpc fly --replay {echo(folder)}/{flight.record}")
+            lines.append(
+                f"  {name:{width}} {what:>12}  mambo-nmpc fly --replay {echo(folder)}/{flight.record}"
+            )
     return "\n".join(lines)
 
 
