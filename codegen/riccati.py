@@ -1,8 +1,8 @@
 """Matrix equations of optimal control and estimation, to 40 digits.
 
 Gains become constants of the generated C, which is the same text on every machine. LAPACK rounds differently
-from processor to processor; 40 digits, rounded to float64 once at the end, do not. Doublings compute with
-integers of 384 fractional bits, a resolution of 1e-115, which takes a tenth of the time.
+from processor to processor; 40 digits, rounded to float64 once at the end, do not. Doublings and exponentials
+compute with integers of 384 fractional bits, a resolution of 1e-115, a seventh of the time or less.
 """
 
 from typing import Any, Final
@@ -24,6 +24,8 @@ Integers = NDArray[np.object_]
 _DOUBLINGS: Final = 60
 _CONVERGED: Final = 10 ** (DIGITS - 12)
 _BITS: Final = 384
+_HALVINGS: Final = 32
+"""Of the exponent, so that its Taylor series takes about a dozen terms."""
 _DIVERGED: Final = 1 << (_BITS + 64)
 """No power of a transition whose mode can be stabilised has an element of 2^64."""
 
@@ -37,7 +39,7 @@ def hold(rates: Matrix, inputs: Matrix, period_s: Any) -> tuple[Matrix, Matrix]:
     joint = mp.zeros(n + m)
     joint[:n, :n] = rates * period_s
     joint[:n, n:] = inputs * period_s
-    exponential = mp.expm(joint)
+    exponential = _exponential(joint)
     return exponential[:n, :n], exponential[:n, n:]
 
 
@@ -88,6 +90,20 @@ def sum_costs(transition: Matrix, state_cost: Matrix, to_go: Matrix, steps: int)
         if digit == "1":
             total, power = cost + _product(one.T, total, one), _product(one, power)
     return _matrix(total + _product(power.T, last, power))
+
+
+def _exponential(matrix: Matrix) -> Matrix:
+    """Return the exponential of a matrix (n, n), by scaling and squaring."""
+    scaled, k = _integers(mp.ldexp(1, -_HALVINGS) * matrix), 1
+    total = _integers(mp.eye(matrix.rows)) + scaled
+    term = scaled
+    while np.max(np.abs(term)) > 1:  # a product rounds down, so -1 stays -1
+        k += 1
+        term = _product(term, scaled) // k
+        total = total + term
+    for _ in range(_HALVINGS):
+        total = _product(total, total)
+    return _matrix(total)
 
 
 def _integers(matrix: Matrix) -> Integers:
