@@ -4,7 +4,9 @@ Every index of a crashed flight is infinite: leaving such flights out would favo
 in difficult ones. Intervals are 95 % confidence intervals.
 """
 
+import itertools
 import math
+from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,26 +39,37 @@ Table = Mapping[str, FloatArray]
 def read_table(path: Path) -> Table:
     """Return the numeric columns of a table without a truncated last line; raises ResultsError."""
     name = f"{echo(str(path))}: is not the table of a campaign"
+    columns: dict[str, array[float]] = {}
+    titles: list[str] = []
     try:
-        text = path.read_text("utf-8")
+        with path.open(encoding="utf-8", newline="\n") as file:
+            for number, line in enumerate(itertools.takewhile(_is_complete, file), start=1):
+                cells = line[:-1].split(",")
+                if number == 1:
+                    titles = cells
+                    continue
+                if len(cells) != len(titles):
+                    fault = f"line {number} must have {len(titles)} cells, not {len(cells)}"
+                    raise ResultsError(f"{name}: {fault}; run campaign again")
+                for title, cell in zip(titles, cells, strict=True):
+                    if is_number(title):
+                        columns.setdefault(title, array("d")).append(
+                            _cell(cell, f"{name}: line {number}", title)
+                        )
     except (OSError, ValueError) as error:
         raise ResultsError(f"{name}: {echo(str(error))}; run campaign again") from error
-    titles, *rows = [line.split(",") for line in text.split("\n")[:-1]] or [[]]
-    columns: dict[str, list[float]] = {title: [] for title in titles if rows and is_number(title)}
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(titles):
-            raise ResultsError(
-                f"{name}: line {number} must have {len(titles)} cells, not {len(row)}; run campaign again"
-            )
-        for title, cell in zip(titles, row, strict=True):
-            if title in columns:
-                try:
-                    columns[title].append(read_number(cell))
-                except ValueError as error:
-                    raise ResultsError(
-                        f"{name}: line {number}, {echo(title)}: {error}; run campaign again"
-                    ) from None
     return {title: np.array(values) for title, values in columns.items()}
+
+
+def _is_complete(line: str) -> bool:
+    return line.endswith("\n")
+
+
+def _cell(cell: str, place: str, title: str) -> float:
+    try:
+        return read_number(cell)
+    except ValueError as error:
+        raise ResultsError(f"{place}, {echo(title)}: {error}; run campaign again") from None
 
 
 @dataclass(frozen=True)
