@@ -109,13 +109,13 @@ def _record_name(flight: int, name: str) -> str:
 
 def write_records(campaign: Campaign, store: FlightStore) -> None:
     """Write the missing records of all flights for `fly --replay`; raises UnwritableError."""
-    values = store.values()
     section = campaign.flight
     with convert_os_errors(store.folder):
         (store.folder / RECORDS).mkdir(exist_ok=True)
-        for row, flight in enumerate(map(int, values[FLIGHT])):
+        for cells in store.rows():
+            flight = int(cells[FLIGHT])
             for entrant in campaign.entrants:
-                digest = values[f"{entrant.name}_{DIGEST}"][row]
+                digest = cells[f"{entrant.name}_{DIGEST}"]
                 path = store.folder / _record_name(flight, entrant.name)
                 if not _is_written(path, digest):
                     flown = scenario(section, campaign.draw(flight))

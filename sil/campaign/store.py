@@ -57,10 +57,11 @@ class FlightStore:
         with convert_os_errors(self.folder):
             put(self._table, "".join(ordered).encode())
 
-    def values(self) -> dict[str, list[str]]:
-        """Return the columns of the table by name, in the order of the flights."""
-        rows = (self.lines[flight].rstrip("\n").split(",")[:-1] for flight in sorted(self.lines))
-        return dict(zip((FLIGHT, *self._columns), map(list, zip(*rows, strict=True)), strict=True))
+    def rows(self) -> Iterator[dict[str, str]]:
+        """Yield the cells of each flight by column, in the order of the flights."""
+        for flight in sorted(self.lines):
+            cells = self.lines[flight].rstrip("\n").split(",")[:-1]
+            yield dict(zip((FLIGHT, *self._columns), cells, strict=True))
 
     def _read(self, draw: Callable[[int], Draw]) -> dict[int, str]:
         """Return the lines of an earlier run by flight, after removing a truncated last line.
