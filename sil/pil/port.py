@@ -1,12 +1,12 @@
 """Serial ports and sockets as streams of bytes, with the optional package pyserial."""
 
+import os
+import socket
 from typing import Final, Protocol
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.errors import BoardError
 
-BAUD: Final = 115200
-"""The rate of the shipped boards."""
 READ_S: Final = 0.01
 """How long a read waits for bytes."""
 
@@ -44,9 +44,18 @@ def open_port(name: str, baud: int) -> Port:
             "--port needs pyserial, which is missing: pip install 'mambo-nmpc[serial]', or pyserial itself"
         ) from None
     try:
-        port: Port = serial.serial_for_url(name, baudrate=baud, timeout=READ_S)
+        port = serial.serial_for_url(name, baudrate=baud, timeout=READ_S)
     except ValueError as error:
         raise BoardError(
             f"--port {echo(name)} must be a device, such as /dev/ttyACM0, or socket://HOST:PORT: {error}"
         ) from None
-    return port
+    if name.startswith("socket://"):
+        _send_at_once(port.fileno())
+    opened: Port = port
+    return opened
+
+
+def _send_at_once(descriptor: int) -> None:
+    """Let a socket send a frame even if the one before is not yet acknowledged (RFC 896)."""
+    with socket.socket(fileno=os.dup(descriptor)) as same:
+        same.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
