@@ -127,6 +127,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
     environment = _environment()
     context = _context(Design(settings), with_digest=with_digest) | {
         "ticks_per_update": ticks,
+        "update_period_ns": round(1e9 * settings.horizon.update_period_s),
         "variables": fmu_variables(settings),
         "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
     }

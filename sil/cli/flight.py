@@ -47,7 +47,9 @@ def fly_once(options: FlyOptions) -> None:
     Raises FlightError, TrajectoryError, and the errors of loading settings or boards and of building the C.
     """
     if options.real_time:
-        raise FlightError("--real-time paces the requests to a board: give its --port, or leave it out")
+        raise FlightError(
+            "--real-time lets the clock of a board call the step: give its --port, or leave it out"
+        )
     settings = load(options.source, options.scalar)
     drone = vehicles.load(options.vehicle)
     flight = flight_of_options(options, settings, drone)

@@ -37,7 +37,7 @@ def footprint(
     ] = "all",
     optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
     port: PortName = None,
-    baud: Baud = 115200,
+    baud: Baud = 500000,
     output: OptionalResults = None,
     as_json: AsJson = False,
 ) -> None:

@@ -129,12 +129,13 @@ class FlyOptions:
         ),
     ] = None
     port: PortName = None
-    baud: Baud = 115200
+    baud: Baud = 500000
     real_time: Annotated[
         bool,
         typer.Option(
             "--real-time",
-            help="With --port: one step every update period by the wall clock; count late replies.",
+            help="With --port: the board's own clock calls the step, and the drone flies by it; count late "
+            "inputs, lost replies and periods without a step.",
         ),
     ] = False
     replay: Annotated[

@@ -29,9 +29,9 @@ from mambo_nmpc.sil.flight.loop import fly as simulate
 from mambo_nmpc.sil.footprint.measure import measure_footprint
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.controller import BoardController
-from mambo_nmpc.sil.pil.pace import Pace
 from mambo_nmpc.sil.pil.port import open_port
 from mambo_nmpc.sil.pil.report import BoardFlightSummary, EmulatedCount, board_fields, board_text
+from mambo_nmpc.sil.pil.timed import TimedController
 from mambo_nmpc.sil.vehicles import presets as vehicles
 
 EPISODES = 4
@@ -58,8 +58,7 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
         with connect(port, options.baud, settings) as board:
             first_difference = board.test()
             same_digest = board.digest(EPISODES) == digest_compiled(library, EPISODES)
-            pace = Pace(flight.update_period_s) if options.real_time else None
-            controller = BoardController(settings, board, pace)
+            controller = (TimedController if options.real_time else BoardController)(settings, board)
             with progress_bar("flying") as progress:
                 trace = simulate(flight, controller, progress)
         write_flight(trace, options, folder)
@@ -71,7 +70,6 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
                 "self_test_difference": first_difference,
                 "same_digest": same_digest,
                 "digest_steps": EPISODES * TICKS,
-                "deadlines": pace and pace.deadlines,
                 "same_bits_as_host": not (first_difference or controller.different) and same_digest,
             }
         )

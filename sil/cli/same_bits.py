@@ -25,7 +25,7 @@ def same_bits(
         ),
     ] = None,
     port: PortName = None,
-    baud: Baud = 115200,
+    baud: Baud = 500000,
     as_json: AsJson = False,
 ) -> None:
     """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""

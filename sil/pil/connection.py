@@ -36,6 +36,7 @@ from mambo_nmpc.sil.pil.messages import (
 )
 from mambo_nmpc.sil.pil.port import Port
 
+NO_FLIGHT: Final = "a flight in real time cannot be repeated, so none is written"
 _MOST_RESTARTS: Final = 10
 _MOST_RETURNS: Final = 100
 _REOPEN_PAUSE_S: Final = 0.1
@@ -74,28 +75,56 @@ class Connection:
         say: Callable[[str], None],
         patience: Patience | None = None,
     ) -> None:
-        self._name, self._open, self._settings, self._say = echo(name), open_port, settings, say
+        self.name, self._open, self._settings, self._say = echo(name), open_port, settings, say
         self._number_bytes = np.dtype(Design(settings).numbers.scalar).itemsize
-        self._patience = patience or Patience()
+        self.patience = patience or Patience()
         self.faults = Counter[str]()
         self.round_trips_s: list[float] = []
         self._flown: list[tuple[bytes, StepReply]] = []
         self._numbers = self._received_bytes = 0
+        self._timed = False
         try:
             self._port, self._receiver = open_port(), Receiver()
         except OSError as error:
-            raise BoardError(f"--port {self._name}: cannot be opened: {_reason(error)}") from error
+            raise BoardError(f"--port {self.name}: cannot be opened: {_reason(error)}") from error
         try:
             self.greeting = self._greet()
         except OSError as error:
             self._port.close()
-            raise BoardError(f"--port {self._name}: closed without an answer: {_reason(error)}") from error
+            raise BoardError(f"--port {self.name}: closed without an answer: {_reason(error)}") from error
         self.faults.clear()  # a board that starts when its port is opened misses the first requests
         self._ask_anew(Kind.RESET)
 
     def close(self) -> None:
-        """Release the port."""
+        """Release the port; a board whose clock calls the step is asked to stop it."""
+        if self._timed:
+            with contextlib.suppress(OSError):
+                self._port.write(encode(request(Kind.RESET, 0)))
         self._port.close()
+
+    @property
+    def period_s(self) -> float:
+        """The update period by the board's clock."""
+        return self.greeting.period_cycles / self.greeting.clock_hz
+
+    def tell(self, kind: Kind, number: int, body: bytes) -> None:
+        """Send a request that has no reply of its own; raises BoardError."""
+        self._timed = True
+        try:
+            self._port.write(encode(request(kind, number, body)))
+        except OSError as error:
+            raise self._gone(error) from error
+
+    def hear(self) -> list[tuple[int, int, bytes]]:
+        """Return kind, number and body of the frames that the next bytes complete; raises BoardError."""
+        try:
+            chunk = self._port.read(max(1, self._port.in_waiting))
+        except OSError as error:
+            raise self._gone(error) from error
+        return [split(payload or b"") for payload in self._receiver.feed(chunk)]
+
+    def _gone(self, error: OSError) -> BoardError:
+        return BoardError(f"--port {self.name}: lost: {_reason(error)}; {NO_FLIGHT}")
 
     def test(self) -> int:
         """Run the self-test, and reset; returns 0, or the number of the first step with other bits."""
@@ -131,8 +160,8 @@ class Connection:
     def _count_restart(self) -> None:
         self.faults["restarts"] += 1
         if self.faults["restarts"] > _MOST_RESTARTS:
-            raise BoardError(f"--port {self._name}: the board restarts again and again; check its supply")
-        self._say(f"{self._name}: the board was restarted; it flies its {len(self._flown)} steps again")
+            raise BoardError(f"--port {self.name}: the board restarts again and again; check its supply")
+        self._say(f"{self.name}: the board was restarted; it flies its {len(self._flown)} steps again")
 
     def _fly_again(self) -> None:
         """Bring a board that was restarted to where it was."""
@@ -140,7 +169,7 @@ class Connection:
         for number, (inputs, before) in enumerate(self._flown):
             if self._ask_step(number, inputs).bits != before.bits:
                 raise BoardError(
-                    f"--port {self._name}: after a restart the board answers step {number} with other bits "
+                    f"--port {self.name}: after a restart the board answers step {number} with other bits "
                     "than before; check its supply and its memory"
                 )
 
@@ -149,7 +178,7 @@ class Connection:
         expected = step_reply_bytes(self._number_bytes)
         reply = StepReply.parse(self._ask(Kind.STEP, number, inputs, expected), self._number_bytes)
         if reply is None:
-            raise BoardError(f"--port {self._name}: the board answers a step with numbers of another size")
+            raise BoardError(f"--port {self.name}: the board answers a step with numbers of another size")
         if repeated == self.faults["repeated"]:
             self.round_trips_s.append(time.perf_counter() - started)
         return reply
@@ -168,7 +197,7 @@ class Connection:
         else:
             return greeting
         raise BoardError(
-            f"--port {self._name}: the firmware on the board {fault}; "
+            f"--port {self.name}: the firmware on the board {fault}; "
             "generate it from these settings with mambo-nmpc generate --for pil, build and flash it"
         )
 
@@ -184,7 +213,7 @@ class Connection:
         the board stays silent, _RestartedError for a step that it does not expect, and OSError if the port
         fails while the board is greeted.
         """
-        frame, patience = encode(request(kind, number, body)), self._patience
+        frame, patience = encode(request(kind, number, body)), self.patience
         wait_s = patience.test_s if kind in (Kind.TEST, Kind.DIGEST) else patience.reply_s
         deadline = time.monotonic() + patience.silence_s
         while time.monotonic() < deadline:
@@ -204,7 +233,7 @@ class Connection:
             f"{self._received_bytes} B arrived, but no answer" if self._received_bytes else "nothing came"
         )
         raise BoardError(
-            f"--port {self._name}: the board does not answer, {arrived}; check its supply, its wires, "
+            f"--port {self.name}: the board does not answer, {arrived}; check its supply, its wires, "
             "--baud, and that it has the firmware of mambo-nmpc generate --for pil"
         )
 
@@ -237,9 +266,9 @@ class Connection:
         """Wait until the port is back, with the same firmware behind it; raises BoardError."""
         self.faults["reconnected"] += 1
         if self.faults["reconnected"] > _MOST_RETURNS:
-            raise BoardError(f"--port {self._name}: is lost again and again; check plug and cable")
-        self._say(f"{self._name}: lost: {_reason(error)}; waiting {self._patience.return_s:g} s for it")
-        deadline = time.monotonic() + self._patience.return_s
+            raise BoardError(f"--port {self.name}: is lost again and again; check plug and cable")
+        self._say(f"{self.name}: lost: {_reason(error)}; waiting {self.patience.return_s:g} s for it")
+        deadline = time.monotonic() + self.patience.return_s
         while True:
             with contextlib.suppress(OSError):
                 self._port.close()
@@ -249,7 +278,7 @@ class Connection:
             except OSError as again:
                 if time.monotonic() > deadline:
                     raise BoardError(
-                        f"--port {self._name}: did not come back: {_reason(again)}; no flight is written"
+                        f"--port {self.name}: did not come back: {_reason(again)}; no flight is written"
                     ) from again
                 time.sleep(_REOPEN_PAUSE_S)
             else:

@@ -13,7 +13,6 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.compiled import CompiledController, as_arrays
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.messages import StepReply
-from mambo_nmpc.sil.pil.pace import Pace
 from mambo_nmpc.sil.plant.arrays import IntArray
 
 
@@ -26,14 +25,13 @@ class BoardStep:
 
 
 class BoardController:
-    """One controller on a board, called at a `pace`, or else as soon as the desk has the next inputs.
+    """One controller on a board, called as soon as the desk has the next inputs.
 
     `replies` holds those of all steps, `different` the numbers of the steps whose bits are not the desk's.
     """
 
-    def __init__(self, settings: Settings, board: Connection, pace: Pace | None = None) -> None:
-        self._board, self._desk, self._pace = board, CompiledController(settings), pace
-        self._design = Design(settings)
+    def __init__(self, settings: Settings, board: Connection) -> None:
+        self._board, self._desk, self._design = board, CompiledController(settings), Design(settings)
         self.replies: list[StepReply] = []
         self.different: list[int] = []
 
@@ -43,21 +41,20 @@ class BoardController:
         `CompiledController.step` explains k.
         Raises BoardError if the board is lost.
         """
-        numbers = self._design.numbers
         inputs = as_arrays(self._design, 1, state, target, thrust_acceleration_m_s2)
-        if self._pace is not None:
-            self._pace.wait()
-        reply = self._board.step(b"".join(_bytes(values) for values in inputs))
-        if self._pace is not None:
-            self._pace.note_reply()
+        reply = self._board.step(b"".join(as_bytes(values) for values in inputs))
         desk = self._desk.step(state, target, thrust_acceleration_m_s2)
         if reply.bits != desk_bits(self._design, desk):
             self.different.append(len(self.replies))
         self.replies.append(reply)
-        command = np.frombuffer(reply.command, np.dtype(numbers.scalar).newbyteorder("<")).astype(
-            numbers.scalar
-        )
-        return BoardStep(numbers.to_si(command[np.newaxis], *COMMAND), np.array([reply.status]))
+        return BoardStep(command_of(self._design, reply), np.array([reply.status]))
+
+
+def command_of(design: Design, reply: StepReply) -> NDArray[np.floating]:
+    """Return roll and pitch (1, 2) of a reply, in rad."""
+    numbers = design.numbers
+    command = np.frombuffer(reply.command, np.dtype(numbers.scalar).newbyteorder("<"))
+    return numbers.to_si(command.astype(numbers.scalar)[np.newaxis], *COMMAND)
 
 
 def desk_bits(design: Design, step: Step | ExactStep) -> tuple[int, bytes, int]:
@@ -65,16 +62,16 @@ def desk_bits(design: Design, step: Step | ExactStep) -> tuple[int, bytes, int]:
     numbers = design.numbers
     if isinstance(step, ExactStep):
         flags = bytes([int(step.missed[0]), int(step.saturated[0])])
-        outcome = _bytes(numbers.stored_from_si(step.stored, design.stored))
+        outcome = as_bytes(numbers.stored_from_si(step.stored, design.stored))
     else:
         flags = bytes([int(step.iterations[0]), int(step.converged[0])])
         outcome = b"".join(
-            _bytes(numbers.from_si(getattr(step, name), name)) for name in ("cost", "gradient", "plan_rad")
+            as_bytes(numbers.from_si(getattr(step, name), name)) for name in ("cost", "gradient", "plan_rad")
         )
-    command = _bytes(numbers.from_si(step.command_rad, "command_rad"))
+    command = as_bytes(numbers.from_si(step.command_rad, "command_rad"))
     return int(step.status[0]), command, zlib.crc32(outcome + flags)
 
 
-def _bytes(values: NDArray[np.generic]) -> bytes:
+def as_bytes(values: NDArray[np.generic]) -> bytes:
     """Return numbers of the C as a board sends them, the lowest byte first."""
     return values.astype(values.dtype.newbyteorder("<")).tobytes()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, Self
 
-PROTOCOL: Final = 1
+PROTOCOL: Final = 2
 REPLY: Final = 0x80
 OUT_OF_STEP: Final = 0xFE
 DAMAGED: Final = 0xFF
@@ -21,6 +21,8 @@ class Kind(IntEnum):
     STEP = 3
     TEST = 4
     DIGEST = 5
+    START = 6
+    INPUTS = 7
 
 
 def request(kind: Kind, number: int, body: bytes = b"") -> bytes:
@@ -42,6 +44,8 @@ class Greeting:
     protocol: int
     clock_hz: int
     """Frequency of its cycle counter."""
+    period_cycles: int
+    """The update period, by that counter."""
     steps: int
     """Steps since its reset."""
     generator: str
@@ -50,7 +54,7 @@ class Greeting:
     scalar: str
     board: str
 
-    _NUMBERS = struct.Struct("<BII")
+    _NUMBERS = struct.Struct("<BIII")
 
     @classmethod
     def parse(cls, body: bytes) -> Self | None:
@@ -83,6 +87,30 @@ class StepReply:
     def bits(self) -> tuple[int, bytes, int]:
         """All that must be equal wherever the step is run."""
         return self.status, self.command, self.outcome_crc
+
+
+NAMED_STEPS: Final = 8
+"""Steps whose inputs a `TimedReply` names."""
+
+
+@dataclass(frozen=True)
+class TimedReply:
+    """The result of a step that the board's clock called."""
+
+    step: StepReply
+    overruns: int
+    """Periods without a step since the start."""
+    delay_cycles: int
+    """From the end of the period to the call."""
+    used: bytes
+    """Lowest bytes of the numbers of the inputs of this step, and of the NAMED_STEPS - 1 before it."""
+
+    @classmethod
+    def parse(cls, body: bytes, number_bytes: int) -> Self | None:
+        """Return the result in the body of a reply, with numbers of `number_bytes`; None if it is none."""
+        shape = struct.Struct(f"<II{NAMED_STEPS}s")
+        step = StepReply.parse(body[: -shape.size], number_bytes)
+        return None if step is None else cls(step, *shape.unpack(body[-shape.size :]))
 
 
 def step_reply_bytes(number_bytes: int) -> int:

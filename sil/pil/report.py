@@ -2,7 +2,7 @@
 
 import statistics
 from collections.abc import Sequence
-from typing import Self
+from typing import Final, Self
 
 from pydantic import BaseModel, ConfigDict
 
@@ -10,7 +10,10 @@ from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.sil.flight.report import FlySummary, flight_text
 from mambo_nmpc.sil.pil.connection import Connection
 from mambo_nmpc.sil.pil.controller import BoardController
-from mambo_nmpc.sil.pil.pace import Deadlines
+from mambo_nmpc.sil.pil.timed import Arrival, TimedController
+
+CLOCK_TOLERANCE: Final = 0.01
+"""Share by which the clocks of board and desk may differ: a ceramic resonator is half as bad."""
 
 
 class Spread(BaseModel):
@@ -37,6 +40,27 @@ class EmulatedCount(BaseModel):
     least: int
     mean: float
     most_met: int
+
+
+class RealTime(BaseModel):
+    """How a flight went whose steps the board's clock called."""
+
+    model_config = ConfigDict(frozen=True)
+
+    board_period_s: float
+    """The update period, rounded to cycles of the board's clock."""
+    wall_period_s: float | None
+    """That period by the clock of this machine; None if only one reply came."""
+    clocks_agree: bool
+    """Whether both are equal, but for CLOCK_TOLERANCE and the irregularity of the replies."""
+    overruns: int
+    """Periods of the board without a step."""
+    late_inputs: int
+    """Steps with older inputs than those sent for them, which came too late, damaged, or not at all."""
+    lost_replies: int
+    """Replies that did not come, or damaged: the drone kept its command, and no bits are compared."""
+    delay_s: Spread
+    """From the end of a period to the call of the step."""
 
 
 class BoardFlightSummary(FlySummary):
@@ -67,12 +91,11 @@ class BoardFlightSummary(FlySummary):
     round_trip_s: Spread | None
     """From request to reply, of the steps that were not repeated."""
     link_faults: dict[str, int]
-    """What went wrong on the link and was made good: damaged, repeated, reconnected, restarts."""
-    deadlines: Deadlines | None = None
-    """Of a flight by the wall clock."""
+    """On the link: damaged, repeated, reconnected, restarts; in real time damaged and doubled."""
+    real_time: RealTime | None = None
 
 
-def board_fields(board: Connection, controller: BoardController) -> dict[str, object]:
+def board_fields(board: Connection, controller: BoardController | TimedController) -> dict[str, object]:
     """Return the fields of a `BoardFlightSummary` that follow from a flight."""
     different, replies = controller.different, controller.replies
     return {
@@ -85,7 +108,41 @@ def board_fields(board: Connection, controller: BoardController) -> dict[str, ob
         "stack_bytes": max(reply.stack_bytes for reply in replies),
         "round_trip_s": Spread.of(board.round_trips_s) if board.round_trips_s else None,
         "link_faults": dict(board.faults),
+        "real_time": real_time_of(board, controller) if isinstance(controller, TimedController) else None,
     }
+
+
+def real_time_of(board: Connection, controller: TimedController) -> RealTime:
+    """Return how a flight by the board's clock went."""
+    arrivals = controller.arrivals
+    wall_period_s, agree = wall_clock(arrivals, board.period_s)
+    return RealTime(
+        board_period_s=board.period_s,
+        wall_period_s=wall_period_s,
+        clocks_agree=agree,
+        overruns=arrivals[-1].reply.overruns,
+        late_inputs=controller.late_inputs,
+        lost_replies=controller.lost_replies,
+        delay_s=Spread.of([arrival.reply.delay_cycles / board.greeting.clock_hz for arrival in arrivals]),
+    )
+
+
+def wall_clock(arrivals: Sequence[Arrival], board_period_s: float) -> tuple[float | None, bool]:
+    """Return the period by the clock of this machine, and whether it agrees with the board's.
+
+    The period is the median of those between replies that are half of the flight apart (after Theil and Sen),
+    which a few late replies do not change.
+    """
+    if len(arrivals) == 1:
+        return None, True
+    pairs = zip(arrivals, arrivals[len(arrivals) // 2 :], strict=False)
+    period_s = statistics.median(
+        (later.time_s - one.time_s) / (later.period - one.period) for one, later in pairs
+    )
+    periods = arrivals[-1].period - arrivals[0].period
+    offsets_s = [arrival.time_s - period_s * arrival.period for arrival in arrivals]
+    allowed_s = CLOCK_TOLERANCE * board_period_s * periods + max(offsets_s) - min(offsets_s)
+    return period_s, abs(period_s - board_period_s) * periods <= allowed_s
 
 
 def difference(summary: BoardFlightSummary) -> str | None:
@@ -116,17 +173,25 @@ def emulated_text(summary: BoardFlightSummary) -> str:
 def link_text(summary: BoardFlightSummary) -> str:
     """Say what went wrong on the link."""
     faults = [f"{count} {name}" for name, count in sorted(summary.link_faults.items()) if count]
-    return ", ".join(faults) + ": made good" if faults else "no fault"
+    made_good = ": made good" if summary.real_time is None else ""
+    return ", ".join(faults) + made_good if faults else "no fault"
 
 
-def real_time_text(deadlines: Deadlines, steps: int) -> str:
-    """Say how a flight by the wall clock kept its period."""
-    words = f"{deadlines.misses} of {steps} replies later than the period of {1e3 * deadlines.period_s:g} ms"
-    if deadlines.misses:
-        words += f", the worst by {1e3 * deadlines.worst_lateness_s:.3g} ms"
-    if deadlines.late_requests:
-        words += f"; this machine sent {deadlines.late_requests} requests late"
-    return words
+def real_time_text(timed: RealTime, steps: int) -> list[str]:
+    """Say how a flight by the board's clock went, of which `steps` replies came; a sentence each."""
+    made = steps + timed.lost_replies
+    clock = f"a step every {1e3 * timed.board_period_s:.6g} ms of the board's clock"
+    if timed.wall_period_s is not None:
+        clock += f", {1e3 * timed.wall_period_s:.6g} ms of this machine's"
+        clock += "" if timed.clocks_agree else ": THE CLOCKS DISAGREE"
+    spread = (timed.delay_s.least, timed.delay_s.median, timed.delay_s.most)
+    delay = " / ".join(f"{1e3 * value:.3g}" for value in spread)
+    return [
+        clock,
+        f"called {delay} ms after the end of a period (least, median, most)",
+        f"{timed.late_inputs} of {made} steps with late inputs, {timed.lost_replies} replies lost, "
+        f"{timed.overruns} periods without a step",
+    ]
 
 
 def board_text(summary: BoardFlightSummary) -> str:
@@ -148,6 +213,7 @@ def board_text(summary: BoardFlightSummary) -> str:
     if trip is not None:
         milliseconds = " / ".join(f"{1e3 * value:.3g}" for value in (trip.least, trip.median, trip.most))
         lines.append(f"  request to reply   {milliseconds} ms")
-    if summary.deadlines is not None:
-        lines.append(f"  real time          {real_time_text(summary.deadlines, summary.steps)}")
+    if summary.real_time is not None:
+        first, *others = real_time_text(summary.real_time, summary.steps)
+        lines += [f"  real time          {first}", *(f"{'':21}{sentence}" for sentence in others)]
     return "\n".join([*lines, f"  link               {link_text(summary)}"])

@@ -27,6 +27,6 @@ def board_section(folder: Path, summary: BoardFlightSummary) -> Section:
     }
     if summary.emulated is not None:
         facts["emulated"] = emulated_text(summary)
-    if summary.deadlines is not None:
-        facts["real time"] = real_time_text(summary.deadlines, summary.steps)
+    if summary.real_time is not None:
+        facts["real time"] = "; ".join(real_time_text(summary.real_time, summary.steps))
     return flown_section(folder, summary, facts, [] if found is None else [found])

@@ -22,7 +22,7 @@ from mambo_nmpc.sil.pil.connection import Connection, Patience
 from mambo_nmpc.sil.pil.controller import BoardController
 from mambo_nmpc.sil.pil.port import open_port
 from tests.support.command import run
-from tests.support.serial_line import Faults, build_firmware, serial_line
+from tests.support.serial_line import Faults, build_firmware, edited, serial_line
 from tests.support.tools import require_module
 
 SETTINGS: Final = presets.preset("mambo")
@@ -47,7 +47,7 @@ def desk() -> Trace:
 
 def connect(port: str, said: list[str], patience: Patience = QUICK) -> Connection:
     """Connect to a board; what the user is told goes to `said`."""
-    return Connection(port, partial(open_port, port, 115200), SETTINGS, say=said.append, patience=patience)
+    return Connection(port, partial(open_port, port, 500000), SETTINGS, say=said.append, patience=patience)
 
 
 def fly_through(elf: Path, faults: Faults, desk: Trace) -> tuple[dict[str, int], list[str]]:
@@ -172,16 +172,6 @@ def test_other_firmware_is_refused_by_name(elf: Path) -> None:
     assert "mambo-nmpc generate --for pil" in said
 
 
-def edited(path: str, old: str, new: str) -> Callable[[dict[str, str]], None]:
-    """Return a function that replaces `old` in the file at `path`, where it must be."""
-
-    def edit(files: dict[str, str]) -> None:
-        assert old in files[path]
-        files[path] = files[path].replace(old, new)
-
-    return edit
-
-
 @pytest.mark.parametrize(
     ("path", "old", "new", "message"),
     [
@@ -193,9 +183,9 @@ def edited(path: str, old: str, new: str) -> Callable[[dict[str, str]], None]:
         ),
         (
             "pil.h",
-            "#define PIL_PROTOCOL 1U",
+            "#define PIL_PROTOCOL 2U",
             "#define PIL_PROTOCOL 9U",
-            "speaks version 9 of the protocol, and this is version 1; generate it",
+            "speaks version 9 of the protocol, and this is version 2; generate it",
         ),
     ],
 )
@@ -280,7 +270,10 @@ def test_other_bits_are_told_and_fail(
         (["--port", "x", "--controller", "pd"], "--port x flies the C on a board: leave out --controller"),
         (["--port", "x", "--on", "mega"], "--port x flies the C on a board: leave out --controller and --on"),
         (["--port", "x", "--replay", "y"], "contains the whole flight: leave out --port"),
-        (["--real-time"], "--real-time paces the requests to a board: give its --port, or leave it out"),
+        (
+            ["--real-time"],
+            "--real-time lets the clock of a board call the step: give its --port, or leave it out",
+        ),
     ],
 )
 def test_a_port_that_cannot_be_is_refused(

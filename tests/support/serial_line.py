@@ -58,6 +58,16 @@ def build_firmware(
     return folder / "build" / board / "pil.elf"
 
 
+def edited(path: str, old: str, new: str) -> Callable[[dict[str, str]], None]:
+    """Return a function that replaces `old` in the file at `path`, where it must be."""
+
+    def edit(files: dict[str, str]) -> None:
+        assert old in files[path]
+        files[path] = files[path].replace(old, new)
+
+    return edit
+
+
 def command_of(elf: Path) -> list[str]:
     """Return the command that runs a firmware of `build_firmware`; {fd} stands for its end of the line."""
     board = elf.parent.name
