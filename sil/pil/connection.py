@@ -124,6 +124,7 @@ class Connection:
         return [split(payload or b"") for payload in self._receiver.feed(chunk)]
 
     def _gone(self, error: OSError) -> BoardError:
+        self._timed = False
         return BoardError(f"--port {self.name}: lost: {_reason(error)}; {NO_FLIGHT}")
 
     def test(self) -> int:

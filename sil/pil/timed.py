@@ -5,9 +5,9 @@
     desk                           | command, inputs of update k -> board;  drone: update k to k + 1
 
 When the reply to a step arrives, the drone has flown with the last command until the end of that period. Its
-state at that time is sent at once, and it goes on with the new command. So every step has inputs of one update
-before. If a reply does not arrive, the next one tells how many periods passed: the drone flew all of them with
-its last command.
+state at that time is sent at once, and it goes on with the new command. So every step has inputs of one
+update before. If a reply does not arrive, the next one tells how many periods passed: the drone flew all of
+them with its last command.
 """
 
 import time

@@ -159,12 +159,12 @@ def test_doubled_frames_change_nothing(elf: Path) -> None:
 
 
 def test_inputs_that_come_out_of_order_are_not_used(elf: Path) -> None:
-    """Older ones behind newer ones."""
+    """Older ones behind newer ones; a start while the clock runs."""
     kept = list[bytes]()
 
     def swap(number: int, frame: bytes) -> bytes:
         kept.append(frame)
-        return frame + kept[-3] if number == 25 else frame
+        return frame + kept[-3] + kept[0] if number == 25 else frame
 
     controller, counted = flown(elf, TimedFaults(inputs=swap), Expected())
     assert (controller.late_inputs, controller.lost_replies, counted) == (0, 0, {})
@@ -201,7 +201,7 @@ def test_a_lost_start_is_repeated(elf: Path) -> None:
 
 def test_periods_without_a_step_are_flown_with_the_last_command(tmp_path: Path) -> None:
     """Every tenth time the board is busy for three periods, and its next step has inputs as old."""
-    elf = build_lockstep(SETTINGS, tmp_path, periods_at_once="((periods % 10UL) == 0UL) ? 3UL : 1UL")
+    elf = build_lockstep(SETTINGS, tmp_path, cycles="((periods % 10UL) == 0UL) ? 30UL : 10UL")
     without = frozenset(12 * k + wait for k in range(5) for wait in (9, 10))
     expected = Expected(used={12 * k + 11: 12 * k + 9 for k in range(5)}, without_step=without)
     controller, counted = flown(elf, TimedFaults(), expected)
@@ -210,9 +210,32 @@ def test_periods_without_a_step_are_flown_with_the_last_command(tmp_path: Path) 
     assert len(controller.replies) + len(without) == STEPS
 
 
+def test_a_late_step_does_not_move_the_next_period(tmp_path: Path) -> None:
+    """Step 4 is 4 cycles late, and so are those after it until one comes sooner; none is left out."""
+    elf = build_lockstep(SETTINGS, tmp_path, cycles="(periods == 5UL) ? 14UL : (periods == 8UL) ? 6UL : 10UL")
+    controller, _ = flown(elf, TimedFaults(), Expected())
+    delays = [arrival.reply.delay_cycles for arrival in controller.arrivals]
+    assert delays[:9] == [0, 0, 0, 0, 4, 4, 4, 0, 0]
+    assert controller.arrivals[-1].reply.overruns == 0
+
+
+def test_the_next_start_is_a_new_one(tmp_path: Path) -> None:
+    """Of periods without a step, late steps and numbers of inputs before it is nothing left."""
+    elf = build_lockstep(SETTINGS, tmp_path, cycles="(periods == 5UL) ? 34UL : 10UL")
+    with closing(connect(elf)) as board:
+        first = TimedController(SETTINGS, board)
+        fly(FLIGHT, first)
+        assert board.test() == 0
+        second = TimedController(SETTINGS, board)
+        assert fly(FLIGHT, second).same_bits(fly(FLIGHT, Expected()))
+    ends = [(flight.arrivals[-1].reply.overruns, flight.replies[-1].status) for flight in (first, second)]
+    assert ends == [(2, 0), (0, 0)]
+    assert [arrival.reply.delay_cycles for arrival in second.arrivals] == [0] * STEPS
+
+
 def test_a_clock_that_is_beyond_the_end_of_the_flight_ends_it(tmp_path: Path) -> None:
-    """The board is busy for 1000 periods: the drone flies to its end with the last command."""
-    elf = build_lockstep(SETTINGS, tmp_path, periods_at_once="(periods == 20UL) ? 100UL : 1UL")
+    """The board is busy for 100 periods: the drone flies to its end with the last command."""
+    elf = build_lockstep(SETTINGS, tmp_path, cycles="(periods == 20UL) ? 1000UL : 10UL")
     expected = Expected(without_step=frozenset(range(19, STEPS)))
     controller, _ = flown(elf, TimedFaults(), expected)
     assert controller.arrivals[-1].period > STEPS

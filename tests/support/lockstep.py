@@ -42,7 +42,7 @@ int pil_board_read(uint32_t cycles)
     if (zeros == 3) {
         zeros = 0;
         periods++;
-        now += (uint32_t)(10UL * PERIODS_AT_ONCE);
+        now += (uint32_t)CYCLES;
     } else {
         (void)fflush(stdout);
         byte = getchar();
@@ -68,15 +68,15 @@ def build_lockstep(
     settings: Settings,
     folder: Path,
     change: Callable[[dict[str, str]], None] | None = None,
-    periods_at_once: str = "1UL",
+    cycles: str = "10UL",
 ) -> Path:
     """Build firmware for a process whose clock, of 1000 Hz, moves with each PERIOD that it reads only.
 
-    `periods_at_once` says in C, with `periods` so far, how many periods pass then.
+    `cycles` says in C, with `periods` so far, how many cycles pass then.
     """
 
     def make(files: dict[str, str]) -> None:
-        files["board_host.c"] = BOARD_C.replace("PERIODS_AT_ONCE", f"({periods_at_once})")
+        files["board_host.c"] = BOARD_C.replace("CYCLES", f"({cycles})")
         if change is not None:
             change(files)
 
