@@ -1,8 +1,8 @@
 """The controller on a board whose own clock calls the step: the clock of the flight is that of the board.
 
-    period of the board     k                       k + 1
-    board                   | step -> reply         | step, with the inputs of update k -> reply
-    desk                           | command, inputs of update k -> board;  drone: update k to k + 1
+    end of period   board: step with inputs of   desk, upon the reply: sends inputs of  flies the drone
+    k               update k - 1                 update k                               from k to k + 1
+    k + 1           update k                     update k + 1                           from k + 1 to k + 2
 
 When the reply to a step arrives, the drone has flown with the last command until the end of that period. Its
 state at that time is sent at once, and it goes on with the new command. So every step has inputs of one
@@ -92,7 +92,7 @@ class TimedController:
         if update == 0:
             self._send(Kind.START, inputs)
             return self._held
-        arrived = None
+        arrived, used = None, list[int]()
         if not self.arrivals or self.arrivals[-1].period < update:
             arrived = self._await_reply()
             used = self._inputs_used(arrived)
@@ -161,15 +161,15 @@ class TimedController:
                 "before its own; check wires and --baud"
             )
         used = [newest - ((newest - byte) & 0xFF) for byte in reversed(arrived.reply.used[: lost + 1])]
-        if min(used) < 0 or arrived.reply.overruns < (
-            self.arrivals[-1].reply.overruns if self.arrivals else 0
-        ):
+        overruns = self.arrivals[-1].reply.overruns if self.arrivals else 0
+        if min(used) < 0 or arrived.reply.overruns < overruns:
             raise self._lost(
                 f"the reply to step {arrived.number} contradicts those before; check the memory of the board"
             )
         if newest - used[-1] > OLDEST_INPUTS:
             raise self._lost(
-                f"the board did not receive the last {OLDEST_INPUTS} inputs; check the wire to its receiver"
+                f"the board did not receive the last {OLDEST_INPUTS} inputs in time; check the wire to its "
+                "receiver, and what else keeps this machine busy"
             )
         self.lost_replies += lost
         self.late_inputs += used[0] < newest

@@ -262,7 +262,12 @@ def test_a_board_that_receives_nothing_ends_the_flight(elf: Path) -> None:
     """Its steps go on with inputs that get older and older."""
     deaf = TimedFaults(inputs=lambda number, frame: frame if number < 40 else b"")
     long = Flight(FLIGHT.trajectory, duration_s=4.0)
-    refused(elf, deaf, f"the board did not receive the last {OLDEST_INPUTS} inputs; check the wire .*", long)
+    refused(
+        elf,
+        deaf,
+        f"the board did not receive the last {OLDEST_INPUTS} inputs in time; check the wire .*",
+        long,
+    )
 
 
 def test_inputs_are_known_until_then(elf: Path) -> None:
