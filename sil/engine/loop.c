@@ -43,7 +43,7 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
                         const seen_t *truth_now, const seen_t *seen, double thrust_n, double *command_rad,
                         const engine_trace_t *trace)
 {
-    const int64_t row = (update * simulation->flights) + index;
+    const int64_t row = (index * simulation->updates) + update;
     const double thrust_acceleration_m_s2 = thrust_n / simulation->nominal_mass_kg;
     const int dropped = simulation->dropping && (draws->drops[update] < flight->dropped_share);
     double measured[7];

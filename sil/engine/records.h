@@ -145,7 +145,7 @@ typedef struct {
     const double *drops;
 } engine_draws_t;
 
-/* Arrays of a trace, (updates, flights, axes). Without sensors the last three are NULL. */
+/* Arrays of a trace, (flights, updates, axes). Without sensors the last three are NULL. */
 typedef struct {
     double *position_m;
     double *velocity_m_s;
@@ -162,7 +162,7 @@ typedef struct {
 typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
                                        double thrust_acceleration_m_s2, double *command_rad);
 
-/* Simulate the flight with index `index` from start to end, with its rows of `targets` (updates, flights, 6), and write
+/* Simulate the flight with index `index` from start to end, with its rows of `targets` (flights, updates, 6), and write
  * its rows of the trace. */
 void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                 const double *times_s, const double *targets, const engine_draws_t *draws,

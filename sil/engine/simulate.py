@@ -63,7 +63,9 @@ def fly_compiled(
     record = ffi.new(
         "engine_trace_t *",
         {
-            name: pointer("int64_t *" if name == "status" else "double *", getattr(trace, name, None))
+            name: pointer(
+                "int64_t *" if name == "status" else "double *", _by_flight(getattr(trace, name, None))
+            )
             for name, _ in ffi.typeof("engine_trace_t").fields
         },
     )
@@ -73,7 +75,7 @@ def fly_compiled(
             pointer("engine_flight_t *", flights[index : index + 1]),
             index,
             pointer("double *", times_s),
-            pointer("double *", targets),
+            pointer("double *", _by_flight(targets)),
             draws.draw(seed),
             called.step,
             called.instance(index),
@@ -82,6 +84,11 @@ def fly_compiled(
         if progress is not None:
             progress((index + 1) / flight.flights)
     return trace
+
+
+def _by_flight(array: Any) -> Any:
+    """Return an array (k, n, ...) of a trace as it lies in memory, (n, k, ...); None for None."""
+    return None if array is None else array.swapaxes(0, 1)
 
 
 class _Buffers:

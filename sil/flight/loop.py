@@ -147,10 +147,14 @@ class Flight:
     def given_targets(self) -> FloatArray:
         """Return the targets (k, n, 6) as controllers are given them: with their accelerations.
 
+        Those of a flight are contiguous in memory, as in `allocate_trace`.
         Raises `FlightError` as `targets`.
         """
-        accelerations = self._for_each_flight(self.trajectory.acceleration(self.times_s()))
-        return np.ascontiguousarray(np.concatenate([self.targets(), accelerations], axis=-1))
+        targets = self.targets()
+        given = np.empty((self.flights, len(targets), 6)).swapaxes(0, 1)
+        given[..., :4] = targets
+        given[..., 4:] = self._for_each_flight(self.trajectory.acceleration(self.times_s()))
+        return given
 
     def _for_each_flight(self, values: FloatArray) -> FloatArray:
         """Return values of one trajectory (k, m), or of each (k, n, m), as (k, n, m)."""
@@ -267,15 +271,18 @@ def _unify_nan(trace: Trace) -> None:
 
 
 def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
-    """Return a trace with times and targets set and its other arrays uninitialized."""
+    """Return a trace with times and targets set and its other arrays uninitialized.
+
+    The samples of a flight are contiguous in memory: the engine writes a flight after the other.
+    """
     kind = SensedTrace if sensed else Trace
     shape = targets.shape[:2]
     arrays: dict[str, Any] = {
-        column.name: np.empty((*shape, *AXES[column.name.removeprefix("seen_")]))
+        column.name: np.empty((*shape[::-1], *AXES[column.name.removeprefix("seen_")])).swapaxes(0, 1)
         for column in fields(kind)
         if column.name not in ("time_s", "target", "status")
     }
-    return kind(time_s=times_s, target=targets, status=np.empty(shape, np.int64), **arrays)
+    return kind(time_s=times_s, target=targets, status=np.empty(shape[::-1], np.int64).T, **arrays)
 
 
 class _Caller:

@@ -4,7 +4,7 @@ import hashlib
 import zipfile
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,7 +122,8 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
 def write_npz(trace: Trace, path: Path) -> None:
     """Write all flights of a trace as NPZ, one array per field."""
     with path.open("wb") as file:
-        np.savez(file, **{field.name: getattr(trace, field.name) for field in fields(trace)})
+        arrays: dict[str, Any] = {f.name: np.ascontiguousarray(getattr(trace, f.name)) for f in fields(trace)}
+        np.savez(file, **arrays)
 
 
 def read_npz(path: Path) -> Trace:
