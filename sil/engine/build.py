@@ -18,6 +18,7 @@ HEADERS: Final = (
     "elementary.h",
     "engine.h",
     "first_order.h",
+    "lanes.h",
     "loop.h",
     "mocap.h",
     "records.h",
@@ -32,16 +33,19 @@ CONSTANTS: Final = (
 )
 """Names of the constants in sil/plant/elementary.py that the engine uses."""
 FLAGS: Final = (
-    *("-std=c99", "-O3", "-ffp-contract=off"),
+    *("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"),
     *(("-mno-fma",) if platform.machine() in ("x86_64", "AMD64", "i686") else ()),
 )
 """gcc 12 fuses operations in spite of -ffp-contract=off if CC has -mfma or -march=native.
 
-With -O3 a flight takes four fifths of the time with -O2; -mavx2 gains nothing.
+With -O3 a flight takes four fifths of the time with -O2. -fno-math-errno takes square roots in vectors.
 """
+LANES: Final = {1: (), 2: ("-DLANES=2",), 4: ("-DLANES=4", "-mavx2")}
+"""Flags by number of lanes."""
 LIBRARIES: Final = ("-lm",)
 
 ffi: Final = cffi.FFI()
+ffi.cdef("typedef double real_t; typedef int64_t whole_t;")
 ffi.cdef(resources.files("mambo_nmpc.sil.engine").joinpath("records.h").read_text("utf-8"))
 
 
@@ -66,16 +70,24 @@ def _constants() -> str:
 
 
 @lru_cache
-def load(toolchain: Toolchain) -> Any:
-    """Return the engine, built with `toolchain` unless it is cached; raises BuildError, CacheError."""
+def load(toolchain: Toolchain, lanes: int = 1) -> Any:
+    """Return the engine with 1, 2 or 4 lanes, built with `toolchain` unless it is cached.
+
+    Raises BuildError and CacheError.
+    """
     files = texts()
     return load_shared_library(
-        LibrarySource("engine", files, lambda: files, FLAGS, ffi, LIBRARIES), toolchain
+        LibrarySource("engine", files, lambda: files, (*FLAGS, *LANES[lanes]), ffi, LIBRARIES), toolchain
     )
 
 
+def lanes_for(flights: int, toolchain: Toolchain) -> int:
+    """Return the number of lanes in which so many flights are fastest; raises as `load`."""
+    return 1 if flights == 1 else int(load(toolchain).engine_fastest_lanes())
+
+
 def record_type(name: str) -> np.dtype[Any]:
-    """Return the NumPy type with the members and the layout of a record of records.h."""
+    """Return the NumPy type with the members and the layout of a record of records.h, with one lane."""
     kinds = {"double": "f8", "int64_t": "i8"}
     members = ffi.typeof(name).fields
     formats = []

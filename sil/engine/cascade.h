@@ -9,21 +9,21 @@
 
 /* Shares of thrust, roll, pitch and yaw in the motor commands. The memory is the integrals of angles and rates, and
  * the last rates. */
-static inline void cascade_shares(const engine_simulation_t *simulation, const seen_t *seen, const double *command_rad,
-                                  double thrust_n, double heading_rad, double *memory, double *shares)
+static inline void cascade_shares(const engine_simulation_t *simulation, const seen_t *seen, const real_t *command_rad,
+                                  real_t thrust_n, real_t heading_rad, real_t *memory, real_t *shares)
 {
-    const double reference_rad[3] = { command_rad[0], command_rad[1], heading_rad };
+    const real_t reference_rad[3] = { command_rad[0], command_rad[1], heading_rad };
     int i;
 
     shares[0] = thrust_n / simulation->wrench_per_command[0];
     for (i = 0; i < 3; i++) {
         const double *gains = simulation->cascade[i];
-        const double rate = seen->rates_rad_s[i];
-        const double error_rad = reference_rad[i] - seen->euler_rad[i];
-        const double change_rad_s2 = (rate - memory[6 + i]) / simulation->step_s;
-        double rate_demand;
-        double rate_error;
-        double output;
+        const real_t rate = seen->rates_rad_s[i];
+        const real_t error_rad = reference_rad[i] - seen->euler_rad[i];
+        const real_t change_rad_s2 = (rate - memory[6 + i]) / simulation->step_s;
+        real_t rate_demand;
+        real_t rate_error;
+        real_t output;
 
         memory[i] = clip(memory[i] + (simulation->step_s * error_rad), -gains[3], gains[3]);
         rate_demand = ((gains[0] * error_rad) + (gains[1] * memory[i])) - (gains[2] * rate);

@@ -10,17 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "lanes.h"
 #include "records.h"
-
-/* np.clip, np.maximum: NaN stays NaN. */
-static inline double clip(double value, double low, double high)
-{
-    return (value < low) ? low : ((value > high) ? high : value);
-}
-
-static inline double maximum(double a, double b)
-{
-    return ((a > b) || (a != a)) ? a : b;
-}
 
 #endif

@@ -12,24 +12,24 @@
 
 /* Commands that have not acted yet. */
 typedef struct {
-    double sent_rad[LATE_TICKS_MAX + 2][2];
+    real_t sent_rad[LATE_TICKS_MAX + 2][2];
 } late_t;
 
 /* The angles at the later nodes and the end of the tick, and their rates of change there. */
-static inline void follow(const engine_simulation_t *simulation, int64_t tick, const double *start_rad,
-                          double heading_rad, const late_t *late, double nodes_rad[3][3], double *slopes_rad_s)
+static inline void follow(const engine_simulation_t *simulation, int64_t tick, const real_t *start_rad,
+                          real_t heading_rad, const late_t *late, real_t nodes_rad[3][3], real_t *slopes_rad_s)
 {
     int axis;
     int node;
 
     for (axis = 0; axis < 2; axis++) {
         const int64_t newest = (tick - simulation->late_ticks[axis]) + (LATE_TICKS_MAX + 2);
-        const double now = simulation->response_gain[axis] * late->sent_rad[newest % (LATE_TICKS_MAX + 2)][axis];
-        const double before = simulation->response_gain[axis]
+        const real_t now = simulation->response_gain[axis] * late->sent_rad[newest % (LATE_TICKS_MAX + 2)][axis];
+        const real_t before = simulation->response_gain[axis]
                               * late->sent_rad[(newest - 1) % (LATE_TICKS_MAX + 2)][axis];
 
         for (node = 0; node < 3; node++) {
-            const double turned = before + ((start_rad[axis] - before) * simulation->decay_before[axis][node]);
+            const real_t turned = before + ((start_rad[axis] - before) * simulation->decay_before[axis][node]);
 
             nodes_rad[node][axis] = now + ((turned - now) * simulation->decay_after[axis][node]);
         }
@@ -43,9 +43,9 @@ static inline void follow(const engine_simulation_t *simulation, int64_t tick, c
 
 /* Acceleration in the world by thrust, wind and gravity. */
 static inline void accelerate(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                              double thrust_acceleration_m_s2, const rotation_t *r, double *push_m_s2)
+                              real_t thrust_acceleration_m_s2, const rotation_t *r, real_t *push_m_s2)
 {
-    const double thrust[3] = { 0.0, 0.0, -thrust_acceleration_m_s2 };
+    const real_t thrust[3] = { splat(0.0), splat(0.0), -thrust_acceleration_m_s2 };
     int i;
 
     to_world(r, thrust, push_m_s2);
@@ -56,8 +56,8 @@ static inline void accelerate(const engine_simulation_t *simulation, const engin
 }
 
 /* Time derivative of position and velocity in the world. */
-static inline void motion_derivative(const engine_flight_t *flight, const surroundings_t *around, const double *motion,
-                                     const double *push_m_s2, double *rate)
+static inline void motion_derivative(const engine_flight_t *flight, const surroundings_t *around, const real_t *motion,
+                                     const real_t *push_m_s2, real_t *rate)
 {
     int i;
 
@@ -72,22 +72,22 @@ static inline void motion_derivative(const engine_flight_t *flight, const surrou
 
 /* Advance the body by a tick; `r` belongs to the state before. */
 static inline void advance(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                           const surroundings_t *around, double thrust_share, double thrust_n, double heading_rad,
-                           int64_t tick, const double *command_rad, const rotation_t *r, late_t *late, double *body)
+                           const surroundings_t *around, real_t thrust_share, real_t thrust_n, real_t heading_rad,
+                           int64_t tick, const real_t *command_rad, const rotation_t *r, late_t *late, real_t *body)
 {
     const double half_s = simulation->step_s / 2.0;
     const double three_quarters_s = (3.0 * simulation->step_s) / 4.0;
     const double ninth_s = simulation->step_s / 9.0;
-    const double thrust_acceleration_m_s2 = ((thrust_share * flight->thrust_factor_n_s2) * maximum(thrust_n, 0.0))
-                                            / around->mass_kg;
-    double nodes_rad[3][3];
-    double slopes_rad_s[3];
-    double motion[6];
-    double push_m_s2[3];
-    double first[6];
-    double second[6];
-    double third[6];
-    double inner[6];
+    const real_t share_n = (thrust_share * flight->thrust_factor_n_s2) * maximum(thrust_n, splat(0.0));
+    const real_t thrust_acceleration_m_s2 = share_n / around->mass_kg;
+    real_t nodes_rad[3][3];
+    real_t slopes_rad_s[3];
+    real_t motion[6];
+    real_t push_m_s2[3];
+    real_t first[6];
+    real_t second[6];
+    real_t third[6];
+    real_t inner[6];
     rotation_t turned;
     int i;
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * One flight, update by update. engine_fly runs a whole one; whoever changes target, disturbances or sensors between
+ * A group of flights, update by update. engine_fly runs a whole one; whoever changes target, disturbances or sensors between
  * the updates calls these functions.
  */
 #ifndef ENGINE_LOOP_H
@@ -11,7 +11,7 @@
 #include "sensors.h"
 #include "world.h"
 
-/* All that a flight remembers from one update to the next. */
+/* All that the flights remember from one update to the next. */
 typedef struct {
     vehicle_state_t state;
     suite_t suite;
@@ -19,20 +19,21 @@ typedef struct {
     late_t late;
     gusts_t gusts;
     wire_t wire;
-    double command_rad[2];
+    real_t command_rad[2];
     int64_t ticks;
 } flying_t;
 
-/* Put the drone at its start; sensors and gusts start where the simulation has any. */
+/* Put the drones at their start; sensors and gusts start where the simulation has any. */
 void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
                   flying_t *flying);
 
 /* Start the sensors of the simulation at the true state. */
 void engine_start_sensors(const engine_simulation_t *simulation, flying_t *flying);
 
-/* Advance a flight by one update: the one with row `update` of times, targets, draws and trace. */
+/* Advance the flights by one update: the one with row `update` of times, targets, draws and trace. */
 void engine_update(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index, int64_t update,
                    const double *times_s, const double *targets, const engine_draws_t *draws,
-                   engine_controller_t controller, void *self, flying_t *flying, const engine_trace_t *trace);
+                   engine_controller_t controller, void *self, int64_t stride, flying_t *flying,
+                   const engine_trace_t *trace);
 
 #endif

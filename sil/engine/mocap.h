@@ -11,9 +11,9 @@
 #define MOCAP_DELAY_MAX 400
 
 typedef struct {
-    double late_m[MOCAP_DELAY_MAX + 1][3];
-    double position_m[3];
-    double velocity_m_s[3];
+    real_t late_m[MOCAP_DELAY_MAX + 1][3];
+    real_t position_m[3];
+    real_t velocity_m_s[3];
     int64_t tick;
 } mocap_t;
 
@@ -34,7 +34,7 @@ static inline void mocap_start(const engine_simulation_t *simulation, const seen
 
 /* What the controllers receive at this tick. */
 static inline seen_t capture(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                             const seen_t *truth_now, const double *draws, mocap_t *mocap)
+                             const seen_t *truth_now, const real_t *draws, mocap_t *mocap)
 {
     const int64_t depth = simulation->mocap_delay_ticks + 1;
     const int64_t tick = mocap->tick;
@@ -44,10 +44,10 @@ static inline seen_t capture(const engine_simulation_t *simulation, const engine
     for (i = 0; i < 3; i++) {
         mocap->late_m[tick % depth][i] = truth_now->position_m[i];
         if ((tick % simulation->mocap_period_ticks) == 0) {
-            const double position_m = mocap->late_m[(tick + 1) % depth][i] + (flight->noise[i] * draws[i]);
+            const real_t position_m = mocap->late_m[(tick + 1) % depth][i] + (flight->noise[i] * draws[i]);
 
             if (tick > 0) {
-                const double quotient = (position_m - mocap->position_m[i]) / simulation->mocap_period_s;
+                const real_t quotient = (position_m - mocap->position_m[i]) / simulation->mocap_period_s;
 
                 mocap->velocity_m_s[i] = mocap->velocity_m_s[i]
                                          + (simulation->mocap_share * (quotient - mocap->velocity_m_s[i]));

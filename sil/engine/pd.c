@@ -2,8 +2,8 @@
  *
  * The PD position controllers: sil/controllers/pd.py.
  */
+#undef LANES /* a controller flies one drone */
 #include "elementary.h"
-#include "engine.h"
 
 int64_t engine_pd_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
                        double *command_rad)

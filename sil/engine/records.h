@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * What Python and the engine exchange. cffi reads this file as the C compiler does. Every member is 8 bytes wide,
- * so that the records have the same layout in both. Units are in the names; frames and signs are those of the
+ * so that the records have the same layout in both; lanes.h has real_t and whole_t. Units are in the names; frames and signs are those of the
  * Python modules that the names of the headers repeat.
  */
 
@@ -102,43 +102,45 @@ typedef struct {
     double mocap_share;
 } engine_simulation_t;
 
-/* One flight. Rows of body_start are those of a state of the rigid body. */
+/* A group of flights, one in each lane; with one lane one flight. Rows of body_start are those of a state of the rigid
+ * body. */
 typedef struct {
-    double body_start[12];
-    double rotor_start_rad_s[4];
-    double yaw_rad;
-    double yaw_rate_rad_s;
+    real_t body_start[12];
+    real_t rotor_start_rad_s[4];
+    real_t yaw_rad;
+    real_t yaw_rate_rad_s;
 
-    double mass_kg;
-    double inertia_kg_m2[3];
-    double thrust_factor_n_s2;
-    double torque_per_thrust_m;
-    double rotor_decay[4];    /* at the nodes and at the end of a tick */
-    double drag_1_s;
-    double wind_m_s2[2];
+    real_t mass_kg;
+    real_t inertia_kg_m2[3];
+    real_t thrust_factor_n_s2;
+    real_t torque_per_thrust_m;
+    real_t rotor_decay[4];    /* at the nodes and at the end of a tick */
+    real_t drag_1_s;
+    real_t wind_m_s2[2];
 
-    double gust_mean_m_s;
-    double gust_sigma_m_s;
-    double gust_heading[2];   /* cosine and sine */
-    double gust_decay;
-    double gust_x;
-    double gust_roots[3];     /* Cholesky factor: aa, ab, bb */
+    real_t gust_mean_m_s;
+    real_t gust_sigma_m_s;
+    real_t gust_heading[2];   /* cosine and sine */
+    real_t gust_decay;
+    real_t gust_x;
+    real_t gust_roots[3];     /* Cholesky factor: aa, ab, bb */
 
-    double battery_sag_1_s;
-    double payload_kg;
-    int64_t payload_tick;     /* on the trajectory's clock */
-    double push_n_s[3];
-    int64_t push_tick;        /* on the trajectory's clock */
+    real_t battery_sag_1_s;
+    real_t payload_kg;
+    whole_t payload_tick;     /* on the trajectory's clock */
+    real_t push_n_s[3];
+    whole_t push_tick;        /* on the trajectory's clock */
 
-    int64_t delay_ticks;
-    double dropped_share;
+    whole_t delay_ticks;
+    real_t dropped_share;
 
-    double noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; or position, angles */
-    double bias[6];           /* accelerometer, gyro */
+    real_t noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; or position, angles */
+    real_t bias[6];           /* accelerometer, gyro */
 } engine_flight_t;
 
-/* Random numbers of one flight, a row for each tick: sensors 8 or 6, gusts 3 and a first row for their start. One number
- * for each update: dropped. NULL where the simulation needs none. */
+/* Random numbers of a group, for each lane a row for each tick: sensors (lanes, ticks, 8 or 6), gusts
+ * (lanes, 1 + ticks, 3) with a first row for their start, and drops (lanes, updates). NULL where the simulation needs
+ * none. */
 typedef struct {
     const double *sensors;
     const double *gusts;
@@ -162,11 +164,18 @@ typedef struct {
 typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
                                        double thrust_acceleration_m_s2, double *command_rad);
 
-/* Simulate the flight with index `index` from start to end, with its rows of `targets` (flights, updates, 6), and write
- * its rows of the trace. */
+/* The lanes of this engine. */
+int64_t engine_lanes(void);
+
+/* How many lanes are fastest with this compiler on this processor: 1, 2 or 4. */
+int64_t engine_fastest_lanes(void);
+
+/* Simulate a group of flights from start to end, with their rows of `targets` (flights, updates, 6), and write their
+ * rows of the trace. The first flight has index `index` and the controller `self`; the controllers lie `stride` bytes
+ * apart. A lane beyond the last flight of the simulation has no controller and no rows. */
 void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                 const double *times_s, const double *targets, const engine_draws_t *draws,
-                engine_controller_t controller, void *self, const engine_trace_t *trace);
+                engine_controller_t controller, void *self, int64_t stride, const engine_trace_t *trace);
 
 /* The stock PD position controller; it has no state. Its constants: see engine_pd_t. */
 typedef struct {

@@ -147,6 +147,17 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
     )
 
 
+def in_lanes(records: Record, lanes: int) -> NDArray[np.int64]:
+    """Return n records of `flight_records` as those of groups: (groups, members, lanes), each member 8 bytes.
+
+    The last flight fills the lanes that the last group has left.
+    """
+    members = records.view(np.int64).reshape(len(records), -1)
+    groups = -(-len(records) // lanes)
+    flights = np.minimum(np.arange(groups * lanes), len(records) - 1).reshape(groups, lanes)
+    return np.ascontiguousarray(members[flights].swapaxes(1, 2))
+
+
 def _attitude(drone: VehicleFile) -> dict[str, Any]:
     """Return the members of the attitude loops; those of other kinds than the drone's are 0."""
     values: dict[str, Any] = dict.fromkeys((*_STOCK, *_CASCADE, *_FIRST_ORDER), 0)

@@ -16,16 +16,16 @@
 
 /* Sines and cosines of roll, pitch and yaw. */
 typedef struct {
-    double sin_roll, cos_roll, sin_pitch, cos_pitch, sin_yaw, cos_yaw;
+    real_t sin_roll, cos_roll, sin_pitch, cos_pitch, sin_yaw, cos_yaw;
 } rotation_t;
 
 /* Mass and wind of one tick. */
 typedef struct {
-    double mass_kg;
-    double air_m_s[2];
+    real_t mass_kg;
+    real_t air_m_s[2];
 } surroundings_t;
 
-static inline rotation_t rotation(const double *euler_rad)
+static inline rotation_t rotation(const real_t *euler_rad)
 {
     rotation_t r;
 
@@ -36,14 +36,14 @@ static inline rotation_t rotation(const double *euler_rad)
 }
 
 /* R of eq 3 times a body vector. */
-static inline void to_world(const rotation_t *r, const double *vector, double *world)
+static inline void to_world(const rotation_t *r, const real_t *vector, real_t *world)
 {
-    const double x = vector[0];
-    const double y = vector[1];
-    const double z = vector[2];
-    const double heading_y = (r->cos_roll * y) - (r->sin_roll * z);
-    const double pitched_z = (r->sin_roll * y) + (r->cos_roll * z);
-    const double heading_x = (r->cos_pitch * x) + (r->sin_pitch * pitched_z);
+    const real_t x = vector[0];
+    const real_t y = vector[1];
+    const real_t z = vector[2];
+    const real_t heading_y = (r->cos_roll * y) - (r->sin_roll * z);
+    const real_t pitched_z = (r->sin_roll * y) + (r->cos_roll * z);
+    const real_t heading_x = (r->cos_pitch * x) + (r->sin_pitch * pitched_z);
 
     world[0] = (r->cos_yaw * heading_x) - (r->sin_yaw * heading_y);
     world[1] = (r->sin_yaw * heading_x) + (r->cos_yaw * heading_y);
@@ -51,14 +51,14 @@ static inline void to_world(const rotation_t *r, const double *vector, double *w
 }
 
 /* R transposed times a world vector. */
-static inline void to_body(const rotation_t *r, const double *vector, double *body)
+static inline void to_body(const rotation_t *r, const real_t *vector, real_t *body)
 {
-    const double x = vector[0];
-    const double y = vector[1];
-    const double z = vector[2];
-    const double heading_x = (r->cos_yaw * x) + (r->sin_yaw * y);
-    const double heading_y = (r->cos_yaw * y) - (r->sin_yaw * x);
-    const double pitched_z = (r->cos_pitch * z) + (r->sin_pitch * heading_x);
+    const real_t x = vector[0];
+    const real_t y = vector[1];
+    const real_t z = vector[2];
+    const real_t heading_x = (r->cos_yaw * x) + (r->sin_yaw * y);
+    const real_t heading_y = (r->cos_yaw * y) - (r->sin_yaw * x);
+    const real_t pitched_z = (r->cos_pitch * z) + (r->sin_pitch * heading_x);
 
     body[0] = (r->cos_pitch * heading_x) - (r->sin_pitch * z);
     body[1] = (r->cos_roll * heading_y) + (r->sin_roll * pitched_z);
@@ -67,25 +67,25 @@ static inline void to_body(const rotation_t *r, const double *vector, double *bo
 
 /* Time derivative of a state under a wrench. */
 static inline void derivative(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                              const surroundings_t *around, const rotation_t *r, const double *state,
-                              const double *wrench, double *rate)
+                              const surroundings_t *around, const rotation_t *r, const real_t *state,
+                              const real_t *wrench, real_t *rate)
 {
-    const double u = state[3];
-    const double v = state[4];
-    const double w = state[5];
-    const double p = state[9];
-    const double q = state[10];
-    const double yaw_axis_rate = state[11];
-    const double *inertia = flight->inertia_kg_m2;
-    const double wind_x = flight->wind_m_s2[0];
-    const double wind_y = flight->wind_m_s2[1];
-    double heading_x = (r->cos_yaw * wind_x) + (r->sin_yaw * wind_y);
-    double heading_y = (r->cos_yaw * wind_y) - (r->sin_yaw * wind_x);
-    const double pitched_z = (r->cos_pitch * simulation->gravity_m_s2) + (r->sin_pitch * heading_x);
-    const double external_x = (r->cos_pitch * heading_x) - (r->sin_pitch * simulation->gravity_m_s2);
-    const double external_y = (r->cos_roll * heading_y) + (r->sin_roll * pitched_z);
-    const double external_z = (r->cos_roll * pitched_z) - (r->sin_roll * heading_y);
-    double yaw_rate;
+    const real_t u = state[3];
+    const real_t v = state[4];
+    const real_t w = state[5];
+    const real_t p = state[9];
+    const real_t q = state[10];
+    const real_t yaw_axis_rate = state[11];
+    const real_t *inertia = flight->inertia_kg_m2;
+    const real_t wind_x = flight->wind_m_s2[0];
+    const real_t wind_y = flight->wind_m_s2[1];
+    real_t heading_x = (r->cos_yaw * wind_x) + (r->sin_yaw * wind_y);
+    real_t heading_y = (r->cos_yaw * wind_y) - (r->sin_yaw * wind_x);
+    const real_t pitched_z = (r->cos_pitch * simulation->gravity_m_s2) + (r->sin_pitch * heading_x);
+    const real_t external_x = (r->cos_pitch * heading_x) - (r->sin_pitch * simulation->gravity_m_s2);
+    const real_t external_y = (r->cos_roll * heading_y) + (r->sin_roll * pitched_z);
+    const real_t external_z = (r->cos_roll * pitched_z) - (r->sin_roll * heading_y);
+    real_t yaw_rate;
 
     /* Equation 2. */
     to_world(r, state + VELOCITY, rate + POSITION);
@@ -94,8 +94,8 @@ static inline void derivative(const engine_simulation_t *simulation, const engin
     rate[3] = (external_x - (flight->drag_1_s * u)) - ((q * w) - (yaw_axis_rate * v));
     rate[4] = (external_y - (flight->drag_1_s * v)) - ((yaw_axis_rate * u) - (p * w));
     if (simulation->windy) {
-        const double air_x = around->air_m_s[0];
-        const double air_y = around->air_m_s[1];
+        const real_t air_x = around->air_m_s[0];
+        const real_t air_y = around->air_m_s[1];
 
         heading_x = (r->cos_yaw * air_x) + (r->sin_yaw * air_y);
         heading_y = (r->cos_yaw * air_y) - (r->sin_yaw * air_x);

@@ -11,40 +11,40 @@
 #define TAPS 6
 
 typedef struct {
-    double imu[IMU];
-    double sonar_m;
-    double pressure_pa;
-    double flow_m_s[2];
+    real_t imu[IMU];
+    real_t sonar_m;
+    real_t pressure_pa;
+    real_t flow_m_s[2];
 } readings_t;
 
 /* What instruments and estimators remember from one tick to the next. */
 typedef struct {
-    double velocity_m_s[3];
-    double motion[IMU];
-    double imu_value[IMU];
-    double imu_rate[IMU];
-    double flow_m_s[2];
+    real_t velocity_m_s[3];
+    real_t motion[IMU];
+    real_t imu_value[IMU];
+    real_t imu_rate[IMU];
+    real_t flow_m_s[2];
     int64_t tick;
     readings_t delayed;
 
-    double euler_rad[3];
+    real_t euler_rad[3];
     rotation_t rotation;
-    double forces[TAPS][3];
-    double low_pass[2][3]; /* pressure, sonar */
-    double z_m;
-    double velocity_z_m_s;
-    double predicted_z_m;
-    double predicted_velocity_z_m_s;
-    double body_velocity_m_s[2];
-    double predicted_body_velocity_m_s[2];
-    double position_m[2];
+    real_t forces[TAPS][3];
+    real_t low_pass[2][3]; /* pressure, sonar */
+    real_t z_m;
+    real_t velocity_z_m_s;
+    real_t predicted_z_m;
+    real_t predicted_velocity_z_m_s;
+    real_t body_velocity_m_s[2];
+    real_t predicted_body_velocity_m_s[2];
+    real_t position_m[2];
 } suite_t;
 
 /* Mean specific force since the last tick, in current body axes, and body rates. */
 static inline void measure_motion(const engine_simulation_t *simulation, const suite_t *suite, const seen_t *truth_now,
-                                  const rotation_t *r, double *motion)
+                                  const rotation_t *r, real_t *motion)
 {
-    double force[3];
+    real_t force[3];
     int i;
 
     for (i = 0; i < 3; i++) {
@@ -56,10 +56,10 @@ static inline void measure_motion(const engine_simulation_t *simulation, const s
 }
 
 static inline void measure_flow(const engine_simulation_t *simulation, const seen_t *truth_now, const rotation_t *r,
-                                double *flow_m_s)
+                                real_t *flow_m_s)
 {
-    const double lever = simulation->flow_coupling * truth_now->position_m[2];
-    double body_m_s[3];
+    const real_t lever = simulation->flow_coupling * truth_now->position_m[2];
+    real_t body_m_s[3];
 
     to_body(r, truth_now->velocity_m_s, body_m_s);
     flow_m_s[0] = body_m_s[0] + (lever * -truth_now->rates_rad_s[1]);
@@ -69,7 +69,7 @@ static inline void measure_flow(const engine_simulation_t *simulation, const see
 static inline void suite_start(const engine_simulation_t *simulation, const seen_t *start, const rotation_t *r,
                                suite_t *suite)
 {
-    double body_m_s[3];
+    real_t body_m_s[3];
     int i;
     int k;
 
@@ -80,7 +80,7 @@ static inline void suite_start(const engine_simulation_t *simulation, const seen
     measure_motion(simulation, suite, start, r, suite->motion);
     for (i = 0; i < IMU; i++) {
         suite->imu_value[i] = suite->motion[i];
-        suite->imu_rate[i] = 0.0;
+        suite->imu_rate[i] = splat(0.0);
     }
     measure_flow(simulation, start, r, suite->flow_m_s);
     suite->tick = 0;
@@ -102,21 +102,21 @@ static inline void suite_start(const engine_simulation_t *simulation, const seen
 
 /* The readings that reach the estimators at this tick: those of the tick before, at the first its own. */
 static inline readings_t read_instruments(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                                          const seen_t *truth_now, const rotation_t *r, const double *draws,
+                                          const seen_t *truth_now, const rotation_t *r, const real_t *draws,
                                           suite_t *suite)
 {
     const double *transition = simulation->imu_transition;
-    const double height_m = -truth_now->position_m[2];
+    const real_t height_m = -truth_now->position_m[2];
     readings_t now;
     readings_t arriving;
-    double motion[IMU];
+    real_t motion[IMU];
     int i;
 
     measure_motion(simulation, suite, truth_now, r, motion);
     for (i = 0; i < IMU; i++) {
-        const double mean = 0.5 * (suite->motion[i] + motion[i]);
-        const double value = suite->imu_value[i];
-        const double rate = suite->imu_rate[i];
+        const real_t mean = 0.5 * (suite->motion[i] + motion[i]);
+        const real_t value = suite->imu_value[i];
+        const real_t rate = suite->imu_rate[i];
 
         suite->motion[i] = motion[i];
         suite->imu_value[i] = ((transition[0] * value) + (transition[1] * rate))
@@ -134,7 +134,7 @@ static inline readings_t read_instruments(const engine_simulation_t *simulation,
             != ((simulation->flow_images * (suite->tick - 1)) / simulation->flow_ticks))) {
         measure_flow(simulation, truth_now, r, suite->flow_m_s);
     }
-    now.sonar_m = maximum(height_m + (flight->noise[6] * draws[6]), simulation->sonar_min_m);
+    now.sonar_m = maximum(height_m + (flight->noise[6] * draws[6]), splat(simulation->sonar_min_m));
     now.pressure_pa = (flight->noise[7] * draws[7]) - (simulation->pa_per_m * height_m);
     now.flow_m_s[0] = suite->flow_m_s[0];
     now.flow_m_s[1] = suite->flow_m_s[1];
@@ -147,15 +147,16 @@ static inline readings_t read_instruments(const engine_simulation_t *simulation,
 static inline void estimate_attitude(const engine_simulation_t *simulation, const readings_t *readings, suite_t *suite)
 {
     const rotation_t *r = &suite->rotation;
-    const double p = readings->imu[3];
-    const double q = readings->imu[4];
-    const double yaw_axis_rate = readings->imu[5];
-    const double yaw_rate = ((r->sin_roll * q) + (r->cos_roll * yaw_axis_rate)) / r->cos_pitch;
-    double roll = suite->euler_rad[0] + (simulation->step_s * (p + (r->sin_pitch * yaw_rate)));
-    double pitch = suite->euler_rad[1]
+    const real_t p = readings->imu[3];
+    const real_t q = readings->imu[4];
+    const real_t yaw_axis_rate = readings->imu[5];
+    const real_t yaw_rate = ((r->sin_roll * q) + (r->cos_roll * yaw_axis_rate)) / r->cos_pitch;
+    real_t roll = suite->euler_rad[0] + (simulation->step_s * (p + (r->sin_pitch * yaw_rate)));
+    real_t pitch = suite->euler_rad[1]
                    + (simulation->step_s * ((r->cos_roll * q) - (r->sin_roll * yaw_axis_rate)));
-    double smooth[3];
-    double magnitude;
+    real_t smooth[3];
+    real_t force;
+    mask_t steady;
     int i;
     int k;
 
@@ -169,13 +170,15 @@ static inline void estimate_attitude(const engine_simulation_t *simulation, cons
             smooth[i] = smooth[i] + (simulation->accelerometer_taps[k] * suite->forces[k][i]);
         }
     }
-    magnitude = sqrt(((smooth[0] * smooth[0]) + (smooth[1] * smooth[1])) + (smooth[2] * smooth[2]));
-    if (fabs(magnitude - simulation->gravity_m_s2) < (simulation->tilt_gate * simulation->gravity_m_s2)) {
+    force = square_root(((smooth[0] * smooth[0]) + (smooth[1] * smooth[1])) + (smooth[2] * smooth[2]));
+    steady = magnitude(force - simulation->gravity_m_s2) < (simulation->tilt_gate * simulation->gravity_m_s2);
+    if (any(steady)) {
         const double kept = 1.0 - simulation->tilt_weight;
+        const real_t roll_seen = arc_tangent(smooth[1] / smooth[2]);
+        const real_t pitch_seen = arc_sine(clip(smooth[0] / simulation->gravity_m_s2, -1.0, 1.0));
 
-        roll = (kept * roll) + (simulation->tilt_weight * arc_tangent(smooth[1] / smooth[2]));
-        pitch = (kept * pitch)
-                + (simulation->tilt_weight * arc_sine(clip(smooth[0] / simulation->gravity_m_s2, -1.0, 1.0)));
+        roll = choose(steady, (kept * roll) + (simulation->tilt_weight * roll_seen), roll);
+        pitch = choose(steady, (kept * pitch) + (simulation->tilt_weight * pitch_seen), pitch);
     }
     suite->euler_rad[0] = roll;
     suite->euler_rad[1] = pitch;
@@ -184,11 +187,11 @@ static inline void estimate_attitude(const engine_simulation_t *simulation, cons
 }
 
 /* Butterworth low-pass of third order. */
-static inline double low_pass(const engine_simulation_t *simulation, double *state, double value)
+static inline real_t low_pass(const engine_simulation_t *simulation, real_t *state, real_t value)
 {
-    const double now = ((value - (simulation->low_pass_a[0] * state[0])) - (simulation->low_pass_a[1] * state[1]))
+    const real_t now = ((value - (simulation->low_pass_a[0] * state[0])) - (simulation->low_pass_a[1] * state[1]))
                        - (simulation->low_pass_a[2] * state[2]);
-    const double output = simulation->low_pass_b * (((now + (3.0 * state[0])) + (3.0 * state[1])) + state[2]);
+    const real_t output = simulation->low_pass_b * (((now + (3.0 * state[0])) + (3.0 * state[1])) + state[2]);
 
     state[2] = state[1];
     state[1] = state[0];
@@ -198,15 +201,16 @@ static inline double low_pass(const engine_simulation_t *simulation, double *sta
 
 /* Kalman filter of height and vertical velocity. */
 static inline void estimate_altitude(const engine_simulation_t *simulation, const readings_t *readings,
-                                     double acceleration_m_s2, suite_t *suite)
+                                     real_t acceleration_m_s2, suite_t *suite)
 {
-    const double sonar = -readings->sonar_m;
-    const double slow_pressure = low_pass(simulation, suite->low_pass[0], readings->pressure_pa / simulation->pa_per_m);
-    const double slow_sonar = low_pass(simulation, suite->low_pass[1], sonar);
-    const int accepted = (fabs(suite->z_m - sonar) <= simulation->sonar_jump_m) && (sonar < -simulation->sonar_min_m)
-                         && ((fabs(slow_pressure - suite->z_m) < simulation->pressure_jump_m)
-                             || (fabs(slow_sonar - suite->z_m) < simulation->slow_jump_m));
-    const double innovation = accepted ? (sonar - suite->predicted_z_m) : 0.0;
+    const real_t sonar = -readings->sonar_m;
+    const real_t slow_pressure = low_pass(simulation, suite->low_pass[0], readings->pressure_pa / simulation->pa_per_m);
+    const real_t slow_sonar = low_pass(simulation, suite->low_pass[1], sonar);
+    const mask_t steady = magnitude(suite->z_m - sonar) <= simulation->sonar_jump_m;
+    const mask_t pressure_agrees = magnitude(slow_pressure - suite->z_m) < simulation->pressure_jump_m;
+    const mask_t sonar_agrees = magnitude(slow_sonar - suite->z_m) < simulation->slow_jump_m;
+    const mask_t accepted = steady & (sonar < -simulation->sonar_min_m) & (pressure_agrees | sonar_agrees);
+    const real_t innovation = choose(accepted, sonar - suite->predicted_z_m, splat(0.0));
 
     suite->z_m = suite->predicted_z_m + (simulation->altitude_gains[0] * innovation);
     suite->velocity_z_m_s = suite->predicted_velocity_z_m_s + (simulation->altitude_gains[1] * innovation);
@@ -216,29 +220,29 @@ static inline void estimate_altitude(const engine_simulation_t *simulation, cons
 
 /* Kalman filter of the velocity along body x and y. */
 static inline void estimate_velocity(const engine_simulation_t *simulation, const readings_t *readings,
-                                     const double *acceleration_m_s2, suite_t *suite)
+                                     const real_t *acceleration_m_s2, suite_t *suite)
 {
-    const double p = readings->imu[3];
-    const double q = readings->imu[4];
-    const double tilt_rad = maximum(fabs(suite->euler_rad[0]), fabs(suite->euler_rad[1]));
-    const double rate_rad_s = maximum(fabs(p), fabs(q));
-    const double jump_m_s = maximum(fabs(readings->flow_m_s[0] - suite->body_velocity_m_s[0]),
-                                    fabs(readings->flow_m_s[1] - suite->body_velocity_m_s[1]));
-    const int accepted = (((tilt_rad <= simulation->flow_tilt_rad) && (rate_rad_s <= simulation->flow_rate_rad_s))
-                          || (rate_rad_s <= simulation->flow_slow_rad_s))
-                         && (jump_m_s <= simulation->flow_jump_m_s) && (suite->z_m <= -simulation->flow_min_height_m);
-    const double rotation_rate[2] = { q, -p };
+    const real_t p = readings->imu[3];
+    const real_t q = readings->imu[4];
+    const real_t tilt_rad = maximum(magnitude(suite->euler_rad[0]), magnitude(suite->euler_rad[1]));
+    const real_t rate_rad_s = maximum(magnitude(p), magnitude(q));
+    const real_t jump_m_s = maximum(magnitude(readings->flow_m_s[0] - suite->body_velocity_m_s[0]),
+                                    magnitude(readings->flow_m_s[1] - suite->body_velocity_m_s[1]));
+    const mask_t accepted = (((tilt_rad <= simulation->flow_tilt_rad) & (rate_rad_s <= simulation->flow_rate_rad_s))
+                             | (rate_rad_s <= simulation->flow_slow_rad_s))
+                            & (jump_m_s <= simulation->flow_jump_m_s) & (suite->z_m <= -simulation->flow_min_height_m);
+    const real_t rotation_rate[2] = { q, -p };
     int i;
 
     for (i = 0; i < 2; i++) {
-        const double predicted = suite->predicted_body_velocity_m_s[i];
-        double flow_m_s = readings->flow_m_s[i];
+        const real_t predicted = suite->predicted_body_velocity_m_s[i];
+        real_t flow_m_s = readings->flow_m_s[i];
 
         if (simulation->derotated) {
             flow_m_s = flow_m_s + (suite->z_m * rotation_rate[i]);
         }
-        suite->body_velocity_m_s[i] = predicted
-                                      + (simulation->velocity_gain * (accepted ? (flow_m_s - predicted) : 0.0));
+        suite->body_velocity_m_s[i] =
+            predicted + (simulation->velocity_gain * choose(accepted, flow_m_s - predicted, splat(0.0)));
         suite->predicted_body_velocity_m_s[i] =
             suite->body_velocity_m_s[i]
             + ((simulation->step_s * simulation->acceleration_gain) * acceleration_m_s2[i]);
@@ -247,12 +251,12 @@ static inline void estimate_velocity(const engine_simulation_t *simulation, cons
 
 /* The estimate that the controllers receive at this tick. */
 static inline seen_t estimate(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                              const seen_t *truth_now, const rotation_t *r, const double *draws, suite_t *suite)
+                              const seen_t *truth_now, const rotation_t *r, const real_t *draws, suite_t *suite)
 {
     const readings_t readings = read_instruments(simulation, flight, truth_now, r, draws, suite);
-    double force[3];
-    double acceleration_m_s2[2];
-    double velocity_m_s[3];
+    real_t force[3];
+    real_t acceleration_m_s2[2];
+    real_t velocity_m_s[3];
     seen_t seen;
     int i;
 

@@ -1,16 +1,16 @@
 """Fly simulations in the engine where controller and flight allow it, else in NumPy, with the same bits."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.engine.build import ffi, load, pointer
+from mambo_nmpc.sil.engine.build import ffi, lanes_for, load, pointer
 from mambo_nmpc.sil.engine.native import is_native, native
-from mambo_nmpc.sil.engine.records import flight_records, simulation_record
+from mambo_nmpc.sil.engine.records import flight_records, in_lanes, simulation_record
 from mambo_nmpc.sil.flight import loop
 from mambo_nmpc.sil.flight.loop import Flight, PositionController, allocate_trace
 from mambo_nmpc.sil.flight.names import EngineName
@@ -41,7 +41,8 @@ def fly(
     delay_ticks = int(np.max(flight.link.delay_ticks))
     if engine == "c" and is_native(controller) and delay_ticks <= DELAY_TICKS_MAX:
         try:
-            compiled = load(host_toolchain())
+            toolchain = host_toolchain()
+            compiled = load(toolchain, lanes_for(flight.flights, toolchain))
         except BuildError as error:
             warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=2)
         else:
@@ -52,13 +53,14 @@ def fly(
 def fly_compiled(
     engine: Any, flight: Flight, controller: PositionController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate the flights in a library of `build.load`, one after the other, with a controller in C."""
+    """Simulate the flights in a library of `build.load`, a group after the other, with a controller in C."""
+    lanes = int(engine.engine_lanes())
     times_s, targets = flight.times_s(), flight.given_targets()
     simulation = simulation_record(flight, times_s)
-    flights = flight_records(flight, targets[0])
+    groups = in_lanes(flight_records(flight, targets[0]), lanes)
     trace = allocate_trace(times_s, targets[..., :4], sensed=flight.sensors is not None)
     ticks = len(times_s) * flight.ticks_per_update
-    draws = _Buffers(flight, len(times_s), ticks)
+    draws = _Buffers(flight, lanes, len(times_s), ticks)
     called = native(engine, controller)
     record = ffi.new(
         "engine_trace_t *",
@@ -69,20 +71,22 @@ def fly_compiled(
             for name, _ in ffi.typeof("engine_trace_t").fields
         },
     )
-    for index, seed in enumerate(flight.seeds or (0,) * flight.flights):
+    seeds = flight.seeds or (0,) * flight.flights
+    for index, group in zip(range(0, flight.flights, lanes), groups, strict=True):
         engine.engine_fly(
             pointer("engine_simulation_t *", simulation),
-            pointer("engine_flight_t *", flights[index : index + 1]),
+            pointer("engine_flight_t *", group),
             index,
             pointer("double *", times_s),
             pointer("double *", _by_flight(targets)),
-            draws.draw(seed),
+            draws.draw(seeds[index : index + lanes]),
             called.step,
             called.instance(index),
+            called.stride,
             record,
         )
         if progress is not None:
-            progress((index + 1) / flight.flights)
+            progress(min(index + lanes, flight.flights) / flight.flights)
     return trace
 
 
@@ -92,23 +96,25 @@ def _by_flight(array: Any) -> Any:
 
 
 class _Buffers:
-    """Random numbers of one flight at a time, from the same streams as in NumPy."""
+    """Random numbers of one group at a time, from the same streams as in NumPy."""
 
-    def __init__(self, flight: Flight, updates: int, ticks: int) -> None:
+    def __init__(self, flight: Flight, lanes: int, updates: int, ticks: int) -> None:
         width = mocap.NOISES if isinstance(flight.sensors, MotionCapture) else instruments.NOISES
-        self.sensors = np.empty((ticks, width)) if flight.sensors is not None else None
-        self.gusts = np.empty((ticks + 1, 3)) if flight.disturbances.windy else None
-        self.drops = np.empty(updates) if np.any(flight.link.dropped_share) else None
+        self.sensors = np.empty((lanes, ticks, width)) if flight.sensors is not None else None
+        self.gusts = np.empty((lanes, ticks + 1, 3)) if flight.disturbances.windy else None
+        self.drops = np.empty((lanes, updates)) if np.any(flight.link.dropped_share) else None
         self._record = ffi.new(
             "engine_draws_t *",
             {name: pointer("double *", getattr(self, name)) for name in ("sensors", "gusts", "drops")},
         )
 
-    def draw(self, seed: int) -> Any:
-        """Return the engine_draws_t of the flight with this seed; it is valid until the next call."""
+    def draw(self, seeds: Sequence[int]) -> Any:
+        """Return the engine_draws_t of the flights with these seeds; it is valid until the next call."""
         for purpose, buffer in ((Purpose.SENSORS, self.sensors), (Purpose.GUSTS, self.gusts)):
             if buffer is not None:
-                generators((seed,), purpose)[0].standard_normal(out=buffer)
+                for generator, lane in zip(generators(seeds, purpose), buffer, strict=False):
+                    generator.standard_normal(out=lane)
         if self.drops is not None:
-            generators((seed,), Purpose.DROPS)[0].random(out=self.drops)
+            for generator, lane in zip(generators(seeds, Purpose.DROPS), self.drops, strict=False):
+                generator.random(out=lane)
         return self._record

@@ -12,17 +12,17 @@
 #define FIRST_ORDER 2
 
 typedef struct {
-    double body[STATE_ROWS];
-    double rotor_speed_rad_s[4];
-    double memory[9]; /* of the attitude loop; the stock loop: its integrals, 2 */
+    real_t body[STATE_ROWS];
+    real_t rotor_speed_rad_s[4];
+    real_t memory[9]; /* of the attitude loop; the stock loop: its integrals, 2 */
 } vehicle_state_t;
 
 /* The state as controllers receive it, true or estimated. */
 typedef struct {
-    double position_m[3];
-    double velocity_m_s[3];
-    double euler_rad[3];
-    double rates_rad_s[3];
+    real_t position_m[3];
+    real_t velocity_m_s[3];
+    real_t euler_rad[3];
+    real_t rates_rad_s[3];
 } seen_t;
 
 static inline seen_t truth(const vehicle_state_t *state, const rotation_t *r)
@@ -39,26 +39,26 @@ static inline seen_t truth(const vehicle_state_t *state, const rotation_t *r)
     return seen;
 }
 
-static inline double altitude_thrust_n(const engine_simulation_t *simulation, const seen_t *seen)
+static inline real_t altitude_thrust_n(const engine_simulation_t *simulation, const seen_t *seen)
 {
-    const double error_m = simulation->height_reference_m - seen->position_m[2];
-    const double thrust_n = (simulation->weight_n - (simulation->altitude_p_n_m * error_m))
+    const real_t error_m = simulation->height_reference_m - seen->position_m[2];
+    const real_t thrust_n = (simulation->weight_n - (simulation->altitude_p_n_m * error_m))
                             + (simulation->altitude_d_n_s_m * seen->velocity_m_s[2]);
 
     return clip(thrust_n, -simulation->thrust_limit_n, simulation->thrust_limit_n);
 }
 
 /* Shares of thrust, roll, pitch and yaw in the motor commands, by the stock loop; the integrals grow by a period. */
-static inline void stock_shares(const engine_simulation_t *simulation, const seen_t *seen, const double *command_rad,
-                                double thrust_n, double heading_rad, double *integral_rad_s, double *shares)
+static inline void stock_shares(const engine_simulation_t *simulation, const seen_t *seen, const real_t *command_rad,
+                                real_t thrust_n, real_t heading_rad, real_t *integral_rad_s, real_t *shares)
 {
-    double wrench[4];
+    real_t wrench[4];
     int i;
 
     wrench[0] = thrust_n;
     for (i = 0; i < 2; i++) {
-        const double error_rad = command_rad[i] - seen->euler_rad[i];
-        const double growth = error_rad - (simulation->integral_leak_1_s * integral_rad_s[i]);
+        const real_t error_rad = command_rad[i] - seen->euler_rad[i];
+        const real_t growth = error_rad - (simulation->integral_leak_1_s * integral_rad_s[i]);
 
         wrench[1 + i] = ((simulation->attitude_p_n_m[i] * error_rad)
                          + (simulation->attitude_i_n_m_s[i] * integral_rad_s[i]))
@@ -74,9 +74,9 @@ static inline void stock_shares(const engine_simulation_t *simulation, const see
 }
 
 /* Steady rotor speeds of the commands that sum up shares of thrust, roll, pitch and yaw. */
-static inline void commanded_speeds(const engine_simulation_t *simulation, const double *share, double *speeds)
+static inline void commanded_speeds(const engine_simulation_t *simulation, const real_t *share, real_t *speeds)
 {
-    double command[4];
+    real_t command[4];
     int i;
 
     command[0] = ((share[0] + share[1]) + share[2]) - share[3];
@@ -84,21 +84,21 @@ static inline void commanded_speeds(const engine_simulation_t *simulation, const
     command[2] = ((share[0] - share[1]) - share[2]) - share[3];
     command[3] = ((share[0] + share[1]) - share[2]) + share[3];
     for (i = 0; i < 4; i++) {
-        speeds[i] = sqrt(simulation->speed_squared_per_command_rad2_s2
-                         * clip(command[i], simulation->command_min, simulation->command_max));
+        speeds[i] = square_root(simulation->speed_squared_per_command_rad2_s2
+                                * clip(command[i], simulation->command_min, simulation->command_max));
     }
 }
 
 /* Wrench of the rotors on their way from `before` to `steady`, `decay` being the share of the way that is left. */
 static inline void rotor_wrench(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                                const double *before, const double *steady, double decay, double thrust_share,
-                                double *wrench)
+                                const real_t *before, const real_t *steady, real_t decay, real_t thrust_share,
+                                real_t *wrench)
 {
-    double thrust_n[4];
+    real_t thrust_n[4];
     int i;
 
     for (i = 0; i < 4; i++) {
-        const double speed = steady[i] + ((before[i] - steady[i]) * decay);
+        const real_t speed = steady[i] + ((before[i] - steady[i]) * decay);
 
         thrust_n[i] = flight->thrust_factor_n_s2 * (speed * speed);
     }
@@ -115,19 +115,19 @@ static inline void rotor_wrench(const engine_simulation_t *simulation, const eng
 
 /* Advance body and rotors by a tick with the method of Bogacki and Shampine; `r` belongs to the state before. */
 static inline void integrate(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                             const surroundings_t *around, double thrust_share, const rotation_t *r,
-                             const double *steady, vehicle_state_t *state)
+                             const surroundings_t *around, real_t thrust_share, const rotation_t *r,
+                             const real_t *steady, vehicle_state_t *state)
 {
     const double half_s = simulation->step_s / 2.0;
     const double three_quarters_s = (3.0 * simulation->step_s) / 4.0;
     const double ninth_s = simulation->step_s / 9.0;
-    double *body = state->body;
-    double *speeds = state->rotor_speed_rad_s;
-    double first[STATE_ROWS];
-    double second[STATE_ROWS];
-    double third[STATE_ROWS];
-    double inner[STATE_ROWS];
-    double wrench[4];
+    real_t *body = state->body;
+    real_t *speeds = state->rotor_speed_rad_s;
+    real_t first[STATE_ROWS];
+    real_t second[STATE_ROWS];
+    real_t third[STATE_ROWS];
+    real_t inner[STATE_ROWS];
+    real_t wrench[4];
     rotation_t turned;
     int i;
 

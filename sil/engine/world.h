@@ -10,12 +10,12 @@
 #define DELAY_TICKS_MAX 200
 
 typedef struct {
-    double u;
-    double a;
-    double b;
+    real_t u;
+    real_t a;
+    real_t b;
 } gusts_t;
 
-static inline gusts_t gusts_start(const double *draws)
+static inline gusts_t gusts_start(const real_t *draws)
 {
     const gusts_t gusts = { draws[0], draws[1], (0.5 * draws[1]) + (0.5 * draws[2]) };
 
@@ -23,14 +23,14 @@ static inline gusts_t gusts_start(const double *draws)
 }
 
 /* Air velocity along x and y of the world; advances the filters by a tick. */
-static inline void blow(const engine_simulation_t *simulation, const engine_flight_t *flight, const double *draws,
-                        gusts_t *gusts, double *air_m_s)
+static inline void blow(const engine_simulation_t *simulation, const engine_flight_t *flight, const real_t *draws,
+                        gusts_t *gusts, real_t *air_m_s)
 {
     const double *gain = simulation->gust_across;
-    const double *root = flight->gust_roots;
-    const double along = flight->gust_mean_m_s + (flight->gust_sigma_m_s * gusts->u);
-    const double across = flight->gust_sigma_m_s * ((gain[0] * gusts->a) + (gain[1] * gusts->b));
-    const double decay = flight->gust_decay;
+    const real_t *root = flight->gust_roots;
+    const real_t along = flight->gust_mean_m_s + (flight->gust_sigma_m_s * gusts->u);
+    const real_t across = flight->gust_sigma_m_s * ((gain[0] * gusts->a) + (gain[1] * gusts->b));
+    const real_t decay = flight->gust_decay;
 
     gusts->u = (decay * gusts->u) + (root[0] * draws[0]);
     gusts->b = (decay * (gusts->b + (flight->gust_x * gusts->a))) + ((root[1] * draws[1]) + (root[2] * draws[2]));
@@ -39,39 +39,51 @@ static inline void blow(const engine_simulation_t *simulation, const engine_flig
     air_m_s[1] = (flight->gust_heading[1] * along) + (flight->gust_heading[0] * across);
 }
 
-/* Change the velocity by the impulse that is due at this tick, if any. */
-static inline void push(const engine_flight_t *flight, double payload_kg, const rotation_t *r, vehicle_state_t *state)
+/* Change the velocity of the flights with an impulse at this tick. */
+static inline void push(const engine_flight_t *flight, int64_t tick, real_t payload_kg, const rotation_t *r,
+                        vehicle_state_t *state)
 {
-    double change_m_s[3];
-    int pushed = 0;
+    const mask_t any_axis = (flight->push_n_s[0] != 0.0) | (flight->push_n_s[1] != 0.0) | (flight->push_n_s[2] != 0.0);
+    const mask_t pushed = (flight->push_tick == tick) & any_axis;
+    real_t change_m_s[3];
     int i;
 
-    for (i = 0; i < 3; i++) {
-        pushed = pushed || (flight->push_n_s[i] != 0.0);
-        change_m_s[i] = flight->push_n_s[i] / (flight->mass_kg + payload_kg);
-    }
-    if (pushed) {
+    if (any(pushed)) {
+        for (i = 0; i < 3; i++) {
+            change_m_s[i] = flight->push_n_s[i] / (flight->mass_kg + payload_kg);
+        }
         to_body(r, change_m_s, change_m_s);
         for (i = 0; i < 3; i++) {
-            state->body[VELOCITY + i] = state->body[VELOCITY + i] + change_m_s[i];
+            const real_t before_m_s = state->body[VELOCITY + i];
+
+            state->body[VELOCITY + i] = choose(pushed, before_m_s + change_m_s[i], before_m_s);
         }
     }
 }
 
-/* Commands on their way to the stock loops. */
+/* Commands on their way to the stock loops, at the remainder of their tick. */
 typedef struct {
-    double sent_rad[DELAY_TICKS_MAX + 1][2];
+    real_t sent_rad[DELAY_TICKS_MAX + 1][2];
 } wire_t;
 
-static inline void carry(const engine_flight_t *flight, int64_t tick, const double *command_rad, wire_t *wire,
-                         double *arriving_rad)
+static inline void carry(const engine_flight_t *flight, int64_t tick, const real_t *command_rad, wire_t *wire,
+                         real_t *arriving_rad)
 {
-    const int64_t depth = flight->delay_ticks + 1;
+    const int64_t depth = DELAY_TICKS_MAX + 1;
+    lanes_t delay_ticks;
+    lanes_t arriving[2];
+    int lane;
     int i;
 
+    delay_ticks.whole = flight->delay_ticks;
     for (i = 0; i < 2; i++) {
         wire->sent_rad[tick % depth][i] = command_rad[i];
-        arriving_rad[i] = wire->sent_rad[(tick + 1) % depth][i];
+        for (lane = 0; lane < LANES; lane++) {
+            const int64_t sent = (tick + depth) - delay_ticks.whole_lane[lane];
+
+            arriving[i].lane[lane] = lane_of(wire->sent_rad[sent % depth][i], lane);
+        }
+        arriving_rad[i] = arriving[i].real;
     }
 }
 

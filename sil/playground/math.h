@@ -6,9 +6,7 @@
 #define PLAYGROUND_MATH_H
 
 #define NAN __builtin_nan("")
-#define fabs __builtin_fabs
+#define INFINITY __builtin_inf()
 #define sqrt __builtin_sqrt
-#define copysign __builtin_copysign
-#define isfinite __builtin_isfinite
 
 #endif

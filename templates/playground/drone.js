@@ -63,7 +63,7 @@ class Drone {
   update(...inputs) {
     this.inputs.forEach((place, index) => place.set(inputs[index]));
     this.module.calls.engine_update(
-      this.simulation, this.flight, 0n, 0n, this.time, this.target, this.draws, this.module.step, this.module.self,
+      this.simulation, this.flight, 0n, 0n, this.time, this.target, this.draws, this.module.step, this.module.self, 0n,
       this.flying, this.trace,
     );
   }

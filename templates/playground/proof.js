@@ -18,7 +18,7 @@ async function traceDigest(entry, data) {
   const arrays = TRACE_AXES.map((axes) => module.space(8 * axes * updates));
   module.calls.engine_fly(
     simulation, flight, 0n, module.put(new Uint8Array(times.buffer)), module.put(bytesOf(proof.targets)),
-    module.pointers(sensors, gusts, 0), module.step, module.self, module.pointers(...arrays),
+    module.pointers(sensors, gusts, 0), module.step, module.self, 0n, module.pointers(...arrays),
   );
   const parts = arrays.map((address, place) => module.at(address, TRACE_AXES[place] * updates));
   parts.splice(TARGET_PLACE, 0, targets.filter((_, index) => index % 6 < 4));

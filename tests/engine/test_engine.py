@@ -16,7 +16,7 @@ from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController, PdFeedForwardController, pd_controller
-from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, load, texts
+from mambo_nmpc.sil.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
 from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
 from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight import loop
@@ -25,6 +25,7 @@ from mambo_nmpc.sil.flight.names import PD_NAMES, SENSORS_OF
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.link import Link
+from tests.support.engines import lanes_here
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES, TRUTH, drones, scenarios
 from tests.support.tools import require, toolchain
@@ -33,10 +34,8 @@ MAMBO = ONE_NORM
 PERIOD_S = MAMBO.horizon.update_period_s
 SCALARS = ("float32", "float64", "fixed")
 BUILDS = [
-    Toolchain(("gcc",), "-O0"),
-    Toolchain(("gcc",), "-O2"),
+    *(Toolchain((name,), level) for name in ("gcc", "clang") for level in ("-O0", "-O2", None)),
     Toolchain(("gcc", "-mavx2", "-mfma")),
-    Toolchain(("clang",)),
     Toolchain(("clang", "-mavx2", "-mfma"), "-O2"),
 ]
 
@@ -50,13 +49,14 @@ def controller(kind: str, flight: Flight) -> CompiledController | PdController |
 
 
 def assert_same_bits(flight: Flight, kind: str) -> None:
-    """Fly in C and in NumPy, and compare every array."""
-    toolchain("gcc")
-    ours = fly(flight, controller(kind, flight))
+    """Fly in C, in every number of lanes, and in NumPy, and compare every array."""
     theirs = loop.fly(flight, controller(kind, flight))
-    assert type(ours) is type(theirs)
-    for column in fields(theirs):
-        assert getattr(ours, column.name).tobytes() == getattr(theirs, column.name).tobytes(), column.name
+    for lanes in lanes_here():
+        ours = fly_compiled(load(toolchain("gcc"), lanes), flight, controller(kind, flight))
+        assert type(ours) is type(theirs)
+        for column in fields(theirs):
+            found, expected = getattr(ours, column.name), getattr(theirs, column.name)
+            assert found.tobytes() == expected.tobytes(), (lanes, column.name)
 
 
 @pytest.mark.parametrize("kind", [*PD_NAMES, *SCALARS])
@@ -69,7 +69,7 @@ def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...]
 @settings(max_examples=40)
 @given(data=st.data())
 def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
-    """One or two drawn flights of any drone, without sensors or through them."""
+    """One to nine drawn flights of any drone, without sensors or through them."""
     drone = data.draw(drones())
     shared = {
         "duration_s": 0.5,
@@ -77,7 +77,7 @@ def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
         "sensors": data.draw(st.sampled_from(SENSORS_OF[drone.sensors.kind])),
         "start": "take-off" if data.draw(st.integers(0, 9)) == 0 else "hover",
     }
-    batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=2))
+    batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=9))
     assert_same_bits(flight_of(batch, PERIOD_S), data.draw(st.sampled_from([*PD_NAMES, *SCALARS])))
 
 
@@ -92,24 +92,35 @@ def digests(engine: Any) -> list[str]:
     return found
 
 
+@pytest.fixture(scope="module")
+def known() -> list[str]:
+    """Return the digests of the engine as it is used for a single flight."""
+    return digests(load(toolchain("gcc")))
+
+
+@pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize(
     "build", BUILDS, ids=[" ".join((*build.command, build.optimisation or "-O3")) for build in BUILDS]
 )
-def test_every_build_has_the_same_bits(build: Toolchain) -> None:
-    """Compilers, optimisations, and a processor with fused operations."""
-    expected = digests(load(toolchain("gcc")))
+def test_every_build_has_the_same_bits(build: Toolchain, lanes: int, known: list[str]) -> None:
+    """Compilers, optimisations, numbers of lanes, and a processor with fused operations."""
     require(build.command[0], build.command[0])
-    assert digests(load(build)) == expected
+    if lanes not in lanes_here():
+        pytest.skip(f"the processor has no {lanes} lanes")
+    engine = load(build, lanes)
+    assert engine.engine_lanes() == lanes
+    assert digests(engine) == known
 
 
+@pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_no_operation_is_fused(compiler: str, tmp_path: Path) -> None:
+def test_no_operation_is_fused(compiler: str, lanes: int, tmp_path: Path) -> None:
     """Even where the compiler may use them, for they round once instead of twice."""
     path = require(compiler, compiler)
     for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
-    flags = ["-mavx2", "-mfma", *FLAGS, *LIBRARY_FLAGS, *SOURCES, "-o", "engine.so", *LIBRARIES]
-    subprocess.run([path, *flags], cwd=tmp_path, check=True)
+    flags = ["-mavx2", "-mfma", *FLAGS, *LANES[lanes], *LIBRARY_FLAGS]
+    subprocess.run([path, *flags, *SOURCES, "-o", "engine.so", *LIBRARIES], cwd=tmp_path, check=True)
     code = subprocess.run(
         [require("objdump", "binutils"), "-d", "engine.so"],
         cwd=tmp_path,
@@ -117,18 +128,19 @@ def test_no_operation_is_fused(compiler: str, tmp_path: Path) -> None:
         text=True,
         check=True,
     ).stdout
-    assert re.search(r"\bvmulsd\b", code)
+    assert re.search(r"\bvmulsd\b" if lanes == 1 else r"\bvmulpd\b", code)
     assert not re.search(r"\bvf(n?m)(add|sub)", code)
 
 
 def test_the_engine_compiles_without_a_warning(tmp_path: Path) -> None:
-    """Of gcc and of clang."""
+    """Of gcc and of clang, in every number of lanes."""
     for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
     warnings = ["-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Wundef", "-Wmissing-prototypes", "-Werror"]
     for compiler in ("gcc", "clang"):
-        command = [require(compiler, compiler), "-std=c99", "-O2", *warnings, "-c", *SOURCES]
-        subprocess.run(command, cwd=tmp_path, check=True)
+        for lanes in LANES.values():
+            command = [require(compiler, compiler), "-std=c99", "-O2", *lanes, *warnings, "-c", *SOURCES]
+            subprocess.run(command, cwd=tmp_path, check=True)
 
 
 def test_what_is_no_c_flies_in_numpy() -> None:
@@ -153,8 +165,17 @@ def test_without_a_compiler_the_flight_is_the_same_and_says_so(
 
 
 def test_progress_reaches_the_end() -> None:
-    """One call for each flight."""
-    shares: list[float] = []
-    toolchain("gcc")
-    fly(flight_of(TRUTH, PERIOD_S), PdController(), shares.append)
-    assert shares == [(index + 1) / len(TRUTH) for index in range(len(TRUTH))]
+    """One call for each group of flights."""
+    shares: dict[int, list[float]] = {lanes: [] for lanes in lanes_here()}
+    for lanes, found in shares.items():
+        engine = load(toolchain("gcc"), lanes)
+        fly_compiled(engine, flight_of(TRUTH, PERIOD_S), PdController(), found.append)
+    expected = {1: [0.2, 0.4, 0.6, 0.8, 1.0], 2: [0.4, 0.8, 1.0], 4: [0.8, 1.0]}
+    assert len(TRUTH) == 5
+    assert shares == {lanes: expected[lanes] for lanes in shares}
+
+
+def test_a_batch_flies_in_lanes_and_a_single_flight_does_not() -> None:
+    """The processor's most lanes, or one."""
+    assert lanes_for(1, toolchain("gcc")) == 1
+    assert lanes_for(2, toolchain("gcc")) == max(lanes_here())

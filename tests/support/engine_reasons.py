@@ -9,9 +9,10 @@ from tests.support.reasons import Key
 _LONGER: Final = "an array one element longer than it must be"
 _FIRST_IMAGE: Final = "start and first reading take the same image"
 _LOW_PASS: Final = (
-    "const double output = simulation->low_pass_b "
+    "const real_t output = simulation->low_pass_b "
     "* (((now + (<real> * state[0])) + (<real> * state[1])) + state[2]);"
 )
+_CLIP: Final = "return choose(value < low, splat(low), choose(value > high, splat(high), value));"
 _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no flight shows"
 
 REASONS: Final[Mapping[Key, str]] = {
@@ -22,36 +23,71 @@ REASONS: Final[Mapping[Key, str]] = {
         for change in ("0 -> (-1)", "0 -> 1")
     },
     ("elementary.h", "#define ROUNDING <real> /* <real> * 2^52 */", "negative"): "it rounds alike",
+    (
+        "elementary.h",
+        "const mask_t steep = size > <real>;",
+        "next number",
+    ): "one number, the same result",
+    ("lanes.h", "return number - (real_t){ <real> };", "- -> +"): "the C writes no -0.0 into all lanes",
     **{
-        ("elementary.h", "turns = <real>;", change): "the angle is NaN there, and so is every result"
-        for change in ("left out", "zero -> one")
+        ("lanes.h", f"return lanes.{member};", "left out"): "the value is in the register anyway"
+        for member in ("whole", "real")
     },
-    ("elementary.h", "const int steep = size > <real>;", "next number"): "one number, with the same result",
+    **{
+        ("lanes.h", line, change): "computes what `choose` then ignores"
+        for line, change in (
+            ("int found = 0;", "0 -> (-1)"),
+            ("int found = 0;", "0 -> 1"),
+            ("lanes.whole = mask;", "left out"),
+            ("return found;", "left out"),
+        )
+    },
+    **{
+        ("lanes.h", line, change): "two numbers that are equal"
+        for line, change in (
+            (_CLIP, "< -> <="),
+            (_CLIP, "> -> >="),
+            ("return choose((a > b) | (a != a), a, b);", "> -> >="),
+        )
+    },
     ("loop.c", "return (value == value) ? value : NAN;", "left out"): "the value is in the register anyway",
     **{
         (
             "loop.c",
-            "lost = lost || !isfinite(state->body[i]) "
-            "|| ((i < VELOCITY) && !(fabs(state->body[i]) < simulation->lost_m));",
+            "kept = kept & (magnitude(state->body[i]) "
+            "< ((i < VELOCITY) ? simulation->lost_m : (double)INFINITY));",
             change,
         ): "a position of exactly 10 km, or a speed of as many metres per second"
         for change in ("< -> <=", "< -> <= #1")
     },
     (
         "loop.c",
-        "const int dropped = simulation->dropping && (draws->drops[update] < flight->dropped_share);",
+        "const int dropped = simulation->dropping "
+        "&& (draws->drops[drop] < lane_of(flight->dropped_share, lane));",
         "< -> <=",
     ): "a random number that equals the share",
     **{
-        ("loop.c", f"{line} = {{ {{ {{ <real>, <real> }} }} }};", change): "the first command replaces it"
+        ("loop.c", f"{line} = {{ {{ {{ splat(<real>) }} }} }};", "zero -> one"): (
+            "the first command replaces it"
+        )
         for line in ("const wire_t wire", "const late_t late")
+    },
+    **{
+        (
+            "loop.c",
+            "surroundings_t around = { flight->mass_kg, { splat(<real>), splat(<real>) } };",
+            change,
+        ): ("read only in wind, which sets it")
         for change in ("zero -> one", "zero -> one #1")
     },
     **{
-        ("loop.c", "surroundings_t around = { flight->mass_kg, { <real>, <real> } };", change): (
-            "read only in wind, which sets it"
+        ("loop.c", line, change): "the choice of another compiler or processor"
+        for line, changes in (
+            ('return __builtin_cpu_supports("avx2") ? 4 : 2;', ("2 -> 1", "2 -> 3")),
+            ("return 2;", ("left out", "2 -> 1", "2 -> 3")),
+            ("return 1;", ("left out", "1 -> 0", "1 -> 2")),
         )
-        for change in ("zero -> one", "zero -> one #1")
+        for change in changes
     },
     **{
         ("faults.c", line, change): _BESIDE
@@ -63,7 +99,11 @@ REASONS: Final[Mapping[Key, str]] = {
     },
     ("faults.c", "break;", "left out #6"): "the last case",
     **{
-        ("loop.c", "double thrust_share = <real>;", change): "read only with disturbances, which set it"
+        (
+            "loop.c",
+            "real_t thrust_share = splat(<real>);",
+            change,
+        ): "read only with disturbances, which set it"
         for change in ("negative", "next number")
     },
     **{
@@ -71,7 +111,7 @@ REASONS: Final[Mapping[Key, str]] = {
         for name, constant in (("first_order.h", "LATE_TICKS_MAX"), ("mocap.h", "MOCAP_DELAY_MAX"))
         for change in ("one less", "one more")
     },
-    ("first_order.h", "double nodes_rad[3][3];", "3 -> 4"): _LONGER,
+    ("first_order.h", "real_t nodes_rad[3][3];", "3 -> 4"): _LONGER,
     (
         "mocap.h",
         "for (k = 1; k <= simulation->mocap_delay_ticks; k++) {",
@@ -111,15 +151,14 @@ REASONS: Final[Mapping[Key, str]] = {
     **{
         (
             "sensors.h",
-            "+ (simulation->tilt_weight * "
-            "arc_sine(clip(smooth[0] / simulation->gravity_m_s2, <real>, <real>)));",
+            "const real_t pitch_seen = arc_sine(clip(smooth[0] / simulation->gravity_m_s2, <real>, <real>));",
             change,
         ): "one number just beyond the limit"
         for change in ("next number", "next number #1")
     },
     (
         "sensors.h",
-        "|| (fabs(slow_sonar - suite->z_m) < simulation->slow_jump_m));",
+        "const mask_t sonar_agrees = magnitude(slow_sonar - suite->z_m) < simulation->slow_jump_m;",
         "- -> +",
     ): "the wider gate of the pressure accepts first",
     ("world.h", "#define DELAY_TICKS_MAX <number>", "one more"): _LONGER,
@@ -129,12 +168,13 @@ REASONS: Final[Mapping[Key, str]] = {
         "next number #1",
     ): "one ulp of the first gust, which decays before it changes a rounded state",
     **{
-        ("world.h", line, change): "a push of zero changes nothing but the sign of a zero"
-        for line, change in (
-            ("int pushed = 0;", "0 -> (-1)"),
-            ("int pushed = 0;", "0 -> 1"),
-            ("pushed = pushed || (flight->push_n_s[i] != <real>);", "zero -> one"),
-        )
+        (
+            "world.h",
+            "const mask_t any_axis = (flight->push_n_s[0] != <real>) "
+            "| (flight->push_n_s[1] != <real>) | (flight->push_n_s[2] != <real>);",
+            change,
+        ): "a push of zero changes nothing but the sign of a zero"
+        for change in ("zero -> one", "zero -> one #1", "zero -> one #2")
     },
 }
 
@@ -143,7 +183,7 @@ def reason(key: Key) -> str | None:
     """Return why the fault `key` changes nothing, or None if no reason is known."""
     name, line, change = key
     length = re.fullmatch(r"(\d+) -> (\d+)( #\d+)?", change)
-    if length and re.search(rf"\bdouble \w+\[{length[1]}\](;| = )", line):
+    if length and re.search(rf"\b(?:double|real_t|lanes_t) \w+\[{length[1]}\](;| = )", line):
         return _LONGER if int(length[2]) > int(length[1]) else _BESIDE
     if name == "sensors.h" and not line.startswith("for") and re.fullmatch(r"<=? -> <=?( #\d+)?", change):
         return "two numbers that are equal"

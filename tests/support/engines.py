@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import cffi
 import numpy as np
 
-from mambo_nmpc.sil.engine.build import FLAGS, LIBRARIES, SOURCES, ffi, pointer
+from mambo_nmpc.sil.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, ffi, load, pointer
 from mambo_nmpc.sil.engine.native import Native
-from mambo_nmpc.sil.engine.records import flight_records, simulation_record
+from mambo_nmpc.sil.engine.records import flight_records, in_lanes, simulation_record
 from mambo_nmpc.sil.faults.fault import Fault
 from mambo_nmpc.sil.faults.native import native_faulty
 from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
@@ -25,25 +25,48 @@ _BLOCKS: Final = """\
 #include "first_order.h"
 #include "sensors.h"
 
-/* Each block is a static function of a header. */
-static seen_t seen_of(const double *row)
+/* Each block is a static function of a header. Lane i works on row `first` + i, or on the last one. */
+static real_t column(const double *rows, int first, int n, int width, int place)
+{
+    lanes_t lanes;
+    int lane;
+
+    for (lane = 0; lane < LANES; lane++) {
+        const int row = ((first + lane) < n) ? (first + lane) : (n - 1);
+
+        lanes.lane[lane] = rows[(width * row) + place];
+    }
+    return lanes.real;
+}
+
+static void write_column(real_t value, double *rows, int first, int n, int width, int place)
+{
+    int lane;
+
+    for (lane = 0; (lane < LANES) && ((first + lane) < n); lane++) {
+        rows[(width * (first + lane)) + place] = lane_of(value, lane);
+    }
+}
+
+static seen_t seen_of(const double *rows, int n, int tick)
 {
     seen_t seen;
     int i;
 
     for (i = 0; i < 3; i++) {
-        seen.position_m[i] = row[i];
-        seen.velocity_m_s[i] = row[3 + i];
-        seen.euler_rad[i] = row[6 + i];
-        seen.rates_rad_s[i] = row[9 + i];
+        seen.position_m[i] = column(&rows[12 * tick], 0, LANES, 12 * n, i);
+        seen.velocity_m_s[i] = column(&rows[12 * tick], 0, LANES, 12 * n, 3 + i);
+        seen.euler_rad[i] = column(&rows[12 * tick], 0, LANES, 12 * n, 6 + i);
+        seen.rates_rad_s[i] = column(&rows[12 * tick], 0, LANES, 12 * n, 9 + i);
     }
     return seen;
 }
 
+/* True states (LANES, n, 12) and random numbers (n, 8). */
 void run_suite(const engine_simulation_t *simulation, const engine_flight_t *flight, const double *truths,
                const double *draws, double *found, int n)
 {
-    seen_t truth_now = seen_of(truths);
+    seen_t truth_now = seen_of(truths, n, 0);
     rotation_t r = rotation(truth_now.euler_rad);
     suite_t suite;
     int i;
@@ -51,16 +74,20 @@ void run_suite(const engine_simulation_t *simulation, const engine_flight_t *fli
 
     suite_start(simulation, &truth_now, &r, &suite);
     for (i = 0; i < n; i++) {
+        real_t drawn[8];
         seen_t seen;
 
-        truth_now = seen_of(&truths[12 * i]);
+        for (k = 0; k < 8; k++) {
+            drawn[k] = splat(draws[(8 * i) + k]);
+        }
+        truth_now = seen_of(truths, n, i);
         r = rotation(truth_now.euler_rad);
-        seen = estimate(simulation, flight, &truth_now, &r, &draws[8 * i], &suite);
+        seen = estimate(simulation, flight, &truth_now, &r, drawn, &suite);
         for (k = 0; k < 3; k++) {
-            found[(12 * i) + k] = seen.position_m[k];
-            found[(12 * i) + 3 + k] = seen.velocity_m_s[k];
-            found[(12 * i) + 6 + k] = seen.euler_rad[k];
-            found[(12 * i) + 9 + k] = seen.rates_rad_s[k];
+            write_column(seen.position_m[k], &found[12 * i], 0, LANES, 12 * n, k);
+            write_column(seen.velocity_m_s[k], &found[12 * i], 0, LANES, 12 * n, 3 + k);
+            write_column(seen.euler_rad[k], &found[12 * i], 0, LANES, 12 * n, 6 + k);
+            write_column(seen.rates_rad_s[k], &found[12 * i], 0, LANES, 12 * n, 9 + k);
         }
     }
 }
@@ -71,16 +98,22 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
     int i;
     int k;
 
-    for (i = 0; i < n; i++) {
-        double *row = &rows[33 * i];
-        surroundings_t around = { flight->mass_kg + row[29], { row[30], row[31] } };
+    for (i = 0; i < n; i += LANES) {
+        surroundings_t around;
         vehicle_state_t state;
         late_t late;
-        double shares[4];
-        double steady_rad_s[4];
+        real_t row[33];
+        real_t shares[4];
+        real_t steady_rad_s[4];
         rotation_t r;
         seen_t seen;
 
+        for (k = 0; k < 33; k++) {
+            row[k] = column(rows, i, n, 33, k);
+        }
+        around.mass_kg = flight->mass_kg + row[29];
+        around.air_m_s[0] = row[30];
+        around.air_m_s[1] = row[31];
         memcpy(&state, row, sizeof state);
         r = rotation(state.body + EULER);
         seen = truth(&state, &r);
@@ -104,6 +137,9 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
         row[25] = altitude_thrust_n(simulation, &seen);
         for (k = 0; k < 3; k++) {
             row[26 + k] = seen.velocity_m_s[k];
+        }
+        for (k = 0; k < 33; k++) {
+            write_column(row[k], rows, i, n, 33, k);
         }
     }
 }
@@ -142,10 +178,16 @@ void tabulate(const double *x, double *y, int n)
 {
     int i;
 
-    for (i = 0; i < n; i++) {
-        sine_cosine(x[i], &y[4 * i], &y[4 * i + 1]);
-        y[4 * i + 2] = arc_tangent(x[i]);
-        y[4 * i + 3] = arc_sine(x[i]);
+    for (i = 0; i < n; i += LANES) {
+        const real_t number = column(x, i, n, 1, 0);
+        real_t sine;
+        real_t cosine;
+
+        sine_cosine(number, &sine, &cosine);
+        write_column(sine, y, i, n, 4, 0);
+        write_column(cosine, y, i, n, 4, 1);
+        write_column(arc_tangent(number), y, i, n, 4, 2);
+        write_column(arc_sine(number), y, i, n, 4, 3);
     }
 }
 """
@@ -180,23 +222,26 @@ NUMBERS: Final[FloatArray] = np.concatenate([_DRAWN, _DRAWN / 10.0, _CORNERS, -_
 TICKS: Final = 3000
 
 
-def truths(kind: Literal["gates", "wild"]) -> FloatArray:
-    """Return true states (TICKS, 12) that wander through all gates, or jump and end with infinity and NaN.
+def truths() -> FloatArray:
+    """Return true states (4, TICKS, 12), as no flight has them, that begin at four points of time.
 
-    The columns are position, velocity, angles and rates.
+    Two wander through all gates, two jump and end with infinity and NaN. The columns are position, velocity,
+    angles and rates.
     """
     rng = np.random.default_rng(7)
     walk = np.cumsum(rng.normal(0.0, np.repeat([0.02, 0.2, 0.03, 0.4], 3), (TICKS, 12)), axis=0)
     walk = np.repeat([2.0, 8.0, 1.2, 9.0], 3) * np.sin(walk)
     walk[:, 2] = -1.0 + 0.5 * walk[:, 2]
-    if kind == "wild":
-        walk[rng.random(walk.shape) < 0.001] *= 1e3
-        walk[-300:][rng.random((300, 12)) < 0.002] = np.inf
-        walk[-100:][rng.random((100, 12)) < 0.002] = np.nan
-    return walk
+    wild = walk.copy()
+    wild[rng.random(walk.shape) < 0.001] *= 1e3
+    wild[-300:][rng.random((300, 12)) < 0.002] = np.inf
+    wild[-100:][rng.random((100, 12)) < 0.002] = np.nan
+    half = TICKS // 2
+    wild_later = np.concatenate([wild[half - 500 : -500], wild[: half - 500], wild[-500:]])
+    return np.stack([walk, wild, np.roll(walk, half, axis=0), wild_later])
 
 
-def build(files: Mapping[str, str], folder: Path, *flags: str) -> Path:
+def build(files: Mapping[str, str], folder: Path, *flags: str, lanes: int = 1) -> Path:
     """Compile the engine in `files` with gcc in a new folder, since a library is loaded once.
 
     Raises BuildError.
@@ -205,23 +250,42 @@ def build(files: Mapping[str, str], folder: Path, *flags: str) -> Path:
     for name, text in (dict(files) | {"blocks.c": _BLOCKS}).items():
         (place / name).write_text(text, "utf-8")
     sources = [*SOURCES, "blocks.c"]
-    toolchain("gcc").run([*FLAGS, *LIBRARY_FLAGS, *flags, *sources, "-o", "engine.so", *LIBRARIES], place)
+    options = [*FLAGS, *LANES[lanes], *LIBRARY_FLAGS, *flags]
+    toolchain("gcc").run([*options, *sources, "-o", "engine.so", *LIBRARIES], place)
     return place / "engine.so"
 
 
-def estimates(path: Path, flight: Flight, truths: FloatArray, draws: FloatArray) -> FloatArray:
-    """Return what the sensors of a flight make of true states (k, 12) with random numbers (k, 8), as (k, 12).
+def lanes_here() -> list[int]:
+    """Return the numbers of lanes that this processor has."""
+    most = int(load(toolchain("gcc")).engine_fastest_lanes())
+    return [lanes for lanes in LANES if lanes <= most]
 
-    The columns are position, velocity, angles and rates, as in `Seen`.
+
+def _records(path: Path, flight: Flight) -> tuple[Any, Any]:
+    """Return the records of a simulation and of its first group in the engine at `path`."""
+    flights = flight_records(flight, np.zeros((1, 4)))
+    return simulation_record(flight, flight.times_s()), in_lanes(flights, _lanes(path))
+
+
+def _lanes(path: Path) -> int:
+    engine: Any = ffi.dlopen(str(path))
+    return int(engine.engine_lanes())
+
+
+def estimates(path: Path, flight: Flight, truths: FloatArray, draws: FloatArray) -> FloatArray:
+    """Return what the sensors of a flight make of true states (4, k, 12) with random numbers (k, 8).
+
+    The columns of the result (4, k, 12) are position, velocity, angles and rates, as in `Seen`.
     """
     found = np.empty_like(truths)
-    records = simulation_record(flight, flight.times_s()), flight_records(flight, np.zeros((1, 4)))
+    records, lanes = _records(path, flight), _lanes(path)
     engine: Any = _INTERFACE.dlopen(str(path))
-    engine.run_suite(
-        *(pointer("void *", record) for record in records),
-        *(pointer("double *", array) for array in (truths, draws, found)),
-        len(truths),
-    )
+    for first in range(0, len(truths), lanes):
+        engine.run_suite(
+            *(pointer("void *", record) for record in records),
+            *(pointer("double *", array) for array in (truths[first:], draws, found[first:])),
+            truths.shape[1],
+        )
     return found
 
 
@@ -232,7 +296,7 @@ def ticked(path: Path, flight: Flight, rows: FloatArray) -> FloatArray:
     and the velocity in the world.
     """
     found = rows.copy()
-    records = simulation_record(flight, flight.times_s()), flight_records(flight, np.zeros((1, 4)))
+    records = _records(path, flight)
     engine: Any = _INTERFACE.dlopen(str(path))
     pointers = (pointer("void *", record) for record in records)
     engine.run_tick(*pointers, pointer("double *", found), len(found))

@@ -33,13 +33,28 @@ TRUTH: Final = (
         dropped_share=0.2,
     ),
     Scenario(
-        duration_s=2.0, push_n_s=(0.0, 0.03, 0.0), push_time_s=0.5, yaw_rad=-2.5, start_tilt_rad=(0.0, 0.4)
+        duration_s=2.0,
+        seed=4,
+        push_n_s=(0.0, 0.03, 0.0),
+        push_time_s=0.5,
+        yaw_rad=-2.5,
+        start_tilt_rad=(0.0, 0.4),
+        wind_speed_m_s=2.0,
+        dropped_share=0.1,
     ),
-    Scenario(duration_s=2.0, yaw_rad=0.3, command_delay_ticks=200),
+    Scenario(
+        duration_s=2.0, yaw_rad=0.3, command_delay_ticks=200, push_n_s=(0.02, 0.0, 0.0), push_time_s=1.2
+    ),
     Scenario(duration_s=2.0, start_offset_m=(9999.0, 0.0, 0.0), start_velocity_m_s=(5.0, 0.0, 0.0)),
-    Scenario(duration_s=2.0, start_tilt_rad=(1.5, 1.2), start_offset_m=(0.0, 0.0, 1.0)),
+    Scenario(
+        duration_s=2.0,
+        start_tilt_rad=(1.5, 1.2),
+        start_offset_m=(0.0, 0.0, 1.0),
+        push_n_s=(0.0, 0.0, 0.01),
+        push_time_s=0.3,
+    ),
 )
-"""Without sensors: all disturbances; a push and a hard turn; the longest delay; one lost; one upside down."""
+"""Without sensors: all disturbances; a hard turn; the longest delay; one lost; one upside down; pushes."""
 
 SENSED: Final = (
     Scenario(
