@@ -6,7 +6,7 @@ Arguments and results are plain values, which can be sent to other processes and
 import threading
 from collections.abc import Sequence
 from dataclasses import fields
-from functools import partial
+from functools import cache, partial
 from typing import Any, Final
 
 from mambo_nmpc.codegen import __version__
@@ -80,8 +80,9 @@ def fly_scenarios(
     that cannot be simulated together.
     """
     rows: list[Row] = [{} for _ in scenarios]
+    flight_at = cache(partial(flight_of, scenarios))
     for number, entrant in enumerate(entrants):
-        flight = flight_of(scenarios, entrant.settings.horizon.update_period_s)
+        flight = flight_at(entrant.settings.horizon.update_period_s)
         report = partial(_report_part, number, len(entrants))
         trace = fly(flight, _controller(entrant, flight), report, engine=engine)
         for key, values in _evaluate(

@@ -55,7 +55,7 @@ def fly_compiled(
 ) -> Trace:
     """Simulate the flights in a library of `build.load`, a group after the other, with a controller in C."""
     lanes = int(engine.engine_lanes())
-    times_s, targets = flight.times_s(), flight.given_targets()
+    times_s, targets = flight.times_s(), flight.given_targets
     simulation = simulation_record(flight, times_s)
     groups = in_lanes(flight_records(flight, targets[0]), lanes)
     trace = allocate_trace(times_s, targets[..., :4], sensed=flight.sensors is not None)

@@ -11,6 +11,7 @@ gives the same bits alone and in a batch.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -144,8 +145,9 @@ class Flight:
         """
         return self._for_each_flight(self.trajectory.target(self.times_s()))
 
+    @cached_property
     def given_targets(self) -> FloatArray:
-        """Return the targets (k, n, 6) as controllers are given them: with their accelerations.
+        """The targets (k, n, 6) as controllers are given them: with their accelerations.
 
         Those of a flight are contiguous in memory, as in `allocate_trace`.
         Raises `FlightError` as `targets`.
@@ -172,7 +174,7 @@ def fly(
 
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
-    times_s, targets = flight.times_s(), flight.given_targets()
+    times_s, targets = flight.times_s(), flight.given_targets
     lifting_until = lifting_updates(flight, times_s)
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])

@@ -66,12 +66,12 @@ def proof_flight(drone: VehicleFile, period_s: float) -> Flight:
 
 def records(flight: Flight) -> tuple[Record, Record]:
     """Return the engine's records of the simulation and of its one flight."""
-    return simulation_record(flight, flight.times_s()), flight_records(flight, flight.given_targets()[0])
+    return simulation_record(flight, flight.times_s()), flight_records(flight, flight.given_targets[0])
 
 
 def inputs(flight: Flight) -> ProofInputs:
     """Return what the engine reads besides the records."""
-    targets = flight.given_targets()[:, 0]
+    targets = flight.given_targets[:, 0]
     ticks = len(targets) * flight.ticks_per_update
     sensors, gusts = (generators((_SEED,), purpose)[0] for purpose in (Purpose.SENSORS, Purpose.GUSTS))
     return ProofInputs(
