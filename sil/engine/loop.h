@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * A group of flights, update by update. engine_fly runs a whole one; whoever changes target, disturbances or sensors between
- * the updates calls these functions.
+ * A group of flights, update by update. engine_fly runs a whole one; whoever changes target, disturbances or sensors
+ * between the updates calls these functions.
  */
 #ifndef ENGINE_LOOP_H
 #define ENGINE_LOOP_H

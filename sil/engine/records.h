@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT-0
  *
  * What Python and the engine exchange. cffi reads this file as the C compiler does. Every member is 8 bytes wide,
- * so that the records have the same layout in both; lanes.h has real_t and whole_t. Units are in the names; frames and signs are those of the
- * Python modules that the names of the headers repeat.
+ * so that the records have the same layout in both; lanes.h has real_t and whole_t. Units are in the names; frames and
+ * signs are those of the Python modules that the names of the headers repeat.
  */
 
 /* What the flights of a simulation have in common. Pairs are in the order roll, pitch. */
