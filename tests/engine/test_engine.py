@@ -119,7 +119,7 @@ def test_no_operation_is_fused(compiler: str, lanes: int, tmp_path: Path) -> Non
     path = require(compiler, compiler)
     for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
-    flags = ["-mavx2", "-mfma", *FLAGS, *LANES[lanes], *LIBRARY_FLAGS]
+    flags = ["-mavx2", "-mfma", "-mavx512vl", *FLAGS, *LANES[lanes], *LIBRARY_FLAGS]
     subprocess.run([path, *flags, *SOURCES, "-o", "engine.so", *LIBRARIES], cwd=tmp_path, check=True)
     code = subprocess.run(
         [require("objdump", "binutils"), "-d", "engine.so"],
