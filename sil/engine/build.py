@@ -1,6 +1,5 @@
 """Build the engine with the host's compiler, once per machine, and load it."""
 
-import platform
 from functools import lru_cache
 from importlib import resources
 from typing import Any, Final
@@ -32,14 +31,8 @@ CONSTANTS: Final = (
     *("ARC_EDGES", "ARC_HIGH", "ARC_LOW", "ARC_TANGENT", "HALF_PI_HIGH", "HALF_PI_LOW"),
 )
 """Names of the constants in sil/plant/elementary.py that the engine uses."""
-FLAGS: Final = (
-    *("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"),
-    *(("-mno-fma", "-mno-avx512f") if platform.machine() in ("x86_64", "AMD64", "i686") else ()),
-)
-"""gcc 12 fuses operations in spite of -ffp-contract=off if CC has -mfma, -mavx512vl or -march=native.
-
-With -O3 a flight takes four fifths of the time with -O2. -fno-math-errno takes square roots in vectors.
-"""
+FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno")
+"""With -O3 a flight takes four fifths of the time with -O2. -fno-math-errno takes square roots in vectors."""
 LANES: Final = {1: (), 2: ("-DLANES=2",), 4: ("-DLANES=4", "-mavx2")}
 """Flags by number of lanes."""
 LIBRARIES: Final = ("-lm",)

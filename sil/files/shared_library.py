@@ -1,6 +1,7 @@
 """Compile C as a shared library with the host's compiler, cache it, and load it."""
 
 import hashlib
+import platform
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,8 +15,14 @@ from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.errors import CacheError
 from mambo_nmpc.sil.files.cache import build_cached
 
-LIBRARY_FLAGS: Final = ("-fPIC", "-shared")
-"""Flags that make a library of what would be a program."""
+LIBRARY_FLAGS: Final = (
+    *("-fPIC", "-shared"),
+    *(("-mno-fma", "-mno-avx512f") if platform.machine() in ("x86_64", "AMD64", "i686") else ()),
+)
+"""Flags that make a library of what would be a program, without fused operations.
+
+gcc 12 fuses some in spite of -ffp-contract=off if CC has -mfma, -mavx512vl or -march=native.
+"""
 
 _LOADED: Final[dict[str, Any]] = {}
 

@@ -1,5 +1,7 @@
 """Building the C of a controller: once, and with messages that say what is missing."""
 
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +9,10 @@ from pathlib import Path
 import pytest
 
 from mambo_nmpc.codegen.errors import BuildError
+from mambo_nmpc.codegen.settings import presets
+from mambo_nmpc.codegen.settings.controller_toml import with_option
 from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
@@ -29,6 +34,23 @@ def test_two_processes_may_build_the_same_code_at_once(empty_cache: Path) -> Non
     assert [process.returncode for process in both] == [0, 0]
     assert printed[0] == printed[1] != ""
     assert len(list(empty_cache.iterdir())) == 1
+
+
+@pytest.mark.usefixtures("empty_cache")
+@pytest.mark.parametrize("options", [["-mfma"], ["-march=skylake-avx512"]], ids=" ".join)
+def test_no_operation_is_fused(
+    options: list[str], monkeypatch: pytest.MonkeyPatch, empty_cache: Path
+) -> None:
+    """Not even where CC allows it, and gcc 12 does so in spite of -ffp-contract=off."""
+    require("gcc", "gcc")
+    monkeypatch.setenv("CC", shlex.join(["gcc", *options]))
+    settings = with_option(presets.load("mambo"), "code.scalar", "float64", "test")
+    build_library(settings, host_toolchain())
+    (library,) = empty_cache.iterdir()
+    command = [require("objdump", "binutils"), "-d", str(library)]
+    code = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert re.search(r"\bv?mulsd\b", code)
+    assert not re.search(r"\bvf(n?m)(add|sub)", code)
 
 
 def test_without_a_compiler_the_message_says_what_to_install(

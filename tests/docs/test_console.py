@@ -33,7 +33,10 @@ NOT_RUN = {
     "how-to/identify.md": ("needs a Crazyflie",),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
     "how-to/measure.md": ("needs a board, or QEMU with its firmware",),
-    "how-to/pil.md": ("needs a board; tests of their own fly it in QEMU",),
+    "how-to/pil.md": (
+        "needs a board; tests of their own fly it in QEMU",
+        "needs a board; tests of their own fly it in QEMU",
+    ),
     "how-to/platformio.md": ("needs PlatformIO",),
     "how-to/replay.md": ("needs the log of a Crazyflie",),
     "how-to/tune.md": ("it installs",),
