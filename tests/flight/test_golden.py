@@ -34,7 +34,10 @@ def run(*command: str, processor: str) -> str:
     ).stdout
 
 
-@pytest.mark.parametrize("engine", get_args(EngineName))
+@pytest.mark.parametrize(
+    "engine",
+    [pytest.param(name, marks=[] if name == "c" else [pytest.mark.long]) for name in get_args(EngineName)],
+)
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_flights_have_the_committed_digests(processor: str, engine: EngineName) -> None:
     """In every bit of their traces; `python -m tests.support.golden_flights --write` writes them anew."""

@@ -25,7 +25,6 @@ CASES = [
     ("host", "mambo", "float64"),
     ("host", "mambo-1norm", "fixed"),
     ("crazyflie", "mambo-1norm", "float32"),
-    ("mega", "mambo", "fixed"),
 ]
 LONG_CASES = [
     ("host", "mambo-1norm", "float32"),
@@ -33,6 +32,7 @@ LONG_CASES = [
     ("host", "mambo", "fixed"),
     ("crazyflie", "mambo", "fixed"),
     ("crazyflie", "mambo-1norm", "fixed"),
+    ("mega", "mambo", "fixed"),
     ("mega", "mambo-1norm", "fixed"),
 ]
 

@@ -55,6 +55,7 @@ def test_the_firmware_names_the_board_and_measures_the_counted_steps(tmp_path: P
         assert all(row in shown for row in rows)
 
 
+@pytest.mark.long
 def test_a_flight_on_a_known_board_has_the_count_beside_the_cycles(tmp_path: Path) -> None:
     """That of `footprint`; of a board that footprint does not know there is none."""
     board_builder("crazyflie")
