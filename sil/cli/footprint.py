@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from mambo_nmpc.sil.cli.options import (
+    BAUD,
     BOARD_NAMES,
     AsJson,
     Baud,
@@ -37,7 +38,7 @@ def footprint(
     ] = "all",
     optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
     port: PortName = None,
-    baud: Baud = 500000,
+    baud: Baud = BAUD,
     output: OptionalResults = None,
     as_json: AsJson = False,
 ) -> None:

@@ -63,6 +63,8 @@ PortName = Annotated[
     ),
 ]
 Baud = Annotated[int, typer.Option(help="Rate of the serial port.", min=1)]
+BAUD: Final = 500000
+"""The rate of the shipped boards."""
 
 Engine = Annotated[
     EngineName,
@@ -129,7 +131,7 @@ class FlyOptions:
         ),
     ] = None
     port: PortName = None
-    baud: Baud = 500000
+    baud: Baud = BAUD
     real_time: Annotated[
         bool,
         typer.Option(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mambo_nmpc.sil.cli.options import AsJson, Baud, PortName, Scalar, Source, load, load_boards
+from mambo_nmpc.sil.cli.options import BAUD, AsJson, Baud, PortName, Scalar, Source, load, load_boards
 
 
 def same_bits(
@@ -25,7 +25,7 @@ def same_bits(
         ),
     ] = None,
     port: PortName = None,
-    baud: Baud = 500000,
+    baud: Baud = BAUD,
     as_json: AsJson = False,
 ) -> None:
     """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
