@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from mambo_nmpc.codegen.errors import InvalidSettingsError, echo
-from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, spell
+from mambo_nmpc.codegen.settings.key import spell
 from mambo_nmpc.codegen.settings.messages import faults
 from mambo_nmpc.codegen.settings.methods import used_values
 from mambo_nmpc.codegen.settings.model import Settings
@@ -39,7 +39,11 @@ def validate(document: Mapping[str, object], source: str) -> Settings:
     try:
         return Settings.model_validate(document)
     except ValidationError as error:
-        raise InvalidSettingsError(tuple(f"{source}: {fault}" for fault in faults(error, document))) from None
+        from mambo_nmpc.codegen.settings.keys import SETTINGS  # noqa: PLC0415 - slow to import
+
+        raise InvalidSettingsError(
+            tuple(f"{source}: {fault}" for fault in faults(error, document, SETTINGS))
+        ) from None
 
 
 def with_option(settings: Settings, path: str, value: object, source: str = "settings") -> Settings:
@@ -58,6 +62,8 @@ def to_toml(settings: Settings, title: str = _TITLE) -> str:
 
     Keys that the controller does not use are left out.
     """
+    from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS  # noqa: PLC0415 - slow to import
+
     parts = [comment(title), comment("A missing key takes the value of preset table1.")]
     for section, values in used_values(settings).items():
         parts += ["", comment(SECTIONS[section]), f"[{section}]"]

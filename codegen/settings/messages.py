@@ -10,10 +10,10 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from mambo_nmpc.codegen.errors import echo, echo_value
-from mambo_nmpc.codegen.settings.keys import SETTINGS, Form, Key
+from mambo_nmpc.codegen.settings.key import Form, Key
 
 
-def faults(error: ValidationError, document: Mapping[str, object], form: Form = SETTINGS) -> tuple[str, ...]:
+def faults(error: ValidationError, document: Mapping[str, object], form: Form) -> tuple[str, ...]:
     """Return one sentence for each fault of `document`, without the name of its source."""
     return tuple(
         _fault(details, document, form) for details in error.errors(include_url=False, include_context=False)

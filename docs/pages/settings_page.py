@@ -5,7 +5,8 @@ from typing import Final
 
 from docs.pages.tables import code, plain, table
 from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS, Key, spell
+from mambo_nmpc.codegen.settings.key import Key, spell
+from mambo_nmpc.codegen.settings.keys import KEYS, SECTIONS
 from mambo_nmpc.codegen.settings.methods import is_used
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.vehicles.model import form

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
 from mambo_nmpc.codegen.reference import ExactStep, Step
 from mambo_nmpc.codegen.settings import controller_toml, presets
-from mambo_nmpc.codegen.settings.keys import spell
+from mambo_nmpc.codegen.settings.key import spell
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.api.states import DroneState, TargetState
 from mambo_nmpc.sil.controllers.compiled import CompiledController

@@ -10,9 +10,6 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import Final
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
 LINE_PERIOD_S: Final = 30.0
 """Time from one line to the next where stderr is no terminal."""
 
@@ -100,6 +97,9 @@ def _shown(bar: Bar) -> Iterator[Bar]:
 @contextmanager
 def _moving(bar: Bar) -> Iterator[None]:
     """Draw `bar` on the terminal; it runs to and fro while its share is not known."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
     columns = TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn()
     console, above = Console(stderr=True), sys.stdout.isatty()  # results go above the bar, or to their file
     with Progress(*columns, console=console, transient=True, redirect_stdout=above) as progress:

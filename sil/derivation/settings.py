@@ -10,7 +10,7 @@ from typing import Final
 
 from mambo_nmpc.codegen import __version__
 from mambo_nmpc.codegen.settings.controller_toml import comment
-from mambo_nmpc.codegen.settings.keys import spell
+from mambo_nmpc.codegen.settings.key import spell
 from mambo_nmpc.sil.derivation.response import fit_steps
 from mambo_nmpc.sil.vehicles.model import VehicleFile
 from mambo_nmpc.sil.vehicles.sections import FirstOrderAttitude, MamboSensors, MocapSensors, NoSensors

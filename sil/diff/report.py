@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterator
 
 from mambo_nmpc.codegen.errors import echo
-from mambo_nmpc.codegen.settings.keys import spell
+from mambo_nmpc.codegen.settings.key import spell
 from mambo_nmpc.sil.diff.flights import SETTLED_SHARE, STEP_M
 from mambo_nmpc.sil.diff.law import AXES
 from mambo_nmpc.sil.diff.record import ControllerFigures, DiffSummary, SettingDifference

@@ -23,7 +23,7 @@ from pydantic import (
 
 from mambo_nmpc.codegen.errors import echo
 from mambo_nmpc.codegen.plain_file import read_plain_file
-from mambo_nmpc.codegen.settings.keys import spell
+from mambo_nmpc.codegen.settings.key import spell
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.errors import FlightError, ScenarioError
 from mambo_nmpc.sil.flight.loop import Flight, Offset

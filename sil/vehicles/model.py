@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_nmpc.codegen.gravity import GRAVITY_M_S2
-from mambo_nmpc.codegen.settings.keys import Form, Key, key_of, spell
+from mambo_nmpc.codegen.settings.key import Form, Key, key_of, spell
 from mambo_nmpc.sil.vehicles.sections import (
     AltitudeGains,
     AnyAttitude,

@@ -17,7 +17,8 @@ from mambo_nmpc.codegen.errors import (
     echo,
 )
 from mambo_nmpc.codegen.settings import controller_toml
-from mambo_nmpc.codegen.settings.keys import KEYS, Key, spell
+from mambo_nmpc.codegen.settings.key import Key, spell
+from mambo_nmpc.codegen.settings.keys import KEYS
 from mambo_nmpc.codegen.settings.methods import is_used
 from mambo_nmpc.codegen.settings.model import Settings
 from tests.support.strategies import (
