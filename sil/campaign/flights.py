@@ -16,15 +16,14 @@ from mambo_nmpc.sil.campaign.file import Entrant, scenario
 from mambo_nmpc.sil.campaign.parameters import Draw
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import pd_controller
+from mambo_nmpc.sil.engine.evaluation import evaluate
 from mambo_nmpc.sil.engine.simulate import fly
 from mambo_nmpc.sil.errors import WorkerError
-from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.loop import Flight, PositionController
-from mambo_nmpc.sil.flight.metrics import Metrics, measure, saturated_share
+from mambo_nmpc.sil.flight.metrics import Metrics
 from mambo_nmpc.sil.flight.names import EngineName
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
-from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
-from mambo_nmpc.sil.plant.link import NOT_CALLED
+from mambo_nmpc.sil.flight.traces import Trace
 from mambo_nmpc.sil.vehicles.model import VehicleFile
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
@@ -85,9 +84,8 @@ def fly_scenarios(
         flight = flight_at(entrant.settings.horizon.update_period_s)
         report = partial(_report_part, number, len(entrants))
         trace = fly(flight, _controller(entrant, flight), report, engine=engine)
-        for key, values in _evaluate(
-            trace, Design(entrant.settings).tilt_limit_rad, scenarios[0].vehicle
-        ).items():
+        limit_rad = Design(entrant.settings).tilt_limit_rad
+        for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle, engine).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
     report_share(0.0)
@@ -106,18 +104,15 @@ def _controller(entrant: Entrant, flight: Flight) -> PositionController:
         return CompiledController(entrant.settings, flight.flights)
 
 
-def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> dict[str, list[Any]]:
+def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile, engine: EngineName) -> dict[str, list[Any]]:
     """Return the results of n flights of a drone by key, each a list of n."""
-    refused = (trace.status != 0) & (trace.status != NOT_CALLED)
+    results = evaluate(trace, limit_rad, drone, engine=engine)
     found: dict[str, list[Any]] = {
-        CRASHED: detect_crashes(trace, drone).astype(int).tolist(),
-        REFUSED: refused.sum(axis=0).tolist(),
-        SATURATED: saturated_share(trace.command_rad, limit_rad).tolist(),
+        CRASHED: results.crashed.astype(int).tolist(),
+        REFUSED: results.refused.tolist(),
+        SATURATED: results.saturated_share.tolist(),
     }
-    views = [("", INDICES, trace)]
-    if isinstance(trace, SensedTrace):
-        views.append((SEEN, SEEN_INDICES, trace.as_seen()))
-    for prefix, names, view in views:
-        metrics = measure(view)
-        found |= {prefix + name: getattr(metrics, name).tolist() for name in names}
+    for prefix, names, metrics in (("", INDICES, results.metrics), (SEEN, SEEN_INDICES, results.seen)):
+        if metrics is not None:
+            found |= {prefix + name: getattr(metrics, name).tolist() for name in names}
     return found | {DIGEST: [trace.digest(flight) for flight in range(trace.flights)]}

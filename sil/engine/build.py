@@ -11,7 +11,7 @@ from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.files.shared_library import LibrarySource, load_shared_library
 from mambo_nmpc.sil.plant import elementary
 
-SOURCES: Final = ("faults.c", "loop.c", "pd.c")
+SOURCES: Final = ("evaluation.c", "faults.c", "loop.c", "pd.c")
 HEADERS: Final = (
     "cascade.h",
     "elementary.h",

@@ -177,6 +177,30 @@ void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *fl
                 const double *times_s, const double *targets, const engine_draws_t *draws,
                 engine_controller_t controller, void *self, int64_t stride, const engine_trace_t *trace);
 
+/* How a trace is evaluated: see sil/flight/evaluation.py. */
+typedef struct {
+    int64_t flights;
+    int64_t updates;
+    int64_t first_update;     /* at t >= 0: metrics and crashes count from there */
+    int64_t not_called;       /* the status of an update for which the controller was not called */
+    double limit_rad;         /* a command of this size is saturated */
+    double least_level;       /* cosine of the tilt beyond which a drone has crashed */
+} engine_evaluation_t;
+
+/* Of each flight: whether it crashed, its refused updates and saturated commands, and its metrics (flights, 9) as
+ * flown and, with sensors, as seen. */
+typedef struct {
+    int64_t *crashed;
+    int64_t *refused;
+    int64_t *saturated;
+    double *metrics;
+    double *seen_metrics;
+} engine_results_t;
+
+/* Evaluate a group of flights with their targets (flights, updates, 2); the first has index `index`. */
+void engine_evaluate(const engine_evaluation_t *evaluation, int64_t index, const double *times_s,
+                     const double *targets, const engine_trace_t *trace, const engine_results_t *results);
+
 /* The stock PD position controller; it has no state. Its constants: see engine_pd_t. */
 typedef struct {
     double position_p_rad_m;

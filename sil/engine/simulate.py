@@ -62,15 +62,7 @@ def fly_compiled(
     ticks = len(times_s) * flight.ticks_per_update
     draws = _Buffers(flight, lanes, len(times_s), ticks)
     called = native(engine, controller)
-    record = ffi.new(
-        "engine_trace_t *",
-        {
-            name: pointer(
-                "int64_t *" if name == "status" else "double *", _by_flight(getattr(trace, name, None))
-            )
-            for name, _ in ffi.typeof("engine_trace_t").fields
-        },
-    )
+    record = trace_record(trace)
     seeds = flight.seeds or (0,) * flight.flights
     for index, group in zip(range(0, flight.flights, lanes), groups, strict=True):
         engine.engine_fly(
@@ -88,6 +80,19 @@ def fly_compiled(
         if progress is not None:
             progress(min(index + lanes, flight.flights) / flight.flights)
     return trace
+
+
+def trace_record(trace: Trace) -> Any:
+    """Return the engine_trace_t of a trace whose samples of a flight are contiguous; the caller keeps it."""
+    return ffi.new(
+        "engine_trace_t *",
+        {
+            name: pointer(
+                "int64_t *" if name == "status" else "double *", _by_flight(getattr(trace, name, None))
+            )
+            for name, _ in ffi.typeof("engine_trace_t").fields
+        },
+    )
 
 
 def _by_flight(array: Any) -> Any:

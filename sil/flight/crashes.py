@@ -1,6 +1,7 @@
 """Crashes: a drone tilted too far or on the ground, which the simulation lets fly on."""
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -33,14 +34,14 @@ class Crash(BaseModel):
 def detect_crashes(trace: Trace, drone: VehicleFile = NOMINAL) -> np.ndarray[Any, np.dtype[np.bool_]]:
     """Return which flights (n,) were lost, tilted beyond `crash_tilt_rad` or on the ground after t = 0."""
     level, height_m = _level_and_height(trace)
-    aloft = (level > _least_level(drone)) & (height_m > 0.0)
+    aloft = (level > least_level(drone)) & (height_m > 0.0)
     return np.asarray(~aloft.all(axis=0))
 
 
 def first_crash(trace: Trace, flight: int = 0, drone: VehicleFile = NOMINAL) -> Crash | None:
     """Return when and how a flight first crashed after t = 0; None if it did not, or was lost without."""
     level, height_m = (values[:, flight] for values in _level_and_height(trace))
-    tilted, grounded = level <= _least_level(drone), height_m <= 0.0
+    tilted, grounded = level <= least_level(drone), height_m <= 0.0
     crashed = tilted | grounded
     if not crashed.any():
         return None
@@ -54,7 +55,8 @@ def first_crash(trace: Trace, flight: int = 0, drone: VehicleFile = NOMINAL) -> 
     return Crash(time_s=float(trace.time_s[trace.time_s >= 0.0][first]), how=how)
 
 
-def _least_level(drone: VehicleFile) -> float:
+@lru_cache
+def least_level(drone: VehicleFile) -> float:
     """Return the cosine of the tilt beyond which a drone crashes."""
     return float(sine_cosine(crash_tilt_rad(drone))[1])
 

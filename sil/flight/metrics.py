@@ -92,9 +92,5 @@ def _integral(values: FloatArray, time_s: FloatArray) -> FloatArray:
 
 
 def _sum(values: FloatArray) -> FloatArray:
-    """Return the sums (n,) of values (k, n) over time.
-
-    NumPy's order of additions depends on the memory layout. With time as the contiguous axis a flight in a
-    batch has the same bits as alone.
-    """
-    return np.asarray(np.ascontiguousarray(values.T).sum(axis=-1))
+    """Return the sums (n,) of values (k, n) in the order of time; the order of NumPy's `sum` varies."""
+    return np.asarray(np.add.accumulate(values, axis=0)[-1])

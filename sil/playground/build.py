@@ -28,6 +28,8 @@ CONTROLLER_CALLS: Final = ("nmpc_batch_init", "nmpc_batch_instance_bytes")
 """What it calls besides in one with generated C; with a 1-norm also nmpc_host_set_weights."""
 
 _FLAGS: Final = (*COMPILE_FLAGS, "--target=wasm32", "-ffreestanding", "-nostdlib", "-Wl,--no-entry")
+_UNUSED: Final = ("evaluation.c", "faults.c")
+"""No page evaluates flights, or injects faults, whose C wants the standard library."""
 _INCLUDES: Final = ("-I.", "-Iinclude", "-Isrc")
 
 
@@ -62,11 +64,8 @@ def _compiler() -> Toolchain:
 
 
 def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
-    """Return the C by path, the functions that the page calls, and the step of the controller.
-
-    No page injects faults, whose C wants the standard library.
-    """
-    engine = {path: text for path, text in texts().items() if path != "faults.c"}
+    """Return the C by path, the functions that the page calls, and the step of the controller."""
+    engine = {path: text for path, text in texts().items() if path not in _UNUSED}
     files = engine | {
         "playground.c": _text("playground", "playground.c"),
         "math.h": _text("playground", "math.h"),

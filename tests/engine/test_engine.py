@@ -17,6 +17,7 @@ from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import PdController, PdFeedForwardController, pd_controller
 from mambo_nmpc.sil.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
+from mambo_nmpc.sil.engine.evaluation import evaluate_compiled
 from mambo_nmpc.sil.engine.simulate import fly, fly_compiled
 from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
 from mambo_nmpc.sil.flight import loop
@@ -24,8 +25,10 @@ from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.names import PD_NAMES, SENSORS_OF
 from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
 from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.plant.link import Link
 from tests.support.engines import lanes_here
+from tests.support.evaluations import LIMIT_RAD, bits, traces
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES, TRUTH, drones, scenarios
 from tests.support.tools import require, toolchain
@@ -82,8 +85,8 @@ def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
 
 
 def digests(engine: Any) -> list[str]:
-    """Fly every batch in `engine`; return the digests of all flights."""
-    found = []
+    """Fly every batch in `engine`; return the digests of all flights, and evaluations of any traces."""
+    found = [bits(evaluate_compiled(engine, trace, LIMIT_RAD, NOMINAL)) for trace in traces()]
     for batch in BATCHES.values():
         flight = flight_of(batch, PERIOD_S)
         for name in PD_NAMES:

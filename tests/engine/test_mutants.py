@@ -20,14 +20,18 @@ from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.sil.controllers.compiled import CompiledController
 from mambo_nmpc.sil.controllers.pd import pd_controller
 from mambo_nmpc.sil.engine.build import HEADERS, SOURCES, ffi, texts
+from mambo_nmpc.sil.engine.evaluation import evaluate_compiled
 from mambo_nmpc.sil.engine.simulate import fly_compiled
 from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.flight.names import PD_NAMES
 from mambo_nmpc.sil.flight.scenario import flight_of
 from mambo_nmpc.sil.flight.trajectories import Hover
+from mambo_nmpc.sil.plant.airframe import NOMINAL
 from mambo_nmpc.sil.sensors.instruments import NOISES, Sensors
 from tests.support.engine_reasons import reason
 from tests.support.engines import TICKS, build, estimates, injected, tabulate, truths
+from tests.support.evaluations import LIMIT_RAD, bits
+from tests.support.evaluations import traces as evaluated
 from tests.support.faults import (
     CHANGES,
     FAULTS,
@@ -71,6 +75,7 @@ def digests(path: Path) -> list[str]:
     blocks = [tabulate(path), estimates(path, sensed, truths(), draws)]
     blocks += [injected(path, fault, any_inputs()) for fault in SHOWN]
     found += [str(reweighted.answers), str(engine.engine_fastest_lanes())]
+    found += [bits(evaluate_compiled(engine, each, LIMIT_RAD, NOMINAL)) for each in evaluated()]
     return [*found, *(hashlib.sha256(block.tobytes()).hexdigest() for block in blocks)]
 
 

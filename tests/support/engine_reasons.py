@@ -16,6 +16,15 @@ _CLIP: Final = "return choose(value < low, splat(low), choose(value > high, spla
 _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no flight shows"
 
 REASONS: Final[Mapping[Key, str]] = {
+    **{("evaluation.c", "for (i = 0; i < 9; i++) {", change): _BESIDE for change in ("< -> <=", "9 -> 10")},
+    **{
+        (
+            "evaluation.c",
+            "const int64_t flight = ((index + lane) < evaluation->flights) ? (index + lane) : index;",
+            change,
+        ): "a lane without a flight reads beside the arrays, and its results are not written"
+        for change in ("+ -> -", "< -> <=")
+    },
     **{
         ("elementary.h", "#define COUNT(array) ((int)(sizeof(array) / sizeof((array)[0])))", change): (
             "every element has the same size"
