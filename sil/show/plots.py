@@ -35,8 +35,8 @@ class PlainLogFormatter(LogFormatter):
 def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """Write a figure as PNG and SVG."""
     png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
+    _lay_out(figure)
     figure.savefig(png, metadata={"Software": None})
-    figure.set_layout_engine("none")  # keep the positions instead of computing them again
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     svg.write_text(_shorten_numbers(text.getvalue(), 2), "utf-8")
@@ -45,6 +45,7 @@ def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
 
 def inline(figure: Figure, description: str) -> Markup:
     """Return a figure as an SVG element: transparent, with the page's font and colours and unique ids."""
+    _lay_out(figure)
     text = io.StringIO()
     figure.savefig(text, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     svg = text.getvalue()
@@ -59,6 +60,14 @@ def inline(figure: Figure, description: str) -> Markup:
     svg = re.sub(r"(?<=: )#[0-9a-f]{6}", lambda colour: _VARIABLES.get(colour[0], colour[0]), svg)
     role = Markup('<svg role="img" aria-label="{}"').format(description)
     return Markup(_with_own_ids(svg).replace("<svg", role, 1))
+
+
+def _lay_out(figure: Figure) -> None:
+    """Compute the positions once; with a layout engine matplotlib draws everything twice for each file."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def _shorten_numbers(svg: str, decimals: int) -> str:
