@@ -18,6 +18,10 @@ _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no 
 REASONS: Final[Mapping[Key, str]] = {
     **{("evaluation.c", "for (i = 0; i < 9; i++) {", change): _BESIDE for change in ("< -> <=", "9 -> 10")},
     **{
+        ("evaluation.c", "for (i = 0; i < 4; i++) {", change): "writes what the mean square then overwrites"
+        for change in ("< -> <=", "4 -> 5")
+    },
+    **{
         (
             "evaluation.c",
             "const int64_t flight = ((index + lane) < evaluation->flights) ? (index + lane) : index;",
