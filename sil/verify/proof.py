@@ -30,27 +30,46 @@ class Property:
     text: str
 
 
+@dataclass(frozen=True)
+class Report:
+    """What Frama-C found from one entry function: all properties, and the number of statements reached."""
+
+    properties: tuple[Property, ...]
+    statements: int
+
+
 def check(subject: Subject) -> Result:
     """Prove that no run-time error occurs and that the driver's promises hold; every alarm is a fault."""
     absent = missing("frama-c", "frama-c-base")
     if absent:
         return incomplete(absent)
-    properties: list[Property] = []
-    statements = 0
-    fixed = subject.settings.code.scalar == "fixed"
+    reports = []
     for name in _proofs(subject):
-        report = subject.folder.resolve() / f"{name}.csv"
-        try:
-            done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
-        except subprocess.TimeoutExpired:
-            return incomplete(f"frama-c did not end within {TIME_LIMIT_S:g} s")
-        log = done.stdout + done.stderr
-        (subject.folder / f"{name}.txt").write_text(log, "utf-8")
-        if done.returncode != 0 or not report.is_file():
-            return failed(f"frama-c failed: {_complaint(log)}")
-        properties += read_properties(report)
-        statements += number(log, r"(\d+) statements reached")
+        report = prove(subject, name)
+        if isinstance(report, Result):
+            return report
+        reports.append(report)
+    return judge(subject, reports)
 
+
+def prove(subject: Subject, name: str) -> Report | Result:
+    """Run Frama-C from the entry function `name`; return a result if it ends without a report."""
+    report = subject.folder.resolve() / f"{name}.csv"
+    try:
+        done = run([*command(subject, name), "-then", "-report-csv", str(report)], subject.bundle)
+    except subprocess.TimeoutExpired:
+        return incomplete(f"frama-c did not end within {TIME_LIMIT_S:g} s")
+    log = done.stdout + done.stderr
+    (subject.folder / f"{name}.txt").write_text(log, "utf-8")
+    if done.returncode != 0 or not report.is_file():
+        return failed(f"frama-c failed: {_complaint(log)}")
+    return Report(tuple(read_properties(report)), number(log, r"(\d+) statements reached"))
+
+
+def judge(subject: Subject, reports: Sequence[Report]) -> Result:
+    """Return the result of all proofs of a controller."""
+    properties = [one for report in reports for one in report.properties]
+    statements = sum(report.statements for report in reports)
     alarms = unproven(properties)
     proven = len({one.place for one in properties if one.kind == _PROMISE and one.status == "Valid"})
     promised = _driver(subject).read_text("utf-8").count("/*@ assert ")
@@ -64,6 +83,7 @@ def check(subject: Subject) -> Result:
         return failed(_alarm_text(alarms), figures)
     if proven < promised:
         return failed(f"{promised - proven} of {promised} promises were not reached", figures)
+    fixed = subject.settings.code.scalar == "fixed"
     return passed(
         f"no alarm in {statements} statements for any inputs and any order of calls: no run-time "
         f"error, {'no overflow' if fixed else 'no NaN or infinity stored'}, no command beyond the tilt limit",

@@ -10,38 +10,108 @@ from mambo_nmpc.codegen.settings import presets
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.proof import check, read_properties
+from tests.support import headings
+from tests.support.alarms import Alarm, Fault, runs, unnoticed
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
 STEP, OPTIMIZER, COST, MATH = "src/nmpc.c", "src/nmpc_optimizer.c", "src/nmpc_cost.c", "src/nmpc_math.h"
-HARMS = {
-    "NaN passes a range check": Harm(
-        MATH, r"\(value >= minimum\);\n(.*)\(value <= maximum\)", r"!(value < minimum);\n\1!(value > maximum)"
+SINE, PREDICTOR, DRIVER = "src/nmpc_math.c", "src/nmpc_predictor.c", "proof/nmpc_proof.c"
+ROLL = Alarm(DRIVER, "roll_is_within_the_limit", "user assertion")
+UNINITIALISED = Harm(STEP, r"    self->cost = \(nmpc_sum_t\)0;\n", "")
+UNCHECKED = Harm(STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1")
+UNLIMITED = Harm(OPTIMIZER, r"nmpc_larger\((move_rad - [^,]*), -NMPC_TILT_LIMIT_RAD\)", r"\1")
+FAULTS = {
+    "NaN passes a range check": Fault(
+        "refuse_nan",
+        Harm(
+            MATH,
+            r"\(value >= minimum\);\n(.*)\(value <= maximum\)",
+            r"!(value < minimum);\n\1!(value > maximum)",
+        ),
+        Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite"),
     ),
-    "infinity passes a range check": Harm(MATH, r"\(value <= maximum\)", "1"),
-    "a refused call writes": Harm(STEP, r"    if \(\(state != NULL\)", r"    self->converged = 0U;\n\g<0>"),
-    "the heading goes unchecked": Harm(STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1"),
-    "a weight goes unchecked": Harm(STEP, r"nmpc_between\(weights->effort, [^;]*?LIMIT\)", "1"),
-    "the plan leaves the tilt limit": Harm(
-        OPTIMIZER, r"nmpc_larger\((move_rad - [^,]*), -NMPC_TILT_LIMIT_RAD\)", r"\1"
+    "a refused call writes": Fault(
+        "refuse_nan",
+        Harm(STEP, r"    if \(\(state != NULL\)", r"    self->converged = 0U;\n\g<0>"),
+        Alarm(STEP, "self->converged = 0U;", "mem_access"),
     ),
-    "a reset is not clamped": Harm(
-        STEP, r"nmpc_clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)", "command->pitch_rad"
+    "the heading goes unchecked": Fault(
+        "refuse_nan", UNCHECKED, Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite")
     ),
-    "a null pointer is followed": Harm(STEP, r"\(state != NULL\) && ", ""),
-    "the cost starts uninitialised": Harm(STEP, r"    self->cost = \(nmpc_sum_t\)0;\n", ""),
-    "one move too many": Harm(STEP, r"k < NMPC_MOVES", "k <= NMPC_MOVES"),
-    "a table is read past its end": Harm(
-        COST,
-        r"\(NMPC_LAST_STEP - 1U\) - nmpc_lowest_set_bit",
-        "(NMPC_LAST_STEP + 1U) - nmpc_lowest_set_bit",
+    "a weight goes unchecked": Fault(
+        "refuse_nan",
+        Harm(STEP, r"nmpc_between\(weights->effort, [^;]*?LIMIT\)", "1"),
+        Alarm(STEP, "self->weights = *weights;", "mem_access"),
     ),
-    "a bad input leaves the command unset": Harm(
-        STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""
+    "a null pointer is followed": Fault(
+        "refuse_nan",
+        Harm(STEP, r"\(state != NULL\) && ", ""),
+        Alarm(STEP, "nmpc_within(position_m[0]", "mem_access"),
+    ),
+    "infinity passes a range check": Fault(
+        "take_numbers",
+        Harm(MATH, r"\(value <= maximum\)", "1"),
+        Alarm(SINE, "(int)(quarter_turns", "float_to_int"),
+    ),
+    "a bad input leaves the command unset": Fault(
+        "take_numbers",
+        Harm(STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""),
+        ROLL,
+    ),
+    "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
+    "the cost starts uninitialised": Fault(
+        "take_numbers", UNINITIALISED, Alarm(DRIVER, "(void)stored[i];", "initialization")
+    ),
+    "a reset is not clamped": Fault(
+        "take_numbers",
+        Harm(STEP, r"nmpc_clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)", "command->pitch_rad"),
+        Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
+    ),
+    "one move too many": Fault(
+        "take_numbers",
+        Harm(STEP, r"k < NMPC_MOVES", "k <= NMPC_MOVES"),
+        Alarm(STEP, "self->plan_rad[k] = self->command_rad", "index_bound"),
+    ),
+    "a table is read past its end": Fault(
+        "take_numbers",
+        Harm(
+            COST,
+            r"\(NMPC_LAST_STEP - 1U\) - nmpc_lowest_set_bit",
+            "(NMPC_LAST_STEP + 1U) - nmpc_lowest_set_bit",
+        ),
+        Alarm(COST, "nmpc_predictor_response_sum[i][k]", "index_bound"),
     ),
 }
+AT_ONCE = (
+    ("one move too many", "a table is read past its end"),
+    ("infinity passes a range check", "a bad input leaves the command unset"),
+)
+"""Faults that one proof shows at once; each of the others has a proof of its own."""
+
+FIXED_FAULTS = {
+    "the heading goes unchecked": Fault(
+        "take_numbers",
+        UNCHECKED,
+        Alarm(PREDICTOR, "nmpc_sine_cosine(", "precondition of nmpc_sine_cosine"),
+    ),
+    "errors have a bit too many": Fault(
+        "take_numbers",
+        Harm("include/nmpc_config.h", r"(#define NMPC_ERROR_BITS) \d+", r"\1 NMPC_ACCELERATION_BITS - 1"),
+        Alarm(MATH, "NMPC_ACCELERATION_BITS - NMPC_ERROR_BITS", "shift"),
+    ),
+    "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
+    "a rest that does not fit": Fault(
+        "turn_everywhere",
+        Harm(SINE, r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"),
+        Alarm(SINE, "NMPC_ROUNDED(fine_rad, 8)", "signed_downcast"),
+    ),
+}
+FIXED_AT_ONCE = (("the heading goes unchecked", "errors have a bit too many"),)
+FEW_HEADINGS = Harm(DRIVER, r"quadrant = -653; quadrant <= 653", "quadrant = 0; quadrant <= 0")
+"""An alarm for one heading is an alarm for all."""
 
 
 @pytest.fixture(autouse=True)
@@ -60,33 +130,30 @@ def of_scalar(name: str, scalar: str) -> Settings:
 def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     """Every promise of the driver holds, and what Frama-C said stays as evidence."""
     its = subject(of_scalar(name, scalar), tmp_path)
-    result = check(its)
+    result = headings.check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     promises = 4 if scalar == "fixed" else 8 if its.settings.cost.norm == "quadratic" else 6
     assert result.figures["promises"] == result.figures["promises_proven"] == promises
-    for proof in proofs(scalar, its.settings.cost.norm):
+    for proof in {*proofs(scalar, its.settings.cost.norm)} - {headings.HEADINGS}:
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
 
 
-FIXED_HARMS = {
-    "the heading goes unchecked": HARMS["the heading goes unchecked"],
-    "the plan leaves the tilt limit": HARMS["the plan leaves the tilt limit"],
-    "a rest that does not fit": Harm(
-        "src/nmpc_math.c", r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"
-    ),
-    "errors have a bit too many": Harm(
-        "include/nmpc_config.h", r"(#define NMPC_ERROR_BITS) \d+", r"\1 NMPC_ACCELERATION_BITS - 1"
-    ),
-}
+def of_few_steps(settings: Settings) -> Settings:
+    """Return settings of the same C with a short horizon, which Frama-C interprets in a second."""
+    document = settings.model_dump()
+    document["horizon"] |= {"prediction": 3, "control": 1}
+    document["optimizer"] |= {"iterations": 2}
+    return Settings.model_validate(document)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("harm", FIXED_HARMS)
-def test_a_fault_of_fixed_point_raises_an_alarm(harm: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("names", runs(FIXED_FAULTS, FIXED_AT_ONCE), ids=", ".join)
+def test_a_fault_of_fixed_point_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None:
     """What overflows in the middle of a step is found as what a caller hands in."""
-    result = check(subject(of_scalar("mambo-1norm", "fixed"), tmp_path, FIXED_HARMS[harm]))
-    assert result.outcome is CheckOutcome.FAILED, result.evidence
+    settings = of_few_steps(of_scalar("mambo-1norm", "fixed"))
+    faults = {name: FIXED_FAULTS[name] for name in names}
+    assert unnoticed(settings, tmp_path, faults, FEW_HEADINGS) == []
 
 
 @pytest.mark.long
@@ -94,17 +161,26 @@ def test_a_fault_of_fixed_point_raises_an_alarm(harm: str, tmp_path: Path) -> No
 def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
     """Horizons, variants, warm starts and limits change; the options of the proof do not."""
     scalar = ("float32", "float64", "fixed")[index % 3]
-    result = check(subject(settings_case(index, scalar), tmp_path))
+    result = headings.check(subject(settings_case(index, scalar), tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
 
 @pytest.mark.parametrize(
-    "harm",
-    [pytest.param(harm, marks=[] if index == 0 else [pytest.mark.long]) for index, harm in enumerate(HARMS)],
+    "names",
+    [
+        pytest.param(names, marks=[] if FAULTS[names[0]].entry == "refuse_nan" else [pytest.mark.long])
+        for names in runs(FAULTS, AT_ONCE)
+    ],
+    ids=", ".join,
 )
-def test_a_fault_raises_an_alarm(harm: str, tmp_path: Path) -> None:
+def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None:
     """Each is what a slip of the hand would make, and none goes through."""
-    result = check(subject(ONE_NORM, tmp_path, HARMS[harm]))
+    assert unnoticed(of_few_steps(ONE_NORM), tmp_path, {name: FAULTS[name] for name in names}) == []
+
+
+def test_an_alarm_fails_the_check_and_is_named_by_file_and_line(tmp_path: Path) -> None:
+    """The evidence has the first alarms, the figures all."""
+    result = check(subject(of_few_steps(ONE_NORM), tmp_path, UNINITIALISED))
     assert result.outcome is CheckOutcome.FAILED
     (alarm, *_) = result.figures["alarms"]
     assert alarm["place"] in result.evidence
@@ -113,7 +189,7 @@ def test_a_fault_raises_an_alarm(harm: str, tmp_path: Path) -> None:
 
 def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
     """No report is no proof."""
-    result = check(subject(ONE_NORM, tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
+    result = check(subject(of_few_steps(ONE_NORM), tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
     assert result.outcome is CheckOutcome.FAILED
     assert "frama-c failed" in result.evidence
 
@@ -127,18 +203,17 @@ def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
 )
 def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: Path) -> None:
     """A driver that ends before its promises, or leaves one out, proves nothing."""
-    result = check(subject(ONE_NORM, tmp_path, Harm("proof/nmpc_proof.c", right, wrong)))
+    result = check(subject(of_few_steps(ONE_NORM), tmp_path, Harm("proof/nmpc_proof.c", right, wrong)))
     assert result.outcome is CheckOutcome.FAILED
     assert "Dead" in result.evidence or "not reached" in result.evidence
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("harm", [None, "the heading goes unchecked"])
+@pytest.mark.parametrize("harm", [None, UNCHECKED], ids=["right", "wrong"])
 @pytest.mark.parametrize("amalgamate", [False, True])
-def test_make_proof_comes_to_the_same_verdict(harm: str | None, tmp_path: Path, *, amalgamate: bool) -> None:
+def test_make_proof_comes_to_the_same_verdict(harm: Harm | None, tmp_path: Path, *, amalgamate: bool) -> None:
     """The command of the bundle, in both layouts, ends in an error unless everything is proven."""
     require("make", "make")
-    harms = [HARMS[harm]] if harm else []
-    its = subject(ONE_NORM, tmp_path, *harms, amalgamate=amalgamate)
+    its = subject(of_few_steps(ONE_NORM), tmp_path, *([harm] if harm else []), amalgamate=amalgamate)
     done = subprocess.run(["make", "proof"], cwd=its.bundle, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == (harm is None), done.stdout
