@@ -18,7 +18,7 @@ from mambo_nmpc.sil.flight.loop import Flight
 from mambo_nmpc.sil.plant.arrays import FloatArray
 from tests.support.tools import toolchain
 
-_BLOCKS: Final = """\
+BLOCKS: Final = """\
 #include <string.h>
 
 #include "cascade.h"
@@ -247,7 +247,7 @@ def build(files: Mapping[str, str], folder: Path, *flags: str, lanes: int = 1) -
     Raises BuildError.
     """
     place = Path(mkdtemp(dir=folder))
-    for name, text in (dict(files) | {"blocks.c": _BLOCKS}).items():
+    for name, text in (dict(files) | {"blocks.c": BLOCKS}).items():
         (place / name).write_text(text, "utf-8")
     sources = [*SOURCES, "blocks.c"]
     options = [*FLAGS, *LANES[lanes], *LIBRARY_FLAGS, *flags]
