@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from mambo_nmpc.sil.identify.signals import FlightLog, Signal
 from mambo_nmpc.sil.identify.ulog import TRAJECTORY
@@ -79,53 +80,58 @@ def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str,
     late = [round(delay / TICK_S) for delay in truth.delay_s]
     queue = [np.zeros((2, n)) for _ in range(max(late) + 1)]
     phases = random.uniform(0.0, 2.0 * np.pi, (len(SINES_HZ), 2, n))
+    times_s = TICKS * TICK_S * np.arange(rows, dtype=np.float64)
+    draws = random.normal(size=(rows, 8 + 2 * TICKS, n))
+    yaw = flown.yaw_rad + flown.yaw_rate_rad_s * times_s
+    sines, cosines = np.sin(yaw), np.cos(yaw)
+    angles = 2.0 * np.pi * np.multiply.outer(times_s, SINES_HZ)[..., np.newaxis, np.newaxis] + phases
+    waves = flown.sines_rad * np.sqrt(2.0 / len(SINES_HZ)) * np.sin(angles).sum(axis=1)
+    seen_errors = _correlated(0.9, 0.44 * flown.estimate_noise * NOISE * draws[:, :4])
+    slow = _correlated(0.967, flown.slow_rad * np.sqrt(1.0 - 0.967**2) * draws[:, 4:6])
+    error = slow + flown.white_rad * draws[:, 6:8]
+    gusts = flown.gusts_m_s2 * np.sqrt(TICK_S) * draws[:, 8:]
+    eight = _eight(times_s, flown)
     tilt, position, velocity, gust = (np.zeros((2, n)) for _ in range(4))
-    seen_error, slow = np.zeros((4, n)), np.zeros((2, n))
-    logged: list[Array] = []
-    for row in range(rows):
-        time_s = row * TICKS * TICK_S
-        yaw = flown.yaw_rad + flown.yaw_rate_rad_s * time_s
-        sine, cosine = np.sin(yaw), np.cos(yaw)
-        seen_error = 0.9 * seen_error + 0.44 * random.normal(size=(4, n)) * flown.estimate_noise * NOISE
-        target, speed, pull = _eight(time_s, flown)
-        wanted = 2.0 * (target - position - seen_error[:2]) + 1.8 * (speed - velocity - seen_error[2:]) + pull
-        ahead, right = cosine * wanted[0] + sine * wanted[1], cosine * wanted[1] - sine * wanted[0]
-        command = np.clip(np.stack([right, -ahead]) / G, -0.35, 0.35)
-        waves = [
-            np.sin(2.0 * np.pi * hz * time_s + phase) for hz, phase in zip(SINES_HZ, phases, strict=True)
-        ]
-        command = command + flown.sines_rad * np.sqrt(2.0 / len(SINES_HZ)) * np.sum(waves, axis=0)
-        slow = 0.967 * slow + flown.slow_rad * np.sqrt(1.0 - 0.967**2) * random.normal(size=(2, n))
-        measured = tilt + slow + flown.white_rad * random.normal(size=(2, n))
-        seen_v = velocity + seen_error[2:]
-        seen_p = position + seen_error[:2]
-        logged.append(np.stack([*command, *measured, np.full(n, yaw), *seen_p, *seen_v]))
-        for _ in range(TICKS):
-            queue = [command, *queue[:-1]]
+    table = np.empty((rows, len(NAMES), n))
+    table[:, 4] = yaw[:, np.newaxis]
+    command, push = np.empty((2, n)), np.empty((2, n))
+    pull_m_s2 = truth.acceleration_per_tilt * G
+    for row, (sine, cosine) in enumerate(zip(sines.tolist(), cosines.tolist(), strict=True)):
+        target, speed, pull = eight[row]
+        seen_p, seen_v = position + seen_errors[row, :2], velocity + seen_errors[row, 2:]
+        wanted = 2.0 * (target - seen_p) + 1.8 * (speed - seen_v) + pull
+        command[0], command[1] = cosine * wanted[1] - sine * wanted[0], -cosine * wanted[0] - sine * wanted[1]
+        sent = np.minimum(np.maximum(command / G, -0.35), 0.35) + waves[row]
+        logged = table[row]
+        logged[:2], logged[2:4], logged[5:7], logged[7:] = sent, tilt + error[row], seen_p, seen_v
+        for tick in range(TICKS):
+            queue = [sent, *queue[:-1]]
             acting = np.stack([queue[late[0]][0], queue[late[1]][1]])
             tilt = keep * tilt + (1.0 - keep) * gain * acting
-            gust = (
-                gust + flown.gusts_m_s2 * np.sqrt(TICK_S) * random.normal(size=(2, n)) - 0.5 * TICK_S * gust
-            )
-            a_right, a_ahead = truth.acceleration_per_tilt * G * (tilt - trim) * [[1.0], [-1.0]]
-            push = np.stack([cosine * a_ahead - sine * a_right, sine * a_ahead + cosine * a_right])
+            gust = gust + gusts[row, 2 * tick : 2 * tick + 2] - 0.5 * TICK_S * gust
+            right, back = pull_m_s2 * (tilt - trim)
+            push[0], push[1] = -cosine * back - sine * right, cosine * right - sine * back
             velocity = velocity + TICK_S * (push - truth.drag_1_s * velocity + gust)
             position = position + TICK_S * velocity
-    table = np.stack(logged)
-    time: Array = TICKS * TICK_S * np.arange(rows, dtype=np.float64)
     return [
-        {"time_s": time} | {name: table[:, place, flight] for place, name in enumerate(NAMES)}
+        {"time_s": times_s} | {name: table[:, place, flight] for place, name in enumerate(NAMES)}
         for flight in range(n)
     ]
 
 
-def _eight(time_s: float, flown: Flown) -> tuple[Array, Array, Array]:
-    """Return position, velocity and acceleration (2, 1) on the figure of eight."""
+def _eight(times_s: Array, flown: Flown) -> Array:
+    """Return position, velocity and acceleration (k, 3, 2, 1) on the figure of eight."""
     a, b, w = flown.size_m, flown.height * flown.size_m, flown.rate_rad_s
-    s, c, s2, c2 = np.sin(w * time_s), np.cos(w * time_s), np.sin(2.0 * w * time_s), np.cos(2.0 * w * time_s)
+    s, c = np.sin(w * times_s), np.cos(w * times_s)
+    s2, c2 = np.sin(2.0 * w * times_s), np.cos(2.0 * w * times_s)
     rows = ((a * s, b * s2), (a * w * c, 2.0 * b * w * c2), (-a * w * w * s, -4.0 * b * w * w * s2))
-    found = [np.array(row)[:, np.newaxis] for row in rows]
-    return found[0], found[1], found[2]
+    return np.moveaxis(np.array(rows), -1, 0)[..., np.newaxis]
+
+
+def _correlated(keep: float, noise: Array) -> Array:
+    """Return noise (k, m, n) through x' = keep x + noise, from 0."""
+    found: Array = lfilter([1.0], [1.0, -keep], noise, axis=0)
+    return found
 
 
 def drop_and_jitter(columns: Mapping[str, Array], random: Generator) -> dict[str, Array]:
