@@ -61,6 +61,15 @@ def files_of(wheel: Path) -> set[str]:
     return {name for name in names if not re.match(r"mambo_nmpc-[^/]*\.dist-info/", name)}
 
 
+def environment(folder: Path, *packages: str | Path) -> Path:
+    """Return the Python of a new environment that has nothing but `packages`, which no one has compiled."""
+    run(sys.executable, "-m", "venv", "--without-pip", folder, folder=folder.parent)
+    python = folder / "bin" / "python"
+    options = ("-q", "--no-compile", "--disable-pip-version-check")
+    run(sys.executable, "-m", "pip", "--python", python, "install", *options, *packages, folder=folder)
+    return python
+
+
 def wheel_of(source: Path, folder: Path) -> Path:
     """Build the wheel of a source folder or archive."""
     run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", "wheels", source, folder=folder)
@@ -89,9 +98,7 @@ def test_wheel_and_source_archive_hold_every_tracked_file_and_no_other(source: P
     assert {"mambo_nmpc/py.typed", "mambo_nmpc/templates/src/nmpc.c.j2"} <= expected
     assert files_of(wheel_of(source, tmp_path)) == expected
 
-    run(sys.executable, "-m", "venv", "builder", folder=tmp_path)
-    python = tmp_path / "builder" / "bin" / "python"
-    run(python, "-m", "pip", "install", "-q", "setuptools>=77", folder=tmp_path)
+    python = environment(tmp_path / "builder", "setuptools>=77")
     run(python, "-c", BUILD_SDIST, tmp_path, folder=source)
     (tmp_path / "again").mkdir()
     archive = next(tmp_path.glob("*.tar.gz"))
@@ -102,10 +109,7 @@ def test_wheel_and_source_archive_hold_every_tracked_file_and_no_other(source: P
 def test_the_wheel_generates_and_flies_in_a_clean_environment(source: Path, tmp_path: Path) -> None:
     """Only mambo_nmpc is added to site-packages, and the bundle equals the committed one."""
     wheel = wheel_of(source, tmp_path)
-    run(sys.executable, "-m", "venv", "clean", folder=tmp_path)
-    binaries = tmp_path / "clean" / "bin"
-    constraints = ROOT / "constraints.txt"
-    run(binaries / "python", "-m", "pip", "install", "-q", "-c", constraints, wheel, folder=tmp_path)
+    binaries = environment(tmp_path / "clean", "-c", ROOT / "constraints.txt", wheel).parent
     packages = next((tmp_path / "clean" / "lib").glob("python*/site-packages"))
     assert not [name for name in FOLDERS if (packages / name).exists()]
     command = binaries / "mambo-nmpc"
