@@ -1,13 +1,15 @@
 """Short flights of every kind and the digests of their traces, which must be the same on every processor.
 
-python -m tests.support.golden_flights c         print the digests of flights in the engine as JSON
-python -m tests.support.golden_flights numpy     print those of flights in NumPy
-python -m tests.support.golden_flights --write   write them to the golden file; read the diff
+python -m tests.support.golden_flights c             print the digests of flights in the engine as JSON
+python -m tests.support.golden_flights numpy         print those of flights in NumPy
+python -m tests.support.golden_flights numpy short   print those of the first `SHORT_S` of each flight
+python -m tests.support.golden_flights --write       write all of them to the golden file; read the diff
 """
 
 import json
 import sys
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -50,16 +52,21 @@ SCENARIOS: Final = {
 }
 
 
-def digests(engine: EngineName) -> dict[str, str]:
+SHORT_S: Final = 2.0
+SHORT: Final = {name: flown.model_copy(update={"duration_s": SHORT_S}) for name, flown in SCENARIOS.items()}
+"""The same flights, ended early."""
+
+
+def digests(engine: EngineName, scenarios: Mapping[str, Scenario]) -> dict[str, str]:
     """Fly every scenario with both PDs and with the presets; return the digests of the traces."""
     chosen = {name: presets.load(name) for name in PRESETS}
     period_s = chosen[PRESETS[0]].horizon.update_period_s
     batches = defaultdict(list)
-    for name, flown in SCENARIOS.items():
+    for name, flown in scenarios.items():
         batches[tuple(getattr(flown, key) for key in SHARED_KEYS)].append(name)
     found: dict[str, str] = {}
     for names in batches.values():
-        flight = flight_of([SCENARIOS[name] for name in names], period_s)
+        flight = flight_of([scenarios[name] for name in names], period_s)
         traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd), engine=engine) for pd in PD_NAMES}
         traces |= {
             preset: fly(flight, CompiledController(settings, len(names)), engine=engine)
@@ -72,6 +79,8 @@ def digests(engine: EngineName) -> dict[str, str]:
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--write"]:
-        GOLDEN.write_text(json.dumps(digests("numpy"), indent=2) + "\n", "utf-8")
+        both = {"whole": digests("numpy", SCENARIOS), "short": digests("numpy", SHORT)}
+        GOLDEN.write_text(json.dumps(both, indent=2) + "\n", "utf-8")
     else:
-        print(json.dumps(digests("c" if sys.argv[1:] == ["c"] else "numpy"), indent=2))
+        chosen_engine: EngineName = "c" if sys.argv[1] == "c" else "numpy"
+        print(json.dumps(digests(chosen_engine, SHORT if sys.argv[2:] else SCENARIOS), indent=2))
