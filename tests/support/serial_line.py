@@ -1,6 +1,7 @@
 """Boards as processes behind a serial line that can fail: a host process, or firmware in QEMU."""
 
 import select
+import shutil
 import socket
 import subprocess
 import threading
@@ -39,23 +40,37 @@ EMULATORS: Final = {
 Bytes = Callable[[bytes], bytes]
 
 
+_built: Final[dict[tuple[str, str], Path]] = {}
+"""Folders in which firmware was built unchanged, by settings digest and board."""
+
+
 def build_firmware(
     settings: Settings, board: str, folder: Path, change: Callable[[dict[str, str]], None] | None = None
 ) -> Path:
     """Build the firmware of `settings` with its own Makefile; a warning is an error. Returns the ELF file.
 
-    `change` may edit the files, {path: text}, before.
+    `change` may edit the files, {path: text}, before. What has been built is not built again: unchanged
+    firmware stays in the folder of its first test, and of changed firmware make builds what has changed.
     """
     compiler, package = COMPILERS[board]
     require(compiler, package)
-    files = render_target(settings, TARGETS["pil"], with_digest=False)
-    if change is not None:
-        change(files)
-    place(files, folder)
-    line = [require("make", "make"), f"BOARD={board}", f"CC={compiler} -Werror", "FLASH=0x08000000"]
-    done = subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    return folder / "build" / board / "pil.elf"
+    here = _built.get((settings.digest, board))
+    if here is None or change is not None:
+        files = render_target(settings, TARGETS["pil"], with_digest=False)
+        before = dict(files)
+        if change is not None:
+            change(files)
+        if here is not None:
+            shutil.copytree(here, folder, dirs_exist_ok=True)
+            files = {path: text for path, text in files.items() if text != before.get(path)}
+        place(files, folder)
+        line = [require("make", "make"), f"BOARD={board}", f"CC={compiler} -Werror", "FLASH=0x08000000"]
+        done = subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+        here = folder
+        if change is None:
+            _built[settings.digest, board] = folder
+    return here / "build" / board / "pil.elf"
 
 
 def edited(path: str, old: str, new: str) -> Callable[[dict[str, str]], None]:
