@@ -18,6 +18,8 @@ from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 from tests.support.command import command, run
 from tests.support.one_norm import ONE_NORM
 
+PLAIN = ("--json", "--no-pictures")
+
 
 def test_ctrl_c_while_the_command_starts_exits_130(tmp_path: Path) -> None:
     """A signal in the middle of the imports: no traceback."""
@@ -66,7 +68,7 @@ def test_without_pictures_the_earlier_ones_go(tmp_path: Path) -> None:
 def test_reference_and_compiled_flights_print_the_same() -> None:
     """--controller reference flies the very same flight as the C."""
     nmpc, reference = (
-        json.loads(run("fly", "--duration-s", "1", "--controller", kind, "--json", "-o", kind)[0])
+        json.loads(run("fly", "--duration-s", "1", "--controller", kind, *PLAIN, "-o", kind)[0])
         for kind in ("nmpc", "reference")
     )
     assert nmpc["metrics"] == reference["metrics"]
@@ -82,13 +84,13 @@ def test_reference_and_compiled_flights_print_the_same() -> None:
 def test_every_curve_flies(trajectory: str) -> None:
     """Each named trajectory, with wind, heading, motor lag and a start from the ground."""
     options = ["--wind", "0.2,-0.1", "--yaw-rad", "0.5", "--motor-lag-s", "0.02", "--start", "take-off"]
-    said, _ = run("fly", "--trajectory", trajectory, *options, "--duration-s", "1", "--json")
+    said, _ = run("fly", "--trajectory", trajectory, *options, "--duration-s", "1", *PLAIN)
     assert json.loads(said)["lost"] is False
 
 
 def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
     """The same seed gives the same flight, another another; true and seen metrics are told apart."""
-    options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "0.2", "--json"]
+    options = ["--sensors", "mambo", "--wind", "gusts", "--controller", "pd", "--duration-s", "0.2", *PLAIN]
     flights = [
         run("fly", *options, "--seed", seed, "-o", f"{number}")[0]
         for number, seed in enumerate(("7", "7", "8"))
@@ -105,7 +107,7 @@ def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
 def test_waypoints_fly(tmp_path: Path) -> None:
     """A CSV file is a trajectory."""
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,0,0\n1,0.2,0.1\n")
-    run("fly", "--trajectory", "way.csv", "--duration-s", "2")
+    run("fly", "--trajectory", "way.csv", "--duration-s", "2", "--no-pictures")
 
 
 @pytest.mark.parametrize(
@@ -147,7 +149,9 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
 def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
     """More than half of the inputs refused: exit 1, with the range that was exceeded."""
     (tmp_path / "deaf.toml").write_text("[ranges]\nthrust_acceleration_min_m_s2 = 20.0\n")
-    said, _ = run("fly", "deaf.toml", "--controller", "reference", "--duration-s", "1", code=1)
+    said, _ = run(
+        "fly", "deaf.toml", "--controller", "reference", "--duration-s", "1", "--no-pictures", code=1
+    )
     assert "101 steps: thrust out of range, 9.81..9.81 m/s^2, but ranges" in said
     assert "thrust_acceleration_* = 20..50; the drone kept the last command" in said
     assert "NOT CONTROLLED" in said
@@ -155,7 +159,7 @@ def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
 
 def test_a_crash_is_a_failure_that_says_when_and_how(tmp_path: Path) -> None:
     """Motors too slow for the stock roll loop: exit 1, the time and the tilt, in the summary too."""
-    said, _ = run("fly", "--motor-lag-s", "0.2", "--duration-s", "2", code=1)
+    said, _ = run("fly", "--motor-lag-s", "0.2", "--duration-s", "2", "--no-pictures", code=1)
     line = next(line for line in said.splitlines() if line.startswith("CRASHED"))
     crash = json.loads((tmp_path / "flight" / "summary.json").read_text())["crash"]
     assert line == f"CRASHED at {crash['time_s']:.2f} s: {crash['how']}"
@@ -172,7 +176,7 @@ def test_a_replayed_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
         flown = fly(flight, pd_controller(pd))
         record = Record(scenario=scenario, controller=pd, settings=ONE_NORM, trace_sha256=flown.digest())
         write_record(record, tmp_path / name)
-        said, _ = run("fly", "--replay", name, code=code)
+        said, _ = run("fly", "--replay", name, "--no-pictures", code=code)
         assert "replay: the trace equals the recorded one" in said
         assert ("CRASHED at 0.00 s: tilted 68.8 degrees" in said) == (code == 1)
 
@@ -181,7 +185,7 @@ def test_the_pd_with_feed_forward_flies_closer_than_the_stock_pd(tmp_path: Path)
     """The page names which of them flew."""
     iae_m_s = []
     for pd in PD_NAMES:
-        said, _ = run("fly", "--controller", pd, "--duration-s", "20", "--json", "-o", pd)
+        said, _ = run("fly", "--controller", pd, "--duration-s", "20", *PLAIN, "-o", pd)
         iae_m_s.append(json.loads(said)["metrics"]["iae_m_s"])
     assert iae_m_s[1] < 0.2 * iae_m_s[0]
     run("report", "pd", "pd-feedforward", "-o", "report.html")
@@ -192,20 +196,21 @@ def test_the_pd_with_feed_forward_flies_closer_than_the_stock_pd(tmp_path: Path)
 
 def test_refusals_during_lift_off_are_explained() -> None:
     """They belong to every start from the ground, which does well."""
-    options = ["--start", "take-off", "--duration-s", "0.1"]
+    options = ["--start", "take-off", "--duration-s", "0.1", "--no-pictures"]
     assert "77 steps during lift-off: thrust out of range" in run("fly", *options)[0]
 
 
 def test_a_flight_just_longer_than_the_transient_has_no_second_column() -> None:
     """10.001 s are flown as 10 s, of which nothing is left after 10 s."""
-    assert "after 10 s" not in run("fly", "--controller", "pd", "--duration-s", "10.001")[0]
+    options = ["--controller", "pd", "--duration-s", "10.001", "--no-pictures"]
+    assert "after 10 s" not in run("fly", *options)[0]
 
 
 def test_the_summary_repeats_the_flight(tmp_path: Path) -> None:
     """Everything asked for is in it, what was not flown is null, and stdout has the same text."""
     options = ["--controller", "pd", "--wind", "90,0", "--duration-s", "40", "--trajectory", "way.csv"]
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,9000,0\n")
-    said, talk = run("fly", *options, "--json", code=1)
+    said, talk = run("fly", *options, *PLAIN, code=1)
     assert talk.count("\n") == 1
     assert said == (tmp_path / "flight" / "summary.json").read_text()
     summary = json.loads(said, parse_constant=pytest.fail)
@@ -253,5 +258,5 @@ def test_a_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_flying_again_overwrites_our_own_results(tmp_path: Path) -> None:
     """The second flight into a folder replaces the first."""
     for duration in ("0.1", "0.2"):
-        run("fly", "--controller", "pd", "--duration-s", duration)
+        run("fly", "--controller", "pd", "--duration-s", duration, "--no-pictures")
     assert json.loads((tmp_path / "flight" / "summary.json").read_text())["duration_s"] == 0.2
