@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from mambo_nmpc.sil.flight.names import EngineName
     from mambo_nmpc.sil.regress.file import FlightSuite
 
+_WORTH_A_WORKER_S = 4000.0
+"""Simulated time that the engine flies while a worker process starts, about half a second."""
+
 
 def regress(
     suite: Annotated[str, typer.Argument(help="A shipped suite or a TOML file.")] = "envelope",
@@ -83,8 +86,12 @@ def _fly(suite: "FlightSuite", entrant: "Entrant", engine: "EngineName") -> "lis
     from mambo_nmpc.sil.cli.progress import counting_bar
     from mambo_nmpc.sil.regress.run import fly_suite
 
+    workers = os.cpu_count() or 1
+    if engine == "c":
+        flown_s = sum(flight.scenario.duration_s for flight in suite.flights)
+        workers = min(workers, 1 + int(flown_s / _WORTH_A_WORKER_S))
     with (
         counting_bar("flying", "flights", len(suite.flights)) as progress,
-        processes(os.cpu_count() or 1) as pool,
+        processes(workers) as pool,
     ):
         return fly_suite(suite, entrant, pool, progress, engine=engine)
