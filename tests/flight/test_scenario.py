@@ -20,7 +20,7 @@ from mambo_nmpc.sil.flight.trajectories import Bernoulli
 from mambo_nmpc.sil.plant.airframe import MAMBO as MAMBO_AIRFRAME
 from mambo_nmpc.sil.plant.vehicle import Vehicle
 from mambo_nmpc.sil.sensors.instruments import Sensors
-from tests.support.command import command
+from tests.support.command import run
 from tests.support.one_norm import ONE_NORM
 
 MAMBO = ONE_NORM
@@ -279,25 +279,24 @@ def test_step_sizes_are_the_changes_of_the_plan() -> None:
 
 
 @pytest.mark.long
-def test_a_record_is_flown_again_with_its_inner_steps(tmp_path: Path) -> None:
+def test_a_record_is_flown_again_with_its_inner_steps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The reference replays a flight of the C bit for bit; a wrong digest or further options fail."""
     trace = fly(flight_of([CALM, HARD], 0.01), CompiledController(MAMBO, 2))
     good = Record(scenario=HARD, settings=MAMBO, trace_sha256=trace.digest(1))
     write_record(good, tmp_path / "good.json")
     write_record(good.model_copy(update={"trace_sha256": "0" * 64}), tmp_path / "other.json")
 
-    done = command("fly", "--replay", "good.json", "-o", "good", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "the trace equals the recorded one, bit for bit" in done.stdout
+    monkeypatch.chdir(tmp_path)
+    said, _ = run("fly", "--replay", "good.json", "--no-pictures", "-o", "good")
+    assert "the trace equals the recorded one, bit for bit" in said
     inner = np.load(tmp_path / "good" / "inner-steps.npz")
     k, iterations = len(trace.time_s), MAMBO.optimizer.iterations
     assert inner["cost"].shape == (k, iterations, 1)
     assert inner["plan_rad"].shape == inner["step_size_rad"].shape == (k, iterations, 1, 2, 2)
     header = (tmp_path / "good" / "trace.csv").read_text().splitlines()[0]
     assert header.endswith(",".join(SEEN_COLUMNS))
-    assert command("fly", "--replay", "other.json", folder=tmp_path).returncode == 1
-    refused = command("fly", "--replay", "good.json", "--seed", "3", folder=tmp_path)
-    assert (refused.returncode, refused.stderr) == (
-        2,
-        "--replay good.json contains the whole flight: leave out --seed\n",
-    )
+    run("fly", "--replay", "other.json", "--no-pictures", code=1)
+    _, refused = run("fly", "--replay", "good.json", "--seed", "3", code=2)
+    assert refused == "--replay good.json contains the whole flight: leave out --seed\n"
