@@ -117,6 +117,7 @@ def test_the_wheel_generates_and_flies_in_a_clean_environment(source: Path, tmp_
     assert "IAE" in run(command, "fly", "--duration-s", "1", "-o", "flight", folder=tmp_path)
 
 
+@pytest.mark.long
 def test_every_command_works_beside_folders_of_our_names(tmp_path: Path) -> None:
     """A user's own packages codegen, sil and templates, on the search path, change nothing."""
     require("gcc", "gcc")

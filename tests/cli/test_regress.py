@@ -141,6 +141,7 @@ main()
 """
 
 
+@pytest.mark.long
 def test_a_stopped_run_leaves_nothing_half_written(passed: Path) -> None:
     """Ctrl-C: neither folder nor baseline, and earlier results stay as they are."""
     done = command("regress", "mine.toml", "-o", "out", "--update", script=STOPPED)

@@ -23,6 +23,7 @@ def ended(*outcomes: CheckOutcome) -> list[Verified]:
     ]
 
 
+@pytest.mark.long
 def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
     """Settings, C, reports, page and summary; stdout repeats the summary, and a hostile name is text."""
     require("cppcheck", "cppcheck")

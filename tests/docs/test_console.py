@@ -13,9 +13,10 @@ RUN = [page for page in PAGES if read(page).steps]
 NAMES = [str(page.relative_to(DOCS)) for page in RUN]
 LONG = {
     *(f"tutorials/{name}.md" for name in ("crazyflie", "first-flight", "own-drone", "paper")),
-    *(f"how-to/{name}.md" for name in ("campaign", "design", "regress", "report", "tune", "verify")),
+    *(f"how-to/{name}.md" for name in ("campaign", "check", "crazyflie", "design", "footprint", "identify")),
+    *(f"how-to/{name}.md" for name in ("identify-binary", "regress", "replay", "report", "tune", "verify")),
 }
-"""Pages whose commands take more than three seconds of an idle core."""
+"""Pages whose commands take two seconds or more of an idle core."""
 ARM = ("arm-none-eabi-gcc", "gcc-arm-none-eabi")
 TOOLS = {
     "how-to/footprint.md": [ARM],

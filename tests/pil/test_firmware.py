@@ -24,12 +24,12 @@ CASES = [
     ("host", "mambo", "float32"),
     ("host", "mambo", "float64"),
     ("host", "mambo-1norm", "fixed"),
-    ("crazyflie", "mambo-1norm", "float32"),
 ]
 LONG_CASES = [
     ("host", "mambo-1norm", "float32"),
     ("host", "mambo-1norm", "float64"),
     ("host", "mambo", "fixed"),
+    ("crazyflie", "mambo-1norm", "float32"),
     ("crazyflie", "mambo", "fixed"),
     ("crazyflie", "mambo-1norm", "fixed"),
     ("mega", "mambo", "fixed"),

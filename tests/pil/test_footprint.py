@@ -23,6 +23,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.long
 def test_the_firmware_names_the_board_and_measures_the_counted_steps(tmp_path: Path) -> None:
     """STM32F405 is the crazyflie: both sides over 300 ticks, in text, JSON, page and report."""
     board_builder("crazyflie")

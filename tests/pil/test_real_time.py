@@ -67,7 +67,7 @@ def test_a_flight_by_the_clock_of_a_process_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("board", "scalar"),
     [
-        ("crazyflie", "float32"),
+        pytest.param("crazyflie", "float32", marks=pytest.mark.long),
         pytest.param("mega", "float32", marks=pytest.mark.long),
         pytest.param("crazyflie", "fixed", marks=pytest.mark.long),
         pytest.param("mega", "fixed", marks=pytest.mark.long),
