@@ -4,6 +4,7 @@ import ast
 import gc
 import tomllib
 from collections import defaultdict
+from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -72,21 +73,35 @@ def modules() -> dict[str, Path]:
     return {name.removesuffix(".__init__"): path for path, name in dotted.items()}
 
 
-@cache
-def nodes(module: str) -> list[ast.AST]:
-    """Return the nodes of the syntax tree of a module, made without looking for garbage again and again."""
+def tree(module: str) -> ast.Module:
+    """Return the syntax tree of a module, made without looking for garbage again and again."""
     gc.disable()
     try:
-        return list(ast.walk(ast.parse(modules()[module].read_text("utf-8"))))
+        return ast.parse(modules()[module].read_text("utf-8"))
     finally:
         gc.enable()
+
+
+def nodes(module: str) -> Iterator[ast.AST]:
+    """Return the nodes of the syntax tree of a module."""
+    return ast.walk(tree(module))
+
+
+def statements(module: str) -> Iterator[ast.AST]:
+    """Yield the statements of a module, those inside others too, which are a tenth of its nodes."""
+    left: list[ast.AST] = [tree(module)]
+    while left:
+        node = left.pop()
+        yield node
+        children = ast.iter_child_nodes(node)
+        left += [each for each in children if isinstance(each, ast.stmt | ast.excepthandler | ast.match_case)]
 
 
 @cache
 def imported(module: str) -> frozenset[str]:
     """Return the names that a module imports anywhere in it, of ours those of modules and packages."""
     names: set[str] = set()
-    for node in nodes(module):
+    for node in statements(module):
         if isinstance(node, ast.Import):
             names |= {ours(alias.name) for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -174,7 +189,7 @@ def test_one_class_name_is_one_class() -> None:
     homes = defaultdict(list)
     for module in modules():
         if not module.startswith("tests"):
-            for node in nodes(module):
+            for node in statements(module):
                 if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                     homes[node.name].append(module)
     assert not {name: where for name, where in homes.items() if len(where) > 1}
