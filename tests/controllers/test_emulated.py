@@ -1,5 +1,6 @@
 """The emulated controller: the reference's bits on every core, and errors of the emulated program."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from mambo_nmpc.sil.controllers.emulated import GUEST, EmulatedController, build
 from mambo_nmpc.sil.emulation.machine import CORES as EMULATED_CORES
 from mambo_nmpc.sil.emulation.machine import Machine, start
 from mambo_nmpc.sil.errors import EmulationError
+from mambo_nmpc.sil.verify.inputs import StepInputs
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.parity import Run, differences, inputs_of_steps
@@ -37,6 +39,9 @@ CASES = [
     for index in range(12)
     if (board, index) != ("mega", 4)  # too large
 ]
+
+N = 30
+"""Controllers of a case."""
 
 BAD_GUEST = """
 #ifdef __AVR__
@@ -78,6 +83,16 @@ def test_every_board_has_a_core() -> None:
     assert set(EMULATED_CORES) == set(CORES.values())
 
 
+@cache
+def reference_run(index: int, scalar: str) -> tuple[list[StepInputs], Run]:
+    """Return the inputs of four steps of N controllers, some not finite, and the answers of the reference."""
+    settings = settings_case(index, scalar)
+    inputs = inputs_of_steps(settings, N, 4, seed=index)
+    inputs[2].state[::7, index % 7] = np.nan
+    reference = ReferenceController(Design(settings), N)
+    return inputs, Run([], [reference.step(case.state, case.target, case.thrust) for case in inputs])
+
+
 @pytest.mark.parametrize(
     ("name", "scalar", "index"),
     [
@@ -87,15 +102,9 @@ def test_every_board_has_a_core() -> None:
 )
 def test_every_core_has_the_bits_of_the_reference(name: str, scalar: str, index: int, tmp_path: Path) -> None:
     """Bits are equal over consecutive steps with random, extreme and refused inputs, for random settings."""
-    settings = settings_case(index, scalar)
-    n, steps = 30, 4
-    inputs = inputs_of_steps(settings, n, steps, seed=index)
-    inputs[2].state[::7, index % 7] = np.nan
-    controllers = start_emulated(name, settings, tmp_path, n), ReferenceController(Design(settings), n)
-    ours, theirs = (
-        Run([], [controller.step(case.state, case.target, case.thrust) for case in inputs])
-        for controller in controllers
-    )
+    inputs, theirs = reference_run(index, scalar)
+    controller = start_emulated(name, settings_case(index, scalar), tmp_path, N)
+    ours = Run([], [controller.step(case.state, case.target, case.thrust) for case in inputs])
     assert not differences(ours, theirs)
     assert np.all(ours.steps[2].status[::7] != 0)
     assert np.mean([step.status == 0 for step in ours.steps]) > 0.5
