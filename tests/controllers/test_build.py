@@ -20,6 +20,7 @@ from tests.support.tools import require
 MAMBO = ONE_NORM
 
 
+@pytest.mark.long
 def test_two_processes_may_build_the_same_code_at_once(empty_cache: Path) -> None:
     """Both fly, and one file remains."""
     require("cc", "gcc")

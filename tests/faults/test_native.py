@@ -80,6 +80,7 @@ def faults(draw: st.DrawFn) -> Fault:
     return Fault(begin, end, alter, draw(st.integers(0, 4)), draw(st.integers(0, 30)))
 
 
+@pytest.mark.long
 @settings(max_examples=25)
 @given(data=st.data())
 @pytest.mark.filterwarnings("ignore:invalid value|overflow:RuntimeWarning")

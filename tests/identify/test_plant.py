@@ -72,6 +72,7 @@ def rise_s(summary: IdentifySummary, name: str, share: float) -> float:
     return float(np.interp(share, risen[above - 1 : above + 1], time_s[above - 1 : above + 1])) - 1.0
 
 
+@pytest.mark.long
 def test_the_stock_loops_are_identified(trace: Path) -> None:
     """Through noise: gain 1, the integrator, and the rise times of docs/explanation/plant.md."""
     summary = identify(read_logs([trace], {}))[0]
@@ -89,6 +90,7 @@ def test_the_stock_loops_are_identified(trace: Path) -> None:
         assert f"{name}_integral_1_s" in summary.model
 
 
+@pytest.mark.long
 def test_the_drag_of_the_plant_is_identified(trace: Path) -> None:
     """From the true motion: 0.067 1/s, and g per radian."""
     columns = {name: Column(name) for name in KNOWN if name not in COMMANDS}

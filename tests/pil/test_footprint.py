@@ -116,6 +116,7 @@ def test_other_bits_fail(tmp_path: Path) -> None:
     assert "fits 1 of 1 boards; other bits on host process" in Path("report.html").read_text("utf-8")
 
 
+@pytest.mark.long
 def test_a_lost_reply_is_made_good(tmp_path: Path) -> None:
     """As in a flight: every step is measured once, and the fault is in the summary."""
     board_builder("crazyflie")

@@ -137,6 +137,7 @@ def test_a_folder_of_each_command_is_shown(kind: str) -> None:
     assert "&lt;img src=x" in page
 
 
+@pytest.mark.long
 def test_many_folders_make_one_page_with_an_overview() -> None:
     """A link to each part, in the order asked for; only flights bring the script, once."""
     page = page_of(*map(made, FOLDERS))

@@ -130,6 +130,7 @@ def alone() -> Trace:
     return fly(flight_of(1), CompiledController(SETTINGS))
 
 
+@pytest.mark.long
 def test_every_sign_of_the_frames_counts(built: Built, alone: Trace) -> None:
     """Through the app the drone flies as with the controller alone; a wrong sign takes it away from there."""
     trace = flown_by([built.app(), *(built.mutant(name, *mutant) for name, mutant in FRAME_MUTANTS.items())])

@@ -145,6 +145,7 @@ def test_both_units_fly_with_the_bits_of_the_controller_alone(name: str, tmp_pat
         unit.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", VERSIONS)
 def test_an_importer_compiles_the_sources(version: str, tmp_path: Path) -> None:
     """FMPy builds them with CMake as the unit describes them, and what it built flies the same bits."""
