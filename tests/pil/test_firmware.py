@@ -151,7 +151,7 @@ def test_a_long_flight_has_the_bits_of_the_desk(
 ) -> None:
     """A figure of eight of Table II, which takes 12.6 s, on the STM32F405; a third of it on the Mega.
 
-    The 100 s of Table II are the same figure eight times; `docs/evidence/pil.md` has flown them.
+    The 100 s of Table II are this figure eight times; `docs/evidence/pil.md` reports them, flown once.
     """
     with serial_line(build_firmware(presets.preset("mambo"), board, tmp_path / "pil")) as line:
         summary = flown(line, "mambo", "--duration-s", str(duration_s))
