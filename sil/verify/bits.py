@@ -37,18 +37,20 @@ def play(subject: Subject, builds: Sequence[Build], finding: str) -> Result:
     calls = sum(len(tape) for tape in tapes)
     tapes_file = subject.folder / "tapes.bin"
     replay.write_tapes(subject.settings, tapes, tapes_file)
-    faults, gaps, good = [], [], []
+    faults: list[str] = []
+    gaps: list[str] = []
+    good: list[str] = []
     for index, build in enumerate(builds):
         folder = subject.folder / f"build-{index}"
         folder.mkdir()
-        gap = replay.missing(build.tool, build.flags, folder)
-        if gap:
-            gaps.append(gap)
-            continue
         try:
             program = replay.build(subject, build.tool, build.flags, folder)
         except BuildError as error:
-            faults.append(f"{build.name}: does not compile: {error}")
+            gap = replay.missing(build.tool, build.flags, folder)
+            if gap:
+                gaps.append(gap)
+            else:
+                faults.append(f"{build.name}: does not compile: {error}")
             continue
         played = replay.play(program, tapes_file, subject.settings, tapes)
         (folder / "report.txt").write_text(played.report)
