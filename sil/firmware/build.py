@@ -5,6 +5,7 @@ memset and memcpy, which compilers call. If clang compiles, the board's GCC link
 arithmetic.
 """
 
+import hashlib
 import re
 import shutil
 from collections.abc import Sequence
@@ -73,16 +74,29 @@ class Builder:
         define: Sequence[str] = (),
         address: Sequence[str] = (),
     ) -> Path:
-        """Compile and link the C of `sources` {path: text}; the symbols `keep` stay, the entry first."""
-        sources = sources | {"freestanding.c": (_PACKAGE / "freestanding.c").read_text("utf-8")}
-        for path, text in sources.items():
-            (place / path).parent.mkdir(parents=True, exist_ok=True)
-            (place / path).write_text(text, "utf-8")
-        chosen = sorted(path for path in sources if re.fullmatch(r"(src/)?[^/]*\.c", path))
+        """Compile and link the C of `sources` {path: text}; the symbols `keep` stay, the entry first.
+
+        All programs in one folder share the objects of the bundle, which is everything but the main program.
+        """
+        freestanding = (_PACKAGE / "freestanding.c").read_text("utf-8")
+        main = {"freestanding.c": freestanding, "main.c": sources["main.c"]}
+        files = {path: text for path, text in sources.items() if path not in main}
         core, optimisation = self.board.compiler.flags, self.toolchain.optimisation
         flags = [*COMPILE_FLAGS, *core, *([optimisation] if optimisation else []), *_COMPILE, *self.own_flags]
-        self._run(self.toolchain, [*flags, *define, "-Iinclude", "-c", *chosen], place)
-        objects = [Path(source).with_suffix(".o").name for source in chosen]
+        chosen = sorted(path for path in files if re.fullmatch(r"(src/)?[^/]*\.c", path))
+        key = repr((self.toolchain.command, flags, sorted(files.items())))
+        bundle = place.parent.resolve() / f"bundle-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+        parts = [bundle / Path(source).with_suffix(".o").name for source in chosen]
+        if not all(part.is_file() for part in parts):
+            _write(files, bundle)
+            self._run(self.toolchain, [*flags, "-Iinclude", "-c", *chosen], bundle)
+        _write(main, place)
+        self._run(
+            self.toolchain,
+            [*flags, *define, *(f"-I{path}" for path in (bundle, bundle / "include")), "-c", *main],
+            place,
+        )
+        objects = [*(Path(source).with_suffix(".o").name for source in main), *map(str, parts)]
         kept = [f"-Wl,-e,{keep[0]}", *(f"-Wl,-u,{symbol}" for symbol in keep[1:])]
         link = [*core, *objects, *_LINK, *address, *kept, *self.board.compiler.libraries]
         self._run(self.linker, [*link, "-o", "program.elf"], place)
@@ -99,6 +113,12 @@ class Builder:
                 f"{self.board.core.value} that takes {' '.join(compiler.flags)} (compiler.candidates and "
                 f"compiler.flags of the board; Debian: {' '.join(compiler.packages)})\n{error}"
             ) from error
+
+
+def _write(sources: dict[str, str], place: Path) -> None:
+    for path, text in sources.items():
+        (place / path).parent.mkdir(parents=True, exist_ok=True)
+        (place / path).write_text(text, "utf-8")
 
 
 def builder(board: Board, optimisation: str | None = None) -> Builder:
