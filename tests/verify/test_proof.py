@@ -128,13 +128,17 @@ def of_scalar(name: str, scalar: str) -> Settings:
 @pytest.mark.parametrize("scalar", ["float32", "float64", "fixed"])
 @pytest.mark.parametrize("name", presets.names())
 def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
-    """Every promise of the driver holds, and what Frama-C said stays as evidence."""
+    """Every promise of the driver holds, and what Frama-C said stays as evidence.
+
+    One is checked as a user does it; of the others all but `tests.support.headings` leaves out.
+    """
     its = subject(of_scalar(name, scalar), tmp_path)
-    result = headings.check(its)
+    whole = (name, scalar) == ("mambo", "float32")
+    result = check(its) if whole else headings.check(its)
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     promises = 4 if scalar == "fixed" else 8 if its.settings.cost.norm == "quadratic" else 6
     assert result.figures["promises"] == result.figures["promises_proven"] == promises
-    for proof in {*proofs(scalar, its.settings.cost.norm)} - {headings.HEADINGS}:
+    for proof in {*proofs(scalar, its.settings.cost.norm)} - (set() if whole else {headings.HEADINGS}):
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
 
@@ -168,7 +172,7 @@ def test_settings_of_every_kind_are_proven(index: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "names",
     [
-        pytest.param(names, marks=[] if FAULTS[names[0]].entry == "refuse_nan" else [pytest.mark.long])
+        pytest.param(names, marks=[pytest.mark.long] * (names != ("NaN passes a range check",)))
         for names in runs(FAULTS, AT_ONCE)
     ],
     ids=", ".join,
