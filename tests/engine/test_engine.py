@@ -43,6 +43,9 @@ BUILDS = [
 ]
 
 
+DEFAULT_BUILDS = (Toolchain(("gcc",)), Toolchain(("clang",), "-O0"))
+
+
 def controller(kind: str, flight: Flight) -> CompiledController | PdController | PdFeedForwardController:
     """Make controllers for a flight: a PD, or preset mambo in a scalar type."""
     for name in PD_NAMES:
@@ -103,7 +106,15 @@ def known() -> list[str]:
 
 @pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize(
-    "build", BUILDS, ids=[" ".join((*build.command, build.optimisation or "-O3")) for build in BUILDS]
+    "build",
+    [
+        pytest.param(
+            build,
+            id=" ".join((*build.command, build.optimisation or "-O3")),
+            marks=[] if build in DEFAULT_BUILDS else [pytest.mark.long],
+        )
+        for build in BUILDS
+    ],
 )
 def test_every_build_has_the_same_bits(build: Toolchain, lanes: int, known: list[str]) -> None:
     """Compilers, optimisations, numbers of lanes, and a processor with fused operations."""
@@ -115,8 +126,10 @@ def test_every_build_has_the_same_bits(build: Toolchain, lanes: int, known: list
     assert digests(engine) == known
 
 
-@pytest.mark.parametrize("lanes", LANES)
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize(
+    "lanes", [pytest.param(lanes, marks=[pytest.mark.long] * (lanes != 4)) for lanes in LANES]
+)
+@pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=pytest.mark.long)])
 def test_no_operation_is_fused(compiler: str, lanes: int, tmp_path: Path) -> None:
     """Even where the compiler may use them, for they round once instead of twice."""
     path = require(compiler, compiler)
@@ -135,15 +148,17 @@ def test_no_operation_is_fused(compiler: str, lanes: int, tmp_path: Path) -> Non
     assert not re.search(r"\bvf(n?m)(add|sub)", code)
 
 
-def test_the_engine_compiles_without_a_warning(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "lanes", [pytest.param(lanes, marks=[pytest.mark.long] * (lanes != 1)) for lanes in LANES]
+)
+@pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=pytest.mark.long)])
+def test_the_engine_compiles_without_a_warning(compiler: str, lanes: int, tmp_path: Path) -> None:
     """Of gcc and of clang, in every number of lanes."""
     for name, text in texts().items():
         (tmp_path / name).write_text(text, "utf-8")
     warnings = ["-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Wundef", "-Wmissing-prototypes", "-Werror"]
-    for compiler in ("gcc", "clang"):
-        for lanes in LANES.values():
-            command = [require(compiler, compiler), "-std=c99", "-O2", *lanes, *warnings, "-c", *SOURCES]
-            subprocess.run(command, cwd=tmp_path, check=True)
+    command = [require(compiler, compiler), "-std=c99", "-O2", *LANES[lanes], *warnings, "-c", *SOURCES]
+    subprocess.run(command, cwd=tmp_path, check=True)
 
 
 def test_what_is_no_c_flies_in_numpy() -> None:
