@@ -18,12 +18,12 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
 from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from tests.support.builds import libraries
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.extension import build_extension
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 
-BUILDS = [("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2")]
 FEW_SETTINGS = range(len(CORNER_HORIZONS) + 1)
 MANY_SETTINGS = range(50)
 
@@ -219,10 +219,10 @@ def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int,
     """In 100,000 cases of each of 50 settings no bit differs, at every optimisation, with gcc and clang."""
     settings = settings_case(index, scalar)
     chunk = 5000
-    libraries = [build_library(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
+    built = libraries(settings)
     for seed in range(5):
         inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
         expected = run(ReferenceController(Design(settings), chunk), inputs, seed)
-        for (compiler, level), library in zip(BUILDS, libraries, strict=True):
+        for build, library in built.items():
             found = run(CompiledController(settings, chunk, library), inputs, seed)
-            assert differences(expected, found) == {}, f"{compiler} {level} for {settings!r}"
+            assert differences(expected, found) == {}, f"{build} for {settings!r}"

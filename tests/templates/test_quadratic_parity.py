@@ -15,12 +15,12 @@ from mambo_nmpc.codegen.reference.observer import Estimate, KalmanObserver
 from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.controllers.build import build_library
 from mambo_nmpc.sil.controllers.compiled import CompiledController
+from tests.support.builds import libraries
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case
 from tests.support.quadratic_parity import differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 
-BUILDS = [("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2")]
 SCALARS = ("float32", "float64")
 FEW_SETTINGS = range(len(CORNER_SETTINGS) + 2)
 MANY_SETTINGS = range(50)
@@ -220,9 +220,8 @@ def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int,
     """In 100,000 steps with each of 50 settings no bit differs, at every optimisation, with gcc and clang."""
     settings = quadratic_case(index, scalar)
     n, steps = 500, 200
-    libraries = [build_library(settings, toolchain(compiler, level)) for compiler, level in BUILDS]
     inputs = inputs_of_steps(settings, n, steps, seed=index)
     expected = run(ExactReferenceController(Design(settings), n), inputs, index)
-    for (compiler, level), library in zip(BUILDS, libraries, strict=True):
+    for build, library in libraries(settings).items():
         found = run(CompiledController(settings, n, library), inputs, index)
-        assert differences(expected, found) == {}, f"{compiler} {level} for {settings!r}"
+        assert differences(expected, found) == {}, f"{build} for {settings!r}"
