@@ -50,9 +50,10 @@ def distance_subgradient(predictor: Predictor, errors_m: Real) -> tuple[Real, Re
     distance = ordered_sum(np.abs(errors_m), axis=0)
     negative = np.signbit(errors_m) if errors_m.dtype.kind == "f" else errors_m < 0
     changes = negative[1:] != negative[:-1]
-    shape = (*distance.shape, predictor.response_sum.shape[1])
-    subgradient = np.broadcast_to(predictor.response_sum[-1], shape)
+    subgradient = np.tile(predictor.response_sum[-1], (*distance.shape, 1))
+    rows = subgradient.reshape(-1, subgradient.shape[-1])
     for change, responses in zip(changes[::-1], predictor.response_sum[-2::-1], strict=True):
-        subgradient = np.where(change[..., None], responses - subgradient, subgradient)
+        changed = np.flatnonzero(change)
+        rows[changed] = responses - rows[changed]
     first_sign = np.where(distance == 0, scalar(0), np.where(negative[0], scalar(-1), scalar(1)))
     return distance[:, 0] + distance[:, 1], first_sign[..., None] * subgradient
