@@ -54,7 +54,9 @@ class Mutant:
 
 
 @dataclass(frozen=True)
-class _Token:
+class Token:
+    """A token of C, without spaces and comments."""
+
     kind: str
     text: str
     start: int
@@ -76,7 +78,7 @@ def mutants(file: str, text: str) -> list[Mutant]:
 
     A key consists of file, line and change; equal changes of equal lines are numbered.
     """
-    tokens = _tokens(text)
+    tokens = tokens_of(text)
     partner = _partners(tokens)
     changes = {
         *_of_tokens(tokens),
@@ -98,10 +100,10 @@ def mutants(file: str, text: str) -> list[Mutant]:
     return found
 
 
-def _tokens(text: str) -> list[_Token]:
+def tokens_of(text: str) -> list[Token]:
     """Split C into tokens and find the place of each."""
     raw = [(m.lastgroup or "", m[0], m.start()) for m in _TOKEN.finditer(text)]
-    tokens: list[_Token] = []
+    tokens: list[Token] = []
     braces: list[str] = []
     in_initialiser, in_define = False, -1
     for kind, word, start in raw:
@@ -114,7 +116,7 @@ def _tokens(text: str) -> list[_Token]:
             continue
         place = braces[-1] if braces else ("data" if in_initialiser else "")
         if start < in_define:
-            tokens.append(_Token(kind, word, start, "define"))
+            tokens.append(Token(kind, word, start, "define"))
             continue
         if word == "{":
             braces.append(_brace(tokens, place))
@@ -122,7 +124,7 @@ def _tokens(text: str) -> list[_Token]:
             braces.pop()
         elif not braces and word in {"=", ";"}:
             in_initialiser = word == "="
-        tokens.append(_Token(kind, word, start, place))
+        tokens.append(Token(kind, word, start, place))
     return tokens
 
 
@@ -131,7 +133,7 @@ def _end_of_directive(text: str, start: int) -> int:
     return found.end() if found else start
 
 
-def _brace(before: Sequence[_Token], place: str) -> str:
+def _brace(before: Sequence[Token], place: str) -> str:
     """Return the place of the tokens that follow an opening brace."""
     if place:
         return place
@@ -141,7 +143,7 @@ def _brace(before: Sequence[_Token], place: str) -> str:
     return "code" if last.text == ")" else "none"
 
 
-def _of_tokens(tokens: Sequence[_Token]) -> Iterator[_Change]:
+def _of_tokens(tokens: Sequence[Token]) -> Iterator[_Change]:
     """Change operators and constants."""
     casts = _ends_of_casts(tokens)
     for index, token in enumerate(tokens):
@@ -158,7 +160,7 @@ def _of_tokens(tokens: Sequence[_Token]) -> Iterator[_Change]:
             yield _Change(token.start, token.start + 1, "")
 
 
-def _numbers(token: _Token) -> Iterator[tuple[str, str]]:
+def _numbers(token: Token) -> Iterator[tuple[str, str]]:
     """Yield replacements of a constant with their names: the neighbours, and the negative of a real."""
     if token.kind == "integer":
         found = re.fullmatch(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)", token.text)
@@ -191,7 +193,7 @@ def _operators(sign: str, *, binary: bool) -> Sequence[str]:
     return _ALWAYS.get(sign, ())
 
 
-def _is_binary(tokens: Sequence[_Token], index: int, casts: frozenset[int]) -> bool:
+def _is_binary(tokens: Sequence[Token], index: int, casts: frozenset[int]) -> bool:
     if index == 0 or index - 1 in casts:
         return False
     before = tokens[index - 1]
@@ -200,7 +202,7 @@ def _is_binary(tokens: Sequence[_Token], index: int, casts: frozenset[int]) -> b
     return before.kind in {"real", "integer"} or before.text in {")", "]"}
 
 
-def _ends_of_casts(tokens: Sequence[_Token]) -> frozenset[int]:
+def _ends_of_casts(tokens: Sequence[Token]) -> frozenset[int]:
     """Return the indices of the brackets that close a cast."""
     ends, start = [], -1
     for index, token in enumerate(tokens):
@@ -214,7 +216,7 @@ def _ends_of_casts(tokens: Sequence[_Token]) -> frozenset[int]:
     return frozenset(ends)
 
 
-def _of_brackets(text: str, tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterator[_Change]:
+def _of_brackets(text: str, tokens: Sequence[Token], partner: Mapping[int, int]) -> Iterator[_Change]:
     """Change an index by one, and negate a condition."""
     declared = {
         index
@@ -235,14 +237,14 @@ def _of_brackets(text: str, tokens: Sequence[_Token], partner: Mapping[int, int]
             yield _Change(token.start, end + 1, turned, "condition turned round")
 
 
-def _of_statements(tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterator[_Change]:
+def _of_statements(tokens: Sequence[Token], partner: Mapping[int, int]) -> Iterator[_Change]:
     """Leave a statement out."""
     for first, last, is_declaration in _statements(tokens, partner):
         if not is_declaration:
             yield _Change(tokens[first].start, tokens[last].start, "", "left out")
 
 
-def _partners(tokens: Sequence[_Token]) -> dict[int, int]:
+def _partners(tokens: Sequence[Token]) -> dict[int, int]:
     """Return for each opening bracket the index of the one that closes it."""
     closing, open_, partner = {"(": ")", "[": "]"}, list[int](), dict[int, int]()
     for index, token in enumerate(tokens):
@@ -253,7 +255,7 @@ def _partners(tokens: Sequence[_Token]) -> dict[int, int]:
     return partner
 
 
-def _statements(tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterator[tuple[int, int, bool]]:
+def _statements(tokens: Sequence[Token], partner: Mapping[int, int]) -> Iterator[tuple[int, int, bool]]:
     """Yield first token, semicolon, and whether it declares, for every simple statement of every function."""
     index = 0
     while index < len(tokens):
@@ -276,6 +278,6 @@ def _statements(tokens: Sequence[_Token], partner: Mapping[int, int]) -> Iterato
             index = last + 1
 
 
-def _declarator_end(tokens: Sequence[_Token], first: int, last: int) -> int:
+def _declarator_end(tokens: Sequence[Token], first: int, last: int) -> int:
     """Return where the initialiser of a declaration begins, or its end if it has none."""
     return next((index for index in range(first, last) if tokens[index].text == "="), last)

@@ -1,15 +1,22 @@
 """Compile mutants of a bundle, run the verification cases on each, and tell what shows the fault."""
 
+import subprocess
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from mambo_nmpc.codegen.errors import BuildError
 from mambo_nmpc.codegen.render import SUB_BLOCKS
 from mambo_nmpc.codegen.toolchain import Toolchain
 from mambo_nmpc.sil.verify import replay
+from mambo_nmpc.sil.verify.calls import outcome_type
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import Subject
 from tests.support.mutants import Mutant, mutants
+from tests.support.schemata import ORIGINAL, can_share, refused_numbers, with_mutants
 
 FILES: Final = (
     "include/nmpc_config.h",
@@ -22,6 +29,11 @@ FILES: Final = (
 LIMIT_S: Final = 5
 """Processor time of a mutant, in seconds; the generated C takes a tenth of one."""
 
+SHARED_LIMIT_S: Final = 1
+"""The same in a shared program, in which the C without a fault runs first and must end in time."""
+
+_PROGRAM: Final = Path(__file__).with_name("schemata.c")
+_SHARED: Final = "shared"
 _LIBRARY: Final = "all.c"
 _OTHERS: Final = {
     "fuzz/replay.c": ("include/nmpc_config.h",),
@@ -60,6 +72,14 @@ class Bench:
         self._tapes, self._expected = cases(subject.settings)
         self._tapes_file = subject.folder / "tapes.bin"
         replay.write_tapes(subject.settings, self._tapes, self._tapes_file)
+        self._outcomes_file = subject.folder / "outcomes.bin"
+        any_outcome = np.zeros(1, outcome_type(self.settings)).tobytes()
+        self._outcomes_file.write_bytes(
+            b"".join(
+                b"\0" + any_outcome + b"".join(b"\1" + outcome.tobytes() for outcome in outcomes)
+                for outcomes in self._expected
+            )
+        )
         self._originals = {flags: self._all_objects(flags) for flags in (_FAST, _SANITIZED)}
         self._optimized = self._compile(("-O3",), _LIBRARY)
 
@@ -77,6 +97,52 @@ class Bench:
             return self._fate(mutant.file)
         finally:
             file.write_text(text, "utf-8")
+
+    def unnoticed(self, mutants: Sequence[Mutant]) -> list[Mutant]:
+        """Run many mutants in one program; return those that show in no outcome.
+
+        Mutants that cannot share a program, or that the compiler refuses in it, are returned too.
+        """
+        texts = {path: (self._folder / path).read_text("utf-8") for path in {one.file for one in mutants}}
+        shared = [one for one in mutants if can_share(texts[one.file], one)]
+        numbered = dict(enumerate(shared, ORIGINAL + 1))
+        noticed = dict(numbered)
+        try:
+            while refused := self._build_shared(texts, noticed):
+                noticed = {number: one for number, one in noticed.items() if number not in refused}
+        finally:
+            for path, text in texts.items():
+                (self._folder / path).write_text(text, "utf-8")
+        done = subprocess.run(
+            [f"./{_SHARED}", str(self._tapes_file), str(SHARED_LIMIT_S), str(self._outcomes_file)]
+            + [str(number) for number in (ORIGINAL, *noticed)],
+            cwd=self._folder,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        original, *same = map(int, done.stdout.split())
+        assert original == ORIGINAL, "the C without a fault shows in no outcome either"
+        shown = {noticed[number] for number in noticed.keys() - set(same)}
+        return [one for one in mutants if one not in shown]
+
+    def _build_shared(self, texts: Mapping[str, str], numbered: Mapping[int, Mutant]) -> set[int]:
+        """Compile mutants into one program; return the numbers of those that the compiler refuses."""
+        for path, text in texts.items():
+            own = {number: one for number, one in numbered.items() if one.file == path}
+            (self._folder / path).write_text(with_mutants(text, own), "utf-8")
+        size = f"-DOUTCOME_BYTES={outcome_type(self.settings).itemsize}U"
+        units = (_LIBRARY, "src/nmpc_self_test.c", str(_PROGRAM))
+        done = subprocess.run(
+            ["gcc", *_FLAGS, *_FAST, size, *units, "-o", _SHARED],
+            cwd=self._folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        refused = refused_numbers(done.stderr)
+        assert refused or done.returncode == 0, done.stderr
+        return refused
 
     def difference(self) -> str | None:
         """Compile all anew and run the cases; return what differs from the reference, None if nothing."""

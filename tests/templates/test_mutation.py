@@ -1,5 +1,6 @@
 """The verification cases notice every small fault of the C, except those with a reason."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -131,20 +132,19 @@ def test_every_reason_is_of_a_mutant_that_there_is() -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("settings", "path"),
-    [
-        *((MAMBO, path) for path in FILES if "tracker" not in path),
-        *((TRACKED, path) for path in TRACKED_FILES),
-    ],
-    ids=lambda value: value if isinstance(value, str) else value.target.acceleration,
+    ("settings", "files"),
+    [(MAMBO, [path for path in FILES if "tracker" not in path]), (TRACKED, TRACKED_FILES)],
+    ids=["mambo", "mambo-1norm"],
 )
 @pytest.mark.parametrize("scalar", ["float32", "fixed"])
 def test_every_fault_is_noticed_or_explained(
-    tmp_path: Path, scalar: str, settings: Settings, path: str
+    tmp_path: Path, scalar: str, settings: Settings, files: Sequence[str]
 ) -> None:
     """All mutants of preset mambo, and of mambo-1norm where it differs; the message has the survivors."""
     require("gcc", "gcc")
     bench = Bench(subject(in_scalar(settings, scalar), tmp_path))
     assert bench.difference() is None
-    survivors = [mutant.key for mutant in bench.mutants_of(path) if bench.fate(mutant) is Fate.SURVIVED]
-    assert [key for key in survivors if not is_explained(key, REASONS, bench.settings)] == []
+    unnoticed = bench.unnoticed([mutant for path in files for mutant in bench.mutants_of(path)])
+    unexplained = [one for one in unnoticed if not is_explained(one.key, REASONS, bench.settings)]
+    assert len(unexplained) < len(unnoticed), "those that have a reason run to the end"
+    assert [one.key for one in unexplained if bench.fate(one) is Fate.SURVIVED] == []
