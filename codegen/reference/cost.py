@@ -52,8 +52,8 @@ def distance_subgradient(predictor: Predictor, errors_m: Real) -> tuple[Real, Re
     changes = negative[1:] != negative[:-1]
     subgradient = np.tile(predictor.response_sum[-1], (*distance.shape, 1))
     rows = subgradient.reshape(-1, subgradient.shape[-1])
-    for change, responses in zip(changes[::-1], predictor.response_sum[-2::-1], strict=True):
-        changed = np.flatnonzero(change)
-        rows[changed] = responses - rows[changed]
+    for step in np.flatnonzero(changes.any(axis=(1, 2)))[::-1]:
+        changed = np.flatnonzero(changes[step])
+        rows[changed] = predictor.response_sum[step] - rows[changed]
     first_sign = np.where(distance == 0, scalar(0), np.where(negative[0], scalar(-1), scalar(1)))
     return distance[:, 0] + distance[:, 1], first_sign[..., None] * subgradient
