@@ -150,9 +150,9 @@ class Bench:
         return self._play(_FAST, self._all_objects(_FAST))
 
     def _fate(self, changed: str) -> Fate:
-        if all(self._preprocessed(unit) == text for unit, text in self._texts.items()):
-            return Fate.SAME
         try:
+            if all(self._preprocessed(unit) == text for unit, text in self._texts.items()):
+                return Fate.SAME
             objects = self._objects(_FAST, changed)
         except BuildError:
             return Fate.REFUSED
