@@ -36,7 +36,10 @@ from tests.support.faults import SHOWN, any_inputs
 from tests.support.scenarios import LATE, LIMITED
 
 
-@pytest.fixture(scope="module", params=LANES)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(lanes, marks=[] if lanes != 2 else pytest.mark.long) for lanes in LANES],
+)
 def engine(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the engine with access to its blocks."""
     if request.param not in lanes_here():

@@ -84,8 +84,11 @@ def test_the_bound_holds_and_is_tight(board: str, optimisation: str, tmp_path: P
 
 @pytest.mark.parametrize(
     ("board", "scalar"),
-    # avr-gcc's double has 32 bits
-    [case for case in itertools.product(CORES, ("float64", "fixed")) if case != ("mega", "float64")],
+    [
+        pytest.param(*case, marks=[] if case == ("crazyflie", "float64") else pytest.mark.long)
+        for case in itertools.product(CORES, ("float64", "fixed"))
+        if case != ("mega", "float64")  # avr-gcc's double has 32 bits
+    ],
 )
 def test_other_scalar_types_have_a_bound(board: str, scalar: str, tmp_path: Path) -> None:
     """The analysis covers the compiler's helpers, including those with their own calling convention."""

@@ -155,6 +155,7 @@ def test_a_quadratic_cost_has_nothing_to_sweep(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["quadratic.toml"]
 
 
+@pytest.mark.long
 def test_a_sweep_yields_the_points_in_order() -> None:
     """A longer horizon takes more flash and instructions, and no less RAM."""
     board_builder("crazyflie")

@@ -128,6 +128,7 @@ def stack_bound(settings: Settings, folder: Path) -> int:
     return bound_stack(load(elf), ENTRY).bytes
 
 
+@pytest.mark.long
 def test_the_stm32_flies_and_measures(tmp_path: Path) -> None:
     """Counted cycles; a painted stack within the bound, which also has the frame of the caller."""
     settings = presets.preset("mambo")

@@ -24,7 +24,10 @@ from tests.support.extension import build_extension
 from tests.support.parity import differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 
-FEW_SETTINGS = range(len(CORNER_HORIZONS) + 1)
+FEW_SETTINGS = [
+    pytest.param(index, marks=[] if index in {2, 5} else pytest.mark.long)
+    for index in range(len(CORNER_HORIZONS) + 1)
+]
 MANY_SETTINGS = range(50)
 
 

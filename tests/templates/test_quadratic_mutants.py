@@ -157,6 +157,7 @@ class SelfTest:
         return code
 
 
+@pytest.mark.long
 def test_the_self_test_notices_every_constant_of_every_table(files: dict[str, str], tmp_path: Path) -> None:
     """Each number of the rows and ratios, and of the attitude model, larger by a millionth."""
     bench = SelfTest(files, tmp_path)
