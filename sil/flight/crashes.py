@@ -1,7 +1,6 @@
 """Crashes: a drone tilted too far or on the ground, which the simulation lets fly on."""
 
 import math
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,6 @@ def first_crash(trace: Trace, flight: int = 0, drone: VehicleFile = NOMINAL) -> 
     return Crash(time_s=float(trace.time_s[trace.time_s >= 0.0][first]), how=how)
 
 
-@lru_cache
 def least_level(drone: VehicleFile) -> float:
     """Return the cosine of the tilt beyond which a drone crashes."""
     return float(sine_cosine(crash_tilt_rad(drone))[1])

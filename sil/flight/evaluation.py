@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mambo_nmpc.sil.flight.crashes import detect_crashes
 from mambo_nmpc.sil.flight.metrics import Metrics, measure, saturated_share
@@ -34,13 +33,8 @@ def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
     """Evaluate the flights of `drone` under commands that are limited to `limit_rad`."""
     return Evaluation(
         crashed=detect_crashes(trace, drone),
-        refused=count_refused(trace),
+        refused=np.sum((trace.status != 0) & (trace.status != NOT_CALLED), axis=0),
         saturated_share=saturated_share(trace.command_rad, limit_rad),
         metrics=measure(trace),
         seen=measure(trace.as_seen()) if isinstance(trace, SensedTrace) else None,
     )
-
-
-def count_refused(trace: Trace) -> NDArray[np.int64]:
-    """Return how many updates (n,) the controller refused."""
-    return np.asarray(np.sum((trace.status != 0) & (trace.status != NOT_CALLED), axis=0))

@@ -12,6 +12,16 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.proof import Report, prove
 from tests.support.subjects import Harm, subject
 
+_STEP, _MATH = "src/nmpc.c", "src/nmpc_math.h"
+NAN_PASSES = Harm(
+    _MATH, r"\(value >= minimum\);\n(.*)\(value <= maximum\)", r"!(value < minimum);\n\1!(value > maximum)"
+)
+INFINITY_PASSES = Harm(_MATH, r"\(value <= maximum\)", "1")
+UNCHECKED_HEADING = Harm(_STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1")
+NULL_FOLLOWED = Harm(_STEP, r"\(state != NULL\) && ", "")
+UNSET_COMMAND = Harm(_STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", "")
+"""Faults that the C of both norms can have."""
+
 
 class Alarm(NamedTuple):
     """An alarm of a kind at the line of `path` in which `line` occurs."""

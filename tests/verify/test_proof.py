@@ -11,7 +11,17 @@ from mambo_nmpc.codegen.settings.model import Settings
 from mambo_nmpc.sil.verify.check import CheckOutcome
 from mambo_nmpc.sil.verify.proof import check, read_properties
 from tests.support import headings
-from tests.support.alarms import Alarm, Fault, runs, unnoticed
+from tests.support.alarms import (
+    INFINITY_PASSES,
+    NAN_PASSES,
+    NULL_FOLLOWED,
+    UNCHECKED_HEADING,
+    UNSET_COMMAND,
+    Alarm,
+    Fault,
+    runs,
+    unnoticed,
+)
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
@@ -21,16 +31,11 @@ STEP, OPTIMIZER, COST, MATH = "src/nmpc.c", "src/nmpc_optimizer.c", "src/nmpc_co
 SINE, PREDICTOR, DRIVER = "src/nmpc_math.c", "src/nmpc_predictor.c", "proof/nmpc_proof.c"
 ROLL = Alarm(DRIVER, "roll_is_within_the_limit", "user assertion")
 UNINITIALISED = Harm(STEP, r"    self->cost = \(nmpc_sum_t\)0;\n", "")
-UNCHECKED = Harm(STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1")
 UNLIMITED = Harm(OPTIMIZER, r"nmpc_larger\((move_rad - [^,]*), -NMPC_TILT_LIMIT_RAD\)", r"\1")
 FAULTS = {
     "NaN passes a range check": Fault(
         "refuse_nan",
-        Harm(
-            MATH,
-            r"\(value >= minimum\);\n(.*)\(value <= maximum\)",
-            r"!(value < minimum);\n\1!(value > maximum)",
-        ),
+        NAN_PASSES,
         Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite"),
     ),
     "a refused call writes": Fault(
@@ -39,7 +44,7 @@ FAULTS = {
         Alarm(STEP, "self->converged = 0U;", "mem_access"),
     ),
     "the heading goes unchecked": Fault(
-        "refuse_nan", UNCHECKED, Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite")
+        "refuse_nan", UNCHECKED_HEADING, Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite")
     ),
     "a weight goes unchecked": Fault(
         "refuse_nan",
@@ -48,17 +53,17 @@ FAULTS = {
     ),
     "a null pointer is followed": Fault(
         "refuse_nan",
-        Harm(STEP, r"\(state != NULL\) && ", ""),
+        NULL_FOLLOWED,
         Alarm(STEP, "nmpc_within(position_m[0]", "mem_access"),
     ),
     "infinity passes a range check": Fault(
         "take_numbers",
-        Harm(MATH, r"\(value <= maximum\)", "1"),
+        INFINITY_PASSES,
         Alarm(SINE, "(int)(quarter_turns", "float_to_int"),
     ),
     "a bad input leaves the command unset": Fault(
         "take_numbers",
-        Harm(STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""),
+        UNSET_COMMAND,
         ROLL,
     ),
     "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
@@ -94,7 +99,7 @@ AT_ONCE = (
 FIXED_FAULTS = {
     "the heading goes unchecked": Fault(
         "take_numbers",
-        UNCHECKED,
+        UNCHECKED_HEADING,
         Alarm(PREDICTOR, "nmpc_sine_cosine(", "precondition of nmpc_sine_cosine"),
     ),
     "errors have a bit too many": Fault(
@@ -213,7 +218,7 @@ def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: 
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("harm", [None, UNCHECKED], ids=["right", "wrong"])
+@pytest.mark.parametrize("harm", [None, UNCHECKED_HEADING], ids=["right", "wrong"])
 @pytest.mark.parametrize("amalgamate", [False, True])
 def test_make_proof_comes_to_the_same_verdict(harm: Harm | None, tmp_path: Path, *, amalgamate: bool) -> None:
     """The command of the bundle, in both layouts, ends in an error unless everything is proven."""

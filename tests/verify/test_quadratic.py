@@ -11,7 +11,17 @@ from mambo_nmpc.sil.verify import bits, dialects, fuzzing, rules, sanitizers
 from mambo_nmpc.sil.verify.cases import cases
 from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
 from tests.support import headings
-from tests.support.alarms import Alarm, Fault, runs, unnoticed
+from tests.support.alarms import (
+    INFINITY_PASSES,
+    NAN_PASSES,
+    NULL_FOLLOWED,
+    UNCHECKED_HEADING,
+    UNSET_COMMAND,
+    Alarm,
+    Fault,
+    runs,
+    unnoticed,
+)
 from tests.support.quadratic import quadratic_settings
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
@@ -23,16 +33,12 @@ FEW_RUNS = 20_000
 UNPROVEN = {
     "NaN passes a range check": Fault(
         "refuse_nan",
-        Harm(
-            MATH,
-            r"\(value >= minimum\);\n(.*)\(value <= maximum\)",
-            r"!(value < minimum);\n\1!(value > maximum)",
-        ),
+        NAN_PASSES,
         Alarm(STEP, "self->command_rad[0] = roll_rad;", "mem_access"),
     ),
     "the heading goes unchecked": Fault(
         "refuse_nan",
-        Harm(STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1"),
+        UNCHECKED_HEADING,
         Alarm(DRIVER, "step_refuses_nan", "user assertion"),
     ),
     "a refused state is used": Fault(
@@ -47,12 +53,12 @@ UNPROVEN = {
     ),
     "a null pointer is followed": Fault(
         "refuse_nan",
-        Harm(STEP, r"\(state != NULL\) && ", ""),
+        NULL_FOLLOWED,
         Alarm(STEP, "nmpc_within(position_m[0]", "mem_access"),
     ),
     "infinity passes a range check": Fault(
         "take_numbers",
-        Harm(MATH, r"\(value <= maximum\)", "1"),
+        INFINITY_PASSES,
         Alarm(STEP, "nmpc_sine_cosine(", "precondition of nmpc_sine_cosine"),
     ),
     "the command leaves the tilt limit": Fault(
@@ -86,7 +92,7 @@ UNPROVEN = {
     ),
     "a bad input leaves the command unset": Fault(
         "take_numbers",
-        Harm(STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""),
+        UNSET_COMMAND,
         Alarm(DRIVER, "roll_is_within_the_limit", "user assertion"),
     ),
 }
