@@ -35,9 +35,9 @@ MARKED = -m "long or not long"
 endif
 
 # Tests that need no compiler and take seconds. They run with a PATH on which there is none.
-CHECKED = tests/test_house.py tests/campaign/test_campaign.py tests/files tests/firmware \
+CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/results tests/board/firmware \
     $(filter-out %/test_generations.py %/test_exact_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
-    tests/flight/test_trajectories.py tests/plant tests/sensors
+    tests/flight/test_trajectories.py tests/drone/plant tests/drone/sensors
 
 .PHONY: fly check test tools generated docs evidence bench bench-peers clean
 
@@ -127,13 +127,10 @@ $(SETUP_BENCH): pyproject.toml constraints.txt
 	$(PIP_INSTALL) ".[bench]"
 	@touch $@ $(SETUP)
 
-# mypy reads the one installed package from a folder in which its parts are linked side by side.
 define STYLE_AND_TYPES
 $(BIN)/ruff check .
 $(BIN)/ruff format --check .
-@mkdir -p build/typing/mambo_nmpc
-@ln -sfn ../../../codegen ../../../sil ../../../templates ../../../sil/package/__init__.py \
-    ../../../sil/package/__main__.py ../../../sil/package/py.typed build/typing/mambo_nmpc/
+$(BIN)/lint-imports
 $(BIN)/mypy
 endef
 

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from benchmarks.markdown import table
-from mambo_nmpc.sil.flight.names import EngineName
+from mambo_sil.flight.names import EngineName
 
 WORKERS: Final = 2
 

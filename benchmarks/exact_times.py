@@ -22,13 +22,13 @@ from benchmarks.ours import Ours
 from benchmarks.peers_setups import PEERS
 from benchmarks.programs import NotHereError, Program, run_tool
 from benchmarks.times_report import FLAGS
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.quadratic import second_derivatives
-from mambo_nmpc.codegen.reference import ExactReferenceController
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.law import second_derivatives
+from mambo_codegen.reference import ExactReferenceController
+from mambo_codegen.settings import presets
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.trajectories import Bernoulli
 
 Array = NDArray[Any]
 

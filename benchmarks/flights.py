@@ -13,13 +13,13 @@ from typing import Final
 from rotorpy.vehicles.crazyflie_params import quad_params
 from rotorpy.vehicles.multirotor import Multirotor
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.names import EngineName
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_codegen.settings import presets
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.names import EngineName
+from mambo_sil.flight.trajectories import Bernoulli
 
 DURATION_S: Final = 100.0
 ROUNDS: Final = 5

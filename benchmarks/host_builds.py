@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.ours import Ours
 from benchmarks.programs import BENCHMARKS, Program, run_tool
-from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_codegen.toolchain import host_toolchain
 
 Array = NDArray[Any]
 

@@ -22,15 +22,15 @@ from benchmarks.programs import BENCHMARKS, run_tool
 from benchmarks.searches import Array, CostModel
 from benchmarks.states import Inputs, state_sets
 from benchmarks.times import prepare, time_all
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.reference import Step
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.toolchain import host_toolchain
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.footprint.counts import FLIGHT
-from mambo_nmpc.sil.footprint.measure import measure_footprint
+from mambo_codegen import boards
+from mambo_codegen.reference import Step
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.board.footprint.counts import FLIGHT
+from mambo_sil.board.footprint.measure import measure_footprint
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.loop import Flight, fly
 
 ITERATIONS: Final = (5, 10, 20, 40, 60, 100)
 """100 is the largest setting."""

@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 from benchmarks.problem import GRAVITY_M_S2
 from benchmarks.programs import Cost
 from benchmarks.searches import Array, CostModel, Problems
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.settings.model import Settings
 
 
 def problems(settings: Settings, inputs: Array) -> Problems:

@@ -7,11 +7,11 @@ from typing import Final
 
 from benchmarks.problem import STEP_S
 from benchmarks.programs import Program
-from mambo_nmpc.codegen.literals import real
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.bundle.render import render
+from mambo_codegen.numbers.literals import real
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 
 ONE_NORM: Final = with_option(presets.load("mambo-1norm"), "target.acceleration", "none")
 """Preset mambo-1norm without its tracker: the lags of the Mambo, and targets as the peers know them."""

@@ -19,20 +19,15 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.markdown import table
-from mambo_nmpc.sil.campaign.file import (
-    CampaignFile,
-    distributions,
-    load_its_drone,
-    scenario,
-)
-from mambo_nmpc.sil.campaign.parameters import draw
-from mambo_nmpc.sil.controllers.pd import GAINS, PdController, PdFeedForwardController, PdGains
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.crashes import detect_crashes
-from mambo_nmpc.sil.flight.loop import Flight, PositionController
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.scenario import flight_of
-from mambo_nmpc.sil.flight.traces import SensedTrace
+from mambo_sil.experiment.campaign.campaign_file import CampaignFile, distributions, load_its_drone, scenario
+from mambo_sil.experiment.campaign.parameters import draw
+from mambo_sil.flight.controllers.pd import GAINS, PdController, PdFeedForwardController, PdGains
+from mambo_sil.flight.crashes import detect_crashes
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.scenario import flight_of
+from mambo_sil.flight.traces import SensedTrace
 
 CURVES: Final[dict[str, dict[str, Any]]] = {
     "bernoulli": {"size_m": {"uniform": [1.0, 2.0]}, "rate_rad_s": {"uniform": [0.25, 0.75]}},

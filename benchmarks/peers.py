@@ -20,15 +20,15 @@ from benchmarks.markdown import table
 from benchmarks.ours import ONE_NORM, PEERS_MODEL, Ours, bundle
 from benchmarks.peers_setups import DOUBLE, PEERS
 from benchmarks.programs import NotHereError, Program, run_tool
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.sil.firmware.build import ENTRY, PREFIX, Builder, builder
-from mambo_nmpc.sil.firmware.elf import FootprintError, Image, load
-from mambo_nmpc.sil.firmware.gate import find_forbidden
-from mambo_nmpc.sil.firmware.sizes import measure_added, measure_sections
-from mambo_nmpc.sil.firmware.stack import bound_stack
+from mambo_codegen import boards
+from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_codegen.bundle.render import render
+from mambo_codegen.errors import BuildError
+from mambo_sil.board.firmware.elf import FootprintError, Image, load
+from mambo_sil.board.firmware.firmware_build import ENTRY, PREFIX, Builder, builder
+from mambo_sil.board.firmware.gate import find_forbidden
+from mambo_sil.board.firmware.sizes import measure_added, measure_sections
+from mambo_sil.board.firmware.stack import bound_stack
 
 _BOARD: Final = "crazyflie"
 _VEHICLE: Final = "mambo"

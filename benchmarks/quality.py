@@ -17,20 +17,20 @@ import numpy as np
 from benchmarks.markdown import table
 from benchmarks.ours import ONE_NORM
 from benchmarks.searches import Searching, SearchingController, best_iterate, from_zero_moves, optimum
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.crashes import detect_crashes
-from mambo_nmpc.sil.flight.loop import PositionController
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
-from mambo_nmpc.sil.flight.traces import SensedTrace, Trace
-from mambo_nmpc.sil.footprint.measure import measure_footprint
-from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.plant.gusts import LIGHT_M_S
+from mambo_codegen import boards
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.board.footprint.measure import measure_footprint
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.gusts import LIGHT_M_S
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.crashes import detect_crashes
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import PositionController
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.scenario import Scenario, flight_of
+from mambo_sil.flight.traces import SensedTrace, Trace
 
 PRESETS: Final = ("table1", "mambo-1norm")
 EFFORT_WEIGHTS: Final = (1.0, 100.0, 200.0, 300.0, 1000.0)

@@ -22,20 +22,20 @@ from rotorpy.vehicles.multirotor import Multirotor
 from scipy.spatial.transform import Rotation
 
 from benchmarks.markdown import table
-from mambo_nmpc.codegen.settings import controller_toml, presets
-from mambo_nmpc.sil.api.controller import Controller
-from mambo_nmpc.sil.api.frames import attitude_of_quaternion, command_in_frame
-from mambo_nmpc.sil.api.states import DroneState, TargetState
-from mambo_nmpc.sil.derivation.settings import controller_text
-from mambo_nmpc.sil.flight.names import CurveName
-from mambo_nmpc.sil.flight.trajectories import CURVES
-from mambo_nmpc.sil.plant import loops
-from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.plant.vehicle import Seen
-from mambo_nmpc.sil.sensors.mocap import MocapSuite, MotionCapture
-from mambo_nmpc.sil.vehicles.model import VehicleFile
-from mambo_nmpc.sil.vehicles.presets import read
-from mambo_nmpc.sil.vehicles.sections import MocapSensors
+from mambo_codegen.settings import controller_toml, presets
+from mambo_sil.drone.plant import loops
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import Seen
+from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.presets import read
+from mambo_sil.drone.vehicles.sections import MocapSensors
+from mambo_sil.flight.api.controller import Controller
+from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
+from mambo_sil.flight.api.states import DroneState, TargetState
+from mambo_sil.flight.names import CurveName
+from mambo_sil.flight.trajectories import CURVES
+from mambo_sil.model.derive.derived_settings import controller_text
 
 STEP_S: Final = 0.01
 SEEDS: Final = (0, 1, 2, 3, 4)

@@ -15,13 +15,13 @@ from scipy.linalg import expm
 from scipy.optimize import linprog
 from scipy.sparse import block_diag
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.horizon import shortened_lags_s
-from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
-from mambo_nmpc.codegen.reference.arithmetic import arithmetic
-from mambo_nmpc.codegen.reference.optimizer import Evaluate, Rprop, Search
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.horizon import shortened_lags_s
+from mambo_codegen.methods.one_norm.optimizer import Evaluate, Rprop, Search
+from mambo_codegen.reference import ReferenceController, Status, Step
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
 

@@ -16,20 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markdown import table
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController, Status, Step
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.inner_steps import InnerSteps, step_watched
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.loop import Flight, Outcome
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.trajectories import Trajectories
-from mambo_nmpc.sil.paper.table2 import CASES, DURATION_S
-from mambo_nmpc.sil.verify.inputs import random_inputs
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_codegen.reference import ReferenceController, Status, Step
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.experiment.table2.table2 import CASES, DURATION_S
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.inner_steps import InnerSteps, step_watched
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, Outcome
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.trajectories import Trajectories
+from mambo_sil.verify.inputs import random_inputs
 
 RANDOM_STEPS: Final = 100_000
 EDGE_SEEDS: Final = 10_000

@@ -8,14 +8,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
-from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.scenario import Scenario, flight_of
 
 STARTS: Final = 12
 RADIUS_M: Final = 0.001

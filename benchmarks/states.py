@@ -5,11 +5,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
+from mambo_codegen.settings import presets
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.trajectories import Bernoulli
 
 Inputs = NDArray[np.float32]
 """(n, 6): x (m), vx (m/s), y, vy of the drone less the target's; roll and pitch last commanded (rad)."""

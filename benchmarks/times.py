@@ -30,9 +30,9 @@ from benchmarks.peers_setups import PEERS
 from benchmarks.programs import BENCHMARKS, ROOT, NotHereError, Program, run_tool
 from benchmarks.states import Inputs, state_sets
 from benchmarks.times_report import COLD, FLAGS, Row, Timing, write_report
-from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.toolchain import host_toolchain
+from mambo_codegen.errors import BuildError
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.toolchain import host_toolchain
 
 Array = NDArray[np.float64]
 Libraries = dict[tuple[str, str], Path]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from benchmarks.markdown import table
 from benchmarks.peers_setups import Peer
 from benchmarks.programs import Program
-from mambo_nmpc.sil.show.plots import save
-from mambo_nmpc.sil.show.style import BLUE, ORANGE, PAGE_INCHES, QUIET, THIN, style
+from mambo_sil.results.pictures import save
+from mambo_sil.results.style import BLUE, ORANGE, PAGE_INCHES, QUIET, THIN, style
 
 FLAGS: Final = ("-O2", "-O3 -march=native")
 SETS: Final = ("W", "T", "F", "C")

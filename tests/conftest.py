@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from mambo_nmpc.codegen.errors import BuildError
+from mambo_codegen.errors import BuildError
 from tests.support.tools import require
 
 settings.register_profile(

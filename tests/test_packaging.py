@@ -13,8 +13,8 @@ import pytest
 from tests.support.tools import require
 
 ROOT = Path(__file__).parent.parent
-FOLDERS = ("codegen", "sil", "templates")
-BUILD_SDIST = "import sys; from setuptools import build_meta; print(build_meta.build_sdist(sys.argv[1]))"
+ROOTS = ("codegen", "sil", "templates")
+BUILD_SDIST = "import sys; from hatchling import build; print(build.build_sdist(sys.argv[1]))"
 # Runs each line of stdin as a command; the exit code of this script is that of the first that fails.
 MANY_COMMANDS = """
 import sys
@@ -51,7 +51,7 @@ def tracked() -> list[str]:
 
 def installed(path: str) -> str:
     """Return where a tracked file of ours stands in site-packages."""
-    return "mambo_nmpc/" + path.removeprefix("sil/package/")
+    return path.partition("/")[2]
 
 
 def files_of(wheel: Path) -> set[str]:
@@ -86,19 +86,19 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     stale = folder / "build" / "lib" / "mambo_nmpc" / "stale.py"
     stale.parent.mkdir(parents=True)
     stale.write_text("", "utf-8")
+    (folder / "sil" / "mambo_nmpc" / "__pycache__").mkdir()
+    (folder / "sil" / "mambo_nmpc" / "__pycache__" / "stale.pyc").write_text("", "utf-8")
     return folder
 
 
 @pytest.mark.long
 def test_wheel_and_source_archive_hold_every_tracked_file_and_no_other(source: Path, tmp_path: Path) -> None:
-    """A package missing in pyproject.toml, or a stale module in build/lib, changes the list of files."""
-    expected = {
-        installed(path) for path in tracked() if path.startswith(tuple(f"{name}/" for name in FOLDERS))
-    }
-    assert {"mambo_nmpc/py.typed", "mambo_nmpc/templates/src/nmpc.c.j2"} <= expected
+    """A package missing in pyproject.toml, or a file that an earlier build left, changes the list."""
+    expected = {installed(path) for path in tracked() if path.startswith(tuple(f"{name}/" for name in ROOTS))}
+    assert {"mambo_nmpc/py.typed", "mambo_templates/src/nmpc.c.j2"} <= expected
     assert files_of(wheel_of(source, tmp_path)) == expected
 
-    python = environment(tmp_path / "builder", "setuptools>=77")
+    python = environment(tmp_path / "builder", "hatchling>=1.27")
     run(python, "-c", BUILD_SDIST, tmp_path, folder=source)
     (tmp_path / "again").mkdir()
     archive = next(tmp_path.glob("*.tar.gz"))
@@ -107,11 +107,11 @@ def test_wheel_and_source_archive_hold_every_tracked_file_and_no_other(source: P
 
 @pytest.mark.long
 def test_the_wheel_generates_and_flies_in_a_clean_environment(source: Path, tmp_path: Path) -> None:
-    """Only mambo_nmpc is added to site-packages, and the bundle equals the committed one."""
+    """Our names alone are added to site-packages, and the bundle equals the committed one."""
     wheel = wheel_of(source, tmp_path)
     binaries = environment(tmp_path / "clean", "-c", ROOT / "constraints.txt", wheel).parent
     packages = next((tmp_path / "clean" / "lib").glob("python*/site-packages"))
-    assert not [name for name in FOLDERS if (packages / name).exists()]
+    assert not [name for name in ROOTS if (packages / name).exists()]
     command = binaries / "mambo-nmpc"
     run(command, "generate", "mambo", "-o", ROOT / "generated" / "mambo", "--check", folder=tmp_path)
     assert "IAE" in run(command, "fly", "--duration-s", "1", "-o", "flight", folder=tmp_path)
@@ -121,7 +121,7 @@ def test_the_wheel_generates_and_flies_in_a_clean_environment(source: Path, tmp_
 def test_every_command_works_beside_folders_of_our_names(tmp_path: Path) -> None:
     """A user's own packages codegen, sil and templates, on the search path, change nothing."""
     require("gcc", "gcc")
-    for name in FOLDERS:
+    for name in ROOTS:
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("", "utf-8")
     path = str(tmp_path)
@@ -139,12 +139,9 @@ def test_every_command_works_beside_folders_of_our_names(tmp_path: Path) -> None
 
 def test_a_missing_template_is_a_bug_with_a_traceback(tmp_path: Path) -> None:
     """It is a broken installation, not a file that the user could provide."""
-    package = tmp_path / "mambo_nmpc"
-    shutil.copytree(ROOT / "sil" / "package", package)
-    for name in ("codegen", "sil"):
-        (package / name).symlink_to(ROOT / name)
-    shutil.copytree(ROOT / "templates", package / "templates")
-    (package / "templates" / "quadratic" / "nmpc_observer.c.j2").unlink()
+    templates = tmp_path / "mambo_templates"
+    shutil.copytree(ROOT / "templates" / "mambo_templates", templates)
+    (templates / "quadratic" / "nmpc_observer.c.j2").unlink()
     command = [sys.executable, "-m", "mambo_nmpc", "generate", "-o", "c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1

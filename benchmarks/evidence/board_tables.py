@@ -8,7 +8,7 @@ from typing import Any, Final
 from benchmarks.evidence.item import Figures
 from benchmarks.evidence.tables import Row, summary
 from benchmarks.markdown import table
-from mambo_nmpc.sil.faults.flights import STATUS_NAMES
+from mambo_sil.experiment.faults.fault_flights import STATUS_NAMES
 
 _ENDS: Final = ("back", "away", "crashed")
 """How a flight with a fault ends, from the best to the worst."""

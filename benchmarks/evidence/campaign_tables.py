@@ -10,8 +10,8 @@ import numpy as np
 from benchmarks.evidence.item import Figures
 from benchmarks.evidence.tables import Row, summary, three, title
 from benchmarks.markdown import table
-from mambo_nmpc.sil.campaign.statistics import Table, index_values, read_table
-from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.experiment.campaign.statistics import Table, index_values, read_table
 
 MOTOR_LAGS_S: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.evidence.sources import ROOT, parts
-from mambo_nmpc.sil.files.folders import finite
+from mambo_sil.results.folders import finite
 
 PAGES: Final = ROOT / "docs" / "evidence"
 DATA: Final = PAGES / "data"

@@ -38,11 +38,11 @@ from benchmarks.evidence.tables import (
 
 _HERE: Final = "benchmarks/evidence"
 _ONE_NORM: Final = f"{_HERE}/one-norm.toml"
-_MAMBO: Final = "sil/vehicles/data/vehicles/mambo.toml"
+_MAMBO: Final = "sil/mambo_sil/drone/vehicles/data/vehicles/mambo.toml"
 _MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
-_STYLE: Final = "mambo_nmpc.sil.show.style"
+_STYLE: Final = "mambo_sil.results.style"
 _FIXED: Final = f"{_HERE}/mambo-1norm-fixed.toml"
 
 
@@ -62,9 +62,9 @@ def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], 
         commands=(f"mambo-nmpc campaign {_HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
         controllers=_FLOWN,
         modules=(
-            "mambo_nmpc.sil.campaign.run",
-            "mambo_nmpc.sil.campaign.statistics",
-            *(("mambo_nmpc.sil.campaign.plots", _STYLE) if drawn else ()),
+            "mambo_sil.experiment.campaign.campaign_run",
+            "mambo_sil.experiment.campaign.statistics",
+            *(("mambo_sil.experiment.campaign.campaign_plots", _STYLE) if drawn else ()),
         ),
         data=(_MAMBO, f"{_HERE}/{name}.toml"),
         read=read_campaign,
@@ -78,7 +78,7 @@ ITEMS: Final = (
         name="table2",
         commands=(f"mambo-nmpc table2 -o {RESULTS}/table2/table2",),
         controllers=(*_FLOWN, "table1-printed"),
-        modules=("mambo_nmpc.sil.paper.table2", "mambo_nmpc.sil.paper.plots", _STYLE),
+        modules=("mambo_sil.experiment.table2.table2", "mambo_sil.experiment.table2.table2_plots", _STYLE),
         data=(_MAMBO,),
         read=read_table2,
         tables={"table2": table2, "table2-quarter": table2_quarter},
@@ -88,7 +88,7 @@ ITEMS: Final = (
         name="sensors",
         commands=(f"mambo-nmpc table2 --sensors -o {RESULTS}/sensors/sensors",),
         controllers=("mambo", "table1"),
-        modules=("mambo_nmpc.sil.paper.sensed",),
+        modules=("mambo_sil.experiment.table2.sensed",),
         data=(_MAMBO,),
         read=read_sensors,
         tables={"sensors": sensors},
@@ -97,7 +97,7 @@ ITEMS: Final = (
         name="conditions",
         commands=_regress("conditions", f"{_HERE}/conditions.toml", *CONTROLLERS, _ONE_NORM, _FIXED),
         controllers=(*_FLOWN, _ONE_NORM, _FIXED),
-        modules=("mambo_nmpc.sil.regress.run", "mambo_nmpc.sil.regress.file"),
+        modules=("mambo_sil.experiment.regress.suite_flights", "mambo_sil.experiment.regress.suite_file"),
         data=(_MAMBO, f"{_HERE}/conditions.toml"),
         read=read_suite((*CONTROLLERS, "one-norm", "mambo-1norm-fixed")),
         tables={
@@ -115,8 +115,8 @@ ITEMS: Final = (
         name="vehicles",
         commands=_regress("vehicles", f"{_HERE}/vehicles.toml", *_ON_EACH),
         controllers=_ON_EACH[2:],
-        modules=("mambo_nmpc.sil.regress.run", "mambo_nmpc.sil.regress.file"),
-        data=("sil/vehicles/data/vehicles/*.toml", f"{_HERE}/vehicles.toml"),
+        modules=("mambo_sil.experiment.regress.suite_flights", "mambo_sil.experiment.regress.suite_file"),
+        data=("sil/mambo_sil/drone/vehicles/data/vehicles/*.toml", f"{_HERE}/vehicles.toml"),
         read=read_suite(_ON_EACH),
         tables={"vehicles": vehicles},
     ),
@@ -134,12 +134,12 @@ ITEMS: Final = (
         commands=_regress("envelope", "envelope", *CONTROLLERS),
         controllers=_FLOWN,
         modules=(
-            "mambo_nmpc.sil.regress.run",
-            "mambo_nmpc.sil.regress.file",
+            "mambo_sil.experiment.regress.suite_flights",
+            "mambo_sil.experiment.regress.suite_file",
             "benchmarks.evidence.pictures",
             _STYLE,
         ),
-        data=(_MAMBO, "sil/regress/data/suites/envelope.toml"),
+        data=(_MAMBO, "sil/mambo_sil/experiment/regress/data/suites/envelope.toml"),
         read=read_envelope,
         tables={"envelope": envelope},
         pictures={"envelope.png": "envelope.png", "envelope.svg": "envelope.svg"},
@@ -161,8 +161,13 @@ ITEMS: Final = (
             f"mambo-nmpc footprint mambo-1norm -o {RESULTS}/footprint/1norm",
         ),
         controllers=_MEASURED,
-        modules=("mambo_nmpc.sil.footprint.measure",),
-        data=("codegen/data/boards/*.toml", "codegen/flags.py", "codegen/boards.py", _MAMBO),
+        modules=("mambo_sil.board.footprint.measure",),
+        data=(
+            "codegen/mambo_codegen/data/boards/*.toml",
+            "codegen/mambo_codegen/bundle/flags.py",
+            "codegen/mambo_codegen/boards.py",
+            _MAMBO,
+        ),
         read=read_footprints(dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))),
         tables={
             "footprint": footprint("mambo"),
@@ -181,7 +186,11 @@ ITEMS: Final = (
             f"mambo-nmpc faults {_ONE_NORM} -o {RESULTS}/faults/one-norm",
         ),
         controllers=("mambo", "mambo-1norm", _ONE_NORM),
-        modules=("mambo_nmpc.sil.faults.flights", "mambo_nmpc.sil.faults.plots", _STYLE),
+        modules=(
+            "mambo_sil.experiment.faults.fault_flights",
+            "mambo_sil.experiment.faults.faults_plots",
+            _STYLE,
+        ),
         data=(_MAMBO,),
         read=read_faults({"mambo": "mambo", "mambo-1norm": "mambo-1norm", _ONE_NORM: "one-norm"}),
         tables={

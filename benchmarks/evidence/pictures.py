@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from mambo_nmpc.sil.files.folders import SUMMARY
-from mambo_nmpc.sil.flight.names import PD_NAMES
-from mambo_nmpc.sil.regress.report import RegressSummary
-from mambo_nmpc.sil.show.plots import PlainLogFormatter, save
-from mambo_nmpc.sil.show.style import GRID, PAGE_INCHES, looks, style
+from mambo_sil.experiment.regress.regress_report import RegressSummary
+from mambo_sil.flight.names import PD_NAMES
+from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.pictures import PlainLogFormatter, save
+from mambo_sil.results.style import GRID, PAGE_INCHES, looks, style
 
 _CURVES: Final = {
     "eight": "eight, 0.5 rad/s",

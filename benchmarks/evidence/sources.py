@@ -11,29 +11,24 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 
 ROOT: Final = Path(__file__).parents[2]
 
-INERT: Final = tuple(
-    f"mambo_nmpc.{name}"
-    for name in (
-        *("codegen.atomic", "codegen.bundle", "codegen.errors", "codegen.plain_file", "codegen.toolchain"),
-        *("codegen.attitude", "codegen.design", "codegen.digest", "codegen.exact_fixed_point"),
-        *("codegen.fixed_point", "codegen.horizon", "codegen.literals", "codegen.observer"),
-        *("codegen.quadratic", "codegen.reference", "codegen.render", "codegen.riccati"),
-        *("codegen.self_test", "codegen.settings", "codegen.tracker"),
-        *("sil.campaign.executors", "sil.campaign.store", "sil.errors", "sil.files", "sil.show"),
-    )
+INERT: Final = (
+    *(f"mambo_codegen.{name}" for name in ("atomic", "bundle", "design", "errors", "methods", "plain_file")),
+    *(f"mambo_codegen.{name}" for name in ("numbers.literals", "reference", "settings", "toolchain")),
+    *("mambo_sil.errors", "mambo_sil.results"),
+    *(f"mambo_sil.experiment.campaign.{name}" for name in ("executors", "store")),
 )
 """Modules and packages without influence on a figure: they name, store, format or distribute.
 
 Settings and what is derived from them have one by the generated C, which is looked at itself.
 """
 
-_VERSION: Final = "mambo_nmpc.codegen"
+_VERSION: Final = "mambo_codegen"
 """The package that holds the version, which is no figure either."""
 
 _C_TOKEN: Final = re.compile(r'"(?:\\.|[^"\\\n])*"|//[^\n]*|/\*.*?\*/', re.DOTALL)
@@ -95,9 +90,10 @@ def plain(path: Path) -> str:
 @cache
 def _module_path(module: str) -> Path | None:
     """Return the file of a module of ours, None if there is no such module."""
-    stem = ROOT / module.removeprefix("mambo_nmpc.").replace(".", "/")
-    found = [path for path in (stem.with_suffix(".py"), stem / "__init__.py") if path.is_file()]
-    return found[0] if found else None
+    inside = module.replace(".", "/")
+    stems = [ROOT / folder / inside for folder in ("", "codegen", "sil")]
+    found = [path for stem in stems for path in (stem.with_suffix(".py"), stem / "__init__.py")]
+    return next((path for path in found if path.is_file()), None)
 
 
 @cache
@@ -109,7 +105,9 @@ def _imported(path: Path) -> frozenset[str]:
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return frozenset(name for name in names if name.startswith(("mambo_nmpc.", "benchmarks.")))
+    return frozenset(
+        name for name in names if name.startswith(("mambo_codegen.", "mambo_sil.", "benchmarks."))
+    )
 
 
 def reached(modules: Iterable[str]) -> set[Path]:

@@ -7,10 +7,10 @@ from typing import Final
 
 from benchmarks.evidence.item import Figures
 from benchmarks.markdown import table
-from mambo_nmpc.sil.files.summary import Number
-from mambo_nmpc.sil.flight.names import PD, PD_NAMES, PD_TITLES
-from mambo_nmpc.sil.paper.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD
-from mambo_nmpc.sil.show.numbers import digits, three_digits
+from mambo_sil.experiment.table2.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD
+from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
+from mambo_sil.results.numbers import digits, three_digits
+from mambo_sil.results.summary import Number
 
 Row = dict[str, str]
 

@@ -7,7 +7,7 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from docs.pages.tables import code, plain, table
-from mambo_nmpc.sil.cli.app import app
+from mambo_sil.cli.app import app
 
 INTRODUCTION: Final = """\
 # Command line

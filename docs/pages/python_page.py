@@ -11,7 +11,7 @@ INTRODUCTION: Final = """\
 # Python API
 
 All public names of `mambo_nmpc`; [From Python](python.md) shows them at work. The arrays have the drones
-along the first axis. `mambo_nmpc.codegen` and `mambo_nmpc.sil` are importable too, but may change with any
+along the first axis. `mambo_codegen` and `mambo_sil` are importable too, but may change with any
 version.
 """
 

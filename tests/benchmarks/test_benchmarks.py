@@ -10,9 +10,9 @@ from benchmarks.host_builds import build, plans
 from benchmarks.ours import PEERS_MODEL, Ours, bundle, rollout
 from benchmarks.programs import Cost
 from benchmarks.searches import Array
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 

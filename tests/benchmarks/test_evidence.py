@@ -12,8 +12,8 @@ from benchmarks.evidence import sources
 from benchmarks.evidence.item import DATA, PAGES, EvidenceError, Item, read_stamp, run
 from benchmarks.evidence.items import ITEMS
 from benchmarks.ours import ONE_NORM
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 
 ROOT = Path(__file__).parents[2]
 INCLUDE = re.compile(r"^\[Table: [^\]]+\]\([./\w-]*data/([\w-]+\.md)\)$", re.MULTILINE)
@@ -89,14 +89,30 @@ def test_comments_are_no_part_of_c() -> None:
 
 def test_figures_depend_on_what_their_modules_import() -> None:
     """On the engine in C and on the plant, but not on the command line, on files and on formats."""
-    found = {path.relative_to(ROOT).as_posix() for path in sources.reached(["mambo_nmpc.sil.paper.table2"])}
-    assert {"sil/engine/loop.c", "sil/engine/rigid_body.h", "sil/plant/rotors.py"} <= found
-    assert {"sil/controllers/pd.py", "sil/flight/metrics.py", "sil/paper/table2.py"} <= found
-    assert "codegen/gravity.py" in found
-    inert = ("codegen/settings", "codegen/render", "codegen/__init__", "sil/cli", "sil/files", "sil/show")
+    found = {
+        path.relative_to(ROOT).as_posix() for path in sources.reached(["mambo_sil.experiment.table2.table2"])
+    }
+    assert {
+        "sil/mambo_sil/flight/engine/loop.c",
+        "sil/mambo_sil/flight/engine/rigid_body.h",
+        "sil/mambo_sil/drone/plant/rotors.py",
+    } <= found
+    assert {
+        "sil/mambo_sil/flight/controllers/pd.py",
+        "sil/mambo_sil/flight/metrics.py",
+        "sil/mambo_sil/experiment/table2/table2.py",
+    } <= found
+    assert "codegen/mambo_codegen/numbers/gravity.py" in found
+    inert = (
+        "codegen/mambo_codegen/settings",
+        "codegen/mambo_codegen/bundle/render",
+        "codegen/mambo_codegen/__init__",
+        "sil/mambo_sil/cli",
+        "sil/mambo_sil/results",
+    )
     assert not [path for path in found if path.startswith(inert)]
     with pytest.raises(ValueError, match="no such module"):
-        sources.reached(["mambo_nmpc.sil.paper.table3"])
+        sources.reached(["mambo_sil.experiment.table2.table3"])
 
 
 def test_figures_depend_on_the_generated_c_and_not_on_its_names(tmp_path: Path) -> None:
@@ -117,7 +133,12 @@ def test_a_change_is_named() -> None:
     """By the folder or the controller that has changed."""
     item = next(item for item in ITEMS if item.name == "table2")
     now = item.parts()
-    assert {"commands", "controller mambo", "sil/engine", "sil/plant"} <= now.keys()
+    assert {
+        "commands",
+        "controller mambo",
+        "sil/mambo_sil/flight/engine",
+        "sil/mambo_sil/drone/plant",
+    } <= now.keys()
     assert now == json.loads(json.dumps(now))
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.exact_times import OURS, SETTINGS, Array, build, one_pass, share_limited, write_problem
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference.attitude import AttitudeModel
-from mambo_nmpc.codegen.reference.exact_arithmetic import exact_arithmetic
-from mambo_nmpc.codegen.reference.exact_optimizer import ExactOptimizer
+from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.attitude import AttitudeModel
+from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
 from tests.support.tools import require
 
 DESIGN = Design(SETTINGS)

@@ -6,10 +6,10 @@ import pytest
 from benchmarks import optimum
 from benchmarks.iterations import RecordingController, describe, excess_of_set
 from benchmarks.ours import PEERS_MODEL
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.footprint.counts import FLIGHT
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.board.footprint.counts import FLIGHT
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.loop import Flight, fly
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 

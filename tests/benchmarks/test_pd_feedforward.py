@@ -1,7 +1,7 @@
 """The search for the gains of the PD with feed-forward."""
 
 from benchmarks.pd_feedforward import DRAWS, FIRST, SLACK, STEPS, Judged, choose, drawn_flights, judge, search
-from mambo_nmpc.sil.controllers.pd import PdController, PdFeedForwardController, PdGains
+from mambo_sil.flight.controllers.pd import PdController, PdFeedForwardController, PdGains
 
 
 def bowl(gains: PdGains) -> Judged:

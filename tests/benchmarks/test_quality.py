@@ -16,11 +16,11 @@ from benchmarks.searches import (
     optimum,
     rprop,
 )
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 

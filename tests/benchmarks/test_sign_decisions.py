@@ -14,11 +14,11 @@ from benchmarks.sign_decisions import (
     in_float64,
     random_moments,
 )
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.inner_steps import step_watched
+from mambo_codegen.design import Design
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.inner_steps import step_watched
 from tests.support.one_norm import ONE_NORM
 
 MAMBO = ONE_NORM

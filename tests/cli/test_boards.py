@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.footprint.measure import measure_footprint
-from mambo_nmpc.sil.footprint.plots import draw_footprints
+from mambo_codegen import boards
+from mambo_codegen.settings import presets
+from mambo_sil.board.footprint.footprint_plots import draw_footprints
+from mambo_sil.board.footprint.measure import measure_footprint
 from tests.support.command import run
 from tests.support.tools import board_builder, only, require
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from mambo_nmpc.codegen import errors
-from mambo_nmpc.codegen.settings import controller_toml, presets
+from mambo_codegen import errors
+from mambo_codegen.settings import controller_toml, presets
 from tests.support.command import run
 
-COMMAND = "from mambo_nmpc.codegen import cli, command; app = command.root(); cli.register(app); app()"
+COMMAND = "from mambo_codegen import cli, command; app = command.root(); cli.register(app); app()"
 INTERRUPTED = """
-from mambo_nmpc.codegen import cli, command
+from mambo_codegen import cli, command
 app = command.root()
 cli.register(app)
 @app.command()

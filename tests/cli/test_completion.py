@@ -28,7 +28,7 @@ def test_the_shell_completes_commands_presets_and_boards(
         [
             sys.executable,
             "-c",
-            "import sys; sys.argv[0] = 'mambo-nmpc'; from mambo_nmpc.sil.cli.app import main; main()",
+            "import sys; sys.argv[0] = 'mambo-nmpc'; from mambo_sil.cli.app import main; main()",
         ],
         cwd=tmp_path,
         env=os.environ | asked | {"_MAMBO_NMPC_COMPLETE": "complete_bash"},

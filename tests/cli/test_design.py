@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.settings import controller_toml
-from mambo_nmpc.codegen.settings.presets import load
-from mambo_nmpc.sil.tuning.file import read
+from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.presets import load
+from mambo_sil.model.tune.tuning_file import read
 from tests.support.command import run
 
 DRONE = """\

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import to_toml, with_option
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import to_toml, with_option
 from tests.support.command import command
 from tests.support.tools import require, require_module
 
@@ -60,9 +60,9 @@ COMMANDS = (
     ),
 )
 SCRIPT = """\
-from mambo_nmpc.sil.cli.app import main
-from mambo_nmpc.sil.faults import flights
-from mambo_nmpc.sil.paper import table2
+from mambo_sil.cli.app import main
+from mambo_sil.experiment.faults import flights
+from mambo_sil.experiment.table2 import table2
 
 flights.DURATION_S, table2.DURATION_S = 31.0, 2.0
 main()

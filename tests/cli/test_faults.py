@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.command import load
-from mambo_nmpc.sil.cli.faults import FILES
+from mambo_sil.cli.command import load
+from mambo_sil.cli.faults import FILES
 from tests.support.command import run
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.errors import INTERRUPTED
-from mambo_nmpc.sil.controllers.pd import pd_controller
-from mambo_nmpc.sil.flight.loop import fly
-from mambo_nmpc.sil.flight.names import PD_NAMES, PdName
-from mambo_nmpc.sil.flight.scenario import Record, Scenario, flight_of, write_record
-from mambo_nmpc.sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
+from mambo_codegen.errors import INTERRUPTED
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.loop import fly
+from mambo_sil.flight.names import PD_NAMES, PdName
+from mambo_sil.flight.scenario import Record, Scenario, flight_of, write_record
+from mambo_sil.flight.traces import CSV_COLUMNS, SEEN_COLUMNS, read_npz
 from tests.support.command import command, run
 from tests.support.one_norm import ONE_NORM
 
@@ -239,7 +239,7 @@ def test_a_full_disk_keeps_the_earlier_results(tmp_path: Path) -> None:
     before = {path.name: path.read_bytes() for path in (tmp_path / "flight").iterdir()}
     script = (
         "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096));"
-        "from mambo_nmpc.sil.cli.app import main; main()"
+        "from mambo_sil.cli.app import main; main()"
     )
     line = [sys.executable, "-c", script, "fly", "--controller", "pd", "--duration-s", "1"]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)

@@ -5,14 +5,14 @@ import sys
 
 import pytest
 
-from mambo_nmpc.sil.cli.app import COMMANDS
+from mambo_sil.cli.app import COMMANDS
 from tests.support.command import run
 
 HEAVY = {"capstone", "cffi", "elftools", "jinja2", "matplotlib", "numpy", "optuna", "scipy", "unicorn"}
-SETTINGS = "mambo_nmpc.codegen.settings.model"
+SETTINGS = "mambo_codegen.settings.model"
 SCRIPT = """
 import sys
-from mambo_nmpc.sil.cli.app import main
+from mambo_sil.cli.app import main
 try:
     main()
 except SystemExit as leaving:

@@ -10,12 +10,12 @@ from io import StringIO
 
 import pytest
 
-from mambo_nmpc.sil.cli import progress
-from mambo_nmpc.sil.cli.progress import Bar, counting_bar, progress_bar
+from mambo_sil.cli import progress
+from mambo_sil.cli.progress import Bar, counting_bar, progress_bar
 
 ON_A_TERMINAL = """
 import sys
-from mambo_nmpc.sil.cli.progress import counting_bar
+from mambo_sil.cli.progress import counting_bar
 with counting_bar("starting", "flights", 8) as bar:
     bar(2)
     bar.stage("flying")

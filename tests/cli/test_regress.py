@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from mambo_nmpc.codegen.errors import INTERRUPTED
+from mambo_codegen.errors import INTERRUPTED
 from tests.support.command import command, run
 
 SUITE = """
@@ -130,7 +130,7 @@ def test_a_refused_command_leaves_no_folder(arguments: list[str], message: str) 
 STOPPED = """
 import os, signal
 from mambo_nmpc.__main__ import main
-from mambo_nmpc.sil.campaign.executors import Pool
+from mambo_sil.experiment.campaign.executors import Pool
 run = Pool.run
 def run_and_stop(*arguments):
     for found in run(*arguments):

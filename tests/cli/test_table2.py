@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.sil.paper.table2 import Claim, Table2Row, Table2Summary, table2_text
+from mambo_sil.experiment.table2.table2 import Claim, Table2Row, Table2Summary, table2_text
 from tests.support.command import run
 
 

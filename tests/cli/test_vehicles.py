@@ -7,9 +7,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from mambo_nmpc.codegen.settings.toml_file import parse_document
-from mambo_nmpc.sil.flight.scenario import read_record
-from mambo_nmpc.sil.vehicles import presets
+from mambo_codegen.settings.toml_file import parse_document
+from mambo_sil.drone.vehicles import presets
+from mambo_sil.flight.scenario import read_record
 from tests.support.command import run
 from tests.support.tools import require_module
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.sil.verify.check import CheckOutcome
-from mambo_nmpc.sil.verify.checks import CHECKS
-from mambo_nmpc.sil.verify.report import Verified, closing, verdict
+from mambo_sil.verify.check import CheckOutcome
+from mambo_sil.verify.checks import CHECKS
+from mambo_sil.verify.verify_report import Verified, closing, verdict
 from tests.support.command import run
 from tests.support.tools import require
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import bundle
+from mambo_codegen.bundle import bundle
 from tests.support.bundles import FILES
 
 

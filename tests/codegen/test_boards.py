@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.boards import Board
-from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
+from mambo_codegen import boards
+from mambo_codegen.boards import Board
+from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
 from tests.support.tools import require
 
 FOLDER = Path(boards.__file__).parent / "data" / "boards"

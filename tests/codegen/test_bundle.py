@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import bundle
-from mambo_nmpc.codegen.bundle import Changes, Drift
-from mambo_nmpc.codegen.errors import ForeignFilesError, LayoutError, UnwritableError
+from mambo_codegen.bundle import bundle
+from mambo_codegen.bundle.bundle import Changes, Drift
+from mambo_codegen.errors import ForeignFilesError, LayoutError, UnwritableError
 from tests.support.bundles import FILES, NEXT, content, expected
 
 

@@ -5,12 +5,12 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.horizon import horizon_tables
-from mambo_nmpc.codegen.reference import ReferenceController, Step
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm.horizon import horizon_tables
+from mambo_codegen.reference import ReferenceController, Step
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 
 ONE_NORM = presets.load("mambo-1norm")
 FEEDBACK_S = {"roll": 0.04, "pitch": 0.02}

@@ -4,8 +4,8 @@ from dataclasses import FrozenInstanceError
 
 import pytest
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_codegen.design import Design
+from mambo_codegen.settings.controller_toml import with_option
 from tests.support.cases import SCALARS
 from tests.support.one_norm import ONE_NORM
 

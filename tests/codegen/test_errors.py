@@ -8,10 +8,10 @@ from typing import Final
 
 import pytest
 
-from mambo_nmpc.codegen.errors import ForeignFilesError, InvalidSettingsError, MamboNmpcError
-from mambo_nmpc.codegen.settings.controller_toml import parse
-from mambo_nmpc.sil.campaign.executors import processes
-from mambo_nmpc.sil.errors import LogError
+from mambo_codegen.errors import ForeignFilesError, InvalidSettingsError, MamboNmpcError
+from mambo_codegen.settings.controller_toml import parse
+from mambo_sil.errors import LogError
+from mambo_sil.experiment.campaign.executors import processes
 
 ROOT = Path(__file__).parents[2]
 ARGUMENTS: dict[type[MamboNmpcError], tuple[object, ...]] = {
@@ -32,7 +32,7 @@ def error_classes() -> list[type[MamboNmpcError]]:
     for path in sorted(path for folder in ("codegen", "sil") for path in (ROOT / folder).rglob("*.py")):
         names = re.findall(r"^class (\w+Error)\b", path.read_text("utf-8"), re.MULTILINE)
         if names:
-            module = import_module(".".join(("mambo_nmpc", *path.relative_to(ROOT).with_suffix("").parts)))
+            module = import_module(".".join(path.relative_to(ROOT).with_suffix("").parts[1:]))
             found += [getattr(module, name) for name in names]
     return found
 

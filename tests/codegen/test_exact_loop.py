@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ExactReferenceController, ExactStep, Status
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.reference import ExactReferenceController, ExactStep, Status
+from mambo_codegen.settings.model import Settings
 from tests.support.quadratic import ANGLES, ONE_MOVE, TWO_MOVES, Array, axis_of, case_values, settings_of
 
 G_M_S2, HOVER = 9.81, 9.81

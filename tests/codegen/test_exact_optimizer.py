@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference.exact_arithmetic import exact_arithmetic
-from mambo_nmpc.codegen.reference.exact_optimizer import ExactOptimizer
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
+from mambo_codegen.settings.model import Settings
 from tests.support.quadratic import (
     ANGLES,
     TWO_MOVES,

@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.errors import InvalidSettingsError
-from mambo_nmpc.codegen.fixed_point import LARGEST, formats, raw
-from mambo_nmpc.codegen.flags import COMPILE_FLAGS
-from mambo_nmpc.codegen.horizon import horizon_tables
-from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import parse, with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.build import build_library
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.verify.calls import ApiFunction, Tape, answers, calls
+from mambo_codegen.bundle.flags import COMPILE_FLAGS
+from mambo_codegen.design import Design
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.methods.one_norm.formats import LARGEST, formats, raw
+from mambo_codegen.methods.one_norm.horizon import horizon_tables
+from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
+from mambo_codegen.reference import ReferenceController, Status
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import parse, with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.verify.calls import ApiFunction, Tape, answers, calls
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.strategies import Values, toml, valid_values

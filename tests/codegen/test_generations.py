@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import bundle
-from mambo_nmpc.codegen import render as rendering
-from mambo_nmpc.codegen.atomic import is_left_over
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
+from mambo_codegen.atomic import is_left_over
+from mambo_codegen.bundle import bundle
+from mambo_codegen.bundle import render as rendering
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 from tests.support.bundles import FILES, NEXT, content, expected, place
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
@@ -25,7 +25,7 @@ MINE = {"src/mine.txt": "mine", "build/nmpc.o": "\0"}
 STOPPED_RUNS = """
 import json, os, shutil, signal, sys
 from pathlib import Path
-from mambo_nmpc.codegen import bundle
+from mambo_codegen import bundle
 
 start, root, how, force = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], sys.argv[4] == "True"
 files = json.load(sys.stdin)
@@ -61,8 +61,8 @@ for operation in range(1, 1000):
 EDITED_MEANWHILE = """
 import json, sys
 from pathlib import Path
-from mambo_nmpc.codegen import bundle
-from mambo_nmpc.codegen.errors import ForeignFilesError
+from mambo_codegen import bundle
+from mambo_codegen.errors import ForeignFilesError
 
 folder, edited = Path(sys.argv[1]), []
 
@@ -82,8 +82,8 @@ except ForeignFilesError as error:
 FULL_DISK = """
 import json, resource, sys
 from pathlib import Path
-from mambo_nmpc.codegen import bundle
-from mambo_nmpc.codegen.errors import UnwritableError
+from mambo_codegen import bundle
+from mambo_codegen.errors import UnwritableError
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 try:

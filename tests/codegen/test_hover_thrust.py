@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.reference.inputs import Status
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from tests.support.cases import SCALARS
 
 THRUSTS_M_S2 = [9.81, 6.0, 14.0, 9.81]

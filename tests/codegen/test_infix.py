@@ -2,7 +2,7 @@
 
 import pytest
 
-from mambo_nmpc.codegen.infix import infix
+from mambo_codegen.bundle.infix import infix
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController, cost
-from mambo_nmpc.codegen.reference.arithmetic import arithmetic
-from mambo_nmpc.codegen.reference.paper import Array, Paper
-from mambo_nmpc.codegen.reference.predictor import Predictor
-from mambo_nmpc.codegen.reference.tracker import Tracker, unknown_motion
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm import cost
+from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.paper import Array, Paper
+from mambo_codegen.methods.one_norm.predictor import Predictor
+from mambo_codegen.methods.tracker import Tracker, unknown_motion
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from tests.support.cases import settings_case
 
 CASES = [index for index in range(60) if settings_case(index, "float64").horizon.prediction <= 20]

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.errors import MamboNmpcError
-from mambo_nmpc.codegen.plain_file import read_plain_file
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.campaign import file as campaign_file
-from mambo_nmpc.sil.flight.scenario import read_record
-from mambo_nmpc.sil.flight.trajectories import Waypoints
-from mambo_nmpc.sil.tuning import file as tuning_file
+from mambo_codegen import boards
+from mambo_codegen.errors import MamboNmpcError
+from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.settings import presets
+from mambo_sil.experiment.campaign import campaign_file
+from mambo_sil.flight.scenario import read_record
+from mambo_sil.flight.trajectories import Waypoints
+from mambo_sil.model.tune import tuning_file
 
 
 def test_a_plain_file_is_read_up_to_a_limit(tmp_path: Path) -> None:

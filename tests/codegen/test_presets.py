@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from mambo_nmpc.codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.model import Settings
 
 
 def departures(settings: Settings) -> dict[str, Any]:

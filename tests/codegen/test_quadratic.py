@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.riccati import mp, solve_riccati, sum_costs
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.riccati import mp, solve_riccati, sum_costs
+from mambo_codegen.settings.model import Settings
 from tests.support.golden_gains import GOLDEN
 from tests.support.quadratic import (
     ANGLES,

@@ -9,18 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mambo_nmpc.codegen.errors import (
-    LONGEST_ECHO,
-    InvalidSettingsError,
-    MamboNmpcError,
-    UnreadableFileError,
-    echo,
-)
-from mambo_nmpc.codegen.settings import controller_toml
-from mambo_nmpc.codegen.settings.key import Key, spell
-from mambo_nmpc.codegen.settings.keys import KEYS
-from mambo_nmpc.codegen.settings.methods import is_used
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
+from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.key import Key, spell
+from mambo_codegen.settings.keys import KEYS
+from mambo_codegen.settings.methods import is_used
+from mambo_codegen.settings.model import Settings
 from tests.support.strategies import (
     LAGS,
     NUMBERS,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.render import render, render_target
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.targets import TARGETS
+from mambo_codegen.bundle.render import render, render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings import presets
 from tests.support.command import run
 
 LONGEST_PAGE = 80

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.crashes import Crash, crash_tilt_rad, detect_crashes, first_crash
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.flight.trajectories import Hover
-from mambo_nmpc.sil.plant.airframe import NOMINAL
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.crashes import Crash, crash_tilt_rad, detect_crashes, first_crash
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.traces import Trace
+from mambo_sil.flight.trajectories import Hover
 
 CRASH_TILT_RAD = crash_tilt_rad(NOMINAL)
 

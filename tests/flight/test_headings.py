@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import parse
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.scenario import Scenario, flight_of
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import parse
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.scenario import Scenario, flight_of
 
 WITHDRAWN = """
 horizon = { prediction = 6, control = 1, prediction_step_s = 0.08637 }

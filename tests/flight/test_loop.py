@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.sil.controllers.pd import PdController, PdOutcome
-from mambo_nmpc.sil.engine import simulate
-from mambo_nmpc.sil.errors import FlightError
-from mambo_nmpc.sil.flight.loop import Flight, Offset, fly
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.traces import SensedTrace
-from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep, Trajectories
-from mambo_nmpc.sil.paper.table2 import CASES, PRINTED_PD
-from mambo_nmpc.sil.plant.disturbances import Disturbances
-from mambo_nmpc.sil.plant.vehicle import Vehicle
-from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_sil.drone.plant.disturbances import Disturbances
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.errors import FlightError
+from mambo_sil.experiment.table2.table2 import CASES, PRINTED_PD
+from mambo_sil.flight.controllers.pd import PdController, PdOutcome
+from mambo_sil.flight.engine import simulate
+from mambo_sil.flight.loop import Flight, Offset, fly
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.traces import SensedTrace
+from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep, Trajectories
 
 FloatArray = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.sil.flight.metrics import TRANSIENT_S, measure, saturated_share
-from mambo_nmpc.sil.flight.traces import Trace
+from mambo_sil.flight.metrics import TRANSIENT_S, measure, saturated_share
+from mambo_sil.flight.traces import Trace
 
 FloatArray = NDArray[np.float64]
 

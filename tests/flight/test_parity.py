@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import reference_controller
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.controllers.build import build_library
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.loop import Flight, PositionController
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.paper.table2 import PRINTED_IMPROVEMENT, PRINTED_PD
-from mambo_nmpc.sil.plant.vehicle import Vehicle
+from mambo_codegen.design import Design
+from mambo_codegen.reference import reference_controller
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.experiment.table2.table2 import PRINTED_IMPROVEMENT, PRINTED_PD
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.traces import Trace
+from mambo_sil.flight.trajectories import Bernoulli
 from tests.support.cases import SCALARS
 from tests.support.tools import toolchain
 
@@ -34,7 +34,7 @@ def demand_reference(flight: Flight, trace: Trace, reference: PositionController
     """Demand that the reference answers every update of `flight` with the commands and statuses of a trace.
 
     So the flight with the reference is this one: its first input is the same, and as long as the commands
-    are, so are the next inputs, since the plant is the same (`tests/engine` compares the engine with NumPy).
+    are, so are the next inputs, since the plant is the same (tests/flight/engine compares them).
     """
     inputs = np.concatenate(
         [trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad], axis=-1

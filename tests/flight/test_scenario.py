@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.inner_steps import WatchedController
-from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.errors import FlightError, ScenarioError
-from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
-from mambo_nmpc.sil.flight.traces import SEEN_COLUMNS
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.plant.airframe import MAMBO as MAMBO_AIRFRAME
-from mambo_nmpc.sil.plant.vehicle import Vehicle
-from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_sil.drone.plant.airframe import MAMBO as MAMBO_AIRFRAME
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.errors import FlightError, ScenarioError
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.inner_steps import WatchedController
+from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.scenario import SHARED_KEYS, Record, Scenario, flight_of, read_record, write_record
+from mambo_sil.flight.traces import SEEN_COLUMNS
+from mambo_sil.flight.trajectories import Bernoulli
 from tests.support.command import run
 from tests.support.one_norm import ONE_NORM
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.errors import TraceError
-from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.traces import (
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.errors import TraceError
+from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.traces import (
     CSV_COLUMNS,
     SEEN_COLUMNS,
     SensedTrace,
@@ -19,8 +20,7 @@ from mambo_nmpc.sil.flight.traces import (
     write_csv,
     write_npz,
 )
-from mambo_nmpc.sil.flight.trajectories import Bernoulli, Circle, Trajectories
-from mambo_nmpc.sil.sensors.instruments import Sensors
+from mambo_sil.flight.trajectories import Bernoulli, Circle, Trajectories
 
 
 @pytest.fixture(scope="module")

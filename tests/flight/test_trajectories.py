@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_nmpc.sil.errors import TrajectoryError
-from mambo_nmpc.sil.flight.trajectories import CURVES as CURVES_BY_NAME
-from mambo_nmpc.sil.flight.trajectories import (
+from mambo_sil.errors import TrajectoryError
+from mambo_sil.flight.trajectories import CURVES as CURVES_BY_NAME
+from mambo_sil.flight.trajectories import (
     Bernoulli,
     Circle,
     Gerono,

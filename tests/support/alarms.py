@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.proof import Report, prove
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.proof import Report, prove
 from tests.support.subjects import Harm, subject
 
 _STEP, _MATH = "src/nmpc.c", "src/nmpc_math.h"

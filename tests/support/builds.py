@@ -2,11 +2,11 @@
 
 from typing import Any, Final
 
-from mambo_nmpc.codegen.flags import COMPILE_FLAGS
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.build import ffi, glue, with_default_prefix
-from mambo_nmpc.sil.files.shared_library import LibrarySource, load_shared_library
+from mambo_codegen.bundle.flags import COMPILE_FLAGS
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import ffi, glue, with_default_prefix
+from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 from tests.support.tools import toolchain
 
 BUILDS: Final = (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))

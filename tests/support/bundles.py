@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from mambo_nmpc.codegen import bundle
+from mambo_codegen.bundle import bundle
 
 FILES = {
     "README.md": "What.\n",

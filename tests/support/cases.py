@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.settings.model import Settings
 
 SCALARS = ("float32", "float64", "fixed")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from mambo_nmpc.sil.cli.app import app
+from mambo_sil.cli.app import app
 
 
 def run(*arguments: str, code: int = 0) -> tuple[str, str]:
@@ -19,7 +19,7 @@ def run(*arguments: str, code: int = 0) -> tuple[str, str]:
 def command(
     *arguments: object,
     folder: Path | None = None,
-    script: str = "from mambo_nmpc.sil.cli.app import main; main()",
+    script: str = "from mambo_sil.cli.app import main; main()",
 ) -> subprocess.CompletedProcess[str]:
     """Run mambo-nmpc in `folder` and a session of its own, until all that hold its output have ended.
 

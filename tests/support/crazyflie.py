@@ -9,7 +9,7 @@ from typing import Any, Final
 import cffi
 import numpy as np
 
-from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from tests.support.shell import shell
 from tests.support.tools import require
 

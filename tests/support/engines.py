@@ -8,14 +8,14 @@ from typing import Any, Final
 import cffi
 import numpy as np
 
-from mambo_nmpc.sil.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, ffi, load, pointer
-from mambo_nmpc.sil.engine.native import Native
-from mambo_nmpc.sil.engine.records import flight_records, in_lanes, simulation_record
-from mambo_nmpc.sil.faults.fault import Fault
-from mambo_nmpc.sil.faults.native import native_faulty
-from mambo_nmpc.sil.files.shared_library import LIBRARY_FLAGS
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.experiment.faults.fault import Fault
+from mambo_sil.experiment.faults.faults_in_c import native_faulty
+from mambo_sil.flight.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, ffi, load, pointer
+from mambo_sil.flight.engine.native import Native
+from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
+from mambo_sil.flight.loop import Flight
+from mambo_sil.results.shared_library import LIBRARY_FLAGS
 from tests.support.tools import toolchain
 
 BLOCKS: Final = """\

@@ -5,13 +5,13 @@ from dataclasses import fields
 
 import numpy as np
 
-from mambo_nmpc.sil.flight.crashes import least_level
-from mambo_nmpc.sil.flight.evaluation import Evaluation
-from mambo_nmpc.sil.flight.loop import allocate_trace
-from mambo_nmpc.sil.flight.metrics import Metrics
-from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.plant.airframe import NOMINAL
-from mambo_nmpc.sil.plant.elementary import arc_cosine, sine_cosine
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.plant.elementary import arc_cosine, sine_cosine
+from mambo_sil.flight.crashes import least_level
+from mambo_sil.flight.evaluation import Evaluation
+from mambo_sil.flight.loop import allocate_trace
+from mambo_sil.flight.metrics import Metrics
+from mambo_sil.flight.traces import Trace
 
 LIMIT_RAD = 0.35
 

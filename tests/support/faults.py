@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.faults.fault import (
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.experiment.faults.fault import (
     Alteration,
     Fault,
     WeightChange,
@@ -22,10 +22,10 @@ from mambo_nmpc.sil.faults.fault import (
     shift_yaw,
     wrap_yaw,
 )
-from mambo_nmpc.sil.faults.injection import FaultyController, LevellingCaller, ReweightedController
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.plant.arrays import FloatArray
+from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller, ReweightedController
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.trajectories import Bernoulli
 
 UPDATES: Final = 101
 

@@ -13,14 +13,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.campaign.file import default, scenario
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.controllers.pd import pd_controller
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.flight.names import PD_NAMES, PD_TITLES, EngineName
-from mambo_nmpc.sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
-from mambo_nmpc.sil.vehicles import presets as vehicles
+from mambo_codegen.settings import presets
+from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.experiment.campaign.campaign_file import default, scenario
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.names import PD_NAMES, PD_TITLES, EngineName
+from mambo_sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
 PRESETS: Final = ("mambo", "mambo-1norm")

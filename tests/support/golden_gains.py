@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.design import Design
+from mambo_codegen.design import Design
 from tests.support.quadratic import ONE_MOVE, TWO_MOVES, settings_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_gains.json")

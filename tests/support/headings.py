@@ -14,10 +14,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Final
 
-from mambo_nmpc.codegen.flags import PROOF_PREPROCESSING, proofs
-from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.verify.check import Result, Subject
-from mambo_nmpc.sil.verify.proof import Property, Report, judge, prove
+from mambo_codegen.bundle.flags import PROOF_PREPROCESSING, proofs
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.verify.check import Result, Subject
+from mambo_sil.verify.proof import Property, Report, judge, prove
 from tests.support.tools import require
 
 HEADINGS: Final = "turn_everywhere"

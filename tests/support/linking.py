@@ -3,9 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.firmware.build import Builder
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.board.firmware.firmware_build import Builder
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.pil.frames import DELIMITER, Receiver, decode
-from mambo_nmpc.sil.pil.messages import REPLY, Kind, split
-from mambo_nmpc.sil.pil.port import READ_S
+from mambo_codegen.settings.model import Settings
+from mambo_sil.board.pil.frames import DELIMITER, Receiver, decode
+from mambo_sil.board.pil.messages import REPLY, Kind, split
+from mambo_sil.board.pil.port import READ_S
 from tests.support.serial_line import build_firmware
 
 PERIOD: Final = 3 * DELIMITER

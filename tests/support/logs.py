@@ -15,8 +15,8 @@ from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from mambo_nmpc.sil.identify.signals import FlightLog, Signal
-from mambo_nmpc.sil.identify.ulog import TRAJECTORY
+from mambo_sil.model.identify.signals import FlightLog, Signal
+from mambo_sil.model.identify.ulog import TRAJECTORY
 
 Array = NDArray[np.float64]
 

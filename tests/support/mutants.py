@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen import literals
+from mambo_codegen.numbers import literals
 from tests.support.reasons import Key, plain
 
 _TOKEN: Final = re.compile(

@@ -8,13 +8,13 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.render import SUB_BLOCKS
-from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.verify import replay
-from mambo_nmpc.sil.verify.calls import outcome_type
-from mambo_nmpc.sil.verify.cases import cases
-from mambo_nmpc.sil.verify.check import Subject
+from mambo_codegen.bundle.render import SUB_BLOCKS
+from mambo_codegen.errors import BuildError
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.verify import tape_replay
+from mambo_sil.verify.calls import outcome_type
+from mambo_sil.verify.cases import cases
+from mambo_sil.verify.check import Subject
 from tests.support.mutants import Mutant, mutants
 from tests.support.schemata import ORIGINAL, can_share, refused_numbers, with_mutants
 
@@ -41,7 +41,7 @@ _OTHERS: Final = {
 }
 """What is linked with the library, and the files with mutants that it includes."""
 
-_FLAGS: Final = (*replay.FLAGS, "-Werror=return-type", "-Iinclude", "-Isrc", "-I.")
+_FLAGS: Final = (*tape_replay.FLAGS, "-Werror=return-type", "-Iinclude", "-Isrc", "-I.")
 _FAST: Final[tuple[str, ...]] = ("-O1",)
 _SANITIZED: Final[tuple[str, ...]] = (
     "-O1",
@@ -68,10 +68,10 @@ class Bench:
         self._folder = subject.bundle
         units = [path for path in FILES if path.endswith(".c") and (self._folder / path).is_file()]
         (self._folder / _LIBRARY).write_text("".join(f'#include "{unit}"\n' for unit in units))
-        replay.write_program("nmpc", self._folder / "fuzz")
+        tape_replay.write_program("nmpc", self._folder / "fuzz")
         self._tapes, self._expected = cases(subject.settings)
         self._tapes_file = subject.folder / "tapes.bin"
-        replay.write_tapes(subject.settings, self._tapes, self._tapes_file)
+        tape_replay.write_tapes(subject.settings, self._tapes, self._tapes_file)
         self._outcomes_file = subject.folder / "outcomes.bin"
         any_outcome = np.zeros(1, outcome_type(self.settings)).tobytes()
         self._outcomes_file.write_bytes(
@@ -196,8 +196,10 @@ class Bench:
             (self._folder / name).write_bytes(code)
         self._gcc(*flags, *names, "-o", "replay")
         limit_s = 10 * LIMIT_S if flags == _SANITIZED else LIMIT_S
-        played = replay.play(self._folder / "replay", self._tapes_file, self.settings, self._tapes, limit_s)
-        return replay.fault(played, self._expected)
+        played = tape_replay.play(
+            self._folder / "replay", self._tapes_file, self.settings, self._tapes, limit_s
+        )
+        return tape_replay.fault(played, self._expected)
 
     def _gcc(self, *arguments: str) -> None:
         Toolchain(("gcc",)).run([*_FLAGS, *arguments], self._folder)

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference.arithmetic import arithmetic
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.settings.model import Settings
 from tests.support.reasons import Reason, reasons
 
 

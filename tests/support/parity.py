@@ -5,9 +5,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_nmpc.codegen.reference import Step
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.inputs import StepInputs, random_steps
+from mambo_codegen.reference import Step
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.inputs import StepInputs, random_steps
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
 

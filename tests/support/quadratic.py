@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.model import Settings
 from tests.support.strategies import Values, nested
 
 Array = NDArray[np.float64]

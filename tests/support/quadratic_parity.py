@@ -5,10 +5,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ExactStep
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.inputs import StepInputs, random_steps
+from mambo_codegen.design import Design
+from mambo_codegen.reference import ExactStep
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.inputs import StepInputs, random_steps
 from tests.support.parity import count_differing
 
 FIELDS = ("status", "command_rad", "missed", "saturated", "stored")

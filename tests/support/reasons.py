@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.settings.model import Settings
 
 Key = tuple[str, str, str]
 """File, line, and what happens there, spelled by `plain`, so that the key stays valid when the line moves."""

@@ -9,35 +9,35 @@ from typing import Final
 
 import numpy as np
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.campaign.report import CampaignSummary, Drawn, WorstFlight
-from mambo_nmpc.sil.campaign.statistics import Distributions, Improvement, Proportion
-from mambo_nmpc.sil.controllers.pd import PdController
-from mambo_nmpc.sil.engine.simulate import fly
-from mambo_nmpc.sil.faults.flights import End, FaultsSummary, Verdict
-from mambo_nmpc.sil.firmware.sizes import Added, Parts, SectionBytes
-from mambo_nmpc.sil.flight import report
-from mambo_nmpc.sil.flight.loop import Flight
-from mambo_nmpc.sil.flight.names import PD, PD_TITLES
-from mambo_nmpc.sil.flight.report import FlySummary, ReplaySummary
-from mambo_nmpc.sil.flight.scenario import Scenario
-from mambo_nmpc.sil.flight.traces import Trace, write_npz
-from mambo_nmpc.sil.footprint import report as footprint_report
-from mambo_nmpc.sil.footprint.measure import Footprint
-from mambo_nmpc.sil.footprint.sweep import Point, SweepSummary, budgets
-from mambo_nmpc.sil.identify.identify import Curves
-from mambo_nmpc.sil.identify.motion import Motion
-from mambo_nmpc.sil.identify.record import AxisResult, IdentifySummary, LogResult, Noise
-from mambo_nmpc.sil.identify.report import curves_csv
-from mambo_nmpc.sil.identify.response import AxisParameters, FirstOrder, Interval
-from mambo_nmpc.sil.paper.sensed import SensedRow, SensedSummary
-from mambo_nmpc.sil.paper.table2 import CASES, Claim, Table2Row, Table2Summary
-from mambo_nmpc.sil.plant.airframe import NOMINAL
-from mambo_nmpc.sil.regress.report import Check, FlightResult, RegressSummary
-from mambo_nmpc.sil.verify import report as verify_report
-from mambo_nmpc.sil.verify.check import CheckOutcome
-from mambo_nmpc.sil.verify.checks import CHECKS
+from mambo_codegen import boards
+from mambo_codegen.settings.model import Settings
+from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
+from mambo_sil.board.footprint import footprint_report
+from mambo_sil.board.footprint.measure import Footprint
+from mambo_sil.board.footprint.sweep import Point, SweepSummary, budgets
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn, WorstFlight
+from mambo_sil.experiment.campaign.statistics import Distributions, Improvement, Proportion
+from mambo_sil.experiment.faults.fault_flights import End, FaultsSummary, Verdict
+from mambo_sil.experiment.regress.regress_report import Check, FlightResult, RegressSummary
+from mambo_sil.experiment.table2.sensed import SensedRow, SensedSummary
+from mambo_sil.experiment.table2.table2 import CASES, Claim, Table2Row, Table2Summary
+from mambo_sil.flight import flight_report
+from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.flight_report import FlySummary, ReplaySummary
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.names import PD, PD_TITLES
+from mambo_sil.flight.scenario import Scenario
+from mambo_sil.flight.traces import Trace, write_npz
+from mambo_sil.model.identify.identify import Curves
+from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
+from mambo_sil.model.identify.identify_report import curves_csv
+from mambo_sil.model.identify.motion import Motion
+from mambo_sil.model.identify.response import AxisParameters, FirstOrder, Interval
+from mambo_sil.verify import verify_report
+from mambo_sil.verify.check import CheckOutcome
+from mambo_sil.verify.checks import CHECKS
 
 HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
 """A name of a file that is markup, the end of a script, and quotes."""
@@ -73,7 +73,7 @@ def fly_folder(folder: Path, *, lost: bool = False) -> None:
         update_period_s=0.01,
         trajectory_sha256=None,
         **scenario.model_dump(include=set(FlySummary.model_fields)) | {"trajectory": HOSTILE},
-        **report.judge(flown, Settings(), NOMINAL) | {"refusals": [HOSTILE]},
+        **flight_report.judge(flown, Settings(), NOMINAL) | {"refusals": [HOSTILE]},
     ).write(folder)
 
 
@@ -88,7 +88,7 @@ def replay_folder(folder: Path) -> None:
         controller="pd",
         scenario=Scenario(),
         settings=Settings().digest,
-        **report.judge(flown, Settings(), NOMINAL),
+        **flight_report.judge(flown, Settings(), NOMINAL),
     ).write(folder)
 
 

@@ -4,10 +4,10 @@ from typing import Any, Final
 
 from hypothesis import strategies as st
 
-from mambo_nmpc.sil.flight.names import CURVE_NAMES
-from mambo_nmpc.sil.flight.scenario import OF_THE_VEHICLE, Scenario
-from mambo_nmpc.sil.vehicles import presets
-from mambo_nmpc.sil.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.flight.names import CURVE_NAMES
+from mambo_sil.flight.scenario import OF_THE_VEHICLE, Scenario
 
 TRUTH: Final = (
     Scenario(

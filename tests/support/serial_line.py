@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from mambo_nmpc.codegen.render import render_target
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.targets import TARGETS
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings.model import Settings
 from tests.support.bundles import place
 from tests.support.tools import require
 

@@ -10,11 +10,11 @@ from typing import Any
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from mambo_nmpc.codegen.settings.key import Key, spell
-from mambo_nmpc.codegen.settings.keys import KEYS
-from mambo_nmpc.codegen.settings.methods import is_used
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
+from mambo_codegen.settings.key import Key, spell
+from mambo_codegen.settings.keys import KEYS
+from mambo_codegen.settings.methods import is_used
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
 from tests.support.cases import SCALARS
 
 Values = dict[str, Any]

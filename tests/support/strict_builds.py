@@ -8,10 +8,10 @@ from typing import Final
 
 import cffi
 
-from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_nmpc.codegen.render import render, with_prefix
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.build import DECLARATIONS, glue
+from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_codegen.bundle.render import render, with_prefix
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import DECLARATIONS, glue
 from tests.support.bundles import place
 from tests.support.tools import require
 

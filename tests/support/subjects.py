@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify import replay
-from mambo_nmpc.sil.verify.calls import Outcomes, Tape
-from mambo_nmpc.sil.verify.cases import cases
-from mambo_nmpc.sil.verify.check import Subject
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify import tape_replay
+from mambo_sil.verify.calls import Outcomes, Tape
+from mambo_sil.verify.cases import cases
+from mambo_sil.verify.check import Subject
 from tests.support.bundles import place
 from tests.support.tools import require
 
@@ -46,7 +46,9 @@ def played_fault(
     its: Subject, *flags: str, played: tuple[Sequence[Tape], Sequence[Outcomes]] | None = None
 ) -> str | None:
     """Build the C with gcc, play tapes, by default all cases, and return what differs from the reference."""
-    program = replay.build(its, require("gcc", "gcc"), flags, its.folder)
+    program = tape_replay.build(its, require("gcc", "gcc"), flags, its.folder)
     tapes, expected = played or cases(its.settings)
-    replay.write_tapes(its.settings, tapes, its.folder / "tapes.bin")
-    return replay.fault(replay.play(program, its.folder / "tapes.bin", its.settings, tapes), expected)
+    tape_replay.write_tapes(its.settings, tapes, its.folder / "tapes.bin")
+    return tape_replay.fault(
+        tape_replay.play(program, its.folder / "tapes.bin", its.settings, tapes), expected
+    )

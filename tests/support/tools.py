@@ -8,9 +8,9 @@ from typing import NoReturn
 
 import pytest
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.firmware.build import Builder, builder
+from mambo_codegen import boards
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.board.firmware.firmware_build import Builder, builder
 
 CORES = {
     "mambo": "arm926",

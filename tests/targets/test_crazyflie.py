@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.errors import InvalidSettingsError
-from mambo_nmpc.codegen.render import render_target
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.targets import TARGETS
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import Flight, fly
-from mambo_nmpc.sil.flight.metrics import measure
-from mambo_nmpc.sil.flight.traces import Trace
-from mambo_nmpc.sil.flight.trajectories import Circle
-from mambo_nmpc.sil.plant.arrays import FloatArray
-from mambo_nmpc.sil.plant.vehicle import Vehicle
-from mambo_nmpc.sil.vehicles import presets as vehicles
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.traces import Trace
+from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place
 from tests.support.crazyflie import FIRMWARE_FLAGS, STUBS, Crazyflie, Fleet, compile_host, link
 from tests.support.one_norm import ONE_NORM

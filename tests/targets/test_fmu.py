@@ -14,16 +14,16 @@ from typing import Any, Final
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.fmu import fmu_variables
-from mambo_nmpc.codegen.render import render_target
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.targets import TARGETS
-from mambo_nmpc.sil.controllers.compiled import CompiledController
-from mambo_nmpc.sil.flight.loop import Flight, PositionController, fly
-from mambo_nmpc.sil.flight.trajectories import Bernoulli
-from mambo_nmpc.sil.plant.arrays import FloatArray, IntArray
+from mambo_codegen.bundle.fmu import fmu_variables
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.loop import Flight, PositionController, fly
+from mambo_sil.flight.trajectories import Bernoulli
 from tests.support.bundles import place
 from tests.support.shell import shell
 from tests.support.tools import require, require_module

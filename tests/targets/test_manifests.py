@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.render import render_target
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.targets import TARGETS
+from mambo_codegen import boards
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings import presets
 from tests.support.bundles import place
 from tests.support.shell import shell
 from tests.support.tools import require

@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from mambo_nmpc.codegen import boards
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.digest import self_test_digest
-from mambo_nmpc.codegen.errors import InvalidSettingsError
-from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.dialects import DIALECTS
+from mambo_codegen import boards
+from mambo_codegen.bundle.digest import self_test_digest
+from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_codegen.bundle.render import render
+from mambo_codegen.design import Design
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.dialects import DIALECTS
 from tests.support.bundles import place
 from tests.support.cases import SCALARS, settings_case
 from tests.support.one_norm import ONE_NORM

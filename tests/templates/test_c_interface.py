@@ -9,14 +9,14 @@ from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.literals import SCALARS
-from mambo_nmpc.codegen.reference import ReferenceController, Status
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.build import build_library
-from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_codegen.bundle.render import render
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.literals import SCALARS
+from mambo_codegen.reference import ReferenceController, Status
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import CompiledController
 from tests.support.extension import build_extension, load_extension
 from tests.support.one_norm import ONE_NORM
 from tests.support.parity import Controller

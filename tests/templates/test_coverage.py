@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify.check import Subject
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.verify.check import Subject
 from tests.support.cases import SCALARS, settings_case
 from tests.support.coverage_reasons import REASONS
 from tests.support.one_norm import ONE_NORM

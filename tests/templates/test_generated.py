@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen import bundle
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import read, with_option
+from mambo_codegen.bundle import bundle
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import read, with_option
 
 GENERATED = Path(__file__).parents[2] / "generated"
 BUNDLES = {

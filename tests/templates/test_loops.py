@@ -5,7 +5,7 @@ from graphlib import CycleError, TopologicalSorter
 
 import pytest
 
-from mambo_nmpc.codegen.render import render
+from mambo_codegen.bundle.render import render
 from tests.support.cases import SCALARS, settings_case
 from tests.support.one_norm import ONE_NORM
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
 from tests.support.mutants import mutants
 from tests.support.mutation import FILES, Bench, Fate
 from tests.support.mutation_reasons import REASONS

@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController, cost
-from mambo_nmpc.codegen.reference.arithmetic import arithmetic
-from mambo_nmpc.codegen.reference.predictor import Predictor
-from mambo_nmpc.codegen.reference.tracker import Tracker, unknown_motion
-from mambo_nmpc.codegen.representation import COMMAND, STATE, TARGET, THRUST
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.limits import YAW_LIMIT_RAD
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.codegen.trigonometry import SINE_ERRORS
-from mambo_nmpc.sil.controllers.build import build_library
-from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm import cost
+from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.predictor import Predictor
+from mambo_codegen.methods.tracker import Tracker, unknown_motion
+from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST
+from mambo_codegen.numbers.trigonometry import SINE_ERRORS
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.limits import YAW_LIMIT_RAD
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import CompiledController
 from tests.support.builds import libraries
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.extension import build_extension

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.flags import COMPILE_FLAGS, WARNING_FLAGS
-from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.controllers.build import build_library, ffi
-from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
+from mambo_codegen.bundle.render import render
+from mambo_codegen.reference import Status
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.flight.controllers.build import build_library, ffi
+from mambo_sil.flight.controllers.compiled import CompiledController
 from tests.support.bundles import place
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, Array, quadratic_case

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ExactReferenceController
-from mambo_nmpc.codegen.reference.attitude import AttitudeModel, AttitudeState
-from mambo_nmpc.codegen.reference.exact_arithmetic import exact_arithmetic
-from mambo_nmpc.codegen.reference.exact_optimizer import ExactOptimizer
-from mambo_nmpc.codegen.reference.observer import Estimate, KalmanObserver
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.build import build_library
-from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState
+from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
+from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
+from mambo_codegen.reference import ExactReferenceController
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import CompiledController
 from tests.support.builds import libraries
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.toolchain import Toolchain
+from mambo_codegen.bundle.render import render
+from mambo_codegen.errors import BuildError
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.toolchain import Toolchain
 from tests.support.bundles import place
 from tests.support.mutants import Mutant, mutants
 from tests.support.one_norm import ONE_NORM

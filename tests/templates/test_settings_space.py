@@ -8,11 +8,11 @@ import pytest
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from mambo_nmpc.codegen.design import Design
-from mambo_nmpc.codegen.reference import ReferenceController
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.controllers.build import ffi
-from mambo_nmpc.sil.controllers.compiled import CompiledController
+from mambo_codegen.design import Design
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.build import ffi
+from mambo_sil.flight.controllers.compiled import CompiledController
 from tests.support import command
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run

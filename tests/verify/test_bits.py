@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify import bits
-from mambo_nmpc.sil.verify.check import CheckOutcome
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify import bits
+from mambo_sil.verify.check import CheckOutcome
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.sil.verify.check import CheckOutcome
-from mambo_nmpc.sil.verify.dialects import DIALECTS, check
+from mambo_sil.verify.check import CheckOutcome
+from mambo_sil.verify.dialects import DIALECTS, check
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require

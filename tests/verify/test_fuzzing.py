@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.render import render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify import fuzzing, replay
-from mambo_nmpc.sil.verify.check import CheckOutcome
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.verify import fuzzing, tape_replay
+from mambo_sil.verify.check import CheckOutcome
 from tests.support.bundles import place
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
@@ -117,7 +117,7 @@ def test_the_command_in_the_harness_works(tmp_path: Path, *, amalgamate: bool) -
     comment = (tmp_path / "fuzz/nmpc_fuzz.c").read_text().partition("*/")[0]
     lines = [line.removeprefix(" *   ") for line in comment.splitlines() if line.startswith(" *   ")]
     script = "\n".join(lines).replace("1000000", "1000")
-    assert replay.missing("clang", ["-fsanitize=fuzzer"], tmp_path) is None
+    assert tape_replay.missing("clang", ["-fsanitize=fuzzer"], tmp_path) is None
     done = subprocess.run(["sh", "-ec", script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "Done 1000 runs" in done.stderr

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.flags import proofs
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.model import Settings
-from mambo_nmpc.sil.verify.check import CheckOutcome
-from mambo_nmpc.sil.verify.proof import check, read_properties
+from mambo_codegen.bundle.flags import proofs
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.check import CheckOutcome
+from mambo_sil.verify.proof import check, read_properties
 from tests.support import headings
 from tests.support.alarms import (
     INFINITY_PASSES,

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.sil.verify import bits, dialects, fuzzing, rules, sanitizers
-from mambo_nmpc.sil.verify.cases import cases
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
+from mambo_codegen.reference import Status
+from mambo_sil.verify import bits, dialects, fuzzing, rules, sanitizers
+from mambo_sil.verify.cases import cases
+from mambo_sil.verify.check import CheckOutcome, Result, Subject
 from tests.support import headings
 from tests.support.alarms import (
     INFINITY_PASSES,

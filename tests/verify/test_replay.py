@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_nmpc.codegen.errors import BuildError
-from mambo_nmpc.codegen.reference import Status
-from mambo_nmpc.sil.verify import replay
-from mambo_nmpc.sil.verify.calls import (
+from mambo_codegen.errors import BuildError
+from mambo_codegen.reference import Status
+from mambo_sil.verify import tape_replay
+from mambo_sil.verify.calls import (
     NULL_COMMAND,
     NULL_SELF,
     UNWRITTEN_RAD,
@@ -17,8 +17,8 @@ from mambo_nmpc.sil.verify.calls import (
     calls,
     tape_from,
 )
-from mambo_nmpc.sil.verify.cases import cases
-from mambo_nmpc.sil.verify.check import Subject
+from mambo_sil.verify.cases import cases
+from mambo_sil.verify.check import Subject
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import played_fault, subject
 
@@ -88,4 +88,4 @@ def test_tapes_of_unequal_length_do_not_disturb_each_other() -> None:
 def test_an_amalgamated_bundle_is_refused(tmp_path: Path) -> None:
     """The message says which layout to generate."""
     with pytest.raises(BuildError, match="generate the bundle in folders"):
-        replay.sources(Subject(MAMBO, tmp_path, tmp_path))
+        tape_replay.sources(Subject(MAMBO, tmp_path, tmp_path))

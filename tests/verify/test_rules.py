@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.render import DEVIATIONS, render
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.codegen.settings.controller_toml import with_option
-from mambo_nmpc.sil.verify.check import CheckOutcome, Result, Subject
-from mambo_nmpc.sil.verify.rules import check, deviations
+from mambo_codegen.bundle.render import DEVIATIONS, render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.verify.check import CheckOutcome, Result, Subject
+from mambo_sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.settings import presets
-from mambo_nmpc.sil.verify import sanitizers
-from mambo_nmpc.sil.verify.check import CheckOutcome
+from mambo_codegen.settings import presets
+from mambo_sil.verify import sanitizers
+from mambo_sil.verify.check import CheckOutcome
 from tests.support.cases import CORNER_HORIZONS, settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from mambo_nmpc.codegen.errors import UnwritableError
-from mambo_nmpc.codegen.toolchain import Toolchain
-from mambo_nmpc.sil.verify import bits
-from mambo_nmpc.sil.verify.tools import run
+from mambo_codegen.errors import UnwritableError
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.verify import bits
+from mambo_sil.verify.tools import run
 from tests.support.command import command
 from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import subject

@@ -1,0 +1,1 @@
+"""A bundle: templates rendered to text, and text written to a folder."""

@@ -1,0 +1,237 @@
+"""The self-test digest: a checksum of many control steps; a build with other bits has another digest.
+
+An episode is TICKS steps of one controller after nmpc_init. Its inputs come from an integer random number
+generator, so that C and NumPy draw the same ones. The C (`nmpc_self_test.c.j2`) runs the
+episodes one after the other; this module runs them in parallel arrays when the C is generated.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.math import Real, rounded
+from mambo_codegen.methods.one_norm.formats import LARGEST
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.representation import OUTCOME, STATE, InputLimits, Representation
+from mambo_codegen.reference import ExactStep, Step, reference_controller
+from mambo_codegen.settings.model import Settings
+
+TICKS: Final = 100
+"""Steps of an episode."""
+TICKS_PER_INPUT: Final = 4
+"""Steps for which an input is held, long enough for plans to reach their limits and for costs to converge."""
+
+_MOST_EPISODES: Final = 1000
+_USUAL_WORK: Final = 100
+"""Largest Np x Nc x iterations for which the digest covers _MOST_EPISODES."""
+_LEAST_WORK: Final = 20
+"""Np x Nc below which the reference is not faster, because NumPy's overhead per operation dominates."""
+_SIDE_BY_SIDE: Final = 250
+"""Episodes per array: few enough for the processor's caches, many enough to outweigh NumPy's overhead."""
+_UNIT_BITS: Final = 23
+_UNIT: Final = 1 << _UNIT_BITS
+"""Random numbers are integers in -_UNIT.._UNIT - 1, which every scalar type represents exactly."""
+_MULTIPLIER: Final = 2654435761
+"""The prime nearest to 2**32 / golden ratio (Knuth, The Art of Computer Programming 3, section 6.4)."""
+
+Words = NDArray[np.uint32]
+StepInputs = tuple[Real, Real, Real]
+"""States (n, 7), targets (n, 4) and thrusts (n,) of one step of n controllers."""
+
+
+@dataclass(frozen=True)
+class InputScales:
+    """Factors from random integers to inputs; errors between drone and target have four sizes.
+
+    In floating point an input is integer x factor. In fixed point, whose formats cannot represent factors
+    that small, it is integer x factor / _UNIT.
+    """
+
+    target_position_m: float
+    target_velocity_m_s: float
+    error_position_m: tuple[float, ...]
+    error_velocity_m_s: tuple[float, ...]
+    attitude_rad: float
+    yaw_rad: float
+    thrust_acceleration_m_s2: float
+    hover_m_s2: float
+    target_motion: float
+    """Of what the tracker reads: the change of the target's velocity from step to step, in m/s, or a given
+    acceleration, in m/s^2; 0 without a tracker."""
+
+
+def input_scales(design: Design) -> InputScales:
+    """Return the factors that give inputs as in a flight, within the ranges of the settings."""
+    settings = design.settings
+    half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
+    position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
+    near = 0.25, 0.025, 0.0025
+    fixed, most_m_s2 = settings.code.scalar == "fixed", settings.ranges.thrust_acceleration_max_m_s2
+    hover_m_s2 = min(GRAVITY_M_S2, most_m_s2) if fixed else GRAVITY_M_S2
+    thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
+    unit = 1 if fixed else _UNIT
+    tracker, motion = design.tracker, 0.0
+    if tracker:
+        most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
+        motion = min(tracker.tested_input, most)
+    return InputScales(
+        target_position_m=position_m / unit,
+        target_velocity_m_s=velocity_m_s / unit,
+        error_position_m=tuple(
+            error / unit for error in (min(20.0, half_m), *(size * position_m for size in near))
+        ),
+        error_velocity_m_s=tuple(
+            error / unit for error in (min(10.0, half_m_s), *(size * velocity_m_s for size in near))
+        ),
+        attitude_rad=0.5 / unit,
+        yaw_rad=100.0 / unit,
+        thrust_acceleration_m_s2=thrust_m_s2 / unit,
+        hover_m_s2=hover_m_s2,
+        target_motion=motion / unit,
+    )
+
+
+def episode_count(settings: Settings) -> int:
+    """Return how many episodes the digest covers: fewer for long horizons, which keeps the run time equal."""
+    horizon = settings.horizon
+    if settings.cost.norm == "quadratic":
+        return _MOST_EPISODES
+    work = max(horizon.prediction * horizon.control, _LEAST_WORK) * settings.optimizer.iterations
+    return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
+
+
+@lru_cache(maxsize=64)  # a bundle renders in 0.1 s instead of 1.5 s
+def self_test_digest(design: Design, count: int) -> int:
+    """Run the first `count` episodes on the reference controller, and return their digest of 32 bits."""
+    digest = np.zeros(1, np.uint32)
+    for first in range(0, count, _SIDE_BY_SIDE):
+        episodes = np.arange(first, min(first + _SIDE_BY_SIDE, count), dtype=np.uint32)
+        for word in _episode_digests(design, episodes):
+            digest = _fold(digest, word)
+    return int(digest[0])
+
+
+def episode_inputs(design: Design, episodes: Words) -> Iterator[StepInputs]:
+    """Yield the inputs of each of TICKS steps; `episodes` (n,) are the indices of the episodes."""
+    numbers, generator, scales = design.numbers, _Generator(episodes), input_scales(design)
+    for _ in range(TICKS // TICKS_PER_INPUT):
+        state, target, thrust, change = _next_inputs(design, scales, generator)
+        for _ in range(TICKS_PER_INPUT):
+            yield (
+                numbers.to_si(state, *STATE),
+                numbers.to_si(target, *design.target),
+                numbers.to_si(thrust, "thrust"),
+            )
+            target = target + change
+
+
+class _Generator:
+    """n random number generators: Marsaglia's xorshift (Journal of Statistical Software 8(14), 2003)."""
+
+    def __init__(self, episodes: Words) -> None:
+        self._state = _fold(np.zeros_like(episodes), episodes + np.uint32(1))
+
+    def next(self) -> Words:
+        """Return the next 32 bits of every generator."""
+        number = self._state
+        number = number ^ (number << np.uint32(13))
+        number = number ^ (number >> np.uint32(17))
+        number = number ^ (number << np.uint32(5))
+        self._state = number
+        return number
+
+    def draw(self, numbers: Representation, scale: Real) -> Real:
+        """Return the upper 24 of the next 32 bits as a signed integer times `scale`, rounded once."""
+        whole = ((self.next() >> 8).astype(np.int32) - _UNIT).astype(numbers.computed)
+        drawn: Real = whole * scale if numbers.formats is None else rounded(whole * scale, _UNIT_BITS)
+        return drawn
+
+
+def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> tuple[Real, Real, Real, Real]:
+    """Draw states, targets, thrusts and changes of the targets from step to step, in numbers of the C.
+
+    Five in 64 have an input out of range, six if an acceleration is given. Velocities change for a tracker
+    that measures the acceleration by them.
+    """
+    numbers, limits = design.numbers, design.limits
+    choice = generator.next()
+    size = choice & 3
+
+    def draw(scale: float, quantity: str) -> Real:
+        return generator.draw(numbers, numbers.constant(scale, quantity))
+
+    def error(sizes: tuple[float, ...], quantity: str) -> Real:
+        return generator.draw(numbers, np.array([numbers.constant(one, quantity) for one in sizes])[size])
+
+    target = [draw(scales.target_position_m, "position") for _ in range(2)]
+    target += [draw(scales.target_velocity_m_s, "velocity") for _ in range(2)]
+    state: list[Real] = [target[axis] + error(scales.error_position_m, "position") for axis in (0, 1)]
+    state += [target[axis] + error(scales.error_velocity_m_s, "velocity") for axis in (2, 3)]
+    state += [draw(scales.attitude_rad, "angle") for _ in range(2)]
+    state += [draw(scales.yaw_rad, "yaw")]
+    thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_acceleration_m_s2, "thrust")
+    thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
+    change = [np.zeros_like(thrust)] * len(design.target)
+    if design.tracker:
+        motion = [draw(scales.target_motion, design.tracker.input_quantity) for _ in range(2)]
+        if design.tracker.is_given:
+            target += motion
+        else:
+            change[2:4] = motion
+
+    fault = (choice >> 8) & 63
+    position, pitch, yaw, velocity = _out_of_range(numbers, limits)
+    state[0] = np.where(fault == 0, position, state[0])
+    state[5] = np.where(fault == 1, pitch, state[5])
+    state[6] = np.where(fault == 2, yaw, state[6])
+    target[3], change[3] = np.where(fault == 3, velocity, target[3]), np.where(fault == 3, 0, change[3])
+    thrust = np.where(fault == 4, numbers.computed(0), thrust)
+    if len(target) > 4:
+        target[4] = np.where(fault == 5, position, target[4])
+    return np.stack(state, axis=1), np.stack(target, axis=1), thrust, np.stack(change, axis=1)
+
+
+def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, Any, Any, Any]:
+    """Return a position, an attitude, a yaw and a velocity out of range; the position is NaN in float."""
+    if numbers.formats is not None:
+        return LARGEST, LARGEST, LARGEST, -LARGEST
+    two = numbers.scalar(2)
+    return numbers.scalar(np.nan), two * limits.attitude, two * limits.yaw, -two * limits.velocity
+
+
+def _episode_digests(design: Design, episodes: Words) -> Words:
+    """Run n episodes, and return the digest of each (n,)."""
+    controller = reference_controller(design, len(episodes))
+    digests = np.zeros_like(episodes)
+    for inputs in episode_inputs(design, episodes):
+        for word in _words(design, controller.step(*inputs)):
+            digests = _fold(digests, word)
+    return digests
+
+
+def _words(design: Design, step: Step | ExactStep) -> Iterator[Words]:
+    """Yield the outcome of a step as 32-bit words (n,); a 64-bit number gives its upper word first."""
+    numbers = design.numbers
+    if isinstance(step, ExactStep):
+        counts: tuple[NDArray[Any], ...] = (step.status, step.missed, step.saturated)
+        outcome = [numbers.stored_from_si(step.stored, design.stored)]
+    else:
+        counts = (step.status, step.iterations, step.converged)
+        outcome = [numbers.from_si(getattr(step, name), name) for name in OUTCOME]
+    for count in counts:
+        yield count.astype(np.uint32)
+    for values in outcome:
+        rows = np.ascontiguousarray(values.reshape(len(values), -1))
+        yield from rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T
+
+
+def _fold(digest: NDArray[Any], word: NDArray[Any]) -> Words:
+    """Mix a word into a digest; for a given digest, different words give different results."""
+    mixed = (digest ^ word) * np.uint32(_MULTIPLIER)
+    folded: Words = mixed ^ (mixed >> np.uint32(15))
+    return folded

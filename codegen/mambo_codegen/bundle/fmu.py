@@ -1,0 +1,80 @@
+"""The variables of a controller as a functional mock-up unit: names, units, ranges and start values."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_codegen.settings.model import Settings
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """A real variable; its value reference is its place in the list."""
+
+    name: str
+    causality: Literal["input", "output", "parameter"]
+    unit: str
+    least: float
+    most: float
+    start: float
+    description: str
+
+    @property
+    def variability(self) -> str:
+        """Values are held between updates; weights may be changed in a simulation."""
+        return "tunable" if self.causality == "parameter" else "discrete"
+
+
+def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
+    """Return the variables in the order of the C: 12 inputs, 2 outputs, then those of some settings.
+
+    A given acceleration of the target has 2 inputs, a 1-norm 2 weights.
+    """
+    ranges, tilt_rad = settings.ranges, settings.limits.tilt_rad
+
+    def symmetric(name: str, unit: str, most: float, description: str) -> FmuVariable:
+        return FmuVariable(name, "input", unit, -most, most, 0.0, description)
+
+    variables = [
+        symmetric("x", "m", ranges.position_m, "measured position north"),
+        symmetric("y", "m", ranges.position_m, "measured position east"),
+        symmetric("vx", "m/s", ranges.velocity_m_s, "measured velocity north"),
+        symmetric("vy", "m/s", ranges.velocity_m_s, "measured velocity east"),
+        symmetric("roll", "rad", ATTITUDE_LIMIT_RAD, "measured roll, right side down"),
+        symmetric("pitch", "rad", ATTITUDE_LIMIT_RAD, "measured pitch, nose up"),
+        symmetric("yaw", "rad", YAW_LIMIT_RAD, "measured yaw, clockwise from above"),
+        symmetric("target_x", "m", ranges.position_m, "position of the target north"),
+        symmetric("target_y", "m", ranges.position_m, "position of the target east"),
+        symmetric("target_vx", "m/s", ranges.velocity_m_s, "velocity of the target north"),
+        symmetric("target_vy", "m/s", ranges.velocity_m_s, "velocity of the target east"),
+        FmuVariable(
+            "thrust_acceleration",
+            "input",
+            "m/s2",
+            ranges.thrust_acceleration_min_m_s2,
+            ranges.thrust_acceleration_max_m_s2,
+            hover_thrust(settings),
+            "thrust over mass",
+        ),
+        FmuVariable("roll_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "roll command"),
+        FmuVariable("pitch_command", "output", "rad", -tilt_rad, tilt_rad, 0.0, "pitch command"),
+    ]
+    if settings.target.acceleration == "given":
+        most_m_s2 = ranges.thrust_acceleration_max_m_s2
+        variables += [
+            symmetric("target_ax", "m/s2", most_m_s2, "acceleration of the target north"),
+            symmetric("target_ay", "m/s2", most_m_s2, "acceleration of the target east"),
+        ]
+    if settings.cost.norm == "1-norm":
+        tracking, effort = settings.cost.tracking_weight, settings.cost.effort_weight
+        numbers = Design(settings).numbers
+        most_tracking, most_effort = numbers.tracking_limit, numbers.effort_limit
+        variables += [
+            FmuVariable(
+                "tracking_weight", "parameter", "1/m", 0.0, most_tracking, tracking, "lambda1, eq 12"
+            ),
+            FmuVariable("effort_weight", "parameter", "1/rad", 0.0, most_effort, effort, "lambda2, eq 12"),
+        ]
+    return tuple(variables)

@@ -1,0 +1,366 @@
+"""Render the templates: settings in, {path: text} of a bundle out; no clock and no path of the machine."""
+
+import hashlib
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import Any, Final
+
+import jinja2
+
+from mambo_codegen import __version__, boards
+from mambo_codegen.bundle.digest import TICKS, TICKS_PER_INPUT, episode_count, input_scales, self_test_digest
+from mambo_codegen.bundle.flags import (
+    COMPILE_FLAGS,
+    PROOF_FLAGS,
+    PROOF_PREPROCESSING,
+    RULE_FLAGS,
+    WARNING_FLAGS,
+    proofs,
+)
+from mambo_codegen.bundle.fmu import fmu_variables
+from mambo_codegen.bundle.infix import infix
+from mambo_codegen.bundle.self_test import self_test
+from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
+from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm.formats import SINE_BITS
+from mambo_codegen.methods.quadratic.formats import ExactFormats
+from mambo_codegen.numbers import literals
+from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.representation import ROW, STATE, THRUST, WEIGHTS, Representation
+from mambo_codegen.numbers.trigonometry import SINE_ERRORS
+from mambo_codegen.settings.controller_toml import to_toml
+from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_codegen.settings.model import Settings
+
+PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
+SUB_BLOCKS: Final = {
+    "1-norm": ("nmpc_math", "nmpc_tracker", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer"),
+    "quadratic": ("nmpc_math", "nmpc_tracker", "nmpc_attitude", "nmpc_observer", "nmpc_optimizer"),
+}
+"""Sources with a header each, by norm; a bundle has nmpc_tracker only if its settings have a tracker."""
+_QUADRATIC: Final = frozenset(
+    {"nmpc_config.h", "nmpc.h", "nmpc.c"}
+    | {f"{block}.{kind}" for block in SUB_BLOCKS["quadratic"][2:] for kind in "hc"}
+)
+"""Files of a bundle whose templates are in quadratic/ if the cost is."""
+PROJECT: Final = {
+    "README.md": "README.md",
+    "Makefile": "Makefile",
+    "CMakeLists.txt": "CMakeLists.txt",
+    "main.c": "example/main.c",
+    "nmpc_fuzz.c": "fuzz/nmpc_fuzz.c",
+    "nmpc_proof.c": "proof/nmpc_proof.c",
+}
+DEVIATIONS: Final = "deviations.txt"
+"""It names files of the layout in folders, so an amalgamated bundle has none."""
+
+_OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
+_OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
+_REFUSAL: Final = """
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != {})
+#error "this file and its headers are of different bundles: run mambo-nmpc generate again"
+#endif
+"""
+_BYTES: Final = {"float32": (4, 4), "float64": (8, 8), "fixed": (4, 8)}
+"""Bytes of nmpc_real_t and of nmpc_sum_t."""
+
+
+def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = True) -> dict[str, str]:
+    """Render the bundle of `settings`: {relative POSIX path: text}.
+
+    With `amalgamate` the library is one header and one source in the bundle's folder. Without `with_digest`
+    the header does not state the self-test digest, which takes a second to compute; flights do not need it.
+    """
+    design = Design(settings)
+    environment = _environment()
+    public: tuple[str, ...] = PUBLIC_HEADERS
+    norm = settings.cost.norm
+    blocks = tuple(block for block in SUB_BLOCKS[norm] if design.tracker or block != "nmpc_tracker")
+    code: tuple[str, ...] = (*(f"{block}.c" for block in blocks), "nmpc.c", "nmpc_self_test.c")
+    if design.numbers.formats is not None:
+        public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
+
+    def template(folder: str, name: str) -> jinja2.Template:
+        own = design.is_quadratic and name in _QUADRATIC
+        return environment.get_template(f"{'quadratic' if own else folder}/{name}.j2")
+
+    headers = {name: template("include", name) for name in public}
+    privates = {f"{block}.h": template("src", f"{block}.h") for block in blocks}
+    sources = {name: template("src", name) for name in code}
+    others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
+    project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
+
+    context = _context(design, with_digest=with_digest) | {"amalgamated": amalgamate}
+    text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
+    if design.numbers.formats is None:
+        text = {name: infix(content) for name, content in text.items()}
+    if amalgamate:
+        layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
+        library = _join([text[name] for name in public], [text[name] for name in (*privates, *code)])
+    else:
+        layout = {
+            "header_folder": "include/",
+            "source_folder": "src/",
+            "headers": [f"include/{name}" for name in public],
+            "sources": [f"src/{name}" for name in code],
+        }
+        library = {
+            f"include/{name}" if name in public else f"src/{name}": content for name, content in text.items()
+        }
+    files = library | {path: template.render(context | layout) for path, template in project.items()}
+    return _finish(files, settings)
+
+
+def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bool = True) -> dict[str, str]:
+    """Render the folder of `target`, {relative POSIX path: text}: the amalgamated library and its templates.
+
+    `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update period.
+    """
+    ticks = target.ticks_per_update(settings.horizon.update_period_s)
+    bundle = render(settings, amalgamate=True, with_digest=with_digest)
+    header, source = (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
+    library = {
+        f"{target.source_folder}{header}": bundle[header],
+        f"{target.source_folder}{source}": target.opening + bundle[source],
+    }
+    environment = _environment()
+    context = _context(Design(settings), with_digest=with_digest) | {
+        "ticks_per_update": ticks,
+        "update_period_ns": round(1e9 * settings.horizon.update_period_s),
+        "variables": fmu_variables(settings),
+        "real_type": "float" if settings.code.scalar == "fixed" else "nmpc_real_t",
+    }
+    own = f"{TARGETS_FOLDER}/{target.name}/"
+    files = {
+        path.removeprefix(own).removesuffix(".j2"): environment.get_template(path).render(context)
+        for path in environment.list_templates(extensions=["j2"])
+        if path.startswith(own)
+    }
+    return library | _finish(files, settings)
+
+
+def _finish(files: Mapping[str, str], settings: Settings) -> dict[str, str]:
+    """Return rendered `files` with guards and the prefix of `settings`, and their controller.toml."""
+    prefix, settings_id = settings.code.prefix, _settings_id(settings)
+    named = {
+        with_prefix(path, prefix): with_prefix(_add_guard(path, text, settings_id), prefix)
+        for path, text in files.items()
+    }
+    return named | {"controller.toml": to_toml(settings)}
+
+
+def with_prefix(text: str, prefix: str) -> str:
+    """Replace nmpc in every name of the controller: nmpc_step becomes prefix_step, NMPC_OK PREFIX_OK."""
+    return _OWN_NAME.sub(lambda name: prefix if name[1] == "nmpc" else prefix.upper(), text)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    """Return the Jinja environment; its number filters use the `Spelling` under "spelling" in the context."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("mambo_templates", ""),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
+    return environment
+
+
+def _number_filter(name: str) -> Callable[..., str]:
+    """Return a filter that calls the method `name` of the context's `Spelling`."""
+
+    @jinja2.pass_context
+    def spell(context: jinja2.runtime.Context, *arguments: Any, **options: Any) -> str:
+        text: str = getattr(context["spelling"], name)(*arguments, **options)
+        return text
+
+    return spell
+
+
+def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
+    """Return all values that the templates insert; `with_digest` as in `render`."""
+    settings, numbers = design.settings, design.numbers
+    scalar = settings.code.scalar
+    own = _quadratic_context(design) if design.is_quadratic else _one_norm_context(design)
+    return own | {
+        "settings": settings,
+        "spelling": literals.Spelling(scalar, numbers.bits),
+        "parameters": [
+            (f"{section}.{key}", value)
+            for section, values in settings.in_use.items()
+            for key, value in values.items()
+            if key != "prefix"  # every public name shows it
+        ],
+        "version": __version__,
+        "digest": settings.short_digest,
+        "settings_id": _settings_id(settings),
+        "fixed": numbers.formats is not None,
+        "formats": numbers.formats,
+        "sine_bits": SINE_BITS,
+        "scales": _powers(numbers, 1),
+        "units": _powers(numbers, -1),
+        "c_type": literals.C_TYPES[scalar],
+        "shell": "nmpc_float_" if numbers.formats else "nmpc_",
+        "sum_type": literals.SUM_TYPES[scalar],
+        "scalar_bytes": _BYTES[scalar][0],
+        "instance_bytes": instance_bytes(design),
+        "tracker": design.tracker,
+        "feedback": design.feedback_steps is not None,
+        "feedback_steps": design.feedback_steps,
+        "given": design.tracker is not None and design.tracker.is_given,
+        "trigonometry": design.trigonometry,
+        "sine_error": SINE_ERRORS[scalar],
+        "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
+        "yaw_limit_rad": YAW_LIMIT_RAD,
+        "vectors": self_test(design),
+        "episodes": episode_count(settings),
+        "ticks": TICKS,
+        "held": TICKS_PER_INPUT,
+        "self_test_steps": TICKS * episode_count(settings),
+        "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
+        "spread": input_scales(design),
+        "boards": [
+            {
+                "name": board.name,
+                "compiler": board.compiler.common,
+                "flags": " ".join(board.compiler.flags),
+            }
+            for board in map(boards.load, boards.names())
+        ],
+        "hover_thrust_m_s2": hover_thrust(settings),
+        "example_position_m": min(1.0, settings.ranges.position_m / 2),
+        "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
+        "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
+        "compile_flags": " ".join(COMPILE_FLAGS),
+        "warning_flags": " ".join(WARNING_FLAGS),
+        "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
+        "proofs": {
+            name: " ".join((*PROOF_FLAGS, *flags))
+            for name, flags in proofs(scalar, settings.cost.norm).items()
+        },
+        "rule_flags": " ".join(RULE_FLAGS),
+    }
+
+
+def _one_norm_context(design: Design) -> dict[str, object]:
+    settings, numbers = design.settings, design.numbers
+    return {
+        "quadratic": False,
+        "backtracking": settings.optimizer.variant == "rprop+",
+        "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
+        "tables": design.tables,
+        "hover": settings.model.thrust == "hover",
+        "tracking_limit": numbers.tracking_limit,
+        "effort_limit": numbers.effort_limit,
+    }
+
+
+def _quadratic_context(design: Design) -> dict[str, object]:
+    period_s, model = design.settings.horizon.update_period_s, design.settings.model
+    formats = design.numbers.formats
+    return {
+        "quadratic": True,
+        "attitude": design.attitude,
+        "observer": design.observer,
+        "law": design.law,
+        "stored_numbers": len(design.stored),
+        "stored_quantities": design.stored,
+        "row_quantities": ROW,
+        "stored_limits": _stored_limits(design),
+        "attitude_shares": [period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)],
+        "wide": "(nmpc_sum_t)" if formats else "",
+        "shifts": formats.shifts if isinstance(formats, ExactFormats) else None,
+        "plain_products": _plain_products(design),
+    }
+
+
+def _stored_limits(design: Design) -> list[str]:
+    """Spell the limits of what a controller with a quadratic cost stores, in ascending order."""
+    numbers, tracker = design.numbers, design.tracker
+    limits = [
+        numbers.constant(design.settings.ranges.position_m, "position"),
+        numbers.constant(design.observer.velocity_limit_m_step, "speed"),
+        numbers.constant(design.observer.disturbance_limit_m_step2, "acceleration"),
+        numbers.constant(design.attitude.limit_m_step2, "acceleration"),
+        numbers.constant(design.settings.limits.tilt_rad, "angle"),
+    ]
+    if tracker:
+        limits += [
+            numbers.constant(tracker.acceleration_limit_m_step2, "acceleration"),
+            numbers.constant(tracker.jerk_limit_m_step2_update, "acceleration"),
+        ]
+    return [str(limit) for limit in sorted(limits)]
+
+
+def _plain_products(design: Design) -> list[str]:
+    """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
+    wanted = {
+        "speed_product": True,
+        "tilt_product": True,
+        "command_product": True,
+        "per_step_product": True,
+        "per_step2_product": True,
+        "drag_product": bool(design.observer.drag_1_step),
+        "aged_position": bool(design.observer.age_steps),
+        "aged_velocity": bool(design.observer.age_steps),
+        "feedback_product": design.feedback_steps is not None,
+        "ratio_product": design.law.moves > 1,
+        "target_product": design.tracker is not None,
+        "tracker_product": design.tracker is not None,
+    }
+    return [name for name, is_wanted in wanted.items() if is_wanted]
+
+
+def _settings_id(settings: Settings) -> str:
+    """Return a C constant, 32 bits of a hash of the settings and of the generator's version."""
+    digest = hashlib.sha256(f"{__version__} {settings.digest}".encode()).hexdigest()
+    return f"0x{digest[:8].upper()}UL"
+
+
+def _add_guard(path: str, text: str, settings_id: str) -> str:
+    """Make a C file stop the compiler, after its includes, if they are headers of another bundle."""
+    includes = list(_OWN_INCLUDE.finditer(text))
+    if not path.endswith((".c", ".h")) or not includes:
+        return text
+    end = includes[-1].end()
+    return text[:end] + _REFUSAL.format(settings_id) + text[end:]
+
+
+def _powers(numbers: Representation, sign: int) -> dict[str, str]:
+    """Spell 2^(sign * bits) of each quantity as float: integers per unit; for sign -1 units per integer."""
+    bits = numbers.bits or {}
+    return {
+        name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
+        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance")
+        if name in bits
+    }
+
+
+def instance_bytes(design: Design) -> int:
+    """Return the size of nmpc_t: its numbers, sums and single bytes, with padding."""
+    settings = design.settings
+    number_bytes, sum_bytes = _BYTES[settings.code.scalar]
+    if design.is_quadratic:
+        flags = 3 if design.tracker else 2
+        return (len(design.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
+    moves = 2 * settings.horizon.control
+    weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if design.tables.has_lag else 3), 2
+    tracker, flags = (4 if design.tracker.is_given else 6, 3) if design.tracker else (0, 2)
+    if design.feedback_steps:
+        command, flags = command + 4, flags + 1
+    numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
+    before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
+    return -(-(before_flags + flags) // sum_bytes) * sum_bytes
+
+
+def _join(header: Sequence[str], source: Sequence[str]) -> dict[str, str]:
+    """Join the texts of the library into one header and one source, in order, without its own includes."""
+    return {
+        "nmpc.h": _OWN_INCLUDE.sub("", "\n".join(header)),
+        "nmpc.c": '#include "nmpc.h"\n\n' + _OWN_INCLUDE.sub("", "\n".join(source)),
+    }

@@ -1,0 +1,119 @@
+"""The self-test vectors of a bundle: inputs of consecutive steps, and the results of the reference."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.literals import SCALARS
+from mambo_codegen.reference import (
+    ExactReferenceController,
+    ExactStep,
+    ReferenceController,
+    Status,
+    Step,
+    reference_controller,
+)
+
+STEPS: Final = 24
+_GOLDEN_RATIO: Final = 0.6180339887498949
+
+
+@dataclass(frozen=True)
+class SelfTestStep:
+    """One step: inputs and results.
+
+    Inputs: state (7,), target (4,) or (6,), thrust. Results: status, command (2,) and other numbers: cost and
+    gradient (2,) of the 1-norm; (k,) all stored numbers with a quadratic cost.
+    """
+
+    state: tuple[float, ...]
+    target: tuple[float, ...]
+    thrust_acceleration_m_s2: float
+    status: Status
+    command_rad: tuple[float, float]
+    others: tuple[float, ...]
+
+
+def self_test(design: Design) -> list[SelfTestStep]:
+    """Run the reference controller through STEPS inputs of a typical flight.
+
+    The first input has a position error below the smallest normal number, so that a board that flushes such
+    numbers to zero fails. Every seventh input is out of range: first a state, then a target, then a thrust.
+    For a tracker that reads it the target's velocity changes little from step to step. The values are a Weyl
+    sequence; a library's random numbers may change with its version.
+    """
+    settings = design.settings
+    controller = reference_controller(design)
+    ranges = settings.ranges
+    position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
+    spread = _weyl_sequence()
+    scalar = settings.code.scalar
+    tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
+    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * len(design.target), hover_thrust(settings))]
+    tracker = design.tracker
+    measures = tracker is not None and not tracker.is_given
+    velocity_m_s, change_m_s = [0.0, 0.0], speed_m_s
+    if tracker and measures:
+        change_m_s = min(tracker.tested_input, speed_m_s / 8)
+    for index in range(1, STEPS):
+        target = [_next(spread, scale) for scale in (position_m, position_m, change_m_s, change_m_s)]
+        if measures:
+            velocity_m_s = [v + change for v, change in zip(velocity_m_s, target[2:], strict=True)]
+            target[2:] = velocity_m_s
+        error = [_next(spread, scale) for scale in (*[0.15 * position_m] * 2, *[0.5 * speed_m_s] * 2)]
+        tilt = [_next(spread, settings.limits.tilt_rad) for _ in range(2)]
+        state = [t + e for t, e in zip(target, error, strict=True)] + tilt + [_next(spread, 7.0)]
+        if tracker and tracker.is_given:
+            target += [_next(spread, tracker.input_limit / 2) for _ in range(2)]
+        thrust = hover_thrust(settings, _next(spread, 2.0))
+        if index % 7 == 6:
+            match index // 7:
+                case 0:
+                    state[0] = 2 * ranges.position_m
+                case 1:
+                    target[3] = -2 * ranges.velocity_m_s
+                case _:
+                    thrust = 0.0
+        steps.append(_step(controller, state, target, thrust))
+    return steps
+
+
+def _step(
+    controller: ReferenceController | ExactReferenceController,
+    state: list[float],
+    target: list[float],
+    thrust: float,
+) -> SelfTestStep:
+    step = controller.step([state], [target], [thrust])
+    roll_rad, pitch_rad = step.command_rad[0].tolist()
+    return SelfTestStep(
+        state=tuple(state),
+        target=tuple(target),
+        thrust_acceleration_m_s2=thrust,
+        status=Status(int(step.status[0])),
+        command_rad=(roll_rad, pitch_rad),
+        others=_others(step),
+    )
+
+
+def _others(step: Step | ExactStep) -> tuple[float, ...]:
+    if isinstance(step, ExactStep):
+        return tuple(step.stored[0].tolist())
+    return (float(step.cost[0]), *step.gradient[0, 0].tolist())
+
+
+def _weyl_sequence() -> Iterator[float]:
+    """Yield the Weyl sequence of the golden ratio, in 0..1."""
+    fraction = 0.5
+    while True:
+        fraction = (fraction + _GOLDEN_RATIO) % 1.0
+        yield fraction
+
+
+def _next(spread: Iterator[float], scale: float) -> float:
+    """Return the next value in -scale..scale, rounded to three decimals to keep the vectors readable."""
+    return round(scale * (2 * next(spread) - 1), 3)

@@ -1,0 +1,1 @@
+"""The methods of control, and what they share: target tracker, inputs, functions of numbers."""

@@ -1,0 +1,198 @@
+"""Controller: checks the inputs of a step, predicts, optimizes the plan and applies its first move."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.inputs import Inputs, Status, choose
+from mambo_codegen.methods.math import Real, clamp
+from mambo_codegen.methods.one_norm import cost
+from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.optimizer import Minimize, Rprop, Search
+from mambo_codegen.methods.one_norm.predictor import Predictor
+from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.representation import WEIGHTS
+
+
+@dataclass(frozen=True)
+class Memory:
+    """State of n controllers between two steps.
+
+    command_rad, the first moves of the last plan, is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost
+    (n,), gradient (n, control, 2), iterations (n,), converged (n,). Without a tracker `target` stays unknown.
+    sent_rad (n, 2) are the last commands, tilt_rad (n, 2) the angles of the last good step, has_tilt (n,)
+    whether there was one.
+    """
+
+    command_rad: Real
+    plan_rad: Real
+    weights: Real
+    cost: Real
+    gradient: Real
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+    target: TargetMotion
+    sent_rad: Real
+    tilt_rad: Real
+    has_tilt: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Step:
+    """The result of one step of n controllers; after bad input all but the status is of the last good step.
+
+    status:      (n,) a `Status` each.
+    command_rad: (n, 2) roll and pitch commands, in rad.
+    cost:        (n,) cost of the plan that the last iteration evaluated.
+    gradient:    (n, control, 2) gradient of that plan, per rad.
+    plan_rad:    (n, control, 2) the optimized moves; the first and the rate feedback are the command.
+    iterations:  (n,) updates made.
+    converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
+
+    With fixed point the numbers are those of the C, converted exactly to SI units in float64.
+    """
+
+    status: NDArray[np.int64]
+    command_rad: Real
+    cost: Real
+    gradient: Real
+    plan_rad: Real
+    iterations: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+
+
+class ReferenceController:
+    """n controllers in NumPy that compute the bits of the generated C.
+
+    `minimize` may be wrapped to record the iterations of the optimizer.
+    """
+
+    def __init__(self, design: Design, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
+        settings, products = design.settings, arithmetic(design)
+        self.settings = settings
+        self._numbers, self._inputs = design.numbers, Inputs(design)
+        self._products = products
+        self._feedback = design.feedback_steps and np.array(
+            [design.numbers.constant(steps, "feedback") for steps in design.feedback_steps]
+        )
+        self._predictor = Predictor(design, products)
+        self._tracker = Tracker(design.tracker, products) if design.tracker else None
+        self._rprop = Rprop(settings, products)
+        self._minimize = minimize
+        self.scalar = self._numbers.scalar
+        control, computed = settings.horizon.control, self._numbers.computed
+        weights = [settings.cost.tracking_weight, settings.cost.effort_weight]
+        self.memory = Memory(
+            command_rad=np.zeros((n, 2), computed),
+            plan_rad=np.zeros((n, control, 2), computed),
+            weights=np.tile(self._inputs.numbers([weights], WEIGHTS), (n, 1)),
+            cost=np.zeros(n, computed),
+            gradient=np.zeros((n, control, 2), computed),
+            iterations=np.zeros(n, np.int64),
+            converged=np.zeros(n, np.bool_),
+            target=unknown_motion(np.zeros((n, 2), computed)),
+            sent_rad=np.zeros((n, 2), computed),
+            tilt_rad=np.zeros((n, 2), computed),
+            has_tilt=np.zeros(n, np.bool_),
+        )
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Set last command and plan to `command_rad` (n, 2), clamped to the tilt limit; forget the target.
+
+        Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
+        nothing.
+        """
+        command, good = self._inputs.command(command_rad)
+        plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
+        new = replace(
+            self.memory,
+            command_rad=command,
+            plan_rad=plan,
+            target=unknown_motion(command),
+            sent_rad=command,
+            has_tilt=np.zeros(len(command), np.bool_),
+        )
+        self.memory = choose(good, new, self.memory)
+        return np.where(good, Status.OK, Status.BAD_COMMAND)
+
+    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
+        """Replace tracking and effort weight by `weights` (n, 2), each from 0 to its limit.
+
+        Returns a status (n,); bad weights change nothing.
+        """
+        given = self._inputs.numbers(weights, WEIGHTS)
+        good = np.all((given >= 0) & (given <= self._inputs.limits.weights), axis=1)
+        self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
+        return np.where(good, Status.OK, Status.BAD_WEIGHT)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands.
+
+        state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
+        target (n, 4): x, y (m), vx, vy (m/s); (n, 6) with ax, ay (m/s^2) where the acceleration is given.
+        thrust_acceleration_m_s2 (n,): thrust over mass, up.
+        """
+        states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
+        status = self._inputs.status(*self._inputs.check(states, targets, thrusts))
+        good = status == Status.OK
+        zero = self._numbers.computed(0)
+        states, targets = (np.where(good[:, None], given, zero) for given in (states, targets))
+        thrusts = np.where(good, thrusts, self._inputs.limits.thrust_least)
+        if self.settings.model.thrust == "hover":
+            thrusts = np.full_like(thrusts, self._numbers.constant(hover_thrust(self.settings), "thrust"))
+        motion = self._track(targets)
+        searched = self._search(states, targets, thrusts, motion.acceleration_m_step2)
+        new = replace(
+            self.memory,
+            command_rad=searched.moves_rad[:, 0],
+            plan_rad=searched.moves_rad,
+            cost=searched.cost,
+            gradient=searched.gradient,
+            iterations=searched.iterations,
+            converged=searched.converged,
+            target=motion,
+            sent_rad=self._command(searched.moves_rad[:, 0], states[:, 4:6]),
+            tilt_rad=states[:, 4:6],
+            has_tilt=np.ones(len(states), np.bool_),
+        )
+        new = self.memory = choose(good, new, self.memory)
+        to_si = self._numbers.to_si
+        return Step(
+            status=status,
+            command_rad=to_si(new.sent_rad, "angle"),
+            cost=to_si(new.cost, "cost"),
+            gradient=to_si(new.gradient, "gradient"),
+            plan_rad=to_si(new.plan_rad, "angle"),
+            iterations=new.iterations,
+            converged=new.converged,
+        )
+
+    def _command(self, moves_rad: Real, tilt_rad: Real) -> Real:
+        """Return the commands (n, 2): the first moves, and what the rates of the attitude add."""
+        if self._feedback is None:
+            return moves_rad
+        memory = self.memory
+        change = self._products.feedback_product(self._feedback, tilt_rad - memory.tilt_rad)
+        added = np.where(memory.has_tilt[:, None], moves_rad + change, moves_rad)
+        return clamp(added, self._inputs.limits.tilt)
+
+    def _track(self, target: Real) -> TargetMotion:
+        if self._tracker is None:
+            return self.memory.target
+        return self._tracker.update(self.memory.target, target[:, self._tracker.columns])
+
+    def _search(self, state: Real, target: Real, thrust: Real, target_acceleration: Real) -> Search:
+        memory = self.memory
+        acceleration = None if self._tracker is None else target_acceleration
+        prediction = self._predictor.prepare(state, target, thrust, acceleration)
+
+        def evaluate(moves_rad: Real) -> tuple[Real, Real]:
+            return cost.evaluate(self._predictor, prediction, memory.weights, moves_rad, memory.command_rad)
+
+        start = memory.plan_rad
+        if self.settings.optimizer.warm_start == "last_command":
+            start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
+        return self._minimize(self._rprop, evaluate, start)

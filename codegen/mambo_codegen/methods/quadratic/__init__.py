@@ -1,0 +1,1 @@
+"""A quadratic cost, minimised exactly, with an observer and a model of the attitude loops."""

@@ -1,0 +1,231 @@
+"""Products of a controller with a quadratic cost, by the names that its templates have for them.
+
+In floating point a product is one multiplication, which the C writes as `a * b`. In fixed point it is a
+multiplication to 64 bits and a shift to the format of the result, rounded to nearest, ties up.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
+from mambo_codegen.methods.one_norm.formats import SINE_BITS
+from mambo_codegen.methods.quadratic.formats import ExactFormats
+from mambo_codegen.numbers.representation import Representation
+from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry
+
+
+class ExactArithmetic(Protocol):
+    """The products of a control step and the representation of their numbers."""
+
+    numbers: Representation
+
+    def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
+        """Return sine and cosine of a heading."""
+
+    def sine_product(self, value: Real, sine: Real) -> Real:
+        """Return value * sine, in the format of the value."""
+
+    def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        """Return a b - c d of sines and cosines."""
+
+    def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        """Return a b + c d of sines and cosines."""
+
+    def target_product(self, factor: Any, value: Real) -> Real:
+        """Return factor * change of a velocity, m/s, or given acceleration, m/s^2; in m/step^2."""
+
+    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
+        """Return gain * acceleration, m/step^2."""
+
+    def speed_product(self, velocity_m_s: Real) -> Real:
+        """Return T_s * velocity, m/step."""
+
+    def drag_product(self, drag_1_step: Any, velocity_m_step: Real) -> Real:
+        """Return drag * velocity, m/step^2."""
+
+    def aged_position(self, age_steps: Any, velocity_m_step: Real) -> Real:
+        """Return age * velocity, m."""
+
+    def aged_velocity(self, age_steps: Any, acceleration_m_step2: Real) -> Real:
+        """Return age * acceleration, m/step."""
+
+    def position_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        """Return the correction of a position by both innovations, m."""
+
+    def velocity_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        """Return the correction of a velocity, m/step."""
+
+    def disturbance_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        """Return the correction of a disturbance, m/step^2."""
+
+    def half_change(self, acceleration_m_step2: Real) -> Real:
+        """Return acceleration / 2, m/step."""
+
+    def position_change(self, velocity_m_step: Real) -> Real:
+        """Return a velocity, m/step, as the change of a position, m."""
+
+    def velocity_change(self, acceleration_m_step2: Real) -> Real:
+        """Return an acceleration, m/step^2, as the change of a velocity, m/step."""
+
+    def tilt_product(self, gain_m_step2_rad: Any, tilt_rad: Real) -> Real:
+        """Return gain * tilt, m/step^2."""
+
+    def command_product(self, rad_step2_m: Any, acceleration_m_step2: Real) -> Real:
+        """Return the command that stands for an acceleration, rad."""
+
+    def feedback_product(self, steps: Any, change_rad: Real) -> Real:
+        """Return steps * change of an angle, rad."""
+
+    def attitude_sum(self, products: Real) -> Real:
+        """Return a sum of products of the attitude model as an acceleration."""
+
+    def row_sum(self, products: Real) -> Real:
+        """Return a sum of products of the optimizer's rows as a move, m/step^2."""
+
+    def move_acceleration(self, move_m_step2: Real) -> Real:
+        """Return a move in the format of accelerations."""
+
+    def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
+        """Return ratio * move."""
+
+
+class FloatExactArithmetic:
+    """Products in float32 or float64."""
+
+    def __init__(self, design: Design) -> None:
+        self.numbers = design.numbers
+        self._trigonometry: Trigonometry = design.trigonometry
+        self._update_period_s = self.numbers.scalar(design.settings.horizon.update_period_s)
+        self._half = self.numbers.scalar(0.5)
+
+    def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
+        return sine_cosine(yaw_rad, self._trigonometry)
+
+    def speed_product(self, velocity_m_s: Real) -> Real:
+        return self._update_period_s * velocity_m_s
+
+    def half_change(self, acceleration_m_step2: Real) -> Real:
+        return self._half * acceleration_m_step2
+
+    def position_change(self, velocity_m_step: Real) -> Real:
+        return velocity_m_step
+
+    def velocity_change(self, acceleration_m_step2: Real) -> Real:
+        return acceleration_m_step2
+
+    def attitude_sum(self, products: Real) -> Real:
+        return products
+
+    def row_sum(self, products: Real) -> Real:
+        return products
+
+    def move_acceleration(self, move_m_step2: Real) -> Real:
+        return move_m_step2
+
+    def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return (a * b) - (c * d)
+
+    def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return (a * b) + (c * d)
+
+    def _product(self, a: Any, b: Real) -> Real:
+        return a * b
+
+    def _correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return (gain * by_m) + (other_gain * by_m_step)
+
+    sine_product = target_product = tracker_product = drag_product = aged_position = aged_velocity = _product
+    tilt_product = command_product = feedback_product = ratio_product = _product
+    position_correction = velocity_correction = disturbance_correction = _correction
+
+
+class FixedExactArithmetic:
+    """Products in fixed point."""
+
+    def __init__(self, design: Design, formats: ExactFormats) -> None:
+        self.numbers = design.numbers
+        self._shifts = formats.shifts
+        self._trigonometry: FixedTrigonometry = design.trigonometry
+        self._update_period_s = self.numbers.constant(design.settings.horizon.update_period_s, "step")
+
+    def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
+        return fixed_sine_cosine(yaw_rad, self._trigonometry)
+
+    def sine_product(self, value: Real, sine: Real) -> Real:
+        return rounded(value * sine, SINE_BITS)
+
+    def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return np.clip(rounded((a * b) - (c * d), SINE_BITS), -(2**SINE_BITS), 2**SINE_BITS)
+
+    def sine_sum(self, a: Real, b: Real, c: Real, d: Real) -> Real:
+        return np.clip(rounded((a * b) + (c * d), SINE_BITS), -(2**SINE_BITS), 2**SINE_BITS)
+
+    def target_product(self, factor: Any, value: Real) -> Real:
+        return self._rounded(factor * value, "target_product")
+
+    def tracker_product(self, gain: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(gain * acceleration_m_step2, "tracker_product")
+
+    def speed_product(self, velocity_m_s: Real) -> Real:
+        return self._rounded(self._update_period_s * velocity_m_s, "speed_product")
+
+    def drag_product(self, drag_1_step: Any, velocity_m_step: Real) -> Real:
+        return self._rounded(drag_1_step * velocity_m_step, "drag_product")
+
+    def aged_position(self, age_steps: Any, velocity_m_step: Real) -> Real:
+        return self._rounded(age_steps * velocity_m_step, "aged_position")
+
+    def aged_velocity(self, age_steps: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(age_steps * acceleration_m_step2, "aged_velocity")
+
+    def position_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return self._rounded((gain * by_m) + (other_gain * by_m_step), "position_correction")
+
+    def velocity_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return self._rounded((gain * by_m) + (other_gain * by_m_step), "velocity_correction")
+
+    def disturbance_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
+        return self._rounded((gain * by_m) + (other_gain * by_m_step), "disturbance_correction")
+
+    def half_change(self, acceleration_m_step2: Real) -> Real:
+        return self._rounded(acceleration_m_step2, "half_change")
+
+    def position_change(self, velocity_m_step: Real) -> Real:
+        return self._rounded(velocity_m_step, "position_change")
+
+    def velocity_change(self, acceleration_m_step2: Real) -> Real:
+        return self._rounded(acceleration_m_step2, "velocity_change")
+
+    def tilt_product(self, gain_m_step2_rad: Any, tilt_rad: Real) -> Real:
+        return self._rounded(gain_m_step2_rad * tilt_rad, "tilt_product")
+
+    def command_product(self, rad_step2_m: Any, acceleration_m_step2: Real) -> Real:
+        return self._rounded(rad_step2_m * acceleration_m_step2, "command_product")
+
+    def feedback_product(self, steps: Any, change_rad: Real) -> Real:
+        return self._rounded(steps * change_rad, "feedback_product")
+
+    def attitude_sum(self, products: Real) -> Real:
+        return self._rounded(products, "attitude")
+
+    def row_sum(self, products: Real) -> Real:
+        return self._rounded(products, "row")
+
+    def move_acceleration(self, move_m_step2: Real) -> Real:
+        return move_m_step2 * 2 ** self._shifts["move"]
+
+    def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
+        return self._rounded(ratio * move_m_step2, "ratio_product")
+
+    def _rounded(self, product: Real, name: str) -> Real:
+        return rounded(product, self._shifts[name])
+
+
+def exact_arithmetic(design: Design) -> ExactArithmetic:
+    """Return the products of a controller with a quadratic cost."""
+    formats = design.numbers.formats
+    if isinstance(formats, ExactFormats):
+        return FixedExactArithmetic(design, formats)
+    return FloatExactArithmetic(design)

@@ -1,0 +1,114 @@
+"""Attitude model: how the drone accelerates in answer to the commands."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.math import Real, clamp
+from mambo_codegen.methods.quadratic.arithmetic import ExactArithmetic
+
+
+@dataclass(frozen=True)
+class AttitudeState:
+    """The models of n controllers, (n, 2) along right and forward, in m/step^2.
+
+    tilt, integral, lagged and command are a, i, c, u of `nmpc_attitude.h`; sine and cosine (n,) are those of
+    the heading.
+    """
+
+    tilt: Real
+    integral: Real
+    lagged: Real
+    command: Real
+    sine: Real
+    cosine: Real
+
+
+def rotate(products: ExactArithmetic, vector: Real, sine: Real, cosine: Real) -> Real:
+    """Turn vectors (n, 2) by the angles of which sine and cosine (n,) are given."""
+    product, one, other = products.sine_product, vector[:, 0], vector[:, 1]
+    return np.stack(
+        [product(one, cosine) - product(other, sine), product(other, cosine) + product(one, sine)], axis=1
+    )
+
+
+class AttitudeModel:
+    """The constants of the attitude model, in the scalar type of the controller."""
+
+    def __init__(self, design: Design, arithmetic: ExactArithmetic) -> None:
+        constant, attitude = arithmetic.numbers.constant, design.attitude
+        self._products = arithmetic
+        self._one = constant(1.0, "sine")
+
+        def both(values: Any, quantity: str) -> Real:
+            return np.array([constant(value, quantity) for value in values])
+
+        self._tilt_rows = np.array([both(row, "attitude") for row in attitude.tilt_row])
+        self._integral_rows = np.array([both(row, "attitude") for row in attitude.integral_row])
+        self._lagged_shares = both(attitude.lagged_share, "sine")
+        self._gain = constant(attitude.gain_m_step2_rad, "gain")
+        self._command_gain = both(attitude.command_gain_m_step2_rad, "gain")
+        self._command_rad = both(attitude.command_rad_step2_m, "command")
+        self._trim = both(attitude.trim_rad, "angle")
+        self._trim_command = both(attitude.trim_command_rad, "angle")
+        self._limit = constant(attitude.limit_m_step2, "acceleration")
+        self.command_limit = both(attitude.command_limit_m_step2, "move")
+
+    def set_command(self, attitude: AttitudeState, command_rad: Real) -> AttitudeState:
+        """Set the last commands to `command_rad` (n, 2), roll and pitch."""
+        product = self._products.tilt_product(self._command_gain, command_rad - self._trim_command)
+        return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
+
+    def steady(self, command_rad: Real) -> AttitudeState:
+        """Return the model at the steady attitude of the commands (n, 2)."""
+        zeros = np.zeros_like(command_rad)
+        sine = zeros[:, 0]
+        command = self.set_command(AttitudeState(zeros, zeros, zeros, zeros, sine, sine), command_rad).command
+        return AttitudeState(command, zeros, command, command, sine, np.full_like(sine, self._one))
+
+    def advance(self, attitude: AttitudeState) -> AttitudeState:
+        """Let the model answer the last commands over one control step."""
+        state = np.stack([attitude.tilt, attitude.integral, attitude.lagged, attitude.command], axis=2)
+        change = self._products.sine_product(attitude.command - attitude.lagged, self._lagged_shares)
+        return replace(
+            attitude,
+            tilt=self._next(self._tilt_rows, state),
+            integral=self._next(self._integral_rows, state),
+            lagged=clamp(attitude.lagged + change, self._limit),
+        )
+
+    def turn(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
+        """Turn tilt and command to the heading with this sine and cosine (n,)."""
+        by_sine = self._products.sine_difference(sine, attitude.cosine, cosine, attitude.sine)
+        by_cosine = self._products.sine_sum(cosine, attitude.cosine, sine, attitude.sine)
+
+        def turned(vector: Real) -> Real:
+            return clamp(rotate(self._products, vector, by_sine, by_cosine), self._limit)
+
+        return replace(
+            attitude, tilt=turned(attitude.tilt), command=turned(attitude.command), sine=sine, cosine=cosine
+        )
+
+    def measure(self, tilt_rad: Real) -> Real:
+        """Return the accelerations (n, 2), right and forward, of measured roll and pitch (n, 2)."""
+        product = self._products.tilt_product(self._gain, tilt_rad - self._trim)
+        return np.stack([product[:, 0], -product[:, 1]], axis=1)
+
+    def command_rad(self, attitude: AttitudeState) -> Real:
+        """Return roll and pitch (n, 2) that stand for the last commands."""
+        product = self._products.command_product(self._command_rad, attitude.command)
+        roll, pitch = product[:, 0], -product[:, 1]
+        if self._trim_command[0] != 0:
+            roll = roll + self._trim_command[0]
+        if self._trim_command[1] != 0:
+            pitch = self._trim_command[1] - product[:, 1]
+        return np.stack([roll, pitch], axis=1)
+
+    def _next(self, rows: Real, state: Real) -> Real:
+        """Return the next a or i from states (n, 2, 4)."""
+        total = rows[:, 0] * state[:, :, 0]
+        for k in range(1, rows.shape[1]):
+            total = total + (rows[:, k] * state[:, :, k])
+        return clamp(self._products.attitude_sum(total), self._limit)

@@ -1,0 +1,215 @@
+"""Controller with a quadratic cost: estimates the state, models the attitude loops, minimises the cost."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.inputs import Inputs, Status, choose
+from mambo_codegen.methods.math import Real, clamp
+from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
+from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
+from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
+from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
+from mambo_codegen.numbers.representation import COMMAND
+
+
+@dataclass(frozen=True)
+class ExactMemory:
+    """State of n controllers between two steps.
+
+    tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state, saturated
+    (n,) says whether the last command lies at the tilt limit.
+    """
+
+    estimate: Estimate
+    attitude: AttitudeState
+    target: TargetMotion
+    tilt_rad: Real
+    command_rad: Real
+    missed: NDArray[np.int64]
+    saturated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class ExactStep:
+    """The result of one step of n controllers.
+
+    status:      (n,) a `Status` each.
+    command_rad: (n, 2) roll and pitch commands, in rad.
+    missed:      (n,) control steps since the last good state.
+    saturated:   (n,) whether the last command lies at the tilt limit.
+    stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `Design.stored`.
+    """
+
+    status: NDArray[np.int64]
+    command_rad: Real
+    missed: NDArray[np.int64]
+    saturated: NDArray[np.bool_]
+    stored: Real
+
+
+class ExactReferenceController:
+    """n controllers with a quadratic cost in NumPy that compute the bits of the generated C."""
+
+    def __init__(self, design: Design, n: int = 1) -> None:
+        self.settings, self._design = design.settings, design
+        self._numbers, self._products = design.numbers, exact_arithmetic(design)
+        self._inputs = Inputs(design)
+        self._observer = KalmanObserver(design, self._products)
+        self._model = AttitudeModel(design, self._products)
+        self.optimizer = ExactOptimizer(design, self._products, self._model.command_limit)
+        self._tracker = Tracker(design.tracker, self._products) if design.tracker else None
+        self._feedback = design.feedback_steps and np.array(
+            [self._numbers.constant(steps, "feedback") for steps in design.feedback_steps]
+        )
+        self._no_estimate = design.observer.outage_steps + 1
+        self.scalar = self._numbers.scalar
+        self.memory = self._restarted(np.zeros((n, 2), self._numbers.computed))
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Forget everything; the drones hold the attitudes of `command_rad` (n, 2), clamped to the limit.
+
+        Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
+        nothing.
+        """
+        given, good = self._inputs.command(command_rad)
+        self.memory = choose(good, self._restarted(given), self.memory)
+        return np.where(good, Status.OK, Status.BAD_COMMAND)
+
+    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Tell the controllers that `command_rad` (n, 2) was sent in place of the last command.
+
+        Returns a status (n,) as `reset` does.
+        """
+        given, good = self._inputs.command(command_rad)
+        memory = self.memory
+        new = replace(memory, command_rad=given, attitude=self._model.set_command(memory.attitude, given))
+        self.memory = choose(good, new, memory)
+        return np.where(good, Status.OK, Status.BAD_COMMAND)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> ExactStep:
+        """Compute the next commands; the inputs are those of `ReferenceController.step`."""
+        states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
+        has_state, has_target, has_thrust = self._inputs.check(states, targets, thrusts)
+        zero = self._numbers.computed(0)
+        states = np.where(has_state[:, None], states, zero)
+        targets = np.where(has_target[:, None], targets, zero)
+        self._advance(states, has_state, targets, has_target & has_thrust)
+        memory = self.memory
+        return ExactStep(
+            status=self._inputs.status(has_state, has_target, has_thrust),
+            command_rad=self._numbers.to_si(memory.command_rad, *COMMAND),
+            missed=memory.missed,
+            saturated=memory.saturated,
+            stored=self._numbers.to_si(self.stored, *self._design.stored),
+        )
+
+    def _restarted(self, command_rad: Real) -> ExactMemory:
+        n, zeros = len(command_rad), np.zeros_like(command_rad)
+        return ExactMemory(
+            estimate=Estimate(zeros, zeros, zeros),
+            attitude=self._model.steady(command_rad),
+            target=unknown_motion(zeros),
+            tilt_rad=zeros,
+            command_rad=command_rad,
+            missed=np.full(n, self._no_estimate),
+            saturated=np.zeros(n, np.bool_),
+        )
+
+    def _advance(
+        self, state: Real, has_state: NDArray[np.bool_], target: Real, allows_command: NDArray[np.bool_]
+    ) -> None:
+        memory, model = self.memory, self._model
+        none_yet = memory.missed == self._no_estimate
+        attitude = model.advance(memory.attitude)
+        sine, cosine = self._products.sine_cosine(state[:, 6])
+        measured = choose(
+            none_yet, replace(attitude, sine=sine, cosine=cosine), model.turn(attitude, sine, cosine)
+        )
+        attitude = choose(has_state, measured, attitude)
+        feedback = np.zeros_like(memory.command_rad)
+        if self._feedback is not None:
+            change = self._products.feedback_product(self._feedback, state[:, 4:6] - memory.tilt_rad)
+            feedback = np.where((has_state & (memory.missed == 0))[:, None], change, feedback)
+        tilt = np.where(has_state[:, None], model.measure(state[:, 4:6]), attitude.tilt)
+        world = self._to_world(attitude, tilt)
+        corrected = choose(
+            none_yet,
+            self._observer.start(memory.estimate, state),
+            self._observer.correct(memory.estimate, state, world),
+        )
+        estimate = choose(has_state, corrected, memory.estimate)
+        missed = np.where(has_state, 0, np.minimum(memory.missed + 1, self._no_estimate))
+        commands = allows_command & (missed != self._no_estimate)
+        motion = memory.target
+        if self._tracker is not None:
+            motion = choose(commands, self._tracker.update(motion, target[:, self._tracker.columns]), motion)
+        moves = self._minimize(attitude, estimate, motion, target, tilt)
+        moved = replace(attitude, command=self._products.move_acceleration(moves))
+        command = (
+            model.command_rad(moved) + feedback if self._feedback is not None else model.command_rad(moved)
+        )
+        limit = model.command_limit
+        at_limit = np.any((moves >= limit) | (moves <= -limit), axis=1)
+        self.memory = ExactMemory(
+            estimate=self._observer.predict(estimate, world),
+            attitude=choose(commands, moved, attitude),
+            target=motion,
+            tilt_rad=np.where(has_state[:, None], state[:, 4:6], memory.tilt_rad),
+            command_rad=np.where(
+                commands[:, None], clamp(command, self._inputs.limits.tilt), memory.command_rad
+            ),
+            missed=missed,
+            saturated=np.where(commands, at_limit, memory.saturated),
+        )
+
+    def _minimize(
+        self, attitude: AttitudeState, estimate: Estimate, motion: TargetMotion, target: Real, tilt: Real
+    ) -> Real:
+        """Return the first free moves (n, 2), right and forward."""
+        disturbance, jerk = self._observer.disturbance(estimate), np.zeros_like(tilt)
+        if self._tracker is not None:
+            disturbance = disturbance - motion.acceleration_m_step2
+            jerk = self._to_heading(attitude, motion.jerk_m_step2_update)
+        errors = (
+            estimate.position_m - target[:, 0:2],
+            estimate.velocity_m_step - self._products.speed_product(target[:, 2:4]),
+            disturbance,
+        )
+        if self.settings.model.attitude == "predicted":
+            tilt = attitude.tilt
+        state = [
+            *(self._to_heading(attitude, error) for error in errors),
+            jerk,
+            tilt,
+            attitude.integral,
+            attitude.lagged,
+            attitude.command,
+        ]
+        return self.optimizer.minimize(np.stack(state, axis=2))
+
+    def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
+        """Return vectors (n, 2) along x and y from those along right and forward."""
+        return rotate(self._products, heading[:, ::-1], attitude.sine, attitude.cosine)
+
+    def _to_heading(self, attitude: AttitudeState, world: Real) -> Real:
+        """Return vectors (n, 2) along right and forward from those along x and y."""
+        return rotate(self._products, world[:, ::-1], attitude.sine, attitude.cosine)
+
+    @property
+    def stored(self) -> Real:
+        """All numbers of nmpc_t (n, k), in their order and in the numbers of the C."""
+        memory = self.memory
+        estimate, attitude, motion = memory.estimate, memory.attitude, memory.target
+        columns = [estimate.position_m, estimate.velocity_m_step, estimate.disturbance_m_step2]
+        columns += [attitude.tilt, attitude.integral, attitude.lagged, attitude.command]
+        columns += [attitude.sine[:, None], attitude.cosine[:, None]]
+        if self._tracker is not None:
+            columns += [] if self._tracker.is_given else [motion.velocity_m_s]
+            columns += [motion.acceleration_m_step2, motion.jerk_m_step2_update]
+        if self._feedback is not None:
+            columns += [memory.tilt_rad]
+        return np.concatenate([*columns, memory.command_rad], axis=1)

@@ -1,0 +1,269 @@
+"""The fixed point formats of a controller with a quadratic cost.
+
+As for the 1-norm (`codegen.fixed_point`) each quantity has as many fractional bits as its bound allows, and
+no bound is sampled: each is the sum of the absolute values of all terms, with sine and cosine at most 1 each,
+so that a proof by intervals finds the same bound in the C.
+
+A sum of products is a 64-bit integer, and each gain of a row has the format that gives all products of the
+row the same one; one shift makes the sum a 32-bit number again.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.methods.one_norm.formats import SINE_BITS, feedback_bits, fractional_bits
+from mambo_codegen.methods.quadratic.attitude_constants import attitude_constants, feedback_steps
+from mambo_codegen.methods.quadratic.law import STATES, quadratic_constants
+from mambo_codegen.methods.quadratic.observer_constants import observer_constants
+from mambo_codegen.methods.tracker_constants import tracker_constants
+from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
+from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.sections import Sections
+
+_TURN: Final = 2.01
+"""A component of a vector that turns is at most this times the larger one: |sine|, |cosine| <= 1."""
+
+_SUM_BITS: Final = 62
+"""Most bits of a sum of products without its sign: one less than the type has, as rounding adds to it."""
+
+_COARSEST_POSITION_BITS: Final = 10
+"""Fewest fractional bits of a position: its resolution is 1 mm or better."""
+
+_COARSEST_COMMAND_RAD: Final = 1e-4
+"""The resolution of a command is this or better."""
+
+
+@dataclass(frozen=True)
+class ExactFormats:
+    """Fractional bits by quantity, and the right shifts of products and sums by the names of the templates.
+
+    position:     input and estimated positions, m.       velocity: input velocities, m/s.
+    angle:        tilt and commands, rad.                  yaw: rad.          thrust: m/s^2.
+    speed:        velocities, m/step.                      acceleration: m/step^2.
+    move:         the optimizer's moves, m/step^2.         disturbance: of an estimate, m/s^2.
+    """
+
+    bits: Mapping[str, int]
+    shifts: Mapping[str, int]
+
+    @property
+    def yaw(self) -> int:
+        """Fractional bits of a heading."""
+        return self.bits["yaw"]
+
+
+@dataclass(frozen=True)
+class _Bounds:
+    """Bounds of absolute values: what the rows multiply, by the states' names, and of every quantity."""
+
+    states: Mapping[str, float]
+    position: float
+    speed: float
+    acceleration: float
+    move: float
+    angle: float
+
+
+def exact_formats(settings: Sections) -> ExactFormats:
+    """Choose the formats of `settings`; `exact_refusals` says whether they are fine enough."""
+    return _formats(
+        settings.horizon,
+        settings.model,
+        settings.target,
+        settings.cost,
+        settings.observer,
+        settings.damping,
+        settings.limits,
+        settings.ranges,
+    )
+
+
+@lru_cache(maxsize=64)
+def _formats(*sections: Any) -> ExactFormats:
+    names = ("horizon", "model", "target", "cost", "observer", "damping", "limits", "ranges")
+    settings = Sections.model_construct(**dict(zip(names, sections, strict=True)))
+    attitude, observer = attitude_constants(settings), observer_constants(settings)
+    law, tracker = quadratic_constants(settings), tracker_constants(settings)
+    bounds, period_s = _bounds(settings), settings.horizon.update_period_s
+    ranges = settings.ranges
+
+    position = fractional_bits(bounds.position)
+    speed = fractional_bits(bounds.speed)
+    acceleration = fractional_bits(bounds.acceleration)
+    speed, position = min(speed, acceleration - 1), min(position, speed - 1)
+    bits = {
+        "position": position,
+        "velocity": fractional_bits(2 * ranges.velocity_m_s),
+        "angle": fractional_bits(bounds.angle),
+        "yaw": fractional_bits(YAW_LIMIT_RAD),
+        "thrust": fractional_bits(ranges.thrust_acceleration_max_m_s2),
+        "speed": speed,
+        "acceleration": acceleration,
+        "move": min(fractional_bits(4 * bounds.move), acceleration),
+        "disturbance": fractional_bits(max(settings.observer.disturbance_limit_m_s2, 0.001)),
+        "step": fractional_bits(period_s),
+        "tracker": fractional_bits(tracker.factor) if tracker else 0,
+        "gain": fractional_bits(attitude.gain_m_step2_rad, *attitude.command_gain_m_step2_rad),
+        "command": fractional_bits(*attitude.command_rad_step2_m),
+        "feedback": feedback_bits(feedback_steps(settings)),
+        "drag": fractional_bits(observer.drag_1_step) if observer.drag_1_step else 0,
+        "age": fractional_bits(observer.age_steps) if observer.age_steps else 0,
+        "ratio": fractional_bits(*np.abs(law.ratios)) if law.moves == 2 else 0,
+        "per_step": fractional_bits(observer.steps_per_s),
+        "per_step2": fractional_bits(observer.steps2_per_s2),
+    }
+    shifts = {
+        "attitude": _attitude_shift(attitude.tilt_row, attitude.integral_row, attitude.limit_m_step2, bits),
+        "row": _shift(
+            np.abs(law.rows), [bounds.states[name] for name in STATES], _inputs(bits), bits["move"]
+        ),
+    }
+    bits["attitude"] = shifts["attitude"]
+    for name, row, kind in zip(
+        ("position", "velocity", "disturbance"),
+        observer.gain,
+        ("position", "speed", "acceleration"),
+        strict=True,
+    ):
+        innovations = [bounds.states["innovation"], bounds.states["innovation_step"]]
+        sources = [position, speed]
+        shift = _shift(np.abs(row), innovations, sources, bits[kind])
+        shifts[f"{name}_correction"] = shift
+        for by, source in zip(("position", "velocity"), sources, strict=True):
+            bits[f"{name}_by_{by}"] = shift + bits[kind] - source
+    for name, source in zip(STATES, _inputs(bits), strict=True):
+        bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
+    return ExactFormats(bits, shifts | _product_shifts(bits, tracker.input_quantity if tracker else ""))
+
+
+def exact_refusals(settings: Sections) -> list[Refusal]:
+    """Return which values of `settings` fixed point cannot represent."""
+    formats = exact_formats(settings)
+    command_rad = math.ldexp(np.max(attitude_constants(settings).command_rad_step2_m), -formats.bits["move"])
+    unused = {name for name in ("feedback", "ratio") if not formats.bits[name]}
+    least = min(
+        shift
+        for name, shift in formats.shifts.items()
+        if name != "move" and name.removesuffix("_product") not in unused
+    )
+    if (
+        formats.bits["position"] >= _COARSEST_POSITION_BITS
+        and command_rad <= _COARSEST_COMMAND_RAD
+        and least >= 1
+    ):
+        return []
+    rule = (
+        f'is too wide for code.scalar = "fixed", which would resolve commands to {command_rad:.2g} rad; '
+        "write less"
+    )
+    return [Refusal("ranges", "position_m", rule)]
+
+
+def _inputs(bits: Mapping[str, int]) -> list[int]:
+    """Return the fractional bits of the states that a row multiplies."""
+    return [bits["position"], bits["speed"], *[bits["acceleration"]] * 6]
+
+
+def _bounds(settings: Sections) -> _Bounds:
+    attitude, observer = attitude_constants(settings), observer_constants(settings)
+    law, tracker = quadratic_constants(settings), tracker_constants(settings)
+    reach_m, speed = settings.ranges.position_m, observer.velocity_limit_m_step
+    tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
+    tilted = max(tilted, attitude.limit_m_step2)
+    unexplained = observer.disturbance_limit_m_step2 + (observer.drag_1_step * speed)
+    acceleration = (_TURN * tilted) + unexplained
+    target = tracker.acceleration_limit_m_step2 if tracker else 0.0
+    jerk = tracker.jerk_limit_m_step2_update if tracker else 0.0
+    states = {
+        "e": _TURN * 2 * reach_m,
+        "v": _TURN * 2 * speed,
+        "w": _TURN * (unexplained + target),
+        "j": _TURN * jerk,
+        "a": tilted,
+        "i": attitude.limit_m_step2,
+        "c": attitude.limit_m_step2,
+        "u": attitude.limit_m_step2,
+        "innovation": (2 * reach_m) + (observer.age_steps * speed),
+        "innovation_step": (2 * speed) + (observer.age_steps * acceleration),
+    }
+    corrections = np.abs(observer.gain) @ [states["innovation"], states["innovation_step"]]
+    rows = max(np.max(np.sum(np.abs(row), axis=-1)) for row in (attitude.tilt_row, attitude.integral_row))
+    move = float(np.max(np.abs(law.rows) @ [states[name] for name in STATES]))
+    if law.moves == 2:
+        limit = float(np.max(attitude.command_limit_m_step2))
+        move += float(np.max(np.abs(law.ratios))) * (move + limit)
+    return _Bounds(
+        states=states,
+        position=max(states["e"], reach_m + corrections[0], reach_m + speed + acceleration),
+        speed=max(states["v"], speed + corrections[1], speed + acceleration),
+        acceleration=max(
+            acceleration,
+            states["w"],
+            observer.disturbance_limit_m_step2 + corrections[2],
+            float(rows) * attitude.limit_m_step2,
+            _TURN * attitude.limit_m_step2,
+            (3 * target) + (2 * jerk),
+        ),
+        move=move,
+        angle=(2 * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_command_rad)))))
+        * max([1.0, *(feedback_steps(settings) or ())])
+        + (2 * settings.limits.tilt_rad),
+    )
+
+
+def _attitude_shift(tilt: Any, integral: Any, limit: float, bits: Mapping[str, int]) -> int:
+    rows = np.abs(np.concatenate([tilt, integral]))
+    return _shift(rows, [limit] * 4, [bits["acceleration"]] * 4, bits["acceleration"])
+
+
+def _shift(gains: Any, bounds: Sequence[float], inputs: Sequence[int], result: int) -> int:
+    """Return by how many bits a row's sum of products is shifted to the format `result`.
+
+    gains (..., k) multiply values within `bounds` in the formats `inputs`: as many bits as the gains' words
+    and the sum's word hold.
+    """
+    largest = np.max(gains.reshape(-1, len(bounds)), axis=0)
+    words = [
+        fractional_bits(gain) + source - result
+        for gain, source in zip(largest.tolist(), inputs, strict=True)
+        if gain
+    ]
+    total = float(np.max(gains.reshape(-1, len(bounds)) @ np.array(bounds)))
+    return min(*words, _SUM_BITS - 1 - math.frexp(1.01 * total)[1] - result)
+
+
+def _product_shifts(bits: Mapping[str, int], target_input: str) -> dict[str, int]:
+    """Return the right shift of each product: the bits of both factors less those of the result.
+
+    `target_input` is the quantity that the tracker reads, if there is one.
+    """
+    factors = {
+        "speed_product": ("step", "velocity", "speed"),
+        "drag_product": ("drag", "speed", "acceleration"),
+        "tilt_product": ("gain", "angle", "acceleration"),
+        "command_product": ("command", "acceleration", "angle"),
+        "per_step_product": ("per_step", "speed", "velocity"),
+        "per_step2_product": ("per_step2", "acceleration", "disturbance"),
+        "aged_position": ("age", "speed", "position"),
+        "aged_velocity": ("age", "acceleration", "speed"),
+        "target_product": ("tracker", target_input, "acceleration"),
+    }
+    unused = {name for name in ("drag", "age", "tracker") if not bits[name]}
+    shifts = {
+        name: bits[one] + bits[other] - bits[result]
+        for name, (one, other, result) in factors.items()
+        if one not in unused
+    }
+    shifts["half_change"] = bits["acceleration"] - bits["speed"] + 1
+    shifts["velocity_change"] = bits["acceleration"] - bits["speed"]
+    shifts["position_change"] = bits["speed"] - bits["position"]
+    shifts["feedback_product"] = bits["feedback"]
+    shifts["ratio_product"] = bits["ratio"]
+    shifts["tracker_product"] = SINE_BITS
+    shifts["move"] = bits["acceleration"] - bits["move"]
+    return shifts

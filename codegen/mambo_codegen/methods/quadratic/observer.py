@@ -1,0 +1,98 @@
+"""Observer: position, velocity and disturbance, by a Kalman filter with fixed gains."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.math import Real, clamp
+from mambo_codegen.methods.quadratic.arithmetic import ExactArithmetic
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What n controllers take for the states of their drones, (n, 2) along x and y each."""
+
+    position_m: Real
+    velocity_m_step: Real
+    disturbance_m_step2: Real
+
+
+class KalmanObserver:
+    """The constants of the observer, in the scalar type of the controller."""
+
+    def __init__(self, design: Design, arithmetic: ExactArithmetic) -> None:
+        constant, observer = arithmetic.numbers.constant, design.observer
+        self._products = arithmetic
+        self._gain = [
+            [constant(observer.gain[row][column], name) for column, name in enumerate(names)]
+            for row, names in enumerate(
+                (
+                    ("position_by_position", "position_by_velocity"),
+                    ("velocity_by_position", "velocity_by_velocity"),
+                    ("disturbance_by_position", "disturbance_by_velocity"),
+                )
+            )
+        ]
+        self._position_limit = constant(design.settings.ranges.position_m, "position")
+        self._velocity_limit = constant(observer.velocity_limit_m_step, "speed")
+        self._disturbance_limit = constant(observer.disturbance_limit_m_step2, "acceleration")
+        self._drag = constant(observer.drag_1_step, "drag") if observer.drag_1_step else None
+        self._age = constant(observer.age_steps, "age") if observer.age_steps else None
+
+    def start(self, estimate: Estimate, state: Real) -> Estimate:
+        """Set position and velocity to those of `state` (n, 7)."""
+        return Estimate(
+            position_m=state[:, 0:2],
+            velocity_m_step=self._products.speed_product(state[:, 2:4]),
+            disturbance_m_step2=estimate.disturbance_m_step2,
+        )
+
+    def disturbance(self, estimate: Estimate) -> Real:
+        """Return the acceleration (n, 2) along x and y that the tilt does not explain."""
+        if self._drag is None:
+            return estimate.disturbance_m_step2
+        drag = self._products.drag_product(self._drag, estimate.velocity_m_step)
+        return np.asarray(estimate.disturbance_m_step2 - drag)
+
+    def correct(self, estimate: Estimate, state: Real, tilt_m_step2: Real) -> Estimate:
+        """Correct the estimate by `state` (n, 7), with the tilt's acceleration (n, 2) along x and y."""
+        products = self._products
+        position, velocity = estimate.position_m, estimate.velocity_m_step
+        measured = state[:, 0:2]
+        measured_step = products.speed_product(state[:, 2:4])
+        if self._age is not None:
+            acceleration = tilt_m_step2 + self.disturbance(estimate)
+            measured = measured + products.aged_position(self._age, velocity)
+            measured_step = measured_step + products.aged_velocity(self._age, acceleration)
+        by_position, by_velocity = measured - position, measured_step - velocity
+        corrections = [
+            product(gain[0], by_position, gain[1], by_velocity)
+            for product, gain in zip(
+                (
+                    products.position_correction,
+                    products.velocity_correction,
+                    products.disturbance_correction,
+                ),
+                self._gain,
+                strict=True,
+            )
+        ]
+        return Estimate(
+            position_m=clamp(position + corrections[0], self._position_limit),
+            velocity_m_step=clamp(velocity + corrections[1], self._velocity_limit),
+            disturbance_m_step2=clamp(estimate.disturbance_m_step2 + corrections[2], self._disturbance_limit),
+        )
+
+    def predict(self, estimate: Estimate, tilt_m_step2: Real) -> Estimate:
+        """Predict the estimate at the next control step."""
+        products = self._products
+        acceleration = tilt_m_step2 + self.disturbance(estimate)
+        mean = estimate.velocity_m_step + products.half_change(acceleration)
+        return Estimate(
+            position_m=clamp(estimate.position_m + products.position_change(mean), self._position_limit),
+            velocity_m_step=clamp(
+                estimate.velocity_m_step + products.velocity_change(acceleration), self._velocity_limit
+            ),
+            disturbance_m_step2=estimate.disturbance_m_step2,
+        )

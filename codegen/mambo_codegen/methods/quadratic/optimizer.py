@@ -1,0 +1,33 @@
+"""Optimizer of the quadratic cost: its exact minimum in a box, along both axes of the heading."""
+
+import numpy as np
+
+from mambo_codegen.design import Design
+from mambo_codegen.methods.math import Real, clamp
+from mambo_codegen.methods.quadratic.arithmetic import ExactArithmetic
+
+
+class ExactOptimizer:
+    """The constants of the minimum, in the scalar type of the controller."""
+
+    def __init__(self, design: Design, arithmetic: ExactArithmetic, limit: Real) -> None:
+        numbers, law = arithmetic.numbers, design.law
+        self._products = arithmetic
+        self._limit = limit
+        self._rows = numbers.row_constants(law.rows)
+        self._ratios = np.array([numbers.constant(ratio, "ratio") for ratio in law.ratios])
+
+    def minimize(self, state: Real) -> Real:
+        """Return the first free move (n, 2), right and forward, from states (n, 2, 8)."""
+        moves = [self._row_product(self._rows[:, move], state) for move in range(self._rows.shape[1])]
+        if len(moves) == 1:
+            return clamp(moves[0], self._limit)
+        first, second = moves
+        second_change = clamp(second, self._limit) - second
+        return clamp(first - self._products.ratio_product(self._ratios, second_change), self._limit)
+
+    def _row_product(self, rows: Real, state: Real) -> Real:
+        total = rows[:, 0] * state[:, :, 0]
+        for k in range(1, rows.shape[1]):
+            total = total + (rows[:, k] * state[:, :, k])
+        return self._products.row_sum(total)

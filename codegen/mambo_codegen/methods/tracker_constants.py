@@ -1,0 +1,78 @@
+"""Constants of the target tracker: the target's acceleration and its rate, as `nmpc_tracker.h` derives.
+
+All arithmetic is float64 in a fixed order; constants are rounded to the scalar type once.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.sections import Sections
+
+JUMP_MARGIN: Final = 1.5
+"""A target that accelerates by this factor more than the drone can at its tilt limit has jumped."""
+
+
+JERK_SHARE: Final = 0.1
+"""The largest estimated jerk, per update, as a share of the largest acceleration."""
+
+
+@dataclass(frozen=True)
+class TrackerConstants:
+    """Constants of the target tracker, float64.
+
+    is_given: whether the caller gives the acceleration; else the tracker measures it by changes of velocity.
+    input_limit: largest measured change of the target's velocity in an update period that is no jump, m/s;
+        or the limit of a given acceleration, m/s^2.
+    factor: makes such an input an acceleration in m/step^2: tau^2/T_s, in s; or tau^2, in s^2.
+    acceleration_limit_m_step2: the acceleration of the largest input.
+    jerk_limit_m_step2_update: largest jerk, m/step^2 per update.
+    gain, jerk_gain: alpha and beta.
+    """
+
+    is_given: bool
+    input_limit: float
+    factor: float
+    acceleration_limit_m_step2: float
+    jerk_limit_m_step2_update: float
+    gain: float
+    jerk_gain: float
+
+    @property
+    def input_quantity(self) -> str:
+        """The quantity of the inputs."""
+        return "thrust" if self.is_given else "velocity"
+
+    @property
+    def tested_input(self) -> float:
+        """Largest input in tests: one in five drawn is beyond the limit."""
+        return 1.25 * self.input_limit
+
+
+def tracker_constants(settings: Sections) -> TrackerConstants | None:
+    """Derive the constants of the tracker; None if `settings` have none.
+
+    With a quadratic cost tau is the update period.
+    """
+    if settings.target.acceleration == "none":
+        return None
+    is_given, ranges = settings.target.acceleration == "given", settings.ranges
+    update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain
+    step_s = update_s if settings.cost.norm == "quadratic" else settings.horizon.prediction_step_s
+    acceleration_m_s2 = JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad
+    if is_given:
+        input_limit = min(acceleration_m_s2, ranges.thrust_acceleration_max_m_s2)
+        factor = step_s * step_s
+    else:
+        input_limit = min(acceleration_m_s2 * update_s, 2 * ranges.velocity_m_s)
+        factor = (step_s * step_s) / update_s
+    acceleration_m_step2 = factor * input_limit
+    return TrackerConstants(
+        is_given=is_given,
+        input_limit=input_limit,
+        factor=factor,
+        acceleration_limit_m_step2=acceleration_m_step2,
+        jerk_limit_m_step2_update=JERK_SHARE * acceleration_m_step2,
+        gain=gain,
+        jerk_gain=gain * gain / (2 - gain),
+    )

@@ -1,0 +1,1 @@
+"""Numbers of the C: scalar types, literals, sine and cosine."""

@@ -1,0 +1,14 @@
+"""Gravity, and the thrust of hover."""
+
+from typing import Final
+
+from mambo_codegen.settings.sections import Sections
+
+GRAVITY_M_S2: Final = 9.81
+
+
+def hover_thrust(settings: Sections, offset_m_s2: float = 0.0) -> float:
+    """Return the thrust acceleration of hover plus the offset, m/s^2, clamped to the range of `settings`."""
+    ranges = settings.ranges
+    thrust = GRAVITY_M_S2 + offset_m_s2
+    return min(max(thrust, ranges.thrust_acceleration_min_m_s2), ranges.thrust_acceleration_max_m_s2)

@@ -1,0 +1,121 @@
+"""Constants of the controller's own sine and cosine.
+
+C libraries differ in the last bit of `sinf`, so the controller has a Taylor series of its own. First it
+subtracts whole quarter turns from the angle. For that pi/2 is split into three parts; the first two have so
+few bits that their product with the number of quarter turns is exact (Cody and Waite 1980).
+"""
+
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from math import factorial
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.methods.one_norm.formats import SINE_BITS, WORD_BITS, Formats
+from mambo_codegen.methods.quadratic.formats import ExactFormats
+from mambo_codegen.numbers.literals import SCALARS
+
+SINE_ERRORS: Final = {"float32": 1.2e-7, "float64": 2.3e-16, "fixed": 2e-9}
+"""Largest absolute error of sine and cosine within YAW_LIMIT_RAD: about one ulp of 1; two in fixed point."""
+
+_QUARTER_TURN: Final = Fraction(Decimal("3.14159265358979323846264338327950288419716939937510582")) / 2
+_TURN_BITS: Final = 10
+_FINE_BITS: Final = 40
+
+
+@dataclass(frozen=True)
+class Trigonometry:
+    """Constants of `nmpc_sine_cosine`, each exact in the scalar type.
+
+    Let r be the angle minus its whole quarter turns, |r| <= pi/4:
+    sin r = r + r * r^2 * (sine[0] + r^2 * (sine[1] + ...)), cos r = 1 + r^2 * (cosine[0] + ...).
+    """
+
+    quarter_turns_per_rad: float
+    quarter_turn_rad: tuple[float, float, float]
+    sine: tuple[float, ...]
+    cosine: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FixedTrigonometry:
+    """The same as integers; coefficients and r have the format SINE_BITS.
+
+    quarter_turns_per_rad: 2/pi; its product with an angle has the format `quarter_turns_bits`.
+    quarter_turn:          pi/2 in the format `fine_bits`; an angle times 2^`finer_bits` has that format too.
+    """
+
+    quarter_turns_per_rad: int
+    quarter_turns_bits: int
+    quarter_turn: int
+    fine_bits: int
+    finer_bits: int
+    sine: tuple[int, ...]
+    cosine: tuple[int, ...]
+
+
+def fixed_trigonometry(formats: Formats | ExactFormats) -> FixedTrigonometry:
+    """Derive the constants for the format of yaw in `formats`."""
+    return FixedTrigonometry(
+        quarter_turns_per_rad=round(2**WORD_BITS / _QUARTER_TURN),
+        quarter_turns_bits=WORD_BITS + formats.yaw,
+        quarter_turn=round(2**_FINE_BITS * _QUARTER_TURN),
+        fine_bits=_FINE_BITS,
+        finer_bits=_FINE_BITS - formats.yaw,
+        sine=_fixed_taylor(3),
+        cosine=_fixed_taylor(2),
+    )
+
+
+def _fixed_taylor(first_power: int) -> tuple[int, ...]:
+    """Return the coefficients of all terms that exceed a quarter of the resolution at pi/4."""
+    coefficients: list[int] = []
+    power, sign = first_power, -1
+    while (_QUARTER_TURN / 2) ** power / factorial(power) > Fraction(1, 2 ** (SINE_BITS + 2)):
+        coefficients.append(round(Fraction(sign * 2**SINE_BITS, factorial(power))))
+        power, sign = power + 2, -sign
+    return tuple(coefficients)
+
+
+def trigonometry(scalar: str) -> Trigonometry:
+    """Derive the constants for `scalar`, "float32" or "float64"."""
+    return Trigonometry(
+        quarter_turns_per_rad=_round(1 / _QUARTER_TURN, scalar),
+        quarter_turn_rad=split_quarter_turn(scalar, _TURN_BITS),
+        sine=_taylor(3, scalar),
+        cosine=_taylor(2, scalar),
+    )
+
+
+def _round(value: Fraction, scalar: str) -> float:
+    return float(SCALARS[scalar](float(value)))
+
+
+def split_quarter_turn(scalar: str, turn_bits: int) -> tuple[float, float, float]:
+    """Split pi/2 into a remainder and two parts whose products with integers of `turn_bits` are exact."""
+    bits = np.finfo(SCALARS[scalar]).nmant + 1 - turn_bits
+    high = _truncate(_QUARTER_TURN, bits)
+    middle = _truncate(_QUARTER_TURN - high, bits)
+    return float(high), float(middle), _round(_QUARTER_TURN - high - middle, scalar)
+
+
+def _truncate(value: Fraction, bits: int) -> Fraction:
+    """Truncate a positive value below 2 to its leading `bits` bits."""
+    unit = Fraction(1, 2**bits)
+    while value / unit < 2 ** (bits - 1):
+        unit /= 2
+    return (value // unit) * unit
+
+
+def _taylor(first_power: int, scalar: str) -> tuple[float, ...]:
+    """Return the coefficients of all terms that exceed a sixteenth of the precision at pi/4."""
+    smallest = Fraction(float(np.finfo(SCALARS[scalar]).eps)) / 16
+    largest_angle = _QUARTER_TURN / 2
+    coefficients: list[float] = []
+    power, sign = first_power, -1
+    while largest_angle**power / factorial(power) > smallest:
+        coefficients.append(_round(Fraction(sign, factorial(power)), scalar))
+        power, sign = power + 2, -sign
+    return tuple(coefficients)

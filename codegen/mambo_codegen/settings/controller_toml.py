@@ -1,0 +1,79 @@
+"""Read and write controller.toml: text to settings, all faults reported at once, and back."""
+
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_codegen.settings.key import spell
+from mambo_codegen.settings.messages import faults
+from mambo_codegen.settings.methods import used_values
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.toml_file import parse_document, read_text
+
+COLUMNS = 88
+
+_TITLE = "Settings of a mambo-nmpc controller."
+
+
+def read(path: Path) -> Settings:
+    """Read the settings in the file at `path`.
+
+    Raises UnreadableFileError if it is not TOML, InvalidSettingsError if settings break a rule.
+    """
+    return parse(read_text(path), echo(str(path)))
+
+
+def parse(text: str, source: str) -> Settings:
+    """Return the settings in `text`; `source` begins every message.
+
+    Raises UnreadableFileError for bad syntax, InvalidSettingsError with all faults for bad settings.
+    """
+    return validate(parse_document(text, source), source)
+
+
+def validate(document: Mapping[str, object], source: str) -> Settings:
+    """Return the settings in `document`; raises InvalidSettingsError with all faults, after `source`."""
+    try:
+        return Settings.model_validate(document)
+    except ValidationError as error:
+        from mambo_codegen.settings.keys import SETTINGS  # noqa: PLC0415 - slow to import
+
+        raise InvalidSettingsError(
+            tuple(f"{source}: {fault}" for fault in faults(error, document, SETTINGS))
+        ) from None
+
+
+def with_option(settings: Settings, path: str, value: object, source: str = "settings") -> Settings:
+    """Return `settings` with `value` at the dotted `path`, checked like a file.
+
+    `source` begins the message, such as the option of the command line. Raises InvalidSettingsError.
+    """
+    section, name = path.split(".")
+    document = settings.model_dump()
+    document[section][name] = value
+    return validate(document, source)
+
+
+def to_toml(settings: Settings, title: str = _TITLE) -> str:
+    """Return a complete controller.toml with a comment above every key; reading it gives equal settings.
+
+    Keys that the controller does not use are left out.
+    """
+    from mambo_codegen.settings.keys import KEYS, SECTIONS  # noqa: PLC0415 - slow to import
+
+    parts = [comment(title), comment("A missing key takes the value of preset table1.")]
+    for section, values in used_values(settings).items():
+        parts += ["", comment(SECTIONS[section]), f"[{section}]"]
+        for name, value in values.items():
+            key = KEYS[f"{section}.{name}"]
+            admits = comment(f"{key.kind.capitalize()}: {key.domain}.")
+            parts += ["", comment(key.description), admits, f"{name} = {spell(value)}"]
+    return "\n".join(parts) + "\n"
+
+
+def comment(text: str) -> str:
+    """Return `text` as a comment of TOML, wrapped."""
+    return textwrap.fill(text, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)

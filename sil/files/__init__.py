@@ -1,1 +1,0 @@
-"""Result folders, the compile cache, and the shared libraries in it."""

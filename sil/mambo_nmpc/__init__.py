@@ -1,0 +1,54 @@
+"""Nonlinear model predictive control in static-memory C99 for very small drones.
+
+    from mambo_nmpc import Controller, DroneState, TargetState, Vehicle, fly
+
+runs generated C from Python (docs/reference/python.md). `mambo_codegen` generates C from settings and
+`mambo_templates`; `mambo_sil` simulates flights with that C, and tests it.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from mambo_sil.drone.plant.vehicle import Vehicle
+    from mambo_sil.flight.api.controller import Controller
+    from mambo_sil.flight.api.flights import Flown, fly
+    from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
+    from mambo_sil.flight.api.states import DroneState, TargetState
+
+__all__ = [
+    "Controller",
+    "DroneState",
+    "Flown",
+    "TargetState",
+    "Vehicle",
+    "attitude_of_quaternion",
+    "command_in_frame",
+    "fly",
+]
+
+_HOMES: Final = {
+    "Controller": "mambo_sil.flight.api.controller",
+    "DroneState": "mambo_sil.flight.api.states",
+    "Flown": "mambo_sil.flight.api.flights",
+    "TargetState": "mambo_sil.flight.api.states",
+    "Vehicle": "mambo_sil.drone.plant.vehicle",
+    "attitude_of_quaternion": "mambo_sil.flight.api.frames",
+    "command_in_frame": "mambo_sil.flight.api.frames",
+    "fly": "mambo_sil.flight.api.flights",
+}
+"""The module of each name: imported at its first use, so that the command line starts at once."""
+
+
+if not TYPE_CHECKING:  # a checker would take every name for one of this module
+
+    def __getattr__(name: str) -> Any:
+        """Return one of `__all__`."""
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Return the names of the module, also those that are not imported yet."""
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,196 @@
+"""An ATmega2560 emulated by QEMU, controlled over GDB's remote protocol; a plugin counts instructions."""
+
+import hashlib
+import mmap
+import os
+import re
+import shutil
+import subprocess
+from collections import Counter
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from elftools.elf.elffile import ELFFile
+
+from mambo_codegen.errors import BuildError
+from mambo_codegen.toolchain import Toolchain, host_toolchain
+from mambo_sil.board.emulation.arena import Arena
+from mambo_sil.board.emulation.gdb import GdbStub
+from mambo_sil.errors import EmulationError, EmulatorError
+from mambo_sil.results.cache import build_cached
+
+_EMULATOR: Final = "qemu-system-avr"
+_TOOLS: Final = {_EMULATOR: "qemu-system-misc", "setpriv": "util-linux"}
+_PART: Final = "an ATmega2560"
+
+_FLASH_BYTES: Final = 0x40000
+_RETURN_ADDRESS: Final = _FLASH_BYTES - 0x1000
+_DATA_SPACE: Final = 0x800000
+"""Offset of data addresses in ELF files and in GDB's protocol."""
+_RAM: Final = range(0x200, 0x2200)
+_STACK_BYTES: Final = 2048
+_GUARD: Final = b"\x5a" * 32
+"""Pattern between data and stack; it is overwritten if the stack overflows."""
+_ALIGNMENT: Final = 2
+_AVR6: Final = 6
+"""Machine in the ELF flags of AVR parts with more than 128 KiB of flash."""
+
+_REGISTER_BYTES: Final = 39
+_STACK_POINTER: Final = slice(33, 35)
+_PROGRAM_COUNTER: Final = slice(35, 39)
+_RESULT: Final = slice(22, 26)
+_ARGUMENTS: Final = range(8, 26)
+"""Registers of arguments, allocated from the highest down (avr-gcc, calling convention)."""
+
+_COUNT_BYTES: Final = 8 * _FLASH_BYTES // 2
+_COUNTING_SLOWDOWN: Final = 3
+
+
+class Long(int):
+    """An argument of type unsigned long: 32 bits also where int has 16."""
+
+
+class AvrMachine:
+    """A `Machine` in a QEMU process."""
+
+    word_bytes: Final = 2
+
+    def __init__(self, elf: Path, time_limit_s: float, *, counting: bool = False) -> None:
+        for tool, package in _TOOLS.items():
+            if shutil.which(tool) is None:
+                raise EmulatorError(f"{tool}, needed to emulate {_PART}, is missing (Debian: {package})")
+        flash, data, self._symbols = _read_program(elf)
+        used = max((start + len(content) for start, content in data), default=_RAM.start)
+        self.arena = Arena(used, self.stack.start - len(_GUARD), _ALIGNMENT)
+        if self.arena.free_bytes < 0:
+            size, stack = used - _RAM.start, _STACK_BYTES
+            raise EmulatorError(
+                f"{size} B of data and {stack} B of stack do not fit the {len(_RAM)} B of {_PART}"
+            )
+        self._time_limit_s = time_limit_s * (_COUNTING_SLOWDOWN if counting else 1)
+        files = [_open_memory_file("flash", flash)]
+        options = ["-bios", f"/proc/self/fd/{files[0]}"]
+        if counting:
+            files.append(_open_memory_file("counts", bytes(_COUNT_BYTES)))
+            self._counts = np.frombuffer(mmap.mmap(files[1], _COUNT_BYTES), np.uint64)
+            options += ["-plugin", f"{_build_plugin()},counts={files[1]}"]
+        quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
+        command = [_EMULATOR, "-M", "mega2560", "-S", "-gdb", "stdio", *quiet, *options]
+        try:
+            self._stub = GdbStub(command, files)
+        finally:
+            for file in files:
+                os.close(file)
+        self._stub.set_breakpoint(_RETURN_ADDRESS)
+        for start, content in data:
+            self.write(start, content)
+        self.write(self.stack.start - len(_GUARD), _GUARD)
+
+    @property
+    def stack(self) -> range:
+        """Return the address range of the stack, including the return address."""
+        return _RAM[-_STACK_BYTES:]
+
+    def write(self, address: int, content: bytes) -> None:
+        """Write data memory; `address` with or without the offset of ELF files."""
+        self._stub.write(address | _DATA_SPACE, content)
+
+    def read(self, address: int, size: int) -> bytes:
+        """Read data memory; `address` with or without the offset of ELF files."""
+        return self._stub.read(address | _DATA_SPACE, size)
+
+    def take_counts(self) -> Counter[int]:
+        """Return the instructions executed since the last call, by start address of their basic block."""
+        words = np.flatnonzero(self._counts)
+        counts = Counter({2 * int(word): int(self._counts[word]) for word in words})
+        self._counts[words] = 0
+        return counts
+
+    def call(self, function: str, *arguments: int) -> int:
+        """Call `function` with arguments of type int, pointer or Long; returns an unsigned long.
+
+        Raises EmulationError if it faults or exceeds the time limit; the machine stays usable.
+        """
+        registers = bytearray(_REGISTER_BYTES)
+        pushed = (_RETURN_ADDRESS // 2).to_bytes(3, "big")
+        free = _ARGUMENTS.stop
+        for argument in arguments:
+            content = argument.to_bytes(4 if isinstance(argument, Long) else self.word_bytes, "little")
+            free -= len(content)
+            if free >= _ARGUMENTS.start:
+                registers[free : free + len(content)] = content
+            else:
+                pushed += content
+        self.write(_RAM.stop - len(pushed), pushed)
+        registers[_STACK_POINTER] = (_RAM.stop - len(pushed) - 1).to_bytes(2, "little")
+        registers[_PROGRAM_COUNTER] = self._symbols[function].to_bytes(4, "little")
+        self._stub.set_registers(bytes(registers))
+        stopped = self._stub.run(self._time_limit_s)
+        after = self._stub.registers()
+        place = int.from_bytes(after[_PROGRAM_COUNTER], "little")
+        if not stopped:
+            raise EmulationError(
+                f"{function} did not return within {self._time_limit_s:g} s, at address {place:#x}"
+            )
+        if place != _RETURN_ADDRESS:
+            raise EmulationError(f"{function} faulted at address {place:#x}: illegal instruction")
+        if self.read(self.stack.start - len(_GUARD), len(_GUARD)) != _GUARD:
+            raise EmulationError(f"{function} overflowed its stack of {_STACK_BYTES} B")
+        return int.from_bytes(after[_RESULT], "little")
+
+
+def _read_program(elf: Path) -> tuple[bytes, list[tuple[int, bytes]], dict[str, int]]:
+    """Return the contents of flash (0xFF where unused), the data by address, and the symbols."""
+    flash = bytearray(b"\xff" * _FLASH_BYTES)
+    data: list[tuple[int, bytes]] = []
+    with elf.open("rb") as file:
+        program = ELFFile(file)
+        if program["e_machine"] != "EM_AVR" or program["e_flags"] & 0x7F != _AVR6:
+            raise EmulatorError(f"{elf.name}: not built for {_PART}, the only AVR that is emulated")
+        symbols = {
+            symbol.name: symbol["st_value"]
+            for symbol in program.get_section_by_name(".symtab").iter_symbols()
+        }
+        for segment in program.iter_segments("PT_LOAD"):
+            start = segment["p_vaddr"]
+            if start >= _DATA_SPACE:
+                data.append((start - _DATA_SPACE, segment.data().ljust(segment["p_memsz"], b"\0")))
+            elif start + segment["p_filesz"] > _RETURN_ADDRESS:
+                raise EmulatorError(f"{elf.name}: does not fit the {_FLASH_BYTES} B of flash of {_PART}")
+            else:
+                flash[start : start + segment["p_filesz"]] = segment.data()
+    return bytes(flash), data, symbols
+
+
+def _open_memory_file(name: str, content: bytes) -> int:
+    """Write `content` to an anonymous file in memory; returns its descriptor."""
+    descriptor = os.memfd_create(name)
+    with os.fdopen(os.dup(descriptor), "wb") as file:
+        file.write(content)
+    return descriptor
+
+
+def _build_plugin() -> Path:
+    """Return QEMU's plugin that counts instructions; compiled for the installed QEMU and cached."""
+    source = resources.files("mambo_sil.board.emulation").joinpath("qemu_count.c").read_text("utf-8")
+    output = subprocess.run([_EMULATOR, "--version"], capture_output=True, text=True, check=False).stdout
+    version = re.search(r"version (\d+)", output)
+    if version is None:
+        raise EmulatorError(f"{_EMULATOR} --version prints no version")
+    interface = 1 if int(version[1]) < 9 else 2  # QEMU 9 requires at least 2
+    try:
+        toolchain = host_toolchain()
+    except BuildError as error:
+        raise EmulatorError(f"cannot compile the instruction counter for {_PART}: {error}") from error
+    contents = "\n".join([source, str(interface), toolchain.identity()])
+    name = f"qemu-count-{hashlib.sha256(contents.encode()).hexdigest()[:32]}.so"
+    return build_cached(name, lambda folder: _compile_plugin(source, interface, toolchain, folder))
+
+
+def _compile_plugin(source: str, interface: int, toolchain: Toolchain, folder: Path) -> Path:
+    (folder / "count.c").write_text(source, "utf-8")
+    flags = ["-O2", "-shared", "-fPIC", f"-DQEMU_PLUGIN_INTERFACE={interface}"]
+    toolchain.run([*flags, "count.c", "-o", "count.so"], folder)
+    return folder / "count.so"

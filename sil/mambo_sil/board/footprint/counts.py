@@ -1,0 +1,145 @@
+"""Exact instruction counts of a flight on an emulated core, and a search for a more expensive step."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+from pydantic import Field
+
+from mambo_codegen.reference import Step
+from mambo_codegen.settings.model import Settings
+from mambo_sil.board.emulated import EmulatedController
+from mambo_sil.board.firmware.elf import load
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.vehicle import STEP_S
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.trajectories import Bernoulli
+
+HARNESS: Final = (
+    "nmpc_batch_init",
+    "nmpc_batch_step",
+    "nmpc_batch_instance_bytes",
+    "nmpc_last_cost",
+    "nmpc_last_iterations",
+    "nmpc_has_converged",
+    "nmpc_is_saturated",
+)
+"""Functions of the test harness, which are not part of a step."""
+
+
+FLIGHT: Final = Bernoulli(2.0, 0.5)
+"""The figure of eight of Table II, from rest at its centre: the first ticks have the largest errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class CountedStep:
+    """One step: state (1, 7), target (1, 4), thrust (1,), the instance before it, status and instructions."""
+
+    state: FloatArray
+    target: FloatArray
+    thrust: FloatArray
+    before: bytes
+    accepted: bool
+    by_function: Counter[str]
+
+    @property
+    def instructions(self) -> int:
+        """All instructions of the step."""
+        return self.by_function.total()
+
+
+@dataclass(frozen=True)
+class InstructionCounts:
+    """Instructions of consecutive ticks of a flight, and the most of those and of the search's steps.
+
+    `by_function` has the mean of each function over the ticks, largest first; it is not in a summary.
+    """
+
+    ticks: int
+    searched: int
+    least: int
+    mean: float
+    most_met: int
+    by_function: Annotated[dict[str, float], Field(exclude=True)] = field(default_factory=dict)
+
+
+class CountingController:
+    """One emulated controller that counts the instructions of each step; `steps` has all of them."""
+
+    def __init__(self, settings: Settings, elf: Path, core: str) -> None:
+        self._emulated = EmulatedController(settings, elf, core, counting=True)
+        image = load(elf)
+        self._name_of = lru_cache(None)(image.name_of)
+        self.steps: list[CountedStep] = []
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Step:
+        """Step once with state (1, 7), target (1, 4) and thrust_acceleration_m_s2 (1,)."""
+        before = self._emulated.save()
+        self._emulated.machine.take_counts()
+        outcome: Step = self._emulated.step(state, target, thrust_acceleration_m_s2)
+        by_function: Counter[str] = Counter()
+        for address, instructions in self._emulated.machine.take_counts().items():
+            name = self._name_of(address).partition("+")[0]
+            if name not in HARNESS:
+                by_function[name] += instructions
+        accepted = not outcome.status[0]
+        self.steps.append(CountedStep(state, target, thrust_acceleration_m_s2, before, accepted, by_function))
+        return outcome
+
+    def retry(self, step: CountedStep, state: FloatArray) -> CountedStep:
+        """Repeat an earlier step from the instance before it, with another state (1, 7)."""
+        self._emulated.restore(step.before)
+        self.step(state, step.target, step.thrust)
+        return self.steps.pop()
+
+
+def counted_flight(settings: Settings, ticks: int) -> Flight:
+    """Return the flight of `ticks` updates of `FLIGHT` from its start."""
+    period_s = STEP_S * max(1, round(settings.horizon.update_period_s / STEP_S))
+    return Flight(FLIGHT, duration_s=(ticks - 1) * period_s, update_period_s=period_s)
+
+
+def count_instructions(
+    settings: Settings, elf: Path, core: str, ticks: int, search_steps: int
+) -> InstructionCounts:
+    """Fly the `counted_flight`, then search from the most expensive of them.
+
+    A refused tick returns early and does not count; raises FlightError if all are refused.
+    """
+    controller = CountingController(settings, elf, core)
+    fly(counted_flight(settings, ticks), controller)
+    flown = [step for step in controller.steps if step.accepted]
+    if not flown:
+        raise FlightError("the controller refuses every tick of the flight, which is beyond its [ranges]")
+    totals = [step.instructions for step in flown]
+    sums = sum((step.by_function for step in flown), Counter[str]())
+    return InstructionCounts(
+        ticks=len(flown),
+        searched=search_steps,
+        least=min(totals),
+        mean=float(np.mean(totals)),
+        most_met=_search(controller, flown, search_steps),
+        by_function={name: total / len(flown) for name, total in sums.most_common()},
+    )
+
+
+def _search(controller: CountingController, flown: Sequence[CountedStep], search_steps: int) -> int:
+    """Return the most instructions met from the most expensive tick on (hill climbing).
+
+    Each step starts from the controller's instance at that tick, with its plan, and changes one component of
+    the state; a change that costs at least as much is kept.
+    """
+    rng = np.random.default_rng(0)
+    best = max(flown, key=lambda step: step.instructions)
+    for _ in range(search_steps):
+        state = best.state.copy()
+        state[0, rng.integers(7)] += rng.normal() * 10.0 ** rng.uniform(-4, 0)
+        tried = controller.retry(best, state)
+        if tried.accepted and tried.instructions >= best.instructions:
+            best = tried
+    return best.instructions

@@ -1,0 +1,229 @@
+"""Footprints as a record, as text and as a page: the same figures, three times."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+
+from mambo_codegen.settings.model import Settings
+from mambo_sil.board.firmware.gate import Forbidden
+from mambo_sil.board.firmware.sizes import Parts
+from mambo_sil.board.firmware.stack import Frame
+from mambo_sil.board.footprint.counts import InstructionCounts
+from mambo_sil.board.footprint.measure import Footprint, Limit
+from mambo_sil.board.footprint.on_board import BoardMeasurement
+from mambo_sil.results.html_page import render_page
+from mambo_sil.results.summary import Summary
+
+_HEAD = (
+    "board",
+    "flash B",
+    "RAM B",
+    "stack B",
+    "instructions a step: least / mean / most met",
+    "time ms",
+    "period",
+    "",
+)
+
+
+@dataclass(frozen=True)
+class FunctionFootprint:
+    """A symbol of the program; a dash is what was not measured."""
+
+    name: str
+    size: int | str
+    frame: int | str
+    depth: int | str
+    instructions: int | str
+
+
+@dataclass(frozen=True)
+class BoardFootprint:
+    """The footprint on one board."""
+
+    name: str
+    title: str
+    core: str
+    compiler: str
+    fits: bool
+    complete: bool
+    limits: tuple[Limit, ...]
+    flash_bytes: Parts
+    flash_sections: dict[str, int]
+    ram_bytes: Parts
+    instance_bytes: int
+    stack_path: tuple[Frame, ...]
+    instructions: InstructionCounts | None
+    cycles_estimate: tuple[float, float] | None
+    time_s_estimate: tuple[float, float] | None
+    forbidden: tuple[Forbidden, ...]
+    functions: list[FunctionFootprint]
+    notes: list[str]
+    on_board: BoardMeasurement | None = None
+
+    @property
+    def compared(self) -> list[tuple[str, str, str]]:
+        """A head and rows: what the board at the port measured, beside what was counted or estimated."""
+        board, counts = self.on_board, self.instructions
+        if board is None:
+            return []
+        counted, per_instruction = ("-",) * 4, "-"
+        if counts is not None and self.cycles_estimate is not None and self.time_s_estimate is not None:
+            (low, high), time_ms = self.cycles_estimate, [1000 * limit for limit in self.time_s_estimate]
+            counted = (
+                f"{counts.least} / {counts.mean:.0f} / {counts.most_met}",
+                f"{low:.0f}..{high:.0f}",
+                f"{time_ms[0]:.3g}..{time_ms[1]:.3g}",
+                f"{low / counts.most_met:.3g}..{high / counts.most_met:.3g}",
+            )
+            per_instruction = f"{board.mean_cycles / counts.mean:.3g}"
+        cycles = (board.cycles.least, board.cycles.median, board.cycles.most)
+        time_ms = [1000 * one / board.clock_hz for one in cycles]
+        stack = str(sum(frame.bytes for frame in self.stack_path)) if self.stack_path else "-"
+        return [
+            ("a step", "measured: least / median / most", "counted: least / mean / most met; estimated"),
+            ("instructions", "-", counted[0]),
+            ("cycles", " / ".join(f"{one:.0f}" for one in cycles), counted[1]),
+            ("time, ms", " / ".join(f"{one:.3g}" for one in time_ms), counted[2]),
+            ("cycles per instruction", per_instruction, counted[3]),
+            ("stack, B", str(board.stack_bytes), stack),
+        ]
+
+
+class FootprintSummary(Summary):
+    """Footprints on boards."""
+
+    command = "footprint"
+
+    source: str
+    digest: str
+    scalar: str
+    optimisation: str
+    boards: list[BoardFootprint]
+
+
+def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) -> FootprintSummary:
+    """Return everything that was measured."""
+    return FootprintSummary(
+        source=source,
+        digest=settings.short_digest,
+        scalar=settings.code.scalar,
+        optimisation=footprints[0].optimisation,
+        boards=[_board(footprint) for footprint in footprints],
+    )
+
+
+def text(footprints: Sequence[Footprint]) -> str:
+    """Return a table of the boards, the functions if there is one board, and notes on what fails."""
+    rows = [_HEAD, *(_row(footprint) for footprint in footprints)]
+    lines = _columns(rows)
+    if len(footprints) == 1:
+        if footprints[0].on_board is not None:
+            lines += ["", footprints[0].on_board.sentence, *_columns(_board(footprints[0]).compared)]
+        functions = _functions(footprints[0])
+        head = ("function", "size B", "own frame B", "deepest B", "instructions")
+        lines += ["", *_columns([head, *(tuple(map(str, astuple(one))) for one in functions)])]
+    notes = [note for footprint in footprints for note in _notes(footprint)]
+    return "\n".join([*lines, *(["", *notes] if notes else [])])
+
+
+def page(summary: FootprintSummary) -> str:
+    """Render the summary as one HTML page that needs no other file."""
+    return render_page("footprint.html.j2", {"summary": summary})
+
+
+def _row(footprint: Footprint) -> tuple[str, ...]:
+    counts, time_s = footprint.counts, footprint.time_s
+    return (
+        footprint.board.name,
+        str(footprint.added.flash.total),
+        str(footprint.added.ram.total),
+        "-" if footprint.stack is None else str(footprint.stack.bytes),
+        "-" if counts is None else f"{counts.least} / {counts.mean:.0f} / {counts.most_met}",
+        "-" if time_s is None else f"{1000 * time_s[0]:.3g}..{1000 * time_s[1]:.3g}",
+        "-" if time_s is None else f"{100 * time_s[1] / footprint.update_period_s:.2g} %",
+        ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER",
+    )
+
+
+def _board(footprint: Footprint) -> BoardFootprint:
+    return BoardFootprint(
+        name=footprint.board.name,
+        title=footprint.board.title,
+        core=footprint.board.core.value,
+        compiler=footprint.compiler,
+        fits=footprint.fits,
+        complete=footprint.complete,
+        limits=footprint.limits,
+        flash_bytes=footprint.added.flash,
+        flash_sections=footprint.added.sections.flash,
+        ram_bytes=footprint.added.ram,
+        instance_bytes=footprint.instance_bytes,
+        stack_path=() if footprint.stack is None else footprint.stack.path,
+        instructions=footprint.counts,
+        cycles_estimate=footprint.cycles,
+        time_s_estimate=footprint.time_s,
+        forbidden=footprint.forbidden,
+        functions=_functions(footprint),
+        notes=_notes(footprint),
+        on_board=footprint.on_board,
+    )
+
+
+def _functions(footprint: Footprint) -> list[FunctionFootprint]:
+    """Return size, frame, depth and instructions of every symbol, most instructions first."""
+    counts = footprint.counts.by_function if footprint.counts else {}
+    frames, depths = (footprint.stack.frames, footprint.stack.depths) if footprint.stack else ({}, {})
+    sizes = footprint.added.own | footprint.added.helpers
+    names = dict.fromkeys([*counts, *sorted(sizes, key=lambda name: -sizes[name])])
+    return [
+        FunctionFootprint(
+            name,
+            sizes.get(name, "-"),
+            frames.get(name, "-"),
+            depths.get(name, "-"),
+            round(counts[name]) if name in counts else "-",
+        )
+        for name in names
+    ]
+
+
+def _notes(footprint: Footprint) -> list[str]:
+    """Return a line for each value over budget, forbidden function, and missing measurement."""
+    name, notes = footprint.board.name, []
+    for limit in footprint.limits:
+        if limit.share > 1:
+            value, budget, over = (
+                _format(number, limit.unit)
+                for number in (limit.value, limit.budget, limit.value - limit.budget)
+            )
+            notes.append(f"{name}: {limit.name} {value} is over its budget of {budget} by {over}")
+    if not footprint.fits:
+        sizes = Counter(footprint.added.own | footprint.added.helpers).most_common(5)
+        largest = ", ".join(f"{symbol} {size} B" for symbol, size in sizes)
+        notes.append(f"{name}: largest symbols: {largest}")
+    for found in footprint.forbidden:
+        callers = ", ".join(found.callers) or "an unknown function"
+        notes.append(f"{name}: {found.symbol} ({found.kind}) must not be linked; called by {callers}")
+    measured, clock_hz = footprint.on_board, footprint.board.clock_hz.value
+    if measured is not None and measured.clock_hz != clock_hz:
+        notes.append(
+            f"{name}: measured at {measured.clock_hz / 1e6:g} MHz, estimated at {clock_hz / 1e6:g} MHz; "
+            "compare cycles, not times"
+        )
+    if footprint.stack is None:
+        core = footprint.board.core.value
+        notes.append(f"{name}: stack is not measured: {core} cannot be disassembled")
+    if footprint.counts is None:
+        notes.append(f"{name}: instructions and time are not measured: {footprint.uncounted}")
+    return notes
+
+
+def _format(value: float, unit: str) -> str:
+    return f"{value:.0f} {unit}" if unit == "B" else f"{value:.4g} {unit}"
+
+
+def _columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return the rows as lines, the first column flush left, the others flush right."""
+    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    return ["  ".join([name.ljust(first), *map(str.rjust, cells, others)]).rstrip() for name, *cells in rows]

@@ -1,0 +1,85 @@
+"""Compare the self-test digest of every available build: compilers, optimisations, boards."""
+
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_codegen.boards import Board
+from mambo_codegen.bundle.digest import self_test_digest
+from mambo_codegen.design import Design
+from mambo_codegen.errors import BuildError, echo
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.board.emulated import build_guest, digest_emulated
+from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, Builder, builder, clang_builder
+from mambo_sil.board.pil.connection import Connection
+from mambo_sil.errors import EmulatorError
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import digest_compiled
+from mambo_sil.results.scratch import scratch_folder
+
+HOST_COMPILERS: Final = ("gcc", "clang")
+BOARD_COMPILERS: Final[dict[str, Callable[[Board, str], Builder]]] = {"gcc": builder, "clang": clang_builder}
+REFERENCE: Final = "reference"
+
+
+@dataclass(frozen=True)
+class BuildDigest:
+    """The digest of one build as a C literal; None if it could not run, for `reason`."""
+
+    where: str
+    compiler: str
+    optimisation: str
+    digest: str | None
+    reason: str = ""
+
+
+def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
+    """Yield the digest of the reference, then of every build for this machine and for `boards`."""
+    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(Design(settings), episodes)))
+    for name in HOST_COMPILERS:
+        for optimisation in OPTIMISATIONS:
+            yield _on_host(settings, name, optimisation, episodes)
+    for board in boards:
+        for name in BOARD_COMPILERS:
+            for optimisation in OPTIMISATIONS:
+                yield _on_board(settings, board, name, optimisation, episodes)
+
+
+def run_on_board(
+    settings: Settings, board: Connection, episodes: int, progress: Callable[[float], None]
+) -> Iterator[BuildDigest]:
+    """Yield the digest of the reference, then that of a real board; call `progress` with the share done."""
+    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(Design(settings), episodes)))
+    digest = board.digest(episodes, progress)
+    yield BuildDigest("board", echo(board.greeting.board), "", _format(digest))
+
+
+def count_builds(boards: Sequence[Board]) -> int:
+    """Return the number of digests that `run_everywhere` yields."""
+    return 1 + len(OPTIMISATIONS) * (len(HOST_COMPILERS) + len(BOARD_COMPILERS) * len(boards))
+
+
+def _on_host(settings: Settings, compiler: str, optimisation: str, episodes: int) -> BuildDigest:
+    if shutil.which(compiler) is None:
+        return BuildDigest("host", compiler, optimisation, None, f"{compiler} is missing")
+    library = build_library(settings, Toolchain((compiler,), optimisation))
+    return BuildDigest("host", compiler, optimisation, _format(digest_compiled(library, episodes)))
+
+
+def _on_board(
+    settings: Settings, board: Board, compiler: str, optimisation: str, episodes: int
+) -> BuildDigest:
+    try:
+        found = BOARD_COMPILERS[compiler](board, optimisation)
+        with scratch_folder() as work:
+            elf = build_guest(settings, found, work)
+            digest = digest_emulated(settings, elf, board.emulated_core.value, episodes)
+    except (BuildError, EmulatorError) as error:
+        return BuildDigest(board.name, compiler, optimisation, None, str(error))
+    return BuildDigest(board.name, found.toolchain.command[0], optimisation, _format(digest))
+
+
+def _format(digest: int) -> str:
+    return f"0x{digest:08X}"

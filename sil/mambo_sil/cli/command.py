@@ -1,0 +1,212 @@
+"""The root of `mambo-nmpc`, which turns errors into a message and an exit code; options that commands share.
+
+Results go to stdout, messages to stderr. This module imports nothing slow, because `--help` imports it.
+"""
+
+import errno
+import io
+import os
+import sys
+import traceback
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from mambo_codegen import __version__
+from mambo_codegen.errors import (
+    BAD_INPUT,
+    INTERRUPTED,
+    NO_READER,
+    TERMINATED,
+    FileExistsRefusedError,
+    MamboNmpcError,
+    Terminated,
+    UnwritableError,
+    echo,
+)
+
+if TYPE_CHECKING:
+    from mambo_codegen.settings.model import Settings
+
+EXIT_CODES = (
+    "Exit codes: 0 success; 1 a check failed, or the drone crashed; 2 bad input or a system error; "
+    "130 interrupted; 141 the reader of the output closed it; 143 terminated."
+)
+
+
+def complete_presets(incomplete: str) -> list[str]:
+    """Return the presets that begin with `incomplete`, for the shell; it completes files itself."""
+    from mambo_codegen.settings.toml_file import PRESETS, shipped
+
+    return [name for name in shipped(PRESETS) if name.startswith(incomplete)]
+
+
+Source = Annotated[
+    str, typer.Argument(help="A preset or a controller.toml.", autocompletion=complete_presets)
+]
+OptionalSource = Annotated[
+    str | None,
+    typer.Argument(
+        help="A preset or a controller.toml; by default mambo, with --for the preset of the target.",
+        autocompletion=complete_presets,
+    ),
+]
+Scalar = Annotated[
+    str | None, typer.Option(help="Scalar type of the C (code.scalar).", metavar="float32|float64|fixed")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.", metavar="")]
+
+
+class RootGroup(TyperGroup):
+    """The root command: an error becomes a message and an exit code, without a traceback."""
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Run a command line, help and version included, and flush stdout."""
+        try:
+            if sys.stdout is None:
+                raise OSError(errno.EBADF, "is closed", "stdout")
+            if isinstance(sys.stdout, io.TextIOWrapper):  # replace characters that the terminal cannot encode
+                sys.stdout.reconfigure(errors="backslashreplace")
+            try:
+                return super().main(*arguments, **options)
+            finally:
+                sys.stdout.flush()
+        except OSError as error:
+            sys.exit(_exit_code(error))
+        except SystemExit as leaving:
+            if isinstance(leaving.__context__, BrokenPipeError):  # typer and rich catch it and exit 1
+                sys.exit(_exit_code(leaving.__context__))
+            raise
+
+    def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
+        """Run a command; with `--debug` print the traceback of an error first."""
+        try:
+            result = super().invoke(ctx)
+            sys.stdout.flush()
+        except (MamboNmpcError, OSError, MemoryError, KeyboardInterrupt) as error:
+            if ctx.params["_debug"] and not isinstance(error, KeyboardInterrupt | BrokenPipeError):
+                traceback.print_exception(error)
+            raise typer.Exit(_exit_code(error)) from error
+        return result
+
+
+def _exit_code(error: BaseException) -> int:
+    """Print why the command ended in `error`, and return its exit code."""
+    match error:
+        case Terminated():
+            return TERMINATED
+        case KeyboardInterrupt():
+            return INTERRUPTED
+        case MemoryError():
+            typer.echo("out of memory", err=True)
+        case LookupError():  # jinja2.TemplateNotFound is an OSError too, but a bug of ours
+            raise error
+        case OSError():
+            stdout_failed = _silence_broken_stdout()
+            if isinstance(error, BrokenPipeError):
+                return NO_READER
+            file = "stdout" if stdout_failed else error.filename or "cannot read or write"
+            typer.echo(f"{echo(str(file))}: {error.strerror or error}", err=True)
+        case MamboNmpcError():
+            typer.echo(str(error), err=True)
+            return error.exit_code
+    return BAD_INPUT
+
+
+def _silence_broken_stdout() -> bool:
+    """Redirect stdout to /dev/null if it is broken, lest it fail again at exit; return whether it was."""
+    if sys.stdout is None:
+        return False
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
+
+
+def root() -> typer.Typer:
+    """Return the root command without sub-commands, which `codegen.cli` and `sil.cli` add."""
+    return typer.Typer(
+        name="mambo-nmpc",
+        cls=RootGroup,
+        callback=_root_options,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        epilog=examples("mambo-nmpc init", "mambo-nmpc generate controller.toml -o controller")
+        + f"\n\n{EXIT_CODES}",
+    )
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"mambo-nmpc {__version__}")
+        raise typer.Exit
+
+
+def _root_options(
+    _debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+    _version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version),
+    ] = False,
+) -> None:
+    """Generate a static-memory C99 NMPC for a very small drone, and fly it in simulation."""
+
+
+def output_option(about: str) -> Any:
+    """Return the option -o, a path; `about` is its help."""
+    return typer.Option("--output", "-o", help=about, parser=_output_path, metavar="<path>")
+
+
+def _output_path(text: str | Path) -> Path:
+    """Return the path; raises BadParameter for an empty one, which pathlib reads as the current folder."""
+    if text == "":
+        raise typer.BadParameter("must not be empty; the current folder is .")
+    return Path(text)
+
+
+OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]
+Overwrite = Annotated[bool, typer.Option("--force", help="Overwrite the file.")]
+
+
+def write_file(text: str, output: Path, *, force: bool) -> bool:
+    """Write `text` to a file, whole or not at all, or print it for `-`; return whether it is a file.
+
+    Raises FileExistsRefusedError unless `force`, UnwritableError.
+    """
+    from mambo_codegen.atomic import put
+
+    if str(output) == "-":
+        typer.echo(text, nl=False)
+        return False
+    name = echo(str(output))
+    place = Path(os.path.realpath(output))
+    if place.exists() and not place.is_file():
+        raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
+    try:
+        if os.path.lexists(output) and not force:
+            raise FileExistsRefusedError(
+                f"{name}: already exists; name another with -o, or overwrite it with --force"
+            )
+        put(place, text.encode())
+    except OSError as error:
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror}") from error
+    return True
+
+
+def load(source: str, scalar: str | None) -> "Settings":
+    """Load a preset or a controller.toml; replace its scalar type unless `scalar` is None."""
+    from mambo_codegen.settings import controller_toml, presets
+
+    settings = presets.load(source)
+    if scalar is None:
+        return settings
+    return controller_toml.with_option(settings, "code.scalar", scalar, "--scalar")
+
+
+def examples(*lines: str) -> str:
+    """Return a help epilog of example commands, one paragraph each, because help joins the lines of one."""
+    return "\n\n".join(("Examples:", *lines))

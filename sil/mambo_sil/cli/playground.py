@@ -1,0 +1,47 @@
+"""The command `playground`: an HTML page in which controllers fly."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mambo_codegen.errors import echo
+from mambo_sil.cli.command import complete_presets, output_option
+from mambo_sil.cli.options import AsJson, Drone, show
+
+
+def playground(
+    sources: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="At most four controllers: a preset, a controller.toml, the folder of a bundle, pd or "
+            "pd-feedforward; by default mambo, mambo-1norm and both PDs.",
+            metavar="[SOURCE]...",
+            autocompletion=complete_presets,
+        ),
+    ] = None,
+    *,
+    output: Annotated[Path, output_option("HTML file; an earlier page there is overwritten.")] = Path(
+        "play.html"
+    ),
+    vehicle: Drone = "mambo",
+    as_json: AsJson = False,
+) -> None:
+    """Write an HTML page, without network, in which the generated C flies a simulated drone in real time."""
+    from mambo_sil.cli.progress import progress_bar
+    from mambo_sil.drone.vehicles import presets as vehicles
+    from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
+    from mambo_sil.pages.playground.playground_page import PlaygroundSummary, playground_page
+    from mambo_sil.results.html_page import new_page
+
+    found, drone = page_controllers(sources or DEFAULTS), vehicles.load(vehicle)
+    with new_page(output, "page") as write:
+        with progress_bar("compiling") as bar:
+            text, flown = playground_page(found, drone, bar)
+        size = write(text)
+    summary = PlaygroundSummary(page=str(output), bytes=size, vehicle=drone, controllers=flown)
+    lines = [
+        f"{one.title}: its proof flight has the SHA-256 {made.trace_sha256}"
+        for one, made in zip(found, flown, strict=True)
+    ]
+    show(summary, "\n".join([*lines, f"{echo(str(output))}: {size / 1000:.0f} kB"]), as_json=as_json)

@@ -1,0 +1,93 @@
+"""`fly --port`: the controller on a board flies the simulated drone."""
+
+from contextlib import AbstractContextManager, closing
+from functools import partial
+
+import typer
+
+from mambo_codegen import boards
+from mambo_codegen.bundle.digest import TICKS
+from mambo_codegen.errors import BuildError, echo
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.board.firmware.elf import FootprintError
+from mambo_sil.board.footprint.measure import measure_footprint
+from mambo_sil.board.pil.board_controller import BoardController
+from mambo_sil.board.pil.connection import Connection
+from mambo_sil.board.pil.pil_report import BoardFlightSummary, EmulatedCount, board_fields, board_text
+from mambo_sil.board.pil.port import open_port
+from mambo_sil.board.pil.timed import TimedController
+from mambo_sil.cli.flight import (
+    FLIGHT_FILES,
+    finish,
+    flight_of_options,
+    summary_fields,
+    write_flight,
+    written,
+)
+from mambo_sil.cli.options import FlyOptions, load
+from mambo_sil.cli.progress import progress_bar
+from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.controllers.build import build_library
+from mambo_sil.flight.controllers.compiled import digest_compiled
+from mambo_sil.flight.loop import fly as simulate
+from mambo_sil.results.folders import new_results
+
+EPISODES = 4
+"""Episodes of the self-test digest before the flight: a second on the slowest board."""
+
+
+def connect(port: str, baud: int, settings: Settings) -> AbstractContextManager[Connection]:
+    """Connect to the board at `port`, whose faults go to stderr; raises BoardError."""
+    say = partial(typer.echo, err=True)
+    return closing(Connection(port, partial(open_port, port, baud), settings, say=say))
+
+
+def fly_on_port(options: FlyOptions, port: str) -> None:
+    """Fly once with the controller on the board at `port`; exit 1 if the drone is lost or a bit differs.
+
+    Raises BoardError, and what `fly_once` raises.
+    """
+    if options.controller != "nmpc" or options.on is not None:
+        raise FlightError(f"--port {echo(port)} flies the C on a board: leave out --controller and --on")
+    settings, drone = load(options.source, options.scalar), vehicles.load(options.vehicle)
+    flight = flight_of_options(options, settings, drone)
+    library = build_library(settings, host_toolchain())
+    with new_results(options.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:
+        with connect(port, options.baud, settings) as board:
+            first_difference = board.test()
+            same_digest = board.digest(EPISODES) == digest_compiled(library, EPISODES)
+            controller = (TimedController if options.real_time else BoardController)(settings, board)
+            with progress_bar("flying") as progress:
+                trace = simulate(flight, controller, progress)
+        write_flight(trace, options, folder)
+        fields = summary_fields(options, settings, drone, flight, trace) | board_fields(board, controller)
+        fields |= _emulated(settings, board.greeting.board)
+        summary = BoardFlightSummary(
+            **fields
+            | {
+                "self_test_difference": first_difference,
+                "same_digest": same_digest,
+                "digest_steps": EPISODES * TICKS,
+                "same_bits_as_host": not (first_difference or controller.different) and same_digest,
+            }
+        )
+        summary.write(folder)
+    finish(summary, board_text(summary), options, written(options))
+
+
+def _emulated(settings: Settings, says: str) -> dict[str, object]:
+    """Return what is counted on the emulated core of the board that `says` names, for the summary."""
+    named = boards.called(says)
+    if not named:
+        return {}
+    try:
+        footprint = measure_footprint(settings, named[0])
+    except (BuildError, FootprintError) as error:
+        return {"not_emulated": str(error)}
+    counts = footprint.counts
+    if counts is None:
+        return {"not_emulated": footprint.uncounted}
+    count = EmulatedCount(board=named[0].name, least=counts.least, mean=counts.mean, most_met=counts.most_met)
+    return {"emulated": count}

@@ -1,0 +1,74 @@
+"""`fly --replay`: repeat a recorded flight, and record every iteration of the optimizer."""
+
+from pathlib import Path
+
+from mambo_codegen.design import Design
+from mambo_codegen.errors import echo
+from mambo_codegen.reference import reference_controller
+from mambo_sil.cli.flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
+from mambo_sil.cli.options import FlyOptions
+from mambo_sil.cli.progress import progress_bar
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.flight_report import ReplaySummary, flight_text, judge
+from mambo_sil.flight.loop import PositionController
+from mambo_sil.flight.loop import fly as simulate
+from mambo_sil.flight.scenario import Record, flight_of, read_record
+from mambo_sil.results.folders import new_results
+
+INNER_STEPS = "inner-steps.npz"
+ALLOWED = frozenset({"replay", "output", "pictures", "as_json"})
+"""Options allowed with --replay; the record contains all others."""
+
+
+def fly_again(options: FlyOptions, file: Path) -> None:
+    """Repeat the flight recorded in `file`, with the reference instead of the C.
+
+    Exits 1 if the drone crashes or is lost, or if a bit differs from the recorded flight.
+
+    Raises FlightError and ScenarioError.
+    """
+    context = options.context
+    for name in context.params.keys() - ALLOWED:
+        given = context.get_parameter_source(name)
+        if given is not None and given.name == "COMMANDLINE":
+            option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
+            raise FlightError(f"--replay {echo(str(file))} contains the whole flight: leave out {option}")
+    record = read_record(file)
+    flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
+    watched, controller = _controllers(record)
+    files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
+    with new_results(options.output, ReplaySummary.command, files) as folder:
+        with progress_bar("replaying") as progress:
+            trace = simulate(flight, controller, progress)
+        write_trace(trace, folder)
+        if options.pictures:
+            draw_flight(trace, file.name, folder)
+        if watched is not None:
+            write_inner_steps(watched, folder / INNER_STEPS)
+        recorded = record.trace_sha256
+        summary = ReplaySummary(
+            replay=str(file),
+            same_bits_as_recorded=None if recorded is None else trace.digest() == recorded,
+            same_bits_as_host=None,
+            controller=record.controller,
+            scenario=record.scenario,
+            settings=record.settings.digest,
+            **judge(trace, record.settings, record.scenario.vehicle),
+        )
+        summary.write(folder)
+    written = FLIGHT_FILES if options.pictures else TRACE_FILES
+    finish(summary, flight_text(summary), options, written if watched is None else (*written, INNER_STEPS))
+
+
+def _controllers(record: Record) -> tuple[WatchedController | None, PositionController]:
+    """Return the one that records its iterations, None if it has none, and the one that flies."""
+    match record.controller:
+        case "pd" | "pd-feedforward":
+            return None, pd_controller(record.controller)
+        case _ if record.settings.cost.norm == "quadratic":
+            return None, reference_controller(Design(record.settings))
+        case _:
+            watched = WatchedController(record.settings)
+            return watched, watched

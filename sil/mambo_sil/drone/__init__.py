@@ -1,0 +1,1 @@
+"""The simulated drone: vehicles as data, plant, sensors."""

@@ -1,0 +1,96 @@
+"""Disturbances of a flight: wind with gusts, battery sag, payload and push."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
+from mambo_sil.drone.plant.gusts import Gusts
+from mambo_sil.drone.plant.vehicle import Moment, Vehicle, VehicleState
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbances:
+    """Disturbances of n flights; all are off by default.
+
+    Every field is one value for all flights or an array (n,). Event times are on the trajectory's clock.
+    """
+
+    wind_speed_m_s: PerFlight = 0.0
+    """Mean wind 20 ft above the ground (W20 of `gusts`); 0 is still air."""
+    wind_direction_rad: PerFlight = 0.0
+    """Heading towards which the air moves: 0 north, pi/2 east."""
+    battery_sag_1_s: PerFlight = 0.0
+    """Share of the fresh battery's thrust lost per second since the start of the flight."""
+    payload_kg: PerFlight = 0.0
+    """Mass added at the centre of the drone at `payload_time_s`; a negative mass is dropped."""
+    payload_time_s: PerFlight = 0.0
+    push_n_s: tuple[PerFlight, PerFlight, PerFlight] = (0.0, 0.0, 0.0)
+    """Impulse in the world frame (NED), applied in one instant at `push_time_s`."""
+    push_time_s: PerFlight = 0.0
+
+    @property
+    def windy(self) -> bool:
+        """Whether any flight has wind."""
+        return bool(np.any(self.wind_speed_m_s))
+
+    @cached_property
+    def pushing(self) -> bool:
+        """Whether any flight is pushed."""
+        return any(bool(np.any(component)) for component in self.push_n_s)
+
+    @cached_property
+    def any(self) -> bool:
+        """Whether any disturbance is on in any flight."""
+        return (
+            self.windy or self.pushing or bool(np.any(self.battery_sag_1_s)) or bool(np.any(self.payload_kg))
+        )
+
+
+class World:
+    """Evaluates the disturbances of n flights, one tick after the other."""
+
+    def __init__(
+        self, disturbances: Disturbances, vehicle: Vehicle, seeds: Sequence[int], height_m: float
+    ) -> None:
+        self._disturbances, self._vehicle = disturbances, vehicle
+        self._step_s = vehicle.drone.step_s
+        self._ticks = 0
+        self._gusts = None
+        if disturbances.windy:
+            self._gusts = Gusts(
+                disturbances.wind_speed_m_s,
+                disturbances.wind_direction_rad,
+                seeds,
+                height_m=height_m,
+                step_s=self._step_s,
+            )
+
+    def tick(self, state: VehicleState, time_s: float) -> tuple[VehicleState, Moment | None]:
+        """Return the state after any push due at `time_s`, and thrust, payload and wind of this tick.
+
+        `time_s` is on the trajectory's clock. Without disturbances the second value is None.
+        """
+        disturbances = self._disturbances
+        if not disturbances.any:
+            return state, None
+        step_s = self._step_s
+        flown_s, now = step_s * self._ticks, round(time_s / step_s)
+        self._ticks += 1
+        loaded = np.rint(np.asarray(disturbances.payload_time_s) / step_s) <= now
+        payload_kg: FloatArray = np.asarray(disturbances.payload_kg, np.float64) * loaded
+        due = np.rint(np.asarray(disturbances.push_time_s) / step_s) == now
+        if disturbances.pushing and due.any():
+            flights = state.body.shape[1]
+            impulse_n_s = np.stack(
+                [np.broadcast_to(component * due, flights) for component in disturbances.push_n_s]
+            )
+            state = self._vehicle.apply_push(state, impulse_n_s, payload_kg)
+        moment = Moment(
+            thrust_share=np.maximum(1.0 - disturbances.battery_sag_1_s * flown_s, 0.0),
+            payload_kg=payload_kg,
+            air_m_s=None if self._gusts is None else self._gusts.next(),
+        )
+        return state, moment

@@ -1,0 +1,141 @@
+"""A drone of whose code nothing is known: gain, lag and dead time of each angle, as a log shows them.
+
+    angle(t) follows gain x command(t - dead time) with a first-order lag, yaw its reference
+    horizontal acceleration = k x that of the thrust at these angles - drag (v - air) + wind
+    vertical acceleration = g - that of the thrust
+
+with k the acceleration per tilt: the angles are those that the drone reports, and its thrust need not point
+along them. The thrust is the demanded one. The angles are solved in closed form, the motion is integrated.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
+from mambo_sil.drone.plant.elementary import exponential, sine_cosine
+from mambo_sil.drone.plant.integrator import NODES, bogacki_shampine
+from mambo_sil.drone.plant.rigid_body import EULER, POSITION, RATES, VELOCITY, to_body, to_world
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.sections import FirstOrderAttitude, Response
+
+
+@dataclass(frozen=True, eq=False)
+class Decay:
+    """How one angle follows its command within a tick, in which the command that acts changes once.
+
+    `late_ticks` is the number of whole ticks in the dead time; the command before acts in the rest of it.
+    `before` and `after` are the shares of the error that remain while each of the two acts, at the second and
+    third node of the integrator and at the end of the tick (3,).
+    """
+
+    late_ticks: int
+    before: FloatArray
+    after: FloatArray
+
+
+def decay_of(response: Response, step_s: float) -> Decay:
+    """Return how an angle with this response follows its command."""
+    late_ticks = math.floor(response.dead_time_s / step_s + 1e-9)
+    rest_s = max(response.dead_time_s - late_ticks * step_s, 0.0)
+    nodes_s = step_s * np.append(NODES[1:], 1.0)
+    before = exponential(-np.minimum(nodes_s, rest_s) / response.lag_s)
+    after = exponential(-np.maximum(nodes_s - rest_s, 0.0) / response.lag_s)
+    return Decay(late_ticks, before, after)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Forces on n drones during one tick, each one value or (n,)."""
+
+    thrust_acceleration_m_s2: PerFlight
+    drag_1_s: PerFlight
+    wind_m_s2: tuple[PerFlight, PerFlight]
+    air_m_s: tuple[PerFlight, PerFlight]
+
+
+class FirstOrderDrone:
+    """The drone as a whole; its memory is the commands of the last ticks, the latest first, in pairs."""
+
+    def __init__(self, drone: VehicleFile, attitude: FirstOrderAttitude) -> None:
+        self._step_s, self._attitude = drone.step_s, attitude
+        self._responses = attitude.roll, attitude.pitch
+        self.decays = tuple(decay_of(response, drone.step_s) for response in self._responses)
+        nodes_s = drone.step_s * np.append(NODES[1:], 1.0)
+        self.yaw_decay = exponential(-nodes_s / attitude.yaw_lag_s)
+        self.rows = 2 * (max(decay.late_ticks for decay in self.decays) + 2)
+
+    def advance(
+        self,
+        body: FloatArray,
+        memory: FloatArray,
+        command_rad: FloatArray,
+        yaw_reference_rad: PerFlight,
+        around: Surroundings,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the state (12, n), with the rows of the rigid body, and the memory one tick later."""
+        memory = np.concatenate([command_rad, memory[:-2]])
+        nodes, slopes = self._angles(body[EULER], memory, yaw_reference_rad)
+        push_m_s2 = [self._push(angles, around) for angles in (body[EULER], nodes[0], nodes[1])]
+
+        def derivative(motion: FloatArray, push: FloatArray) -> FloatArray:
+            rate = np.empty_like(motion)
+            rate[:3] = motion[3:]
+            for axis in range(2):
+                drag = around.drag_1_s * (motion[3 + axis] - around.air_m_s[axis])
+                rate[3 + axis] = push[axis] - drag
+            rate[5] = push[2]
+            return rate
+
+        sines, cosines = sine_cosine(body[EULER])
+        motion = np.concatenate([body[POSITION], to_world(sines, cosines, body[VELOCITY])])
+        motion = bogacki_shampine(
+            derivative, motion, (push_m_s2[0], push_m_s2[1], push_m_s2[2]), self._step_s
+        )
+        after = np.empty_like(body)
+        after[POSITION] = motion[:3]
+        after[EULER] = nodes[2]
+        after[VELOCITY] = to_body(nodes[2], motion[3:])
+        after[RATES] = _body_rates(nodes[2], slopes)
+        return after, memory
+
+    def _angles(
+        self, start_rad: FloatArray, memory: FloatArray, yaw_reference_rad: PerFlight
+    ) -> tuple[list[FloatArray], FloatArray]:
+        """Return the angles (3, n) at the later nodes and the end, and their rates of change (3, n) there."""
+        nodes = [np.empty_like(start_rad) for _ in range(3)]
+        slopes = np.empty_like(start_rad)
+        for axis, (response, decay) in enumerate(zip(self._responses, self.decays, strict=True)):
+            newest = 2 * decay.late_ticks + axis
+            now, before = response.gain * memory[newest], response.gain * memory[newest + 2]
+            for node, angles in enumerate(nodes):
+                turned = before + (start_rad[axis] - before) * decay.before[node]
+                angles[axis] = now + (turned - now) * decay.after[node]
+            slopes[axis] = (now - nodes[2][axis]) / response.lag_s
+        for node, angles in enumerate(nodes):
+            angles[2] = yaw_reference_rad + (start_rad[2] - yaw_reference_rad) * self.yaw_decay[node]
+        slopes[2] = (yaw_reference_rad - nodes[2][2]) / self._attitude.yaw_lag_s
+        return nodes, slopes
+
+    def _push(self, angles_rad: FloatArray, around: Surroundings) -> FloatArray:
+        """Return the acceleration (3, n) in the world by thrust, wind and gravity."""
+        thrust = np.zeros_like(angles_rad)
+        thrust[2] = -around.thrust_acceleration_m_s2
+        push = to_world(*sine_cosine(angles_rad), thrust)
+        for axis in range(2):
+            push[axis] = self._attitude.acceleration_per_tilt_g * push[axis] + around.wind_m_s2[axis]
+        push[2] = push[2] + GRAVITY_M_S2
+        return push
+
+
+def _body_rates(angles_rad: FloatArray, slopes_rad_s: FloatArray) -> FloatArray:
+    """Return the body rates (3, n) of drones whose angles change at these rates: eqs 4, 5 solved for them."""
+    (sin_roll, sin_pitch, _), (cos_roll, cos_pitch, _) = sine_cosine(angles_rad)
+    roll, pitch, yaw = slopes_rad_s
+    rates = np.empty_like(angles_rad)
+    rates[0] = roll - sin_pitch * yaw
+    rates[1] = cos_roll * pitch + sin_roll * (cos_pitch * yaw)
+    rates[2] = cos_roll * (cos_pitch * yaw) - sin_roll * pitch
+    return rates

@@ -1,0 +1,208 @@
+"""The drone: inner loops, rotors and rigid body, advanced by one tick at a time."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from mambo_sil.drone.plant.airframe import MAMBO, NOMINAL, Airframe, airframe_of
+from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
+from mambo_sil.drone.plant.cascade import CascadeLoop
+from mambo_sil.drone.plant.elementary import sine_cosine
+from mambo_sil.drone.plant.first_order import FirstOrderDrone, Surroundings
+from mambo_sil.drone.plant.integrator import NODES, bogacki_shampine
+from mambo_sil.drone.plant.loops import Demand, MotorLoop, StockLoop
+from mambo_sil.drone.plant.rigid_body import (
+    EULER,
+    POSITION,
+    RATES,
+    STATE_ROWS,
+    VELOCITY,
+    RigidBody,
+    SineCosine,
+    to_body,
+    to_world,
+)
+from mambo_sil.drone.plant.rotors import Rotors
+from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
+
+STEP_S: Final = NOMINAL.step_s
+"""The Mambo's tick: integration step and period of its inner loops; motor commands are held over it."""
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleState:
+    """State of n drones."""
+
+    body: FloatArray
+    """State of the rigid body (12, n), rows as in `rigid_body`."""
+    rotor_speed_rad_s: FloatArray
+    """(4, n)."""
+    memory: FloatArray
+    """What the attitude loop keeps from tick to tick (its rows, n); the stock loop: its integrals (2, n)."""
+
+    @cached_property
+    def sine_cosine(self) -> SineCosine:
+        """Sines and cosines of roll, pitch, yaw, each (3, n)."""
+        return sine_cosine(self.body[EULER])
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The state as the controllers receive it, true or estimated.
+
+    Every field is (3, n); position and velocity are in the world frame.
+    """
+
+    position_m: FloatArray
+    velocity_m_s: FloatArray
+    euler_rad: FloatArray
+    rates_rad_s: FloatArray
+
+
+def truth(state: VehicleState) -> Seen:
+    """Return the true state in the form that controllers receive."""
+    body = state.body
+    velocity_m_s = to_world(*state.sine_cosine, body[VELOCITY])
+    return Seen(body[POSITION], velocity_m_s, body[EULER], body[RATES])
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Battery, payload and wind during one tick; the default is undisturbed."""
+
+    thrust_share: PerFlight = 1.0
+    """Rotor thrust and torque, relative to a fresh battery."""
+    payload_kg: PerFlight = 0.0
+    air_m_s: tuple[PerFlight, PerFlight] | None = None
+    """Air velocity along x and y of the world; None is still air."""
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """The simulated drone: what differs between flights, and the drone whose inner loops and mixer it has."""
+
+    airframe: Airframe = MAMBO
+    motor_lag_s: PerFlight = NOMINAL.motor_lag_s
+    drag_1_s: PerFlight = NOMINAL.body.drag_1_s
+    wind_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    drone: VehicleFile = NOMINAL
+
+    @classmethod
+    def of(cls, drone: VehicleFile) -> "Vehicle":
+        """Return a drone as it is described."""
+        return cls(airframe_of(drone), drone.motor_lag_s, drone.body.drag_1_s, drone=drone)
+
+    @classmethod
+    def from_preset(cls, name: str) -> "Vehicle":
+        """Return a shipped drone; raises SourceNotFoundError."""
+        return cls.of(presets.preset(name))
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> "Vehicle":
+        """Return the drone of a vehicle.toml.
+
+        Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
+        """
+        return cls.of(presets.read(Path(path)))
+
+    @cached_property
+    def loop(self) -> MotorLoop | FirstOrderDrone:
+        """The attitude loop, or the whole drone if its loop is not known."""
+        match self.drone.attitude:
+            case MamboAttitude() as attitude:
+                return StockLoop(self.drone, attitude)
+            case CascadeAttitude() as attitude:
+                return CascadeLoop(self.drone, attitude)
+            case FirstOrderAttitude() as attitude:
+                return FirstOrderDrone(self.drone, attitude)
+
+    @cached_property
+    def rotors(self) -> Rotors:
+        """The rotors of this drone."""
+        return Rotors(self.airframe, self.motor_lag_s)
+
+    @cached_property
+    def rigid_body(self) -> RigidBody:
+        """The rigid body of this drone, without payload and in still air."""
+        return RigidBody(self.airframe.mass_kg, self.airframe.inertia_kg_m2, self.drag_1_s, self.wind_m_s2)
+
+    @cached_property
+    def rotor_decay(self) -> FloatArray:
+        """Share of a rotor speed error that remains at the nodes and at the end of a step (4, 1, n or 1)."""
+        return self.rotors.decay(self.drone.step_s * np.append(NODES, 1.0))
+
+    def at_rest(self, position_m: FloatArray, yaw_rad: PerFlight, motor_command: PerFlight) -> VehicleState:
+        """Return n drones level and at rest at positions (3, n), their rotors steady at a motor command."""
+        flights = position_m.shape[1]
+        body = np.zeros((STATE_ROWS, flights))
+        body[POSITION] = position_m
+        body[8] = yaw_rad
+        commands = np.broadcast_to(motor_command, (4, flights))
+        speed = self.rotors.commanded_speed_rad_s(commands)
+        return VehicleState(body, speed, np.zeros((self.loop.rows, flights)))
+
+    def apply_push(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
+        """Return the state right after an impulse (3, n) in the world frame."""
+        body = state.body.copy()
+        change_m_s = to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
+        body[VELOCITY] = np.where(impulse_n_s.any(axis=0), body[VELOCITY] + change_m_s, body[VELOCITY])
+        return replace(state, body=body)
+
+    def step(
+        self,
+        state: VehicleState,
+        command_rad: FloatArray,
+        thrust_n: FloatArray,
+        yaw_reference_rad: PerFlight,
+        *,
+        seen: Seen,
+        moment: Moment | None = None,
+    ) -> VehicleState:
+        """Return the state one tick later.
+
+        `command_rad` (2, n) is roll and pitch, `thrust_n` (n,) the demanded total thrust. The inner loops
+        receive `seen`.
+        """
+        loop = self.loop
+        if isinstance(loop, FirstOrderDrone):
+            around = self._surroundings(thrust_n, moment or Moment())
+            body, memory = loop.advance(state.body, state.memory, command_rad, yaw_reference_rad, around)
+            return VehicleState(body, state.rotor_speed_rad_s, memory)
+        demand = Demand(command_rad, yaw_reference_rad, thrust_n, seen.euler_rad, seen.rates_rad_s)
+        motor_command, memory = loop.command_motors(demand, state.memory)
+        return VehicleState(*self.integrate(state, motor_command, moment), memory)
+
+    def _surroundings(self, thrust_n: FloatArray, moment: Moment) -> Surroundings:
+        """Return the forces on drones whose thrust is the demanded one (n,)."""
+        share = moment.thrust_share * self.airframe.thrust_factor_n_s2
+        mass_kg = self.airframe.mass_kg + moment.payload_kg
+        return Surroundings(
+            share * np.maximum(thrust_n, 0.0) / mass_kg,
+            self.drag_1_s,
+            self.wind_m_s2,
+            moment.air_m_s or (0.0, 0.0),
+        )
+
+    def integrate(
+        self, state: VehicleState, motor_command: FloatArray, moment: Moment | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return rigid-body state (12, n) and rotor speeds (4, n) after a tick of held commands (4, n)."""
+        steady = self.rotors.commanded_speed_rad_s(motor_command)
+        speeds = steady + (state.rotor_speed_rad_s - steady) * self.rotor_decay
+        wrenches = self.rotors.wrench(speeds[:3])
+        body = self.rigid_body
+        if moment is not None:
+            wrenches = moment.thrust_share * wrenches
+            mass_kg = self.airframe.mass_kg + moment.payload_kg
+            body = replace(body, mass_kg=mass_kg, air_m_s=moment.air_m_s)
+        inputs = (wrenches[:, 0], wrenches[:, 1], wrenches[:, 2])
+
+        def derivative(stage: FloatArray, wrench: FloatArray) -> FloatArray:
+            return body.derivative(stage, wrench, state.sine_cosine if stage is state.body else None)
+
+        return bogacki_shampine(derivative, state.body, inputs, self.drone.step_s), speeds[3]

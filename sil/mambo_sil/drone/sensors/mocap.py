@@ -1,0 +1,83 @@
+"""Motion capture of n flights: late, noisy positions at a fixed rate, and the drone's own attitude.
+
+The velocity is the difference quotient of successive positions behind a first-order low-pass. Position and
+velocity are held between positions; attitude, with noise, and body rates are those of every tick.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
+from mambo_sil.drone.plant.elementary import exponential
+from mambo_sil.drone.plant.randomness import Draws, Purpose
+from mambo_sil.drone.plant.vehicle import Seen
+from mambo_sil.drone.vehicles.sections import MocapSensors
+
+NOISES: Final = 6
+"""Random numbers of a tick: position x, y, z, roll, pitch, yaw."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionCapture:
+    """Parameters of the motion capture of n flights."""
+
+    figures: MocapSensors
+    noise_scale: PerFlight = 1.0
+    """Factor on the standard deviation of all noise, one value for all or an array (n,); 0 is noise-free."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How positions are sampled and filtered, in ticks."""
+
+    period_ticks: int
+    delay_ticks: int
+    period_s: float
+    share: float
+    """Share of the difference between quotient and velocity by which a new position changes the velocity."""
+
+
+def sampling(figures: MocapSensors, step_s: float) -> Sampling:
+    """Return how positions are sampled with ticks of `step_s`; the delay is the nearest number of ticks."""
+    period_s = 1.0 / figures.position_rate_hz
+    filter_s = figures.velocity_filter_s
+    share = 1.0 - float(exponential(-period_s / filter_s)) if filter_s > 0.0 else 1.0
+    return Sampling(round(period_s / step_s), round(figures.position_delay_s / step_s), period_s, share)
+
+
+def mocap_deviations(capture: MotionCapture, flights: int) -> FloatArray:
+    """Return the standard deviations of the noise (6, n), in the order of `NOISES`."""
+    figures = capture.figures
+    deviations = np.array([[figures.position_noise_m]] * 3 + [[figures.attitude_noise_rad]] * 3)
+    return np.asarray(deviations * np.broadcast_to(np.asarray(capture.noise_scale, np.float64), flights))
+
+
+class MocapSuite:
+    """The motion capture of n flights; call `estimate` once per tick. It starts from the true state."""
+
+    def __init__(self, capture: MotionCapture, seeds: Sequence[int], start: Seen, step_s: float) -> None:
+        self._sampling = sampling(capture.figures, step_s)
+        self._noise = mocap_deviations(capture, len(seeds))
+        self._draws = Draws(seeds, Purpose.SENSORS, NOISES)
+        self._late_m = [start.position_m] * self._sampling.delay_ticks
+        self._position_m = start.position_m
+        self._velocity_m_s = start.velocity_m_s
+        self._tick = 0
+
+    def estimate(self, true: Seen) -> Seen:
+        """Return what the controllers receive at this tick."""
+        noise = self._noise * self._draws.next()
+        self._late_m.append(true.position_m)
+        arriving_m = self._late_m.pop(0)
+        if self._tick % self._sampling.period_ticks == 0:
+            position_m = arriving_m + noise[:3]
+            if self._tick > 0:
+                quotient = (position_m - self._position_m) / self._sampling.period_s
+                change = self._sampling.share * (quotient - self._velocity_m_s)
+                self._velocity_m_s = self._velocity_m_s + change
+            self._position_m = position_m
+        self._tick += 1
+        return Seen(self._position_m, self._velocity_m_s, true.euler_rad + noise[3:], true.rates_rad_s)

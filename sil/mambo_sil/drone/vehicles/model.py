@@ -1,0 +1,180 @@
+"""A drone as data: the content of a vehicle.toml, the rules between its sections, and its JSON schema."""
+
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any, Final, Self, get_args
+
+from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.key import Form, Key, key_of, spell
+from mambo_sil.drone.vehicles.sections import (
+    AltitudeGains,
+    AnyAttitude,
+    AnySensors,
+    Body,
+    FirstOrderAttitude,
+    MamboSensors,
+    MocapSensors,
+    NoSensors,
+    RotorFigures,
+    VehicleSection,
+)
+
+SENSORS_HZ: Final = 200
+"""Rate at which the Mambo's sensors and estimators run."""
+
+KINDS: Final = frozenset({"attitude", "sensors"})
+"""Sections whose key `kind` decides which others they have."""
+
+_INERTIA: Final = ("inertia_x_kg_m2", "inertia_y_kg_m2", "inertia_z_kg_m2")
+
+
+class VehicleFile(VehicleSection):
+    """A drone (vehicle.toml): body, rotors, inner loops and sensors; its name is the stem of its file."""
+
+    name: str = Field(description="The stem of the file.")
+    body: Body = Field(description="Mass, inertia and drag.")
+    rotors: RotorFigures | None = Field(None, description="Four equal rotors in X configuration.")
+    attitude: AnyAttitude = Field(description="The attitude loop, with yaw.")
+    altitude: AltitudeGains = Field(description="The altitude loop.")
+    sensors: AnySensors = Field(NoSensors(), description="The sensors that --sensors switches on.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_altitude(cls, document: Any) -> Any:
+        """Give a drone without an altitude loop one of 10 1/s^2 and 5 1/s, and twice its weight of thrust."""
+        if not isinstance(document, Mapping) or "altitude" in document:
+            return document
+        body = document.get("body")
+        mass_kg = body.get("mass_kg") if isinstance(body, Mapping) else None
+        if not isinstance(mass_kg, int | float) or not 0.0 < mass_kg < 1e6:
+            mass_kg = 1.0  # the fault of the mass is reported
+        thrust_max_n = 2.0 * mass_kg * GRAVITY_M_S2
+        gains = {"p_n_m": 10.0 * mass_kg, "d_n_s_m": 5.0 * mass_kg, "thrust_max_n": thrust_max_n}
+        return {**document, "altitude": gains}
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        faults = [*self._missing(), *self._broken_rules()]
+        if faults:
+            raise ValidationError.from_exception_data("VehicleFile", faults)
+        return self
+
+    def _missing(self) -> Iterator[InitErrorDetails]:
+        """Yield the keys that this kind of attitude loop needs, besides its own."""
+        if not isinstance(self.attitude, FirstOrderAttitude):
+            for key in _INERTIA:
+                if getattr(self.body, key) is None:
+                    yield InitErrorDetails(type="missing", loc=("body", key), input={})
+            if self.rotors is None:
+                yield InitErrorDetails(type="missing", loc=("rotors",), input={})
+
+    def _broken_rules(self) -> Iterator[InitErrorDetails]:
+        """Yield the faults of keys that depend on others."""
+        kind = f"attitude.kind = {spell(self.attitude.kind)}"
+        if isinstance(self.attitude, FirstOrderAttitude):
+            for key in _INERTIA:
+                if getattr(self.body, key) is not None:
+                    yield self._fault("body", key, f"must be left out: {kind} has no torques")
+            if self.rotors is not None:
+                yield self._fault("attitude", "kind", "has no rotors: leave out [rotors]")
+        if self.rotors is not None and self.rotors.command_min >= self.rotors.command_max:
+            least = f"{self.rotors.command_min:g} (rotors.command_min)"
+            yield self._fault("rotors", "command_max", f"must be more than {least}")
+        if self.altitude.thrust_max_n <= self.weight_n:
+            weight = f"{self.weight_n:.4g}, the weight of body.mass_kg"
+            yield self._fault("altitude", "thrust_max_n", f"must be more than {weight}")
+        rate_hz = self.attitude.rate_hz
+        if isinstance(self.sensors, MocapSensors) and rate_hz % self.sensors.position_rate_hz != 0:
+            yield self._fault(
+                "sensors", "position_rate_hz", f"must be a divisor of {rate_hz} (attitude.rate_hz)"
+            )
+        if isinstance(self.sensors, MamboSensors) and rate_hz != SENSORS_HZ:
+            rule = f"needs attitude.rate_hz = {SENSORS_HZ}, at which its estimators run"
+            yield self._fault("sensors", "kind", rule)
+
+    def _fault(self, section: str, key: str, rule: str) -> InitErrorDetails:
+        found = getattr(self, section)
+        return InitErrorDetails(
+            type=PydanticCustomError("vehicle", "{rule}", {"rule": rule}),
+            loc=(section, found.kind, key) if section in KINDS else (section, key),
+            input=getattr(found, key),
+        )
+
+    @property
+    def weight_n(self) -> float:
+        """The weight, which the altitude loop adds to its demand."""
+        return float(self.body.mass_kg * GRAVITY_M_S2)
+
+    @property
+    def inertia_kg_m2(self) -> tuple[float, float, float]:
+        """Moments of inertia about the body axes; ones for a drone without torques."""
+        x, y, z = (getattr(self.body, key) for key in _INERTIA)
+        return (1.0, 1.0, 1.0) if x is None else (x, y, z)
+
+    @property
+    def motor_lag_s(self) -> float:
+        """Time constant of the rotors; 0 for a drone without."""
+        return 0.0 if self.rotors is None else self.rotors.lag_s
+
+    @property
+    def step_s(self) -> float:
+        """Period of the inner loops and of the simulation: a tick."""
+        return 1.0 / self.attitude.rate_hz
+
+    @classmethod
+    def json_schema(cls) -> dict[str, Any]:
+        """Return the JSON schema (draft 2020-12) of vehicle.toml, for editors."""
+        schema = cls.model_json_schema()
+        del schema["properties"]["name"]
+        optional = ("name", "altitude")
+        schema["required"] = [key for key in schema["required"] if key not in optional]
+        return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+@lru_cache
+def form(attitude: str, sensors: str) -> Form:
+    """Return what messages on a file with these kinds of attitude loop and sensors need."""
+    sections: dict[str, str] = {}
+    keys: dict[str, Key] = {}
+    for name, field in VehicleFile.model_fields.items():
+        if name == "name":
+            continue
+        kinds = _models(field.annotation)
+        chosen = {"attitude": attitude, "sensors": sensors}.get(name)
+        model = next((one for one in kinds if _kind_of(one) == chosen), kinds[0])
+        _collect(name, field.description or "", model, sections, keys)
+        if name in KINDS:
+            choices: dict[str, Any] = {"enum": [_kind_of(one) for one in kinds]}
+            keys[f"{name}.kind"] = key_of(
+                f"{name}.kind", choices | {"description": "decides which other keys the section has"}
+            )
+    return Form(sections, keys, KINDS)
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    """Return the models in an annotation: one, or those of a union."""
+    members = get_args(annotation) or (annotation,)
+    return [one for one in members if isinstance(one, type) and issubclass(one, BaseModel)]
+
+
+def _kind_of(model: type[BaseModel]) -> str | None:
+    """Return the kind of which a model is; None for a section of one kind."""
+    field = model.model_fields.get("kind")
+    return None if field is None else str(get_args(field.annotation)[0])
+
+
+def _collect(
+    path: str, description: str, model: type[BaseModel], sections: dict[str, str], keys: dict[str, Key]
+) -> None:
+    """Add the section at `path`, the sections in it, and all their keys."""
+    sections[path] = description
+    schemas = model.model_json_schema()["properties"]
+    for name, field in model.model_fields.items():
+        below, schema = f"{path}.{name}", schemas[name]
+        if inner := _models(field.annotation):
+            _collect(below, field.description or "", inner[0], sections, keys)
+        else:
+            keys[below] = key_of(below, schema.get("anyOf", [schema])[0] | {"description": field.description})

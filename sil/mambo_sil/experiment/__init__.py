@@ -1,0 +1,1 @@
+"""Many flights: campaigns, suites, faults, Table II, two controllers compared."""

@@ -1,0 +1,352 @@
+"""Read campaign.toml: distributions of the parameters, flight and controllers.
+
+A message names file, key, value, rule and fix; all errors of a file are reported together.
+"""
+
+import difflib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, TypeVar, get_args
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+    create_model,
+    field_validator,
+)
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, echo, echo_value
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.toml_file import parse_document, read_text
+from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.errors import FlightError
+from mambo_sil.experiment.campaign.distributions import Distribution, parse
+from mambo_sil.experiment.campaign.parameters import (
+    OF_THE_CURVE,
+    PARAMETERS,
+    Draw,
+    defaults_of,
+    draw,
+    scenario_values,
+)
+from mambo_sil.flight.names import PD_NAMES, SENSORS_OF, PdName, SensorsName, Start
+from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
+
+_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_LONGEST_LIST: Final = 10
+
+
+class FileSection(BaseModel):
+    """A frozen section of a file that rejects unknown keys, conversions of type, infinity and NaN."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+File = TypeVar("File", bound=FileSection)
+
+
+def _checked(name: str) -> PlainValidator:
+    """Return what checks the distribution of a parameter."""
+
+    def validate(value: Any) -> Distribution:
+        try:
+            return parse(value, PARAMETERS[name].domain)
+        except ValueError as error:
+            raise PydanticCustomError("draw", "{rule}", {"rule": str(error)}) from None
+
+    return PlainValidator(validate)
+
+
+_WRITTEN: Final = PlainSerializer(Distribution.document)
+
+
+class FlightSection(FileSection):
+    """Keys that all flights share, and the distributions of what they follow."""
+
+    trajectory: Annotated[Distribution, _checked("trajectory"), _WRITTEN] = PARAMETERS["trajectory"]
+    size_m: Annotated[Distribution, _checked("size_m"), _WRITTEN] = PARAMETERS["size_m"]
+    rate_rad_s: Annotated[Distribution, _checked("rate_rad_s"), _WRITTEN] = PARAMETERS["rate_rad_s"]
+    duration_s: float = Field(100.0, ge=1, le=3600)
+    start: Start = "hover"
+    vehicle: str = vehicles.DEFAULT
+    """A shipped drone, or its vehicle.toml."""
+    sensors: SensorsName | None = None
+    """None: the vehicle's own."""
+
+
+_DRAWN: Final[dict[str, Any]] = {
+    name: (Annotated[Distribution, _checked(name), _WRITTEN], default)
+    for name, default in PARAMETERS.items()
+    if name not in OF_THE_CURVE
+}
+Draws: Any = create_model("Draws", __base__=FileSection, **_DRAWN)
+
+
+def distributions(flight: FlightSection, draws: FileSection) -> dict[str, Distribution]:
+    """Return the distribution of every parameter from the sections [flight] and [draws]."""
+    return dict(draws) | {name: getattr(flight, name) for name in OF_THE_CURVE}
+
+
+class CampaignFile(FileSection):
+    """The keys of campaign.toml; a missing key has its value in the default campaign."""
+
+    seed: int = Field(0, ge=0, le=2**63 - 1)
+    controllers: tuple[str, ...] = Field(("pd", "pd-feedforward", "mambo"), strict=False)
+    flight: FlightSection = FlightSection()
+    draws: Draws = Draws()
+
+    @field_validator("controllers")
+    @classmethod
+    def _check_count(cls, controllers: tuple[str, ...]) -> tuple[str, ...]:
+        if not 1 <= len(controllers) <= _LONGEST_LIST:
+            raise PydanticCustomError(
+                "controllers", f'must name 1 to {_LONGEST_LIST} controllers, as in ["pd", "mambo"]'
+            )
+        return controllers
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """One controller of a campaign: a PD, or generated C."""
+
+    name: str
+    kind: Literal[PdName, "nmpc"]
+    settings: Settings
+    """A PD uses their update period only."""
+
+    def document(self) -> dict[str, Any]:
+        """Return the controller as plain values, for other processes and for files."""
+        return {"name": self.name, "kind": self.kind, "settings": self.settings.model_dump()}
+
+    @classmethod
+    def from_document(cls, document: dict[str, Any]) -> "Entrant":
+        """Return the controller that `document` describes."""
+        return cls(document["name"], document["kind"], Settings.model_validate(document["settings"]))
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign; the other controllers are compared with the first one."""
+
+    file: CampaignFile
+    entrants: tuple[Entrant, ...]
+    drone: VehicleFile
+
+    @property
+    def flight(self) -> dict[str, Any]:
+        """The section [flight] as plain values, with all of the drone."""
+        return self.file.flight.model_dump() | {"vehicle": self.drone.model_dump()}
+
+    def draw(self, flight: int) -> Draw:
+        """Return seed and parameters of flight number `flight`."""
+        return draw(self.file.seed, flight, distributions(self.file.flight, self.file.draws))
+
+    def document(self) -> dict[str, Any]:
+        """Return everything that determines the result, as plain values."""
+        document: dict[str, Any] = self.file.model_dump(mode="json")
+        controllers = [entrant.document() for entrant in self.entrants]
+        return document | {"controllers": controllers, "vehicle": self.drone.model_dump()}
+
+
+def scenario(flight: dict[str, Any], drawn: Draw) -> Scenario:
+    """Return one flight from `Campaign.flight` and from its draws."""
+    drone = VehicleFile.model_validate(flight["vehicle"])
+    return Scenario.model_validate(flight | scenario_values(drawn, drone) | {"vehicle": drone})
+
+
+def default(vehicle: str | None = None) -> Campaign:
+    """Return the default campaign, with another drone if one is named."""
+    return _campaign(CampaignFile(), Path(), "the default campaign", vehicle)
+
+
+def read(path: Path, vehicle: str | None = None) -> Campaign:
+    """Read a campaign.toml; paths of controllers and drone are relative to its folder.
+
+    `vehicle` replaces the drone and, where it has not the sensors of the file, these by its own.
+
+    Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors of
+    the file and of its controllers' files.
+    """
+    source = echo(str(path))
+    return _campaign(read_as(CampaignFile, path), path.parent, source, vehicle)
+
+
+def read_as(model: type[File], path: Path) -> File:
+    """Read the file at `path` as a `model` with sections like those of campaign.toml.
+
+    Raises UnreadableFileError for a file that is missing or not TOML, InvalidSettingsError with all errors.
+    """
+    source = echo(str(path))
+    document = parse_document(read_text(path), source)
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        details = error.errors(include_url=False, include_context=False)
+        raise InvalidSettingsError(tuple(f"{source}: {_explain(one, model)}" for one in details)) from None
+
+
+def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None) -> Campaign:
+    """Load drone and controllers and check that each can be simulated."""
+    file, drone = load_its_drone(file, folder, source, vehicle)
+    entrants = tuple(load_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
+    names = [entrant.name for entrant in entrants]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidSettingsError(
+                (f"{source}: controllers: two are called {name}; give their files different names",)
+            )
+    campaign = Campaign(file, entrants, drone)
+    for entrant, named in zip(entrants, file.controllers, strict=True):
+        demand_flyable(
+            entrant.settings, campaign.flight, campaign.draw(0), f"{source}: controllers: {echo(named)}"
+        )
+    return campaign
+
+
+def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, place: str) -> None:
+    """Raise InvalidSettingsError, which begins with `place`, if a drawn flight cannot be simulated."""
+    try:
+        flight_of([scenario(flight, drawn)], settings.horizon.update_period_s)
+    except FlightError as error:
+        raise InvalidSettingsError((f"{place}: horizon.{error}",)) from None
+
+
+def load_drone(named: str, folder: Path, place: str) -> VehicleFile:
+    """Load a shipped drone or a file in `folder`; raises InvalidSettingsError, which begins with `place`."""
+    path = folder / named
+    try:
+        return vehicles.load(named if named in vehicles.names() or not path.exists() else str(path))
+    except MamboNmpcError as error:
+        raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
+
+
+Flown = TypeVar("Flown", bound=FlightSection)
+
+
+def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -> tuple[File, VehicleFile]:
+    """Load the drone that `vehicle` or else the file names; return the file completed for it, and the drone.
+
+    The file has the sections flight and draws.
+    """
+    content: Any = file
+    drone = choose_drone(content.flight, folder, source, vehicle)
+    update = {
+        "flight": with_drone(content.flight, drone, source, replaced=vehicle is not None),
+        "draws": with_defaults(content.draws, drone),
+    }
+    return file.model_copy(update=update), drone
+
+
+def with_drone(flight: Flown, drone: VehicleFile, source: str, *, replaced: bool) -> Flown:
+    """Return the section [flight] with the drone's name and with sensors that it has.
+
+    If the drone is `replaced`, its own sensors replace those that it has not. Raises InvalidSettingsError.
+    """
+    possible = SENSORS_OF[drone.sensors.kind]
+    sensors = flight.sensors
+    if sensors is None or (replaced and sensors not in possible):
+        sensors = possible[-1]
+    try:
+        choose_sensors(sensors, drone)
+    except FlightError as error:
+        raise InvalidSettingsError((f"{source}: flight.{error}",)) from None
+    return flight.model_copy(update={"vehicle": drone.name, "sensors": sensors})
+
+
+def with_defaults(draws: FileSection, drone: VehicleFile) -> FileSection:
+    """Return the section [draws] with the drone's default for each parameter that the file does not name."""
+    own = {name: found for name, found in defaults_of(drone).items() if name not in draws.model_fields_set}
+    return draws.model_copy(update=own)
+
+
+def choose_drone(flight: FlightSection, folder: Path, source: str, vehicle: str | None) -> VehicleFile:
+    """Return the drone that `vehicle` names, or else that of the section [flight] of a file in `folder`."""
+    if vehicle is not None:
+        return vehicles.load(vehicle)
+    return load_drone(flight.vehicle, folder, f"{source}: flight.vehicle")
+
+
+def load_settings(named: str, folder: Path, place: str) -> Settings:
+    """Load a preset or a file in `folder`; raises InvalidSettingsError, whose lines begin with `place`."""
+    path = folder / named
+    try:
+        return presets.load(named if named in presets.names() or not path.exists() else str(path))
+    except MamboNmpcError as error:
+        raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
+
+
+def load_entrant(named: str, folder: Path, place: str) -> Entrant:
+    """Return the controller called `named`: a PD, a preset or a file in `folder`.
+
+    Raises InvalidSettingsError, whose lines begin with `place`.
+    """
+    for pd in PD_NAMES:
+        if named == pd:
+            return Entrant(pd, pd, Settings())
+    settings = load_settings(named, folder, place)
+    name = named if named in presets.names() else Path(named).stem
+    if not _NAME.fullmatch(name) or name in PD_NAMES:
+        raise InvalidSettingsError(
+            (
+                f"{place}: {echo(named)} must have a name of at most 40 letters, digits, - and "
+                f"_, other than {' and '.join(PD_NAMES)}: results are named after it",
+            )
+        )
+    return Entrant(name, "nmpc", settings)
+
+
+def _explain(details: ErrorDetails, model: type[FileSection]) -> str:
+    """Return a message that names a wrong key, its value and the rule."""
+    names = [str(part) for part in details["loc"]]
+    dotted = echo(".".join(names))
+    value = format_value(details["input"])
+    match details["type"]:
+        case "extra_forbidden":
+            return _explain_unknown(names, dotted, model)
+        case "model_type" | "dict_type":
+            return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
+        case "greater_than_equal" | "less_than_equal":
+            limits = _section(names, model).model_fields[names[-1]].metadata
+            low, high = (next(getattr(m, k) for m in limits if hasattr(m, k)) for k in ("ge", "le"))
+            return f"{dotted} = {value} must lie in {low}..{high}"
+        case _:
+            return f"{dotted} = {value} {details['msg'].replace('Input should', 'must')}"
+
+
+def _section(names: Sequence[str], model: type[FileSection]) -> Any:
+    """Return the model of the section to which the key at the path `names` belongs.
+
+    The names of sections of one kind, as in dict[str, Section], are free.
+    """
+    section: Any = model
+    for name in names[:-1]:
+        inner = get_args(section)
+        section = inner[1] if inner else section.model_fields[name].annotation
+    return section
+
+
+def _explain_unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str:
+    """Return a message that a key does not exist, with similar keys that do."""
+    keys = list(_section(names, model).model_fields)
+    near = [key for key in keys if key.startswith(f"{names[-1]}_")]
+    near = near or difflib.get_close_matches(names[-1], keys, n=1)
+    what = "parameter" if names[0] == "draws" and len(names) == 2 else "key of this file"
+    choice = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(keys)}"
+    return f"{dotted} is not a {what}; {choice}"
+
+
+def format_value(value: object) -> str:
+    """Return a value in about the notation of TOML, shortened, for messages."""
+    if isinstance(value, dict) and len(value) == 1:
+        ((key, inner),) = value.items()
+        return f"{{ {echo(str(key))} = {echo_value(inner)} }}"
+    return echo_value(value)

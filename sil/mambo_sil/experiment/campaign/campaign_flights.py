@@ -1,0 +1,118 @@
+"""The task of a worker: fly a batch of drawn flights with every controller and return their results.
+
+Arguments and results are plain values, which can be sent to other processes and machines.
+"""
+
+import threading
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cache, partial
+from typing import Any, Final
+
+from mambo_codegen import __version__
+from mambo_codegen.design import Design
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.errors import WorkerError
+from mambo_sil.experiment.campaign.campaign_file import Entrant, scenario
+from mambo_sil.experiment.campaign.executors import report_share
+from mambo_sil.experiment.campaign.parameters import Draw
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.evaluation import evaluate
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.metrics import Metrics
+from mambo_sil.flight.names import EngineName
+from mambo_sil.flight.scenario import Scenario, flight_of
+from mambo_sil.flight.traces import Trace
+
+INDICES: Final = tuple(field.name for field in fields(Metrics))
+"""Metrics of the true flight."""
+
+SEEN: Final = "seen_"
+SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
+"""Metrics of the error that are also computed from the estimates."""
+
+CRASHED, REFUSED, DIGEST = "crashed", "refused_updates", "trace_sha256"
+SATURATED: Final = "saturated_share"
+"""Share of the commands with roll or pitch at the tilt limit of the settings; not a column of a campaign."""
+
+Row = dict[str, float | str]
+"""Results of one flight by `<controller>_<index>`."""
+
+_BUILDING: Final = threading.Lock()
+"""Lets only one thread of a worker compile at a time; the next finds the result in the cache."""
+
+
+def columns(names: Sequence[str], *, sensed: bool) -> tuple[str, ...]:
+    """Return the keys of a row for controllers of these names, in the order of the table."""
+    seen = tuple(SEEN + name for name in SEEN_INDICES) if sensed else ()
+    return tuple(f"{name}_{key}" for name in names for key in (CRASHED, REFUSED, *INDICES, *seen, DIGEST))
+
+
+def fly_batch(
+    version: str,
+    entrants: Sequence[dict[str, Any]],
+    flight: dict[str, Any],
+    drawn: Sequence[Draw],
+    engine: EngineName = "c",
+) -> list[Row]:
+    """Fly the flights `drawn` with every controller; return one row per flight, in order.
+
+    `flight` is that of the campaign, `version` that of the calling program. Raises WorkerError if the worker
+    has another version, BuildError if it has no compiler.
+    """
+    if version != __version__:
+        raise WorkerError(
+            f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
+        )
+    scenarios = [scenario(flight, one) for one in drawn]
+    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios, engine)
+
+
+def fly_scenarios(
+    entrants: Sequence[Entrant], scenarios: Sequence[Scenario], engine: EngineName = "c"
+) -> list[Row]:
+    """Fly flights together with every controller; return one row per flight, in order.
+
+    Tells the worker's pool how far it is. Raises BuildError if there is no compiler, FlightError for flights
+    that cannot be simulated together.
+    """
+    rows: list[Row] = [{} for _ in scenarios]
+    flight_at = cache(partial(flight_of, scenarios))
+    for number, entrant in enumerate(entrants):
+        flight = flight_at(entrant.settings.horizon.update_period_s)
+        report = partial(_report_part, number, len(entrants))
+        trace = fly(flight, _controller(entrant, flight), report, engine=engine)
+        limit_rad = Design(entrant.settings).tilt_limit_rad
+        for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle, engine).items():
+            for row, value in zip(rows, values, strict=True):
+                row[f"{entrant.name}_{key}"] = value
+    report_share(0.0)
+    return rows
+
+
+def _report_part(number: int, parts: int, share: float) -> None:
+    """Report the share of one of several equal parts."""
+    report_share((number + share) / parts)
+
+
+def _controller(entrant: Entrant, flight: Flight) -> PositionController:
+    if entrant.kind != "nmpc":
+        return pd_controller(entrant.kind)
+    with _BUILDING:
+        return CompiledController(entrant.settings, flight.flights)
+
+
+def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile, engine: EngineName) -> dict[str, list[Any]]:
+    """Return the results of n flights of a drone by key, each a list of n."""
+    results = evaluate(trace, limit_rad, drone, engine=engine)
+    found: dict[str, list[Any]] = {
+        CRASHED: results.crashed.astype(int).tolist(),
+        REFUSED: results.refused.tolist(),
+        SATURATED: results.saturated_share.tolist(),
+    }
+    for prefix, names, metrics in (("", INDICES, results.metrics), (SEEN, SEEN_INDICES, results.seen)):
+        if metrics is not None:
+            found |= {prefix + name: getattr(metrics, name).tolist() for name in names}
+    return found | {DIGEST: [trace.digest(flight) for flight in range(trace.flights)]}

@@ -1,0 +1,194 @@
+"""Results of a campaign: summary, text and records for replay."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pydantic import BaseModel
+
+from mambo_codegen.atomic import put
+from mambo_codegen.errors import echo
+from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection, scenario
+from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST
+from mambo_sil.experiment.campaign.statistics import (
+    Distributions,
+    Improvement,
+    Proportion,
+    Table,
+    distributions,
+    improvements,
+    read_table,
+    worst_flights,
+)
+from mambo_sil.experiment.campaign.store import TABLE, FlightStore, convert_os_errors
+from mambo_sil.experiment.campaign.table import FLIGHT
+from mambo_sil.flight.scenario import Record, write_record
+from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.numbers import digits
+from mambo_sil.results.summary import Number, Summary
+
+RECORDS: Final = "flights"
+PICTURE: Final = "campaign"
+_SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
+
+
+class NamedController(BaseModel, extra="allow", frozen=True):
+    """A controller of a campaign; the summary keeps all its keys."""
+
+    name: str
+
+
+class Drawn(BaseModel, extra="allow", frozen=True):
+    """Parameters of a campaign; the other controllers are compared with the first one.
+
+    A page shows these keys, the summary keeps all others too.
+    """
+
+    seed: int
+    flight: FlightSection
+    controllers: list[NamedController]
+
+
+@dataclass(frozen=True)
+class WorstFlight:
+    """One of the worst flights, with the record that replays it."""
+
+    flight: int
+    crashed: bool
+    iae_m_s: Number
+    max_error_m: Number
+    record: str
+
+
+class CampaignSummary(Summary):
+    """A finished campaign."""
+
+    command = "campaign"
+
+    campaign: Drawn
+    flights: int
+    controllers: dict[str, Distributions]
+    improvements: list[Improvement]
+    worst: dict[str, list[WorstFlight]]
+
+
+class UnfinishedCampaign(Drawn, Summary):
+    """The summary of a campaign that is not finished."""
+
+    command = "campaign"
+
+
+def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
+    """Return statistics of a finished campaign, and the worst flights with the names of their records."""
+    names = [entrant.name for entrant in campaign.entrants]
+    sensed = campaign.file.flight.sensors != "none"
+    return CampaignSummary(
+        campaign=Drawn.model_validate(campaign.document()),
+        flights=len(table[FLIGHT]),
+        controllers=distributions(table, names, sensed=sensed),
+        improvements=improvements(table, names, sensed=sensed),
+        worst={name: [_worst(table, name, row) for row in worst_flights(table, name)] for name in names},
+    )
+
+
+def _worst(table: Table, name: str, row: int) -> WorstFlight:
+    flight = int(table[FLIGHT][row])
+    return WorstFlight(
+        flight=flight,
+        crashed=bool(table[f"{name}_{CRASHED}"][row]),
+        iae_m_s=float(table[f"{name}_iae_m_s"][row]),
+        max_error_m=float(table[f"{name}_max_error_m"][row]),
+        record=_record_name(flight, name),
+    )
+
+
+def _record_name(flight: int, name: str) -> str:
+    return f"{RECORDS}/{flight:06}-{name}.json"
+
+
+def write_records(campaign: Campaign, store: FlightStore) -> None:
+    """Write the missing records of all flights for `fly --replay`; raises UnwritableError."""
+    section = campaign.flight
+    with convert_os_errors(store.folder):
+        (store.folder / RECORDS).mkdir(exist_ok=True)
+        for cells in store.rows():
+            flight = int(cells[FLIGHT])
+            for entrant in campaign.entrants:
+                digest = cells[f"{entrant.name}_{DIGEST}"]
+                path = store.folder / _record_name(flight, entrant.name)
+                if not _is_written(path, digest):
+                    flown = scenario(section, campaign.draw(flight))
+                    record = Record(
+                        scenario=flown,
+                        controller=entrant.kind,
+                        settings=entrant.settings,
+                        trace_sha256=digest,
+                    )
+                    write_record(record, path)
+
+
+def _is_written(path: Path, digest: str) -> bool:
+    """Return whether the record at `path` is whole and that of the trace with this digest."""
+    try:
+        return path.read_bytes().endswith(f'"trace_sha256": "{digest}"\n}}\n'.encode())
+    except FileNotFoundError:
+        return False
+
+
+def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None]) -> CampaignSummary:
+    """Sort the table and write records, pictures and, last, the summary; raises UnwritableError.
+
+    Calls `stage` with the name of each step before it.
+    """
+    stage("writing records")
+    store.put_in_order()
+    write_records(campaign, store)
+    stage("computing statistics")
+    table = read_table(store.folder / TABLE)
+    summary = summarise(campaign, table)
+    stage("drawing pictures")
+    from mambo_sil.experiment.campaign.campaign_plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
+
+    with convert_os_errors(store.folder):
+        draw_campaign(table, [entrant.name for entrant in campaign.entrants], store.folder / PICTURE)
+        put(store.folder / SUMMARY, summary.text().encode())
+    return summary
+
+
+def campaign_text(summary: CampaignSummary, folder: str) -> str:
+    """Return a summary as text: statistics per controller, improvements, commands to replay the worst."""
+    lines: list[str] = []
+    width = max(len(name) for name in summary.controllers)
+    for name, found in summary.controllers.items():
+        lines.append(f"{name:34}" + "".join(f"{title:>10}" for title in _SHOWN.values()))
+        for index, quantiles in found.quantiles.items():
+            values = "".join(f"{digits(quantiles[share]):>10}" for share in _SHOWN)
+            lines.append(f"  {index:32}{values}")
+        lines.append(f"  crashed: {_spelled(found.crashed)}")
+        if found.refused_an_input.count:
+            lines.append(f"  rejected an input: {_spelled(found.refused_an_input)}")
+        lines.append("")
+    if summary.improvements:
+        first = next(iter(summary.controllers))
+        lines.append(f"ratio of {first} to the other, per flight: median, 95 % interval, ratio above 1 in")
+        for one in summary.improvements:
+            interval = f"{digits(one.low)} .. {digits(one.high)}"
+            ratio = f"{digits(one.median):>9}  {interval:20}"
+            lines.append(f"  {one.controller:{width}} {one.index:18}{ratio}{_spelled(one.better)}")
+        lines.append("")
+    lines.append("worst flights by IAE, and the commands that replay them:")
+    for name, flights in summary.worst.items():
+        for flight in flights:
+            what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
+            lines.append(
+                f"  {name:{width}} {what:>12}  mambo-nmpc fly --replay {echo(folder)}/{flight.record}"
+            )
+    return "\n".join(lines)
+
+
+def _spelled(one: Proportion) -> str:
+    return (
+        f"{one.count} of {one.flights} flights, "
+        f"{100 * one.share:.3g} % ({100 * one.low:.3g} .. {100 * one.high:.3g} %)"
+    )

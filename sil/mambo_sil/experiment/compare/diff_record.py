@@ -1,0 +1,89 @@
+"""The record of a comparison: settings that differ, and figures of both controllers."""
+
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict
+
+from mambo_codegen.bundle.render import instance_bytes
+from mambo_codegen.design import Design
+from mambo_codegen.settings.keys import KEYS
+from mambo_codegen.settings.methods import used_values
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.experiment.compare.compared_flights import Answers, EightAnswer, StepAnswer
+from mambo_sil.experiment.compare.law import AxisLaw, ObserverGains, axis_laws, observer_gains
+from mambo_sil.results.summary import Summary
+
+PICTURES: Final = ("step.png", "step.svg")
+
+
+class SettingDifference(BaseModel):
+    """A setting with two values; None where the controller does not use it."""
+
+    model_config = ConfigDict(frozen=True)
+
+    key: str
+    a: float | int | str | None
+    b: float | int | str | None
+    meaning: str
+
+
+class ControllerFigures(BaseModel):
+    """One controller; what is by axis has roll and pitch. A 1-norm has no law and no observer."""
+
+    model_config = ConfigDict(frozen=True)
+
+    instance_bytes: int
+    law: tuple[AxisLaw, AxisLaw] | None
+    observer: ObserverGains | None
+    step: tuple[StepAnswer, StepAnswer]
+    eight: EightAnswer
+
+
+class DiffSummary(Summary):
+    """Two controllers compared; without figures if they are the same."""
+
+    command = "diff"
+
+    a: str
+    b: str
+    settings_a: str
+    settings_b: str
+    vehicle: VehicleFile
+    differences: list[SettingDifference]
+    figures_a: ControllerFigures | None = None
+    figures_b: ControllerFigures | None = None
+
+    @property
+    def same(self) -> bool:
+        """Whether the C is the same."""
+        return self.settings_a == self.settings_b
+
+
+def differences(a: Settings, b: Settings) -> list[SettingDifference]:
+    """Return the settings that differ, in the order of the file."""
+    left, right = _values(a), _values(b)
+    return [
+        SettingDifference(key=key, a=left.get(key), b=right.get(key), meaning=KEYS[key].description)
+        for key in KEYS
+        if left.get(key) != right.get(key)
+    ]
+
+
+def figures(settings: Settings, flown: Answers) -> ControllerFigures:
+    """Return the figures of one controller."""
+    return ControllerFigures(
+        instance_bytes=instance_bytes(Design(settings)),
+        law=axis_laws(settings),
+        observer=observer_gains(settings),
+        step=flown.step,
+        eight=flown.eight,
+    )
+
+
+def _values(settings: Settings) -> dict[str, Any]:
+    return {
+        f"{section}.{name}": value
+        for section, values in used_values(settings).items()
+        for name, value in values.items()
+    }

@@ -1,0 +1,89 @@
+"""A comparison of two controllers as text."""
+
+import re
+import textwrap
+from collections.abc import Iterator
+
+from mambo_codegen.errors import echo
+from mambo_codegen.settings.key import spell
+from mambo_sil.experiment.compare.compared_flights import SETTLED_SHARE, STEP_M
+from mambo_sil.experiment.compare.diff_record import ControllerFigures, DiffSummary, SettingDifference
+from mambo_sil.experiment.compare.law import AXES
+from mambo_sil.results.numbers import three_digits_or_dash
+
+_WIDE = 34
+_COLUMN = 14
+_MEANING = 60
+_DASH = "\N{EN DASH}"
+
+Row = tuple[str, float | None, str]
+"""Name, value and unit of a figure."""
+
+
+def diff_text(summary: DiffSummary) -> str:
+    """Format a comparison."""
+    if summary.same:
+        return (
+            f"{echo(summary.a)} and {echo(summary.b)} are the same controller: "
+            f"settings {summary.settings_a[:16]}"
+        )
+    lines = [
+        f"A: {echo(summary.a)}, settings {summary.settings_a[:16]}",
+        f"B: {echo(summary.b)}, settings {summary.settings_b[:16]}",
+        "",
+        _line("setting", "A", "B", ""),
+        *(_setting(one) for one in summary.differences),
+    ]
+    a, b = summary.figures_a, summary.figures_b
+    if a is not None and b is not None:
+        lines += ["", _line(f"on vehicle {echo(summary.vehicle.name)}", "A", "B", "")]
+        lines += _figure_lines(a, b)
+    return "\n".join(lines)
+
+
+def _setting(one: SettingDifference) -> str:
+    a, b = (_DASH if value is None else spell(value) for value in (one.a, one.b))
+    meaning = re.split(r"[.:;] |\.$", one.meaning)[0]
+    return _line(one.key, a, b, textwrap.shorten(meaning, _MEANING, placeholder=" ..."))
+
+
+def _figure_lines(a: ControllerFigures, b: ControllerFigures) -> Iterator[str]:
+    """Yield a line for each figure that one of them has."""
+    left, right = ({name: (value, unit) for name, value, unit in figure_rows(one)} for one in (a, b))
+    for name, (_, unit) in (left | right).items():
+        old, new = (three_digits_or_dash(side.get(name, (None, ""))[0]) for side in (left, right))
+        yield _line(name, old, new, unit)
+    for letter, one in (("A", a), ("B", b)):
+        if one.eight.crashed:
+            yield f"{letter} CRASHED on the eight"
+
+
+def figure_rows(one: ControllerFigures) -> Iterator[Row]:
+    """Yield the figures of a controller, the law's first."""
+    for axis, law in zip(AXES, one.law or (), strict=False):
+        yield f"{axis}: gain of position", law.position_gain_rad_m, "rad/m"
+        yield f"{axis}: gain of velocity", law.velocity_gain_rad_s_m, "rad s/m"
+        yield f"{axis}: gain of disturbance", law.disturbance_gain_rad_s2_m, "rad s^2/m"
+        yield f"{axis}: dominant pole", law.dominant_rad_s, "rad/s"
+        yield f"{axis}: its damping", law.dominant_damping, ""
+    if one.observer is not None:
+        gains = one.observer
+        for name, pair, units in (
+            ("position", gains.position, ("", "s")),
+            ("velocity", gains.velocity_1_s, ("1/s", "")),
+            ("disturbance", gains.disturbance_1_s2, ("1/s^2", "1/s")),
+        ):
+            for source, gain, unit in zip(("position", "velocity"), pair, units, strict=True):
+                yield f"observer: {name} by {source}", gain, unit
+    for axis, step in zip(AXES, one.step, strict=True):
+        yield f"{axis}: {STEP_M:g} m step settles to {100 * SETTLED_SHARE:g} %", step.settling_s, "s"
+        yield f"{axis}: overshoot", 100.0 * step.overshoot, "%"
+        yield f"{axis}: IAE of the step", step.iae_m_s, "m s"
+    yield "eight: IAE", one.eight.iae_m_s, "m s"
+    yield "eight: largest error", one.eight.max_error_m, "m"
+    yield "eight: command variation", one.eight.command_variation_rad, "rad"
+    yield "size of nmpc_t", one.instance_bytes, "bytes"
+
+
+def _line(name: str, a: str, b: str, note: str) -> str:
+    return f"{name:<{_WIDE}}{a:>{_COLUMN}}{b:>{_COLUMN}}  {note}".rstrip()

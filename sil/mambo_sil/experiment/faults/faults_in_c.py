@@ -1,0 +1,83 @@
+"""Fill the engine's records of the wrappers in injection.py."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_sil.drone.plant.arrays import IntArray
+from mambo_sil.experiment.faults.fault import Fault, WeightChange
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.build import ffi, pointer
+from mambo_sil.flight.engine.native import Native, foreign, native
+
+_NONE: Final = Fault(0, 0)
+
+
+def native_faulty(
+    engine: Any, inner: Native, faults: Sequence[Fault | None], instances: NDArray[np.uint8] | None
+) -> Native:
+    """Return n controllers with faults around `inner`; `instances` as in `FaultyController`."""
+    chosen = [fault or _NONE for fault in faults]
+    histories = [np.zeros((fault.late_updates + 1, 2)) for fault in chosen]
+    saved = None if instances is None else np.empty_like(instances[0])
+    records = ffi.new("engine_faulty_t[]", len(chosen))
+    for row, (fault, history) in enumerate(zip(chosen, histories, strict=True)):
+        record, alter = records[row], fault.alter
+        record.effect = alter.effect
+        record.values = (*alter.values, *[0.0] * (len(record.values) - len(alter.values)))
+        record.columns = alter.columns
+        record.on, record.of = alter.on, alter.of
+        record.begin, record.end = fault.begin, fault.end
+        record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
+        record.controller, record.self = inner.step, inner.instance(row)
+        record.computed_rad = pointer("double *", history)
+        if instances is not None:
+            record.memory, record.saved = (pointer("char *", array) for array in (instances[row], saved))
+            record.memory_bytes = instances.shape[1]
+    kept = inner, histories, instances, saved
+    return Native(engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept)
+
+
+def native_levelling(engine: Any, inner: Native, compiled: CompiledController, patience: IntArray) -> Native:
+    """Return n callers with `patience` (n,) around `inner` that reset `compiled`."""
+    reset, level = compiled.native_reset(np.zeros((1, 2)))
+    memory = native(engine, compiled)
+    records = ffi.new("engine_levelling_t[]", len(patience))
+    for row, patient in enumerate(patience.tolist()):
+        record = records[row]
+        record.controller, record.self = inner.step, inner.instance(row)
+        record.reset, record.memory = foreign("engine_setter_t", reset), memory.instance(row)
+        record.level, record.patience = pointer("char *", level), patient
+    kept = inner, memory, level
+    return Native(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept)
+
+
+def native_reweighted(
+    engine: Any,
+    inner: Native,
+    compiled: CompiledController,
+    changes: Sequence[WeightChange],
+    status: IntArray,
+) -> Native:
+    """Return the n controllers `inner`, the steps of `compiled`, with changes of their weights.
+
+    The engine writes the answer to each change into its element of `status`.
+    """
+    records = ffi.new("engine_reweighted_t[]", compiled.n)
+    kept: list[Any] = [inner, status]
+    for row in range(compiled.n):
+        records[row].controller, records[row].memory = inner.step, inner.instance(row)
+        own = [index for index, change in enumerate(changes) if change.row == row]
+        if own:
+            set_weights, weights = compiled.native_set_weights([changes[index].weights for index in own])
+            due = ffi.new("engine_weight_change_t[]", len(own))
+            for place, index in enumerate(own):
+                due[place].update = changes[index].update
+                due[place].weights = pointer("char *", weights[place])
+                due[place].status = pointer("int64_t *", status[index : index + 1])
+            records[row].set_weights = foreign("engine_setter_t", set_weights)
+            records[row].changes, records[row].count = due, len(own)
+            kept += [weights, due]
+    return Native(engine.engine_reweighted_step, records, ffi.sizeof("engine_reweighted_t"), tuple(kept))

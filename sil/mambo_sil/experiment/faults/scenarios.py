@@ -1,0 +1,122 @@
+"""The list of faults: name, duration, effect, and the statuses that the controller must return."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_codegen.reference import Status
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.link import NOT_CALLED
+from mambo_sil.experiment.faults.fault import (
+    Alteration,
+    freeze_state,
+    keep_inputs,
+    move_target,
+    report_thrust,
+    scale_state,
+    set_state,
+    shift_yaw,
+    wrap_yaw,
+)
+
+TO_THE_END: Final = math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class FaultScenario:
+    """A named fault without its onset.
+
+    answers: exactly the statuses that the controller must return during the fault; None: any.
+    weights: tracking and effort weight set at the onset; the settings' weights return at the end.
+    moved_m: displacement of the true target along x from the onset on.
+    turning: whether the heading turns throughout the flight.
+    levelled: whether the caller commands zero tilt after `flights.PATIENCE` rejected steps.
+    """
+
+    name: str
+    duration_s: float
+    alter: Alteration = keep_inputs
+    drop_every: int = 0
+    late_updates: int = 0
+    weights: tuple[float, float] | None = None
+    answers: frozenset[int] | None = None
+    moved_m: float = 0.0
+    turning: bool = False
+    levelled: bool = False
+
+
+_NAN: Final = math.nan
+_FEET_PER_M: Final = 1.0 / 0.3048
+_DEGREES_PER_RAD: Final = 180.0 / math.pi
+
+
+def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
+    """Return the faults; their magnitudes depend on the input ranges of `settings`.
+
+    Faults of the weights are there with a 1-norm only.
+    """
+    jump_m = min(100.0, settings.ranges.position_m / 2.0)
+    beyond_m = 3.0 * settings.ranges.position_m
+    outage = set_state(slice(0, 7), _NAN)
+    bursts = set_state(slice(0, 7), _NAN, on=3, of=10)
+    jump = move_target(jump_m)
+    bad_state, bad_target = _only(Status.BAD_STATE), _only(Status.BAD_TARGET)
+    bad_thrust = _only(Status.BAD_THRUST)
+    levels_out = "caller levels out"
+    return (
+        FaultScenario(
+            "state NaN in 3 of 10 steps, 5 s", 5.0, bursts, answers=_only(Status.OK, Status.BAD_STATE)
+        ),
+        FaultScenario("state NaN, 0.2 s", 0.2, outage, answers=bad_state),
+        FaultScenario("state NaN, 1 s", 1.0, outage, answers=bad_state),
+        FaultScenario(f"state NaN, 1 s, {levels_out}", 1.0, outage, answers=bad_state, levelled=True),
+        FaultScenario("state NaN, 5 s", 5.0, outage, answers=bad_state),
+        FaultScenario(f"state NaN, 5 s, {levels_out}", 5.0, outage, answers=bad_state, levelled=True),
+        FaultScenario("state NaN to the end", TO_THE_END, outage, answers=bad_state),
+        FaultScenario(
+            f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True
+        ),
+        FaultScenario("x infinite, 1 s", 1.0, set_state(0, math.inf), answers=bad_state),
+        FaultScenario("vy minus infinite, 1 s", 1.0, set_state(3, -math.inf), answers=bad_state),
+        *(FaultScenario(f"state frozen, {span_s:g} s", span_s, freeze_state) for span_s in (0.2, 1.0, 5.0)),
+        FaultScenario("every 2nd tick dropped, 5 s", 5.0, drop_every=2, answers=_only(Status.OK, NOT_CALLED)),
+        FaultScenario("all ticks dropped, 0.2 s", 0.2, drop_every=1, answers=_only(NOT_CALLED)),
+        FaultScenario("all ticks dropped, 1 s", 1.0, drop_every=1, answers=_only(NOT_CALLED)),
+        *(FaultScenario(f"commands {late} ticks late, 5 s", 5.0, late_updates=late) for late in (2, 5, 20)),
+        *(
+            FaultScenario(f"target {jump_m:g} m off, {span_s:g} s", span_s, jump)
+            for span_s in (0.2, 1.0, 5.0)
+        ),
+        FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
+        FaultScenario("target beyond the range, 1 s", 1.0, move_target(beyond_m), answers=bad_target),
+        FaultScenario("thrust reported as zero, 1 s", 1.0, report_thrust(0.0), answers=bad_thrust),
+        FaultScenario("thrust NaN, 1 s", 1.0, report_thrust(_NAN), answers=bad_thrust),
+        FaultScenario("yaw a turn off, to the end", TO_THE_END, shift_yaw(2.0 * math.pi)),
+        FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, wrap_yaw, turning=True),
+        FaultScenario("yaw half a turn off, 1 s", 1.0, shift_yaw(math.pi)),
+        FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
+        FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
+        FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
+        *(() if settings.cost.norm == "quadratic" else _wrong_weights(settings)),
+    )
+
+
+def _wrong_weights(settings: Settings) -> tuple[FaultScenario, ...]:
+    right, bad_weight = settings.cost, _only(Status.OK, Status.BAD_WEIGHT)
+    return (
+        FaultScenario("weights NaN, 5 s", 5.0, weights=(_NAN, _NAN), answers=bad_weight),
+        FaultScenario(
+            "tracking weight -1, 5 s", 5.0, weights=(-1.0, right.effort_weight), answers=bad_weight
+        ),
+        FaultScenario("both weights zero, 5 s", 5.0, weights=(0.0, 0.0)),
+        FaultScenario("effort weight 1e6, 5 s", 5.0, weights=(right.tracking_weight, 1e6)),
+    )
+
+
+def _only(*statuses: int) -> frozenset[int]:
+    return frozenset(int(status) for status in statuses)
+
+
+def _scaled(position: float, attitude: float) -> Alteration:
+    """Scale position and velocity by one factor, roll, pitch and yaw by another."""
+    return scale_state([position] * 4 + [attitude] * 3)

@@ -1,0 +1,252 @@
+"""Results of a suite: each metric against its limit, the summary, text, and records for replay."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Final
+
+from pydantic import Field
+
+from mambo_codegen.errors import echo
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.experiment.campaign.campaign_file import Entrant
+from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, INDICES, REFUSED, SATURATED, Row
+from mambo_sil.experiment.regress.baseline import Baseline, Recorded
+from mambo_sil.experiment.regress.suite_file import FlightSuite
+from mambo_sil.flight.scenario import Record, write_record
+from mambo_sil.results.numbers import digits
+from mambo_sil.results.summary import Number, Summary
+
+RECORDS: Final = "flights"
+JUNIT: Final = "junit.xml"
+PICTURES: Final = ("regress.png", "regress.svg")
+MOST_SHOWN: Final = 10
+"""Failed flights that text and page list; the summary has all."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One metric of a flight against its limit, the smaller of bound and recorded value plus tolerance."""
+
+    metric: str
+    now: Number
+    bound: float | None
+    then: float | None
+    """The recorded value, if it is compared."""
+    limit: float
+    holds: bool
+
+
+@dataclass(frozen=True)
+class FlightResult:
+    """One flight of a suite; `same_bits` is None unless its trace was compared with the recorded one."""
+
+    group: str
+    name: str
+    metrics: dict[str, Number]
+    checks: list[Check]
+    same_bits: bool | None
+    record: str | None
+    """File for `fly --replay`; only of a failed flight."""
+
+    @property
+    def failures(self) -> list[str]:
+        """What failed, in words."""
+        found = [_explain(check) for check in self.checks if not check.holds]
+        return found + (["the trace differs from the recorded one"] if self.same_bits is False else [])
+
+
+class RegressSummary(Summary):
+    """The results of `regress`; `files` has the SHA-256 of every file in the folder."""
+
+    command = "regress"
+
+    suite: str
+    vehicles: list[str] = Field(default_factory=lambda: [NOMINAL.name])
+    """The drones of its flights."""
+    controller: str
+    settings: str
+    baseline: str | None
+    """The file of the recorded metrics with which these were compared."""
+    settings_then: str | None
+    """Settings digest of that file."""
+    better: int
+    """Flights with a metric that is better than recorded by more than its tolerance."""
+    flights: list[FlightResult]
+    files: dict[str, str] = Field(default_factory=dict)
+
+    @property
+    def failed(self) -> list[FlightResult]:
+        """The flights that failed."""
+        return [flight for flight in self.flights if flight.failures]
+
+
+def judge(
+    suite: FlightSuite, entrant: Entrant, rows: Sequence[Row], baseline: Baseline | None, path: Path
+) -> RegressSummary:
+    """Compare the results of a suite with its bounds, and with the baseline at `path` if there is one."""
+    held = baseline.flights if baseline is not None else {}
+    results = [
+        _result(suite, number, row, held.get(flight.name, {}))
+        for number, (flight, row) in enumerate(zip(suite.flights, rows, strict=True))
+    ]
+    return RegressSummary(
+        suite=suite.name,
+        vehicles=list(dict.fromkeys(flight.scenario.vehicle.name for flight in suite.flights)),
+        controller=entrant.name,
+        settings=entrant.settings.digest,
+        baseline=str(path) if baseline is not None else None,
+        settings_then=baseline.settings if baseline is not None else None,
+        better=sum(_is_better(result, suite) for result in results),
+        flights=results,
+    )
+
+
+def _result(suite: FlightSuite, number: int, row: Row, held: Recorded) -> FlightResult:
+    """Return the result of flight `number` with its recorded values `held`, if it has any."""
+    flight = suite.flights[number]
+    counts: dict[str, Number] = {name: int(row[name]) for name in (CRASHED, REFUSED)}
+    metrics = counts | {name: float(row[name]) for name in (*INDICES, SATURATED)}
+    checks = [
+        _check(name, now, flight.bounds.get(name), suite.tolerances.get(name), held.get(name))
+        for name, now in metrics.items()
+        if name in flight.bounds or (name in suite.tolerances and held.get(name) is not None)
+    ]
+    same_bits = row[DIGEST] == held[DIGEST] if suite.same_bits and held else None
+    failed = same_bits is False or not all(check.holds for check in checks)
+    record = f"{RECORDS}/{number:04}-{flight.group}.json" if failed else None
+    return FlightResult(flight.group, flight.name, metrics, checks, same_bits, record)
+
+
+def _check(
+    metric: str, now: float, bound: float | None, tolerance: float | None, held: float | str | None
+) -> Check:
+    """Compare a metric; one that is NaN, because the flight was lost, exceeds every limit."""
+    limits, then = [] if bound is None else [bound], None
+    if tolerance is not None and held is not None:
+        then = float(held)
+        limits.append(then * (1.0 + tolerance))
+    limit = min(limits)
+    return Check(metric, now, bound, then, limit, now <= limit)
+
+
+def _is_better(result: FlightResult, suite: FlightSuite) -> bool:
+    return any(
+        check.then is not None and check.now < check.then * (1.0 - suite.tolerances[check.metric])
+        for check in result.checks
+    )
+
+
+def _explain(check: Check) -> str:
+    """Return what is wrong with a metric: its value, its bound and its recorded value."""
+    if check.metric == CRASHED:
+        return CRASHED
+    limits = []
+    if check.bound is not None:
+        limits.append(f"bound {digits(check.bound)}")
+    if check.then is not None:
+        limits.append(f"recorded {digits(check.then)}")
+    if check.limit != check.bound:
+        limits[-1] += f", so at most {digits(check.limit)}"
+    return f"{check.metric} = {digits(check.now)} ({'; '.join(limits)})"
+
+
+def write_records(
+    summary: RegressSummary, suite: FlightSuite, entrant: Entrant, rows: Sequence[Row], folder: Path
+) -> None:
+    """Write a record of each failed flight for `fly --replay` into the folder `RECORDS` in `folder`."""
+    (folder / RECORDS).mkdir()
+    for flight, row, result in zip(suite.flights, rows, summary.flights, strict=True):
+        if result.record is not None:
+            record = Record(
+                scenario=flight.scenario,
+                controller=entrant.kind,
+                settings=entrant.settings,
+                trace_sha256=str(row[DIGEST]),
+            )
+            write_record(record, folder / result.record)
+
+
+@dataclass(frozen=True)
+class GroupRow:
+    """One metric over the flights of a group.
+
+    `over_recorded` is the largest ratio to the recorded value, `saturated_share` the largest share of a
+    flight's commands at the tilt limit.
+    """
+
+    group: str
+    metric: str
+    bound: float | None
+    middle: float
+    worst: float
+    over_recorded: float | None
+    saturated_share: float
+    failed: int
+    flights: int
+
+
+def group_rows(summary: RegressSummary) -> Iterator[GroupRow]:
+    """Yield a row for each metric that is checked in a group; for `crashed` only if it failed or is alone."""
+    for group in dict.fromkeys(flight.group for flight in summary.flights):
+        flights = [flight for flight in summary.flights if flight.group == group]
+        for metric in dict.fromkeys(check.metric for flight in flights for check in flight.checks):
+            checks = [check for flight in flights for check in flight.checks if check.metric == metric]
+            failed = sum(not check.holds for check in checks)
+            if metric == CRASHED and not failed and any(len(flight.checks) > 1 for flight in flights):
+                continue
+            values = [math.inf if math.isnan(check.now) else check.now for check in checks]
+            ratios = [value / check.then for value, check in zip(values, checks, strict=True) if check.then]
+            yield GroupRow(
+                group,
+                metric,
+                checks[0].bound,
+                median(values),
+                max(values),
+                max(ratios, default=None),
+                max(flight.metrics[SATURATED] for flight in flights),
+                failed,
+                len(checks),
+            )
+
+
+def finding(summary: RegressSummary) -> str:
+    """Return the result in one line."""
+    failed, flights = len(summary.failed), len(summary.flights)
+    return f"{flights - failed} of {flights} flights passed" + (f", {failed} failed" if failed else "")
+
+
+def remarks(summary: RegressSummary) -> list[str]:
+    """Return what a reader should know of the baseline."""
+    if summary.baseline is None:
+        return ["compared with the bounds only: no recorded metrics"]
+    found = [f"compared with the bounds and with {echo(summary.baseline)}"]
+    if summary.settings_then != summary.settings:
+        found.append("the controller's settings have changed since the metrics were recorded")
+    if summary.better:
+        found.append(
+            f"{summary.better} flights are better than recorded by more than the tolerance; --update "
+            "records them"
+        )
+    return found
+
+
+def regress_text(summary: RegressSummary, folder: str) -> str:
+    """Return a summary as text: a row per group and metric, then the failed flights."""
+    heads = ("bound", "median", "worst", "ratio", "at limit")
+    lines = [f"{'group':21}{'metric':21}" + "".join(f"{head:>11}" for head in heads) + f"{'failed':>12}"]
+    for row in group_rows(summary):
+        numbers = (row.bound, row.middle, row.worst, row.over_recorded)
+        cells = "".join(f"{'-' if number is None else digits(number):>11}" for number in numbers)
+        cells += f"{f'{row.saturated_share:.1%}':>11}"
+        lines.append(f"{row.group:20} {row.metric:21}{cells}{f'{row.failed} of {row.flights}':>12}")
+    lines.append("")
+    for flight in summary.failed[:MOST_SHOWN]:
+        lines.append(f"{flight.name}: {'; '.join(flight.failures)}")
+        lines.append(f"    mambo-nmpc fly --replay {echo(folder)}/{flight.record}")
+    if len(summary.failed) > MOST_SHOWN:
+        lines.append(f"and {len(summary.failed) - MOST_SHOWN} more failed flights, all in {JUNIT}")
+    lines.append(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")
+    return "\n".join([*lines, *remarks(summary)])

@@ -1,0 +1,131 @@
+"""The Table II case with sensors: PDs and NMPC with the true state, and with both estimators."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.elementary import hypotenuse
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.experiment.table2.table2 import (
+    CASES,
+    DURATION_S,
+    INDICES,
+    PRINTED_NMPC,
+    PRINTED_PD,
+    Four,
+    four,
+    report_part,
+)
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.names import PD_NAMES, PD_TITLES, EngineName
+from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.results.numbers import digits
+from mambo_sil.results.summary import Number, Summary
+
+PRESETS: Final = ("mambo", "table1")
+"""Presets that are compared with the PDs."""
+FLIGHTS: Final = 20
+"""Flights of a row with noise; their seeds count from 0."""
+
+VIEWS: Final[dict[str, Sensors | None]] = {
+    "the truth": None,
+    "mambo, noise-free": Sensors(noise_scale=0.0),
+    "mambo": Sensors(),
+    "mambo-derotated, noise-free": Sensors(noise_scale=0.0, derotated=True),
+    "mambo-derotated": Sensors(derotated=True),
+}
+
+
+@dataclass(frozen=True)
+class SensedRow:
+    """One controller with one source of its state: medians over its flights.
+
+    tracked: indices of the true error. seen: indices of the estimated error.
+    worst_iae_m_s: largest true IAE. drift_m: horizontal error of the position estimate at the end.
+    """
+
+    controller: str
+    view: str
+    flights: int
+    lost: int
+    tracked: Four
+    seen: Four
+    worst_iae_m_s: Number
+    drift_m: Number
+
+
+class SensedSummary(Summary):
+    """The Table II case with sensors and estimators."""
+
+    command = "table2 --sensors"
+
+    scalar: str | None
+    """Scalar type that replaces that of the presets, if any."""
+    rows: list[SensedRow]
+
+
+def fly_sensed(
+    settings: Mapping[str, Settings],
+    progress: Callable[[float], None],
+    *,
+    duration_s: float = DURATION_S,
+    flights: int = FLIGHTS,
+    engine: EngineName = "c",
+) -> list[SensedRow]:
+    """Fly the case with both PDs and the compiled C of `settings` by name, each with every one of `VIEWS`.
+
+    Calls `progress` with the share done; rows without noise have one flight.
+    """
+    pds = {PD_TITLES[name]: name for name in PD_NAMES}
+    jobs = [(name, view) for name in (*pds, *settings) for view in VIEWS]
+    case = next(iter(CASES.values()))
+    rows = []
+    for index, (name, view) in enumerate(jobs):
+        sensors = VIEWS[view]
+        n = flights if sensors is not None and sensors.noise_scale else 1
+        flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
+        controller: PositionController = (
+            pd_controller(pds[name]) if name in pds else CompiledController(settings[name], n)
+        )
+        trace = fly(flight, controller, report_part(progress, index, len(jobs)), engine=engine)
+        rows.append(_judge(name, view, trace))
+    return rows
+
+
+def _judge(name: str, view: str, trace: Trace) -> SensedRow:
+    tracked = measure(trace)
+    seen, drift_m = tracked, np.zeros(trace.flights)
+    if isinstance(trace, SensedTrace):
+        seen = measure(trace.as_seen())
+        drift_m = hypotenuse(*(trace.seen_position_m - trace.position_m)[-1, :, :2].T)
+    return SensedRow(
+        controller=name,
+        view=view,
+        flights=trace.flights,
+        lost=int(trace.diverged.sum()),
+        tracked=four(np.median(tracked.table2, axis=1)),
+        seen=four(np.median(seen.table2, axis=1)),
+        worst_iae_m_s=float(tracked.iae_m_s.max()),
+        drift_m=float(np.median(drift_m)),
+    )
+
+
+def text(rows: Sequence[SensedRow]) -> str:
+    """Return the rows as a Markdown table, below those printed in the paper."""
+    heads = ("controller", "sees", "flights", *INDICES, "worst IAE", "IAE as seen", "drift, m")
+    lines = [" | ".join(heads), " | ".join(["---"] * 3 + ["---:"] * 7)]
+    for name, printed in (("PD, printed", PRINTED_PD), ("NMPC, printed", PRINTED_NMPC)):
+        lines.append(" | ".join([name, "", "", *map(digits, printed), "", "", ""]))
+    for row in rows:
+        flights = f"{row.flights}" + (f", {row.lost} lost" if row.lost else "")
+        ends = (row.worst_iae_m_s, row.seen[0], row.drift_m)
+        cells = [row.controller, row.view, flights, *map(digits, row.tracked), *map(digits, ends)]
+        lines.append(" | ".join(cells))
+    return "\n".join(f"| {line} |" for line in lines)

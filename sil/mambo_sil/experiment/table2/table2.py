@@ -1,0 +1,186 @@
+"""Table II of the paper, reproduced: both PDs and every preset, printed and measured indices, claims."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.settings.model import Settings
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.metrics import measure
+from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES, EngineName
+from mambo_sil.flight.traces import Trace
+from mambo_sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
+from mambo_sil.results.numbers import digits, three_digits
+from mambo_sil.results.summary import Number, Summary
+
+INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")
+UNITS: Final = ("m s", "m^2 s", "m^2 s^2", "m s^2")
+PRINTED_PD: Final = (63.02, 47.86, 2460.0, 3200.0)
+PRINTED_NMPC: Final = (19.11, 5.27, 204.23, 862.77)
+PRINTED_IMPROVEMENT: Final = (3.3, 9.1, 12.0, 3.7)
+
+CASES: Final[dict[str, Trajectory]] = {
+    "Bernoulli 0.5 rad/s": Bernoulli(2.0, 0.5),
+    "Bernoulli 0.25 rad/s": Bernoulli(2.0, 0.25),
+    "Gerono 0.25 rad/s": Gerono(2.0, 0.25),
+}
+"""The trajectory that reproduces the printed PD row, and the two that the paper's text may mean."""
+
+PRESETS: Final = ("mambo", "mambo-1norm", "table1", "table1-printed")
+"""The presets for the Mambo."""
+DURATION_S: Final = 100.0
+_CLOSE: Final = 0.10
+
+Four = tuple[Number, Number, Number, Number]
+"""IAE (m s), ISE (m^2 s), ITSE (m^2 s^2), ITAE (m s^2)."""
+
+
+@dataclass(frozen=True)
+class Table2Row:
+    """One controller in one case."""
+
+    case: str
+    controller: str
+    measured: Four
+    improvement: Four | None
+    """Ratio of the paper's PD's index to this controller's, for each index; None for that PD itself."""
+    command_variation_rad: Number
+    """Command variation: the mean 1-norm of the change of the command from update to update."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper, the measurement, and whether the claim holds."""
+
+    text: str
+    holds: bool
+    evidence: str
+
+
+class Table2Summary(Summary):
+    """Results of the command `table2`."""
+
+    command = "table2"
+
+    scalar: str | None
+    """Scalar type that replaces that of the presets, if any."""
+    cases: list[str]
+    rows: list[Table2Row]
+    claims: list[Claim]
+
+
+def report_part(progress: Callable[[float], None], part: int, parts: int) -> Callable[[float], None]:
+    """Return a function that turns the share done of one of `parts` parts into that of the whole."""
+    return lambda share: progress((part + share) / parts)
+
+
+def fly_table2(
+    settings: Mapping[str, Settings], progress: Callable[[float], None], *, engine: EngineName = "c"
+) -> dict[str, Trace]:
+    """Fly every case with both PDs and with the compiled C of `settings` by name, 100 s each.
+
+    Calls `progress` with the share done. Returns the traces by controller, with one flight for each case.
+    """
+    flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
+    controllers: dict[str, PositionController] = {PD_TITLES[name]: pd_controller(name) for name in PD_NAMES}
+    controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
+    return {
+        name: fly(flight, controller, report_part(progress, index, len(controllers)), engine=engine)
+        for index, (name, controller) in enumerate(controllers.items())
+    }
+
+
+def judge_table2(traces: Mapping[str, Trace], scalar: str | None) -> Table2Summary:
+    """Compare the traces of `fly_table2` with the printed table, and judge the claims of section III."""
+    rows = _rows(traces)
+    claims = [_pd_claim(rows, case) for case in CASES]
+    presets = [row for row in rows if row.controller not in PD_TITLES.values()]
+    claims += [_improvement_claim(row) for row in presets if row.case == next(iter(CASES))]
+    return Table2Summary(scalar=scalar, cases=list(CASES), rows=rows, claims=claims)
+
+
+def table2_text(summary: Table2Summary) -> str:
+    """Return Table II as text: a block for each case, printed above measured, then the claims."""
+    lines = [
+        "printed: in the paper; flown: here, 100 s along a figure of eight of 4 m, Bernoulli's or Gerono's;",
+        "PD over this: the index of the flown PD, or of the printed one, divided by that of the row;",
+        "variation: the command variation, the mean change of the command from one update to the next",
+        f"{'':28}" + "".join(f"{unit:>10}" for unit in UNITS) + f"{'  PD over this':36}{'variation':>11}",
+    ]
+    for case in CASES:
+        lines += [f"{case:28}" + "".join(f"{index:>10}" for index in INDICES)]
+        lines[-1] += "".join(f"{index:>9}" for index in INDICES) + f"{'rad':>11}"
+        if case == next(iter(CASES)):
+            lines += [_line("printed PD", PRINTED_PD, None, "")]
+            lines += [_line("printed NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT, "")]
+        lines += [
+            _line(
+                f"flown {row.controller}", row.measured, row.improvement, f"{row.command_variation_rad:.4f}"
+            )
+            for row in summary.rows
+            if row.case == case
+        ]
+        lines += [""]
+    lines += ["the paper's claims, as flown here:"]
+    lines += [
+        f"  {'holds' if claim.holds else 'does not hold':13}  {claim.text}: {claim.evidence}"
+        for claim in summary.claims
+    ]
+    return "\n".join(lines)
+
+
+def _line(name: str, values: Four, improvement: Four | None, variation: str) -> str:
+    ratios = "" if improvement is None else "".join(f"{digits(ratio):>9}" for ratio in improvement)
+    line = f"  {name:26}" + "".join(f"{digits(value):>10}" for value in values)
+    return f"{line}{ratios:36}{variation:>11}".rstrip()
+
+
+def _rows(traces: Mapping[str, Trace]) -> list[Table2Row]:
+    measured = {name: measure(trace) for name, trace in traces.items()}
+    indices = {name: found.table2 for name, found in measured.items()}
+    return [
+        Table2Row(
+            case=case,
+            controller=name,
+            measured=four(values[:, column]),
+            improvement=None if name == PD else four(indices[PD][:, column] / values[:, column]),
+            command_variation_rad=float(measured[name].command_variation_rad[column]),
+        )
+        for column, case in enumerate(CASES)
+        for name, values in indices.items()
+    ]
+
+
+def four(values: np.ndarray) -> Four:
+    """Return four numbers as a tuple."""
+    iae, ise, itse, itae = (float(value) for value in values)
+    return iae, ise, itse, itae
+
+
+def _pd_claim(rows: Sequence[Table2Row], case: str) -> Claim:
+    measured = next(row.measured for row in rows if (row.case, row.controller) == (case, PD))
+    deviation = max(abs(ours / theirs - 1) for ours, theirs in zip(measured, PRINTED_PD, strict=True))
+    return Claim(
+        text=f"the PD has its printed indices on {case}",
+        holds=deviation <= _CLOSE,
+        evidence=f"largest deviation {100 * deviation:.0f} %",
+    )
+
+
+def _improvement_claim(row: Table2Row) -> Claim:
+    improvement = row.improvement or (np.nan,) * 4
+    holds = all(ours >= theirs for ours, theirs in zip(improvement, PRINTED_IMPROVEMENT, strict=True))
+    return Claim(
+        text=f"{row.controller} improves on the PD by at least " + _spelled(PRINTED_IMPROVEMENT),
+        holds=holds,
+        evidence="measured " + _spelled(improvement),
+    )
+
+
+def _spelled(values: Four) -> str:
+    return " / ".join(map(three_digits, values))

@@ -1,0 +1,172 @@
+"""The compiled controller: the generated C with the interface of the reference controller."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.representation import COMMAND, OUTCOME, STATE, THRUST, WEIGHTS, Representation
+from mambo_codegen.reference import ExactStep, Step
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.flight.controllers.build import build_library, ffi
+
+
+def digest_compiled(library: Any, episodes: int) -> int:
+    """Return the self-test digest, computed by the C on this machine."""
+    scratch = ffi.new("char[]", library.nmpc_batch_instance_bytes())
+    digest = 0
+    for episode in range(episodes):
+        digest = library.nmpc_self_test_episode(scratch, episode, digest)
+    return digest
+
+
+def as_arrays(
+    design: Design, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
+) -> list[NDArray[Any]]:
+    """Return state (n, 7), target (n, 4) or (n, 6), thrust (n,) as the C reads them.
+
+    Columns of a target that the controller has no use for are left out. Raises ValueError for other shapes.
+    """
+    columns = len(design.target)
+    return [
+        as_array(design.numbers, values, quantities, shape)
+        for values, quantities, shape in (
+            (state, STATE, (n, 7)),
+            (np.asarray(target)[:, :columns], design.target, (n, columns)),
+            (thrust, THRUST, (n,)),
+        )
+    ]
+
+
+def as_array(
+    numbers: Representation, values: ArrayLike, quantities: Sequence[str], shape: tuple[int, ...]
+) -> NDArray[Any]:
+    """Return `values` as an array of the C's type; raises ValueError unless they have `shape`."""
+    given = np.asarray(values)
+    if given.shape != shape:
+        raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
+    return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
+
+
+def empty_outcome(design: Design, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a step of n controllers fills, in the order of nmpc_outcome_t."""
+    numbers, moves = design.numbers, design.settings.horizon.control
+    if design.is_quadratic:
+        return {
+            "status": np.empty(n, integer),
+            "command_rad": np.empty((n, 2), numbers.scalar),
+            "missed": np.empty(n, integer),
+            "saturated": np.empty(n, integer),
+            "stored": np.empty((n, len(design.stored)), numbers.scalar),
+        }
+    return {
+        "status": np.empty(n, integer),
+        "command_rad": np.empty((n, 2), numbers.scalar),
+        "cost": np.empty(n, numbers.wide),
+        "gradient": np.empty((n, moves, 2), numbers.wide),
+        "plan_rad": np.empty((n, moves, 2), numbers.scalar),
+        "iterations": np.empty(n, integer),
+        "converged": np.empty(n, integer),
+    }
+
+
+def as_step(design: Design, outcome: dict[str, NDArray[Any]]) -> Step | ExactStep:
+    """Return the arrays that a step filled in SI units and with the types of the reference."""
+    to_si = design.numbers.to_si
+    if design.is_quadratic:
+        return ExactStep(
+            status=outcome["status"].astype(np.int64),
+            command_rad=to_si(outcome["command_rad"], *COMMAND),
+            missed=outcome["missed"].astype(np.int64),
+            saturated=outcome["saturated"].astype(np.bool_),
+            stored=to_si(outcome["stored"], *design.stored),
+        )
+    types = {"status": np.int64, "iterations": np.int64, "converged": np.bool_}
+    return Step(
+        **{name: outcome[name].astype(kind) for name, kind in types.items()},
+        **{name: to_si(outcome[name], quantity) for name, quantity in OUTCOME.items()},
+    )
+
+
+DIRT = b"\xa5"
+"""Fills a controller's memory before nmpc_init, since memory on a board is not zero either."""
+
+
+class CompiledController:
+    """n controllers in generated C, with the interface of the reference controller of their norm."""
+
+    def __init__(self, settings: Settings, n: int = 1, library: Any = None) -> None:
+        self.settings = settings
+        self._design = Design(settings)
+        self._numbers = self._design.numbers
+        self.scalar = self._numbers.scalar
+        self.n = n
+        self._library = library or build_library(settings, host_toolchain())
+        self._instance_bytes: int = self._library.nmpc_batch_instance_bytes()
+        self._controllers = ffi.new("char[]", DIRT * (n * self._instance_bytes))
+        self._library.nmpc_batch_init(self._controllers, n)
+
+    @property
+    def native(self) -> tuple[Any, Any, int]:
+        """The function `nmpc_host_step`, the address of the first controller, and the bytes to the next."""
+        return ffi.addressof(self._library, "nmpc_host_step"), self._controllers, self._instance_bytes
+
+    def native_reset(self, command_rad: ArrayLike) -> tuple[Any, NDArray[Any]]:
+        """Return the function `nmpc_host_reset`, and `command_rad` (n, 2) as it reads them."""
+        return self._native_set("nmpc_host_reset", command_rad, COMMAND)
+
+    def native_set_weights(self, weights: ArrayLike) -> tuple[Any, NDArray[Any]]:
+        """Return the function `nmpc_host_set_weights`, and `weights` (n, 2) as it reads them; of a 1-norm."""
+        return self._native_set("nmpc_host_set_weights", weights, WEIGHTS)
+
+    @property
+    def instances(self) -> NDArray[np.uint8]:
+        """The memory (n, bytes) of the controllers, itself and no copy."""
+        whole = np.frombuffer(memoryview(ffi.buffer(self._controllers)), np.uint8)
+        return whole[: self.n * self._instance_bytes].reshape(self.n, -1)
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Reset all controllers to `command_rad` (n, 2), clamped to the tilt limit; returns a status (n,)."""
+        return self._set_each(self._library.nmpc_host_reset, command_rad, COMMAND)
+
+    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
+        """Set tracking and effort weight to `weights` (n, 2), of a 1-norm; returns a status (n,)."""
+        return self._set_each(self._library.nmpc_host_set_weights, weights, WEIGHTS)
+
+    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Tell that `command_rad` (n, 2) was sent, with a quadratic cost; returns a status (n,)."""
+        return self._set_each(self._library.nmpc_host_set_command, command_rad, COMMAND)
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
+        """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
+
+        The target's columns are x, y, vx, vy, ax, ay; only a controller that is given the acceleration of its
+        target reads the last two, and needs them.
+
+        Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
+        """
+        inputs = as_arrays(self._design, self.n, state, target, thrust_acceleration_m_s2)
+        outcome = empty_outcome(self._design, self.n, np.intc)
+        addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
+        self._library.nmpc_batch_step(self._controllers, self.n, *map(_address, inputs), addresses)
+        return as_step(self._design, outcome)
+
+    def _native_set(
+        self, name: str, values: ArrayLike, quantities: Sequence[str]
+    ) -> tuple[Any, NDArray[Any]]:
+        array = as_array(self._numbers, values, quantities, np.shape(values))
+        return ffi.addressof(self._library, name), array
+
+    def _set_each(self, function: Any, values: ArrayLike, quantities: Sequence[str]) -> NDArray[np.int64]:
+        array = as_array(self._numbers, values, quantities, (self.n, 2))
+        status = np.empty(self.n, np.intc)
+        function(self._controllers, self.n, _address(array), ffi.cast("int *", _address(status)))
+        return status.astype(np.int64)
+
+
+def _address(array: Any) -> Any:
+    """Return a pointer to the numbers of a contiguous array, which the caller keeps alive."""
+    return ffi.from_buffer(array)

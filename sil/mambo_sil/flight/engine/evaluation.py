@@ -1,0 +1,80 @@
+"""Evaluate flights in the engine where there is a compiler, else in NumPy, with the same bits."""
+
+from dataclasses import fields, replace
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.errors import BuildError
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.drone.plant.link import NOT_CALLED
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.flight import evaluation
+from mambo_sil.flight.crashes import least_level
+from mambo_sil.flight.engine.build import ffi, lanes_for, load, pointer
+from mambo_sil.flight.engine.simulate import trace_record
+from mambo_sil.flight.evaluation import Evaluation
+from mambo_sil.flight.metrics import Metrics
+from mambo_sil.flight.names import EngineName
+from mambo_sil.flight.traces import SensedTrace, Trace
+
+_METRICS: Final = tuple(field.name for field in fields(Metrics))
+
+
+def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile, *, engine: EngineName = "c") -> Evaluation:
+    """Evaluate the flights of `drone` under commands that are limited to `limit_rad`.
+
+    Raises CacheError and UnwritableError if the engine cannot be built for want of a folder or space.
+    """
+    if engine == "c":
+        try:
+            toolchain = host_toolchain()
+            return evaluate_compiled(
+                load(toolchain, lanes_for(trace.flights, toolchain)), trace, limit_rad, drone
+            )
+        except BuildError:  # the simulation has warned of it
+            pass
+    return evaluation.evaluate(trace, limit_rad, drone)
+
+
+def evaluate_compiled(engine: Any, trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
+    """Evaluate flights in a library of `build.load`; arguments as of `evaluate`."""
+    updates, flights = trace.status.shape
+    by_flight = {
+        name: np.ascontiguousarray(array.swapaxes(0, 1)).swapaxes(0, 1)
+        for name, array in vars(trace).items()
+        if name not in ("time_s", "target")
+    }
+    times_s = np.ascontiguousarray(trace.time_s)
+    targets = np.ascontiguousarray(trace.target[..., :2].swapaxes(0, 1))
+    how = ffi.new(
+        "engine_evaluation_t *",
+        {
+            "flights": flights,
+            "updates": updates,
+            "first_update": int(np.count_nonzero(trace.time_s < 0.0)),
+            "not_called": NOT_CALLED,
+            "limit_rad": limit_rad,
+            "least_level": least_level(drone),
+        },
+    )
+    counts = {name: np.empty(flights, np.int64) for name in ("crashed", "refused", "saturated")}
+    metrics = np.empty((flights, len(_METRICS)))
+    seen = np.empty((flights, len(_METRICS))) if isinstance(trace, SensedTrace) else None
+    results = ffi.new(
+        "engine_results_t *",
+        {name: pointer("int64_t *", array) for name, array in counts.items()}
+        | {"metrics": pointer("double *", metrics), "seen_metrics": pointer("double *", seen)},
+    )
+    record = trace_record(replace(trace, **by_flight))
+    for index in range(0, flights, int(engine.engine_lanes())):
+        engine.engine_evaluate(
+            how, index, pointer("double *", times_s), pointer("double *", targets), record, results
+        )
+    return Evaluation(
+        crashed=counts["crashed"].astype(np.bool_),
+        refused=counts["refused"],
+        saturated_share=counts["saturated"] / updates,
+        metrics=Metrics(*metrics.T),
+        seen=None if seen is None else Metrics(*seen.T),
+    )

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * Faults between drone and controller: sil/mambo_sil/experiment/faults/injection.py.
+ */
+#include <string.h>
+
+#include "engine.h"
+
+/* Effect; 0 keeps the inputs. */
+#define FREEZE_STATE 1
+#define SET_STATE 2
+#define SCALE_STATE 3
+#define SHIFT_STATE 4
+#define WRAP_YAW 5
+#define SHIFT_TARGET 6
+#define SET_THRUST 7
+
+/* Python's remainder by a positive number, but for the sign of zero, which what follows ignores. */
+static double remainder_of(double value, double period)
+{
+    const double rest = fmod(value, period);
+
+    return (rest < 0.0) ? (rest + period) : rest;
+}
+
+/* Alteration.__call__: change the inputs `since` updates after the onset. */
+static void alter(const engine_faulty_t *faulty, int64_t since, double *state, double *target, double *thrust_m_s2)
+{
+    const double *values = faulty->values;
+    int64_t i;
+
+    switch (faulty->effect) {
+    case FREEZE_STATE:
+        for (i = 0; i < 7; i++) {
+            state[i] = faulty->began[i];
+        }
+        break;
+    case SET_STATE:
+        for (i = faulty->columns[0]; ((since % faulty->of) < faulty->on) && (i < faulty->columns[1]); i++) {
+            state[i] = values[0];
+        }
+        break;
+    case SCALE_STATE:
+        for (i = 0; i < 7; i++) {
+            state[i] = state[i] * values[i];
+        }
+        break;
+    case SHIFT_STATE:
+        for (i = 0; i < 7; i++) {
+            state[i] = state[i] + values[i];
+        }
+        break;
+    case WRAP_YAW:
+        state[6] = remainder_of(state[6] + values[0], 2.0 * values[0]) - values[0];
+        break;
+    case SHIFT_TARGET:
+        for (i = 0; i < 6; i++) {
+            target[i] = target[i] + values[i];
+        }
+        break;
+    case SET_THRUST:
+        *thrust_m_s2 = values[0];
+        break;
+    }
+}
+
+int64_t engine_faulty_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                           double *command_rad)
+{
+    engine_faulty_t *faulty = self;
+    const int64_t since = faulty->update - faulty->begin;
+    const int64_t depth = faulty->late_updates + 1;
+    const int active = (faulty->begin <= faulty->update) && (faulty->update < faulty->end);
+    const int dropped = active && (faulty->drop_every > 0) && ((since % faulty->drop_every) == 0);
+    double *computed_rad = faulty->computed_rad + (2 * (faulty->update % depth));
+    const double *before_rad = faulty->computed_rad + (2 * ((faulty->update + faulty->late_updates) % depth));
+    const double *sent_rad = computed_rad;
+    double given[7];
+    double aimed[6];
+    double answer_rad[2];
+    int64_t status;
+    int i;
+
+    memcpy(given, state, sizeof given);
+    memcpy(aimed, target, sizeof aimed);
+    if (active) {
+        if (since == 0) {
+            memcpy(faulty->began, state, sizeof given);
+        }
+        alter(faulty, since, given, aimed, &thrust_acceleration_m_s2);
+    }
+    if (dropped) {
+        for (i = 0; i < 7; i++) {
+            given[i] = NAN;
+        }
+        if (faulty->memory != NULL) {
+            memcpy(faulty->saved, faulty->memory, (size_t)faulty->memory_bytes);
+        }
+    }
+    status = faulty->controller(faulty->self, given, aimed, thrust_acceleration_m_s2, answer_rad);
+    if (dropped) {
+        status = -1;
+        answer_rad[0] = before_rad[0];
+        answer_rad[1] = before_rad[1];
+        if (faulty->memory != NULL) {
+            memcpy(faulty->memory, faulty->saved, (size_t)faulty->memory_bytes);
+        }
+    }
+    computed_rad[0] = answer_rad[0];
+    computed_rad[1] = answer_rad[1];
+    if (active) {
+        const int64_t late = (faulty->late_updates <= since) ? faulty->late_updates : (since + 1);
+
+        sent_rad = faulty->computed_rad + (2 * (((faulty->update + depth) - late) % depth));
+    }
+    command_rad[0] = sent_rad[0];
+    command_rad[1] = sent_rad[1];
+    faulty->update++;
+    return status;
+}
+
+int64_t engine_levelling_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                              double *command_rad)
+{
+    engine_levelling_t *caller = self;
+    const int64_t status = caller->controller(caller->self, state, target, thrust_acceleration_m_s2, command_rad);
+    int ignored;
+
+    caller->refused = (status != 0) ? (caller->refused + 1) : 0;
+    if (caller->refused == caller->patience) {
+        caller->reset(caller->memory, 1, caller->level, &ignored);
+    }
+    if (caller->refused >= caller->patience) {
+        command_rad[0] = 0.0;
+        command_rad[1] = 0.0;
+    }
+    return status;
+}
+
+int64_t engine_reweighted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                               double *command_rad)
+{
+    engine_reweighted_t *reweighted = self;
+    int64_t i;
+
+    for (i = 0; i < reweighted->count; i++) {
+        const engine_weight_change_t *change = &reweighted->changes[i];
+
+        if (change->update == reweighted->update) {
+            int status;
+
+            reweighted->set_weights(reweighted->memory, 1, change->weights, &status);
+            *change->status = status;
+        }
+    }
+    reweighted->update++;
+    return reweighted->controller(reweighted->memory, state, target, thrust_acceleration_m_s2, command_rad);
+}

@@ -1,0 +1,247 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * The closed loop: sil/mambo_sil/flight/loop.py for a group of flights.
+ */
+#include "cascade.h"
+#include "loop.h"
+
+/* A number of the trace: all NaN are one, whatever the processor makes of them. */
+static inline double number(double value)
+{
+    return (value == value) ? value : NAN;
+}
+
+static inline void write_axes(double *array, int64_t row, int lane, int axes, const real_t *values)
+{
+    int i;
+
+    for (i = 0; i < axes; i++) {
+        array[(row * axes) + i] = number(lane_of(values[i], lane));
+    }
+}
+
+/* NaN in the state of a flight that left the bounds or is not finite. */
+static inline void mark_lost(const engine_simulation_t *simulation, vehicle_state_t *state)
+{
+    mask_t kept = state->body[0] == state->body[0];
+    int i;
+
+    for (i = 0; i < STATE_ROWS; i++) {
+        kept = kept & (magnitude(state->body[i]) < ((i < VELOCITY) ? simulation->lost_m : (double)INFINITY));
+    }
+    for (i = 0; i < STATE_ROWS; i++) {
+        state->body[i] = choose(kept, state->body[i], splat(NAN));
+    }
+}
+
+/* Call the controllers, except of dropped updates, and record the update. */
+static inline void call(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
+                        int64_t update, const double *targets, const engine_draws_t *draws,
+                        engine_controller_t controller, void *self, int64_t stride,
+                        const seen_t *truth_now, const seen_t *seen, real_t thrust_n, real_t *command_rad,
+                        const engine_trace_t *trace)
+{
+    const real_t thrust_acceleration_m_s2 = thrust_n / simulation->nominal_mass_kg;
+    lanes_t command[2] = { { command_rad[0] }, { command_rad[1] } };
+    int lane;
+    int i;
+
+    for (lane = 0; (lane < LANES) && ((index + lane) < simulation->flights); lane++) {
+        const int64_t row = ((index + lane) * simulation->updates) + update;
+        const int64_t drop = (lane * simulation->updates) + update;
+        const int dropped = simulation->dropping && (draws->drops[drop] < lane_of(flight->dropped_share, lane));
+        double measured[7];
+        double answer_rad[2];
+        int64_t status;
+
+        for (i = 0; i < 7; i++) {
+            const real_t value = (i < 2) ? seen->position_m[i]
+                                         : ((i < 4) ? seen->velocity_m_s[i - 2] : seen->euler_rad[i - 4]);
+
+            measured[i] = dropped ? NAN : lane_of(value, lane);
+        }
+        status = controller((char *)self + (lane * stride), measured, targets + (6 * row),
+                            lane_of(thrust_acceleration_m_s2, lane), answer_rad);
+        if (dropped) {
+            status = -1;
+        } else {
+            for (i = 0; i < 2; i++) {
+                command[i].lane[lane] = number(answer_rad[i]);
+                command_rad[i] = command[i].real;
+            }
+        }
+        write_axes(trace->position_m, row, lane, 3, truth_now->position_m);
+        write_axes(trace->velocity_m_s, row, lane, 3, truth_now->velocity_m_s);
+        write_axes(trace->euler_rad, row, lane, 3, truth_now->euler_rad);
+        write_axes(trace->command_rad, row, lane, 2, command_rad);
+        write_axes(trace->thrust_acceleration_m_s2, row, lane, 1, &thrust_acceleration_m_s2);
+        trace->status[row] = status;
+        if (simulation->sensed) {
+            write_axes(trace->seen_position_m, row, lane, 3, seen->position_m);
+            write_axes(trace->seen_velocity_m_s, row, lane, 3, seen->velocity_m_s);
+            write_axes(trace->seen_euler_rad, row, lane, 3, seen->euler_rad);
+        }
+    }
+}
+
+void engine_start_sensors(const engine_simulation_t *simulation, flying_t *flying)
+{
+    const rotation_t r = rotation(flying->state.body + EULER);
+    const seen_t start = truth(&flying->state, &r);
+
+    if (simulation->captured) {
+        mocap_start(simulation, &start, &flying->mocap);
+    } else {
+        suite_start(simulation, &start, &r, &flying->suite);
+    }
+}
+
+/* A row of random numbers (lanes, rows, width). */
+static inline void take(const double *numbers, int64_t rows, int64_t row, int width, real_t *taken)
+{
+    int lane;
+    int i;
+
+    for (i = 0; i < width; i++) {
+        lanes_t lanes;
+
+        for (lane = 0; lane < LANES; lane++) {
+            lanes.lane[lane] = numbers[(((lane * rows) + row) * width) + i];
+        }
+        taken[i] = lanes.real;
+    }
+}
+
+void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
+                  flying_t *flying)
+{
+    const late_t late = { { { splat(0.0) } } };
+    const wire_t wire = { { { splat(0.0) } } };
+    vehicle_state_t state;
+    int i;
+
+    for (i = 0; i < STATE_ROWS; i++) {
+        state.body[i] = flight->body_start[i];
+    }
+    for (i = 0; i < 4; i++) {
+        state.rotor_speed_rad_s[i] = flight->rotor_start_rad_s[i];
+    }
+    for (i = 0; i < 9; i++) {
+        state.memory[i] = splat(0.0);
+    }
+    flying->state = state;
+    if (simulation->sensed) {
+        engine_start_sensors(simulation, flying);
+    }
+    if (simulation->windy) {
+        real_t drawn[3];
+
+        take(draws->gusts, (simulation->updates * simulation->ticks_per_update) + 1, 0, 3, drawn);
+        flying->gusts = gusts_start(drawn);
+    }
+    flying->late = late;
+    flying->wire = wire;
+    flying->command_rad[0] = splat(0.0);
+    flying->command_rad[1] = splat(0.0);
+    flying->ticks = 0;
+}
+
+void engine_update(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index, int64_t update,
+                   const double *times_s, const double *targets, const engine_draws_t *draws,
+                   engine_controller_t controller, void *self, int64_t stride, flying_t *flying,
+                   const engine_trace_t *trace)
+{
+    const int64_t rows = simulation->updates * simulation->ticks_per_update;
+    const real_t heading_rad = flight->yaw_rad + (flight->yaw_rate_rad_s * maximum(splat(times_s[update]), splat(0.0)));
+    vehicle_state_t *state = &flying->state;
+    int64_t tick;
+
+    mark_lost(simulation, state);
+    for (tick = 0; tick < simulation->ticks_per_update; tick++) {
+        const rotation_t r = rotation(state->body + EULER);
+        const int64_t ticks = flying->ticks;
+        const int64_t now = simulation->first_tick + ticks;
+        const int64_t row = (update * simulation->ticks_per_update) + tick;
+        surroundings_t around = { flight->mass_kg, { splat(0.0), splat(0.0) } };
+        real_t thrust_share = splat(1.0);
+        real_t thrust_n = splat(simulation->take_off_thrust_n);
+        real_t drawn[8];
+        real_t shares[4];
+        real_t steady_rad_s[4];
+        real_t arriving_rad[2];
+        seen_t truth_now;
+        seen_t seen;
+
+        if (simulation->disturbed) {
+            const real_t payload_kg = choose(flight->payload_tick <= now, flight->payload_kg, splat(0.0));
+
+            push(flight, now, payload_kg, &r, state);
+            thrust_share = maximum(1.0 - (flight->battery_sag_1_s * (simulation->step_s * (double)ticks)), splat(0.0));
+            around.mass_kg = flight->mass_kg + payload_kg;
+            if (simulation->windy) {
+                take(draws->gusts, rows + 1, row + 1, 3, drawn);
+                blow(simulation, flight, drawn, &flying->gusts, around.air_m_s);
+            }
+        }
+        truth_now = truth(state, &r);
+        seen = truth_now;
+        if (simulation->captured) {
+            take(draws->sensors, rows, row, 6, drawn);
+            seen = capture(simulation, flight, &truth_now, drawn, &flying->mocap);
+        } else if (simulation->sensed) {
+            take(draws->sensors, rows, row, 8, drawn);
+            seen = estimate(simulation, flight, &truth_now, &r, drawn, &flying->suite);
+        }
+        if (update >= simulation->lifting_updates) {
+            thrust_n = altitude_thrust_n(simulation, &seen);
+        }
+        if (tick == 0) {
+            call(simulation, flight, index, update, targets, draws, controller, self, stride, &truth_now, &seen,
+                 thrust_n, flying->command_rad, trace);
+        }
+        carry(flight, ticks, flying->command_rad, &flying->wire, arriving_rad);
+        if (simulation->attitude == FIRST_ORDER) {
+            advance(simulation, flight, &around, thrust_share, thrust_n, heading_rad, ticks, arriving_rad, &r,
+                    &flying->late, state->body);
+        } else {
+            if (simulation->attitude == CASCADE) {
+                cascade_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state->memory, shares);
+            } else {
+                stock_shares(simulation, &seen, arriving_rad, thrust_n, heading_rad, state->memory, shares);
+            }
+            commanded_speeds(simulation, shares, steady_rad_s);
+            integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, state);
+        }
+        flying->ticks = ticks + 1;
+    }
+}
+
+int64_t engine_lanes(void)
+{
+    return LANES;
+}
+
+int64_t engine_fastest_lanes(void)
+{
+#if defined(__GNUC__) && defined(__x86_64__)
+    return __builtin_cpu_supports("avx2") ? 4 : 2;
+#elif defined(__GNUC__) && defined(__aarch64__)
+    return 2;
+#else
+    return 1;
+#endif
+}
+
+void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
+                const double *times_s, const double *targets, const engine_draws_t *draws,
+                engine_controller_t controller, void *self, int64_t stride, const engine_trace_t *trace)
+{
+    flying_t flying;
+    int64_t update;
+
+    engine_begin(simulation, flight, draws, &flying);
+    for (update = 0; update < simulation->updates; update++) {
+        engine_update(simulation, flight, index, update, times_s, targets, draws, controller, self, stride, &flying,
+                      trace);
+    }
+}

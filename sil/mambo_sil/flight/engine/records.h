@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * What Python and the engine exchange. cffi reads this file as the C compiler does. Every member is 8 bytes wide,
+ * so that the records have the same layout in both; lanes.h has real_t and whole_t. Units are in the names; frames and
+ * signs are those of the Python modules that the names of the headers repeat.
+ */
+
+/* What the flights of a simulation have in common. Pairs are in the order roll, pitch. */
+typedef struct {
+    int64_t flights;
+    int64_t updates;          /* of the position controller */
+    int64_t ticks_per_update;
+    int64_t first_tick;       /* on the trajectory's clock: negative for a take-off */
+    int64_t lifting_updates;  /* updates with the constant thrust of a take-off */
+    int64_t disturbed;        /* whether any flight has gusts, payload, push or battery sag */
+    int64_t windy;            /* whether any flight has gusts */
+    int64_t dropping;         /* whether any flight drops updates */
+    int64_t sensed;           /* whether controllers receive estimates */
+    int64_t captured;         /* whether these come from motion capture */
+    int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
+
+    double step_s;            /* a tick */
+    double gravity_m_s2;
+    double lost_m;
+    double height_reference_m;
+
+    double gust_across[2];    /* gains of the states a and b of the gust across the wind */
+
+    int64_t attitude;         /* the kind of attitude loop, see vehicle.h; only its members are in use */
+
+    /* Stock loop. */
+    double attitude_p_n_m[2];
+    double attitude_i_n_m_s[2];
+    double attitude_d_n_m_s[2];
+    double integral_limit_rad_s;
+    double integral_leak_1_s;
+    double yaw_p_n_m;
+    double yaw_d_n_m_s;
+
+    /* Cascade: of roll, pitch and yaw P, I, D and limit of the angle, then of the rate. */
+    double cascade[3][8];
+    double rate_max_rad_s;
+    double output_max;
+
+    /* First order: shares that remain at the later nodes and at the end of a tick, see first_order.py. */
+    double response_gain[2];
+    double response_lag_s[2];
+    int64_t late_ticks[2];
+    double decay_before[2][3];
+    double decay_after[2][3];
+    double yaw_lag_s;
+    double yaw_decay[3];
+    double acceleration_per_tilt_g;
+
+    /* Altitude loop. */
+    double altitude_p_n_m;
+    double altitude_d_n_s_m;
+    double weight_n;
+    double thrust_limit_n;
+    double take_off_thrust_n;
+
+    /* Mixer: the wrench that one unit of command of all rotors gives. */
+    double wrench_per_command[4];
+    double nominal_mass_kg;
+    double rotor_offset_m;
+    double speed_squared_per_command_rad2_s2;
+    double command_min;
+    double command_max;
+
+    /* Instruments. */
+    double imu_transition[4]; /* by rows */
+    double imu_input_gain[2];
+    double imu_limits[6];
+    double sonar_min_m;
+    double pa_per_m;
+    double flow_coupling;
+    int64_t flow_images;      /* in flow_ticks ticks */
+    int64_t flow_ticks;
+
+    /* Estimators. */
+    double accelerometer_taps[6];
+    double tilt_weight;
+    double tilt_gate;
+    double altitude_gains[2];
+    double low_pass_a[3];
+    double low_pass_b;
+    double sonar_jump_m;
+    double pressure_jump_m;
+    double slow_jump_m;
+    double velocity_gain;
+    double acceleration_gain;
+    double flow_tilt_rad;
+    double flow_rate_rad_s;
+    double flow_slow_rad_s;
+    double flow_jump_m_s;
+    double flow_min_height_m;
+
+    /* Motion capture. */
+    int64_t mocap_period_ticks;
+    int64_t mocap_delay_ticks;
+    double mocap_period_s;
+    double mocap_share;
+} engine_simulation_t;
+
+/* A group of flights, one in each lane; with one lane one flight. Rows of body_start are those of a state of the rigid
+ * body. */
+typedef struct {
+    real_t body_start[12];
+    real_t rotor_start_rad_s[4];
+    real_t yaw_rad;
+    real_t yaw_rate_rad_s;
+
+    real_t mass_kg;
+    real_t inertia_kg_m2[3];
+    real_t thrust_factor_n_s2;
+    real_t torque_per_thrust_m;
+    real_t rotor_decay[4];    /* at the nodes and at the end of a tick */
+    real_t drag_1_s;
+    real_t wind_m_s2[2];
+
+    real_t gust_mean_m_s;
+    real_t gust_sigma_m_s;
+    real_t gust_heading[2];   /* cosine and sine */
+    real_t gust_decay;
+    real_t gust_x;
+    real_t gust_roots[3];     /* Cholesky factor: aa, ab, bb */
+
+    real_t battery_sag_1_s;
+    real_t payload_kg;
+    whole_t payload_tick;     /* on the trajectory's clock */
+    real_t push_n_s[3];
+    whole_t push_tick;        /* on the trajectory's clock */
+
+    whole_t delay_ticks;
+    real_t dropped_share;
+
+    real_t noise[8];          /* standard deviations: accelerometer, gyro, sonar, pressure; or position, angles */
+    real_t bias[6];           /* accelerometer, gyro */
+} engine_flight_t;
+
+/* Random numbers of a group, for each lane a row for each tick: sensors (lanes, ticks, 8 or 6), gusts
+ * (lanes, 1 + ticks, 3) with a first row for their start, and drops (lanes, updates). NULL where the simulation needs
+ * none. */
+typedef struct {
+    const double *sensors;
+    const double *gusts;
+    const double *drops;
+} engine_draws_t;
+
+/* Arrays of a trace, (flights, updates, axes). Without sensors the last three are NULL. */
+typedef struct {
+    double *position_m;
+    double *velocity_m_s;
+    double *euler_rad;
+    double *command_rad;
+    double *thrust_acceleration_m_s2;
+    int64_t *status;
+    double *seen_position_m;
+    double *seen_velocity_m_s;
+    double *seen_euler_rad;
+} engine_trace_t;
+
+/* A position controller: reads a state of 7 and a target of 6 numbers, writes roll and pitch, returns a status. */
+typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
+                                       double thrust_acceleration_m_s2, double *command_rad);
+
+/* The lanes of this engine. */
+int64_t engine_lanes(void);
+
+/* How many lanes are fastest with this compiler on this processor: 1, 2 or 4. */
+int64_t engine_fastest_lanes(void);
+
+/* Simulate a group of flights from start to end, with their rows of `targets` (flights, updates, 6), and write their
+ * rows of the trace. The first flight has index `index` and the controller `self`; the controllers lie `stride` bytes
+ * apart. A lane beyond the last flight of the simulation has no controller and no rows. */
+void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
+                const double *times_s, const double *targets, const engine_draws_t *draws,
+                engine_controller_t controller, void *self, int64_t stride, const engine_trace_t *trace);
+
+/* How a trace is evaluated: see sil/mambo_sil/flight/evaluation.py. */
+typedef struct {
+    int64_t flights;
+    int64_t updates;
+    int64_t first_update;     /* at t >= 0: metrics and crashes count from there */
+    int64_t not_called;       /* the status of an update for which the controller was not called */
+    double limit_rad;         /* a command of this size is saturated */
+    double least_level;       /* cosine of the tilt beyond which a drone has crashed */
+} engine_evaluation_t;
+
+/* Of each flight: whether it crashed, its refused updates and saturated commands, and its metrics (flights, 9) as
+ * flown and, with sensors, as seen. */
+typedef struct {
+    int64_t *crashed;
+    int64_t *refused;
+    int64_t *saturated;
+    double *metrics;
+    double *seen_metrics;
+} engine_results_t;
+
+/* Evaluate a group of flights with their targets (flights, updates, 2); the first has index `index`. */
+void engine_evaluate(const engine_evaluation_t *evaluation, int64_t index, const double *times_s,
+                     const double *targets, const engine_trace_t *trace, const engine_results_t *results);
+
+/* The stock PD position controller; it has no state. Its constants: see engine_pd_t. */
+typedef struct {
+    double position_p_rad_m;
+    double position_d_rad_s_m;
+    double error_limit_m;
+} engine_pd_t;
+
+int64_t engine_pd_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                       double *command_rad);
+
+/* The PD with feed-forward: PdFeedForwardController. */
+typedef struct {
+    double position_rad_m;
+    double velocity_rad_s_m;
+    double acceleration_rad_s2_m;
+    double tilt_limit_rad;
+} engine_pd_feedforward_t;
+
+int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,
+                                   double thrust_acceleration_m_s2, double *command_rad);
+
+/* A controller with a fault: sil/mambo_sil/experiment/faults/fault.py. Initially update is 0 and computed_rad is 0. */
+typedef struct {
+    engine_controller_t controller;
+    void *self;
+    int64_t effect;
+    double values[7];
+    int64_t columns[2];
+    int64_t on;
+    int64_t of;
+    int64_t begin;            /* update */
+    int64_t end;              /* update */
+    int64_t drop_every;
+    int64_t late_updates;
+    char *memory;             /* of the controller, which a dropped update leaves as it is; NULL if it has none */
+    char *saved;              /* as long as memory */
+    int64_t memory_bytes;
+    double *computed_rad;     /* (late_updates + 1, 2): the last commands, at the remainder of their update */
+    double began[7];          /* state at the onset */
+    int64_t update;
+} engine_faulty_t;
+
+int64_t engine_faulty_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                           double *command_rad);
+
+/* nmpc_host_reset or nmpc_host_set_weights of a generated controller. */
+typedef void (*engine_setter_t)(void *controllers, int n, const void *values, int *status);
+
+/* A caller that commands zero tilt after `patience` rejected steps: LevellingCaller. */
+typedef struct {
+    engine_controller_t controller;
+    void *self;
+    engine_setter_t reset;
+    void *memory;             /* of the generated controller */
+    const void *level;        /* zero tilt in its numbers */
+    int64_t patience;
+    int64_t refused;
+} engine_levelling_t;
+
+int64_t engine_levelling_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                              double *command_rad);
+
+/* Weights in the numbers of a generated controller, and the status with which it answers. */
+typedef struct {
+    int64_t update;
+    const void *weights;
+    int64_t *status;
+} engine_weight_change_t;
+
+/* A generated controller whose weights change: ReweightedController. */
+typedef struct {
+    engine_controller_t controller;
+    void *memory;
+    engine_setter_t set_weights;
+    const engine_weight_change_t *changes;
+    int64_t count;
+    int64_t update;
+} engine_reweighted_t;
+
+int64_t engine_reweighted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                               double *command_rad);

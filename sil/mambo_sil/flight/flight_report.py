@@ -1,0 +1,188 @@
+"""The summary of a flight as a record and as text."""
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from pydantic import SerializerFunctionWrapHandler, model_serializer
+
+from mambo_codegen.reference import Status
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.plant.link import NOT_CALLED
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.flight.crashes import Crash, first_crash
+from mambo_sil.flight.metrics import TRANSIENT_S, Metrics, measure
+from mambo_sil.flight.scenario import Scenario
+from mambo_sil.flight.traces import SensedTrace, Trace
+from mambo_sil.results.summary import Number, Summary
+
+_UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
+_UNITS |= {"_rad": "rad", "_m": "m"}
+
+
+class FlightSummary(Summary):
+    """The results of any flight."""
+
+    controller: str
+    settings: str
+    same_bits_as_host: bool | None
+    lost: bool
+    crash: Crash | None = None
+    mostly_refused: bool
+    """Whether more than half of the updates on the trajectory were refused."""
+    statuses: dict[str, int]
+    refusals: list[str]
+    metrics: dict[str, Number]
+    metrics_without_transient: dict[str, Number] | None = None
+    metrics_as_seen: dict[str, Number] | None = None
+
+    @property
+    def columns(self) -> dict[str, dict[str, float]]:
+        """The sets of metrics by the heading of their column."""
+        columns = {
+            "whole flight": self.metrics,
+            "after 10 s": self.metrics_without_transient,
+            "as seen": self.metrics_as_seen,
+        }
+        return {heading: values for heading, values in columns.items() if values is not None}
+
+    @property
+    def good(self) -> bool:
+        """Whether the drone stayed under control, and an emulated flight has the bits of the host."""
+        controlled = not self.lost and self.crash is None and not self.mostly_refused
+        return controlled and self.same_bits_as_host is not False
+
+    @model_serializer(mode="wrap")
+    def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        optional = ("metrics_without_transient", "metrics_as_seen")
+        return {key: value for key, value in dump(self).items() if value is not None or key not in optional}
+
+
+class FlySummary(FlightSummary):
+    """The results of `fly`; `trajectory_sha256` is the hash of a waypoint file."""
+
+    command = "fly"
+
+    board: str | None
+    source: str
+    vehicle: VehicleFile = NOMINAL
+    update_period_s: float
+    trajectory: str
+    trajectory_sha256: str | None
+    size_m: float
+    rate_rad_s: float
+    yaw_rad: float
+    wind_m_s2: tuple[float, float]
+    wind_speed_m_s: float
+    sensors: str
+    seed: int
+    motor_lag_s: float
+    start: str
+    duration_s: float
+
+
+class ReplaySummary(FlightSummary):
+    """The results of repeating a recorded flight."""
+
+    command = "fly --replay"
+
+    replay: str
+    scenario: Scenario
+    same_bits_as_recorded: bool | None
+
+    @property
+    def good(self) -> bool:
+        """Whether the drone stayed under control, and the flight equals the recorded one in every bit."""
+        return super().good and self.same_bits_as_recorded is not False
+
+
+def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
+    """Return the metrics of the flight with index `flight`, by name."""
+    return {field.name: float(getattr(metrics, field.name)[flight]) for field in fields(metrics)}
+
+
+def refusals(trace: Trace, settings: Settings) -> list[str]:
+    """Say how often the controller of the first flight refused an input, and which range it exceeded."""
+    if isinstance(trace, SensedTrace):
+        trace = trace.as_seen()
+    status, ranges = trace.status[:, 0], settings.ranges
+    sentences = []
+    refused = (status == Status.BAD_STATE) & np.isfinite(trace.position_m[:, 0]).all(axis=-1)
+    for words, unit, values, key, limit in (
+        ("position", "m", trace.position_m[:, 0, :2], "position_m", ranges.position_m),
+        ("speed", "m/s", trace.velocity_m_s[:, 0, :2], "velocity_m_s", ranges.velocity_m_s),
+    ):
+        largest = np.abs(values).max(axis=-1)
+        beyond = refused & (largest > limit)
+        if beyond.any():
+            sentences.append(
+                f"{beyond.sum()} steps: the drone's {words}, up to {largest[beyond].max():.4g} {unit}, "
+                f"exceeds ranges.{key} = {limit:g}"
+            )
+    refused = status == Status.BAD_THRUST
+    if refused.any():
+        thrust = trace.thrust_acceleration_m_s2[refused, 0]
+        during = " during lift-off" if (trace.time_s[refused] < 0.0).all() else ""
+        sentences.append(
+            f"{refused.sum()} steps{during}: thrust out of range, {thrust.min():.4g}..{thrust.max():.4g} "
+            f"m/s^2, but ranges.thrust_acceleration_* = {ranges.thrust_acceleration_min_m_s2:g}.."
+            f"{ranges.thrust_acceleration_max_m_s2:g}"
+        )
+    return [f"{sentence}; the drone kept the last command" for sentence in sentences]
+
+
+def judge(trace: Trace, settings: Settings, drone: VehicleFile) -> dict[str, Any]:
+    """Return the fields of a `FlightSummary` that follow from the trace."""
+    status = trace.status[:, 0]
+    names = {NOT_CALLED: "NOT_CALLED", **{int(each): each.name for each in Status}}
+    counts = {name: int((status == value).sum()) for value, name in names.items()}
+    refused = ~np.isin(status[trace.time_s >= 0.0], (Status.OK, NOT_CALLED))
+    long = trace.time_s[-2] >= TRANSIENT_S
+    return {
+        "lost": bool(trace.diverged[0]),
+        "crash": first_crash(trace, drone=drone),
+        "mostly_refused": bool(np.mean(refused) > 0.5),
+        "statuses": {name: count for name, count in counts.items() if count},
+        "refusals": refusals(trace, settings),
+        "metrics": numbers(measure(trace)),
+        "metrics_without_transient": numbers(measure(trace, TRANSIENT_S)) if long else None,
+        "metrics_as_seen": numbers(measure(trace.as_seen())) if isinstance(trace, SensedTrace) else None,
+    }
+
+
+def flight_text(summary: FlightSummary) -> str:
+    """Format a summary: a metric per line, columns with and without the transient, and as seen."""
+    columns = summary.columns
+    lines = [f"{'':22}" + "".join(f"{heading:>14}" for heading in columns)]
+    for key in summary.metrics:
+        name, unit = named(key)
+        lines.append(
+            f"{name:22}" + "".join(f"{values[key]:14.5g}" for values in columns.values()) + f"  {unit}"
+        )
+    quiet = ("OK", "NOT_CALLED")
+    refused = {name: count for name, count in summary.statuses.items() if name not in quiet}
+    if refused:
+        lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
+        lines += [f"  {sentence}" for sentence in summary.refusals]
+    if isinstance(summary, ReplaySummary) and summary.same_bits_as_recorded is not None:
+        same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
+        lines.append(f"replay: the trace {same} the recorded one, bit for bit")
+    if isinstance(summary, FlySummary) and summary.board is not None:
+        same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
+        lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")
+    if summary.crash is not None:
+        lines.append(f"CRASHED at {summary.crash.time_s:.2f} s: {summary.crash.how}")
+    if summary.lost:
+        lines.append("LOST: the drone diverged before the end of the flight")
+    elif summary.mostly_refused:
+        lines.append("NOT CONTROLLED: the controller refused more than half of its inputs")
+    return "\n".join(lines)
+
+
+def named(key: str) -> tuple[str, str]:
+    """Split the key of a metric, such as rms_error_m, into its name and its unit."""
+    suffix = next((suffix for suffix in _UNITS if key.endswith(suffix)), "")
+    name = key.removesuffix(suffix).replace("_", " ")
+    words = [word.upper() if word in ("iae", "ise", "itse", "itae") else word for word in name.split()]
+    return " ".join(words), _UNITS.get(suffix, "")

@@ -1,0 +1,327 @@
+"""The closed loop: trajectory, position controller and drone, for n flights at once.
+
+    target -> position controller --roll, pitch--> link -> inner loops -> rotors -> rigid body <- disturbances
+              every update period                          every tick                    |
+                      ^------------------------------------------^-- sensors (optional) -'
+
+The simulation is deterministic: the same flight with the same controller gives the same trace, and a flight
+gives the same bits alone and in a batch.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.errors import echo
+from mambo_sil.drone.plant import loops
+from mambo_sil.drone.plant.airframe import airframe_of
+from mambo_sil.drone.plant.arrays import FloatArray, IntArray, PerFlight
+from mambo_sil.drone.plant.disturbances import Disturbances, World
+from mambo_sil.drone.plant.link import NOT_CALLED, Drops, Link, Wire
+from mambo_sil.drone.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
+from mambo_sil.drone.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
+from mambo_sil.drone.sensors.estimators import Suite
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.names import Start
+from mambo_sil.flight.traces import AXES, SensedTrace, Trace
+from mambo_sil.flight.trajectories import Trajectory
+
+HEIGHT_REFERENCE_M = -1.1
+"""Altitude reference of every flight: z points down."""
+
+TAKE_OFF_PHASE_S = 5.0
+"""Time from the beginning of a take-off to t = 0 of the trajectory's clock."""
+
+LOST_M = 1e4
+"""Distance from the origin along any axis beyond which a flight is lost."""
+
+
+class Outcome(Protocol):
+    """The output of a position controller for n flights."""
+
+    @property
+    def command_rad(self) -> NDArray[np.floating[Any]]:
+        """Roll and pitch (n, 2)."""
+        ...
+
+    @property
+    def status(self) -> IntArray:
+        """0 where the controller accepted its input (n,)."""
+        ...
+
+
+class PositionController(Protocol):
+    """The interface of a position controller to the closed loop."""
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
+        """Return the command for states (n, 7), targets (n, 6) and thrust accelerations (n,).
+
+        The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy, ax, ay], in the world frame (NED).
+        The thrust acceleration is positive along -z of the body.
+        """
+        ...
+
+
+Three = tuple[PerFlight, PerFlight, PerFlight]
+
+
+@dataclass(frozen=True, eq=False)
+class Offset:
+    """How a start differs from the one described by `Flight.start`."""
+
+    position_m: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    velocity_m_s: Three = (0.0, 0.0, 0.0)
+    """In the world frame."""
+    tilt_rad: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    """Roll and pitch."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One simulation of n flights; a quantity that differs between them is an array (n,)."""
+
+    trajectory: Trajectory
+    duration_s: float = 100.0
+    flights: int = 1
+    start: Start = "hover"
+    """Above the first point of the trajectory: at `HEIGHT_REFERENCE_M`, level and at rest, at t = 0; or on
+    the ground, `TAKE_OFF_PHASE_S` before t = 0."""
+    yaw_rad: PerFlight = 0.0
+    """Heading at the start, and reference of the yaw loop."""
+    yaw_rate_rad_s: PerFlight = 0.0
+    """Rate of the yaw reference from t = 0 on."""
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    update_period_s: float = 0.01
+    """Period of the position controller: a whole multiple of the tick."""
+    seeds: tuple[int, ...] | None = None
+    """Random seed of each flight; None is 0 for all."""
+    offset: Offset | None = None
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    link: Link = field(default_factory=Link)
+    sensors: Sensors | MotionCapture | None = None
+    """Sensors behind the estimates that position controller and stock loops receive; None: the true state."""
+
+    def __post_init__(self) -> None:
+        step_s = self.vehicle.drone.step_s
+        if not self.update_period_s <= self.duration_s < math.inf:
+            raise FlightError(
+                f"duration_s = {self.duration_s:g} must be finite and at least "
+                f"update_period_s = {self.update_period_s:g}"
+            )
+        if self.update_period_s <= 0.0 or abs(math.remainder(self.update_period_s, step_s)) > 1e-9:
+            raise FlightError(
+                f"update_period_s = {self.update_period_s:g} must be a whole multiple of {step_s:g}; "
+                f"the inner loops of vehicle {echo(self.vehicle.drone.name)} run at {1.0 / step_s:g} Hz"
+            )
+        if isinstance(self.sensors, Sensors) and step_s != STEP_S:
+            raise FlightError(f"sensors: those of the Mambo run at {1.0 / STEP_S:g} Hz, not {1.0 / step_s:g}")
+        if self.seeds is not None and len(self.seeds) != self.flights:
+            raise FlightError(f"seeds: there are {len(self.seeds)} for {self.flights} flights")
+
+    @property
+    def ticks_per_update(self) -> int:
+        """Ticks of the inner loops for each step of the position controller."""
+        return round(self.update_period_s / self.vehicle.drone.step_s)
+
+    def times_s(self) -> FloatArray:
+        """Return the times (k,) of the position controller's updates; t = 0 is one of them."""
+        before = round(TAKE_OFF_PHASE_S / self.update_period_s) if self.start == "take-off" else 0
+        after = round(self.duration_s / self.update_period_s)
+        return self.update_period_s * np.arange(-before, after + 1, dtype=np.float64)
+
+    def targets(self) -> FloatArray:
+        """Return the targets (k, n, 4) at the times of the updates.
+
+        Raises `FlightError` if the number of trajectories is not the number of flights.
+        """
+        return self._for_each_flight(self.trajectory.target(self.times_s()))
+
+    @cached_property
+    def given_targets(self) -> FloatArray:
+        """The targets (k, n, 6) as controllers are given them: with their accelerations.
+
+        Those of a flight are contiguous in memory, as in `allocate_trace`.
+        Raises `FlightError` as `targets`.
+        """
+        targets = self.targets()
+        given = np.empty((self.flights, len(targets), 6)).swapaxes(0, 1)
+        given[..., :4] = targets
+        given[..., 4:] = self._for_each_flight(self.trajectory.acceleration(self.times_s()))
+        return given
+
+    def _for_each_flight(self, values: FloatArray) -> FloatArray:
+        """Return values of one trajectory (k, m), or of each (k, n, m), as (k, n, m)."""
+        if values.ndim == 2:
+            return np.broadcast_to(values[:, np.newaxis, :], (len(values), self.flights, values.shape[1]))
+        if values.shape[1] != self.flights:
+            raise FlightError(f"flights = {self.flights} must be {values.shape[1]}, one for each trajectory")
+        return values
+
+
+def fly(
+    flight: Flight, controller: PositionController, progress: Callable[[float], None] | None = None
+) -> Trace:
+    """Simulate the flights and return their trace; call `progress` with the share done after every update.
+
+    Raises `FlightError` if the number of trajectories is not the number of flights.
+    """
+    times_s, targets = flight.times_s(), flight.given_targets
+    lifting_until = lifting_updates(flight, times_s)
+    seeds = flight.seeds or (0,) * flight.flights
+    vehicle, state = flight.vehicle, start_state(flight, targets[0])
+    drone, step_s = vehicle.drone, vehicle.drone.step_s
+    world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
+    suite = _suite(flight, seeds, truth(state))
+    wire = Wire(flight.link, flight.flights)
+    caller = _Caller(
+        controller,
+        Drops(flight.link, seeds),
+        targets,
+        allocate_trace(times_s, targets[..., :4], sensed=suite is not None),
+        drone.body.mass_kg,
+    )
+    for update, time_s in enumerate(times_s):
+        state = _mark_lost(state)
+        lifting = update < lifting_until
+        heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
+        for tick in range(flight.ticks_per_update):
+            with np.errstate(all="ignore"):
+                state, moment = world.tick(state, time_s + step_s * tick)
+                true = truth(state)
+                seen = true if suite is None else suite.estimate(true)
+                thrust_n = _thrust_n(drone, seen, lifting)
+            if tick == 0:
+                caller.call(update, true, seen, thrust_n)
+            command_rad = wire.carry(caller.command_rad)
+            with np.errstate(all="ignore"):
+                state = vehicle.step(state, command_rad, thrust_n, heading_rad, seen=seen, moment=moment)
+        if progress is not None:
+            progress((update + 1) / len(times_s))
+    _unify_nan(caller.trace)
+    return caller.trace
+
+
+def _suite(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
+    """Return the sensors of n flights; None: the true state."""
+    match flight.sensors:
+        case MotionCapture() as capture:
+            return MocapSuite(capture, seeds, start, flight.vehicle.drone.step_s)
+        case Sensors() as sensors:
+            return Suite(sensors, seeds, start)
+        case None:
+            return None
+
+
+def lifting_updates(flight: Flight, times_s: FloatArray) -> int:
+    """Return how many of the updates at `times_s` (k,) fall into the open-loop beginning of a take-off."""
+    open_loop_s = loops.TAKE_OFF_S if flight.start == "take-off" else 0.0
+    return int((times_s < times_s[0] + open_loop_s - flight.vehicle.drone.step_s / 2.0).sum())
+
+
+def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
+    """Return the initial state of n flights, above their first targets (n, 4) or on the ground below."""
+    position_m = np.zeros((3, flight.flights))
+    position_m[:2] = first_target[:, :2].T
+    nominal = airframe_of(flight.vehicle.drone)
+    command: PerFlight = nominal.command_min
+    if flight.start == "hover":
+        position_m[2] = HEIGHT_REFERENCE_M
+        command = nominal.hover_command
+    state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
+    if flight.offset is None:
+        return state
+    offset, body = flight.offset, state.body
+    for row in range(3):
+        body[POSITION][row] += offset.position_m[row]
+    for row in range(2):
+        body[EULER][row] = offset.tilt_rad[row]
+    velocity_m_s = np.stack([np.broadcast_to(component, flight.flights) for component in offset.velocity_m_s])
+    body[VELOCITY] = to_body(body[EULER], velocity_m_s)
+    return state
+
+
+def _thrust_n(drone: VehicleFile, seen: Seen, lifting: bool) -> FloatArray:
+    """Return the demanded total thrust (n,) in N: constant while lifting, then from the altitude loop."""
+    if lifting:
+        return np.full(seen.position_m.shape[1], loops.take_off_thrust_n(drone))
+    return loops.altitude_thrust(drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
+
+
+def _mark_lost(state: VehicleState) -> VehicleState:
+    """Return the state with NaN in the flights that left the bounds or are not finite."""
+    lost = ~(np.abs(state.body[POSITION]).max(axis=0) < LOST_M) | ~np.isfinite(state.body).all(axis=0)
+    if not lost.any():
+        return state
+    return VehicleState(np.where(lost, np.nan, state.body), state.rotor_speed_rad_s, state.memory)
+
+
+def _unify_nan(trace: Trace) -> None:
+    """Replace every NaN of a trace by the same one: its sign and payload depend on the processor."""
+    for column in fields(trace):
+        values = getattr(trace, column.name)
+        if column.name not in ("time_s", "target", "status"):
+            values[np.isnan(values)] = np.nan
+
+
+def allocate_trace(times_s: FloatArray, targets: FloatArray, *, sensed: bool) -> Trace:
+    """Return a trace with times and targets set and its other arrays uninitialized.
+
+    The samples of a flight are contiguous in memory: the engine writes a flight after the other.
+    """
+    kind = SensedTrace if sensed else Trace
+    shape = targets.shape[:2]
+    arrays: dict[str, Any] = {
+        column.name: np.empty((*shape[::-1], *AXES[column.name.removeprefix("seen_")])).swapaxes(0, 1)
+        for column in fields(kind)
+        if column.name not in ("time_s", "target", "status")
+    }
+    return kind(time_s=times_s, target=targets, status=np.empty(shape[::-1], np.int64).T, **arrays)
+
+
+class _Caller:
+    """Calls the position controller of n flights, records the trace and holds the command (2, n)."""
+
+    def __init__(
+        self, controller: PositionController, drops: Drops, targets: FloatArray, trace: Trace, mass_kg: float
+    ) -> None:
+        self._controller, self._drops, self._targets, self._mass_kg = controller, drops, targets, mass_kg
+        self.trace = trace
+        self.command_rad: FloatArray = np.zeros((2, trace.flights))
+
+    def call(self, update: int, true: Seen, seen: Seen, thrust_n: FloatArray) -> None:
+        """Call the controller with the state `seen` and record the update.
+
+        A flight whose update is dropped passes NaN: the controller rejects it and keeps its internal state.
+        """
+        trace = self.trace
+        measured = np.ascontiguousarray(
+            np.concatenate([seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad]).T
+        )
+        dropped = self._drops.next()
+        if dropped is not None:
+            measured[dropped] = np.nan
+        thrust_acceleration_m_s2 = thrust_n / self._mass_kg
+        outcome = self._controller.step(measured, self._targets[update], thrust_acceleration_m_s2)
+        trace.position_m[update] = true.position_m.T
+        trace.velocity_m_s[update] = true.velocity_m_s.T
+        trace.euler_rad[update] = true.euler_rad.T
+        if isinstance(trace, SensedTrace):
+            trace.seen_position_m[update] = seen.position_m.T
+            trace.seen_velocity_m_s[update] = seen.velocity_m_s.T
+            trace.seen_euler_rad[update] = seen.euler_rad.T
+        trace.command_rad[update] = outcome.command_rad
+        trace.thrust_acceleration_m_s2[update] = thrust_acceleration_m_s2
+        trace.status[update] = outcome.status
+        if dropped is not None:
+            trace.command_rad[update, dropped] = self.command_rad.T[dropped]
+            trace.status[update, dropped] = NOT_CALLED
+        self.command_rad = trace.command_rad[update].T

@@ -1,0 +1,296 @@
+"""Trajectories: target position, velocity and acceleration in the world frame as pure functions of time.
+
+Every curve is centred at the origin. Before t = 0 the target rests on the first point of its curve.
+A jump of the position or of the velocity has no acceleration.
+Half-width and radius are in metres, the angular rate in rad/s.
+"""
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mambo_codegen.errors import echo
+from mambo_codegen.plain_file import read_plain_file
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.elementary import sine_cosine
+from mambo_sil.errors import TrajectoryError
+from mambo_sil.flight.names import CurveName
+
+STEP_TIME_S = 1.0
+COLUMNS = ("time_s", "x_m", "y_m")
+LARGEST = (1e6, 1e4, 1e4)
+"""Largest magnitude of a waypoint's time in s, x in m and y in m."""
+
+LARGEST_FILE_BYTES = 10_000_000
+SHORTEST_LEG_S = 1e-6
+"""Least time from one waypoint to the next, which bounds the velocity."""
+
+Point = tuple[float, float, float]
+"""A waypoint: time in s, x and y in m."""
+
+
+class Trajectory(Protocol):
+    """The interface of a trajectory to the closed loop, for one flight or for n."""
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] in m and m/s.
+
+        Times of shape (...) give (..., 4), or (..., n, 4) with one target for each of n flights.
+        """
+        ...
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] in m/s^2: (..., 2), or (..., n, 2)."""
+        ...
+
+
+def _rest_before_start(time_s: ArrayLike, *target: FloatArray) -> FloatArray:
+    """Return x, y, vx, vy, each (...), as (..., 4), with velocity 0 where the time (...) is before t = 0."""
+    stacked = np.stack(target, axis=-1)
+    stacked[..., 2:] *= (np.asarray(time_s) >= 0.0)[..., np.newaxis]
+    return stacked
+
+
+def _none_before_start(time_s: ArrayLike, *acceleration: FloatArray) -> FloatArray:
+    """Return ax, ay, each (...), as (..., 2), with 0 where the time (...) is before t = 0."""
+    return np.stack(acceleration, axis=-1) * (np.asarray(time_s) >= 0.0)[..., np.newaxis]
+
+
+@dataclass(frozen=True)
+class Bernoulli:
+    """Lemniscate of Bernoulli with its long axis along x, from its centre: the paper's figure of eight."""
+
+    half_width_m: float
+    angular_rate_rad_s: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        phase = self.angular_rate_rad_s * np.maximum(time_s, 0.0)
+        sine, cosine = sine_cosine(phase)
+        denominator = 1.0 + cosine * cosine
+        x = self.half_width_m * sine / denominator
+        speed = self.half_width_m * self.angular_rate_rad_s / (denominator * denominator)
+        vx = speed * cosine * (denominator + 2.0 * sine * sine)
+        return _rest_before_start(time_s, x, x * cosine, vx, speed * (3.0 * cosine * cosine - 1.0))
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        rate = self.angular_rate_rad_s
+        sine, cosine = sine_cosine(rate * np.maximum(time_s, 0.0))
+        square = cosine * cosine
+        denominator = 1.0 + square
+        scale = self.half_width_m * rate * rate * sine / (denominator * denominator * denominator)
+        ax = scale * ((12.0 - square) * square - 3.0)
+        return _none_before_start(time_s, ax, 2.0 * scale * cosine * (3.0 * square - 5.0))
+
+
+@dataclass(frozen=True)
+class Lissajous:
+    """x = a sin(w t), y = a h sin(2 w t): half-width a, ratio h of height to width."""
+
+    half_width_m: float
+    angular_rate_rad_s: float
+    height: float = 1.0
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        rate, width, height = self.angular_rate_rad_s, self.half_width_m, self.height * self.half_width_m
+        phase = rate * np.maximum(time_s, 0.0)
+        (sine, cosine), (sine_2, cosine_2) = sine_cosine(phase), sine_cosine(2.0 * phase)
+        vx, vy = width * rate * cosine, 2.0 * height * rate * cosine_2
+        return _rest_before_start(time_s, width * sine, height * sine_2, vx, vy)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        x, y = np.moveaxis(self.target(time_s)[..., :2], -1, 0)
+        square = self.angular_rate_rad_s * self.angular_rate_rad_s
+        return _none_before_start(time_s, -square * x, -4.0 * square * y)
+
+
+@dataclass(frozen=True)
+class Gerono(Lissajous):
+    """Lemniscate of Gerono, x = a sin(w t), y = a sin(w t) cos(w t): a Lissajous curve of half height."""
+
+    height: float = 0.5
+
+
+@dataclass(frozen=True)
+class Circle:
+    """Circle about the origin; it starts at (radius, 0) towards +y."""
+
+    radius_m: float
+    angular_rate_rad_s: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        rate = self.angular_rate_rad_s
+        phase = rate * np.maximum(time_s, 0.0)
+        sine, cosine = sine_cosine(phase)
+        x, y = self.radius_m * cosine, self.radius_m * sine
+        return _rest_before_start(time_s, x, y, -rate * y, rate * x)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        x, y = np.moveaxis(self.target(time_s)[..., :2], -1, 0)
+        square = self.angular_rate_rad_s * self.angular_rate_rad_s
+        return _none_before_start(time_s, -square * x, -square * y)
+
+
+@dataclass(frozen=True)
+class Hover:
+    """The origin at all times."""
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        return np.zeros((*np.shape(time_s), 4))
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return zeros (..., 2)."""
+        return np.zeros((*np.shape(time_s), 2))
+
+
+@dataclass(frozen=True)
+class PositionStep:
+    """The origin, and from `STEP_TIME_S` on the point (x, y); the target velocity is always 0."""
+
+    x_m: float
+    y_m: float
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        stepped = np.asarray(time_s) >= STEP_TIME_S
+        return np.where(stepped[..., np.newaxis], [self.x_m, self.y_m, 0.0, 0.0], 0.0)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return zeros (..., 2)."""
+        return np.zeros((*np.shape(time_s), 2))
+
+
+@dataclass(frozen=True)
+class Waypoints:
+    """Straight lines between waypoints, each at constant speed; the target rests before and after them.
+
+    Raises `TrajectoryError` unless times increase and all numbers are within `LARGEST`.
+    """
+
+    points: tuple[Point, ...]
+    """Rows of time in s, x and y in m."""
+
+    def __post_init__(self) -> None:
+        _check([f"point {number}" for number in range(1, len(self.points) + 1)], self.points)
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Read a CSV file with the columns time_s, x_m, y_m, in any order; other columns are ignored.
+
+        Raises `TrajectoryError`, which names file, line, column and rule.
+        """
+        name = echo(str(path))
+        try:
+            content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
+            if len(content) > LARGEST_FILE_BYTES:
+                raise TrajectoryError("is larger than 10 MB; some thousand waypoints take less")
+            points = _read(content.decode("utf-8-sig"))
+            _check(list(points), tuple(points.values()))
+        except OSError as error:
+            raise TrajectoryError(f"{name}: cannot be read: {error.strerror}") from error
+        except UnicodeDecodeError:
+            raise TrajectoryError(f"{name}: is not UTF-8; save the file as UTF-8") from None
+        except TrajectoryError as error:
+            raise TrajectoryError(f"{name}: {error}") from None
+        return cls(tuple(points.values()))
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        knots, x, y = np.array(self.points).T
+        clock = np.maximum(time_s, 0.0)
+        leg = np.searchsorted(knots, clock, side="right")
+        vx, vy = (np.concatenate([[0.0], np.diff(each) / np.diff(knots), [0.0]])[leg] for each in (x, y))
+        return _rest_before_start(time_s, np.interp(clock, knots, x), np.interp(clock, knots, y), vx, vy)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return zeros (..., 2)."""
+        return np.zeros((*np.shape(time_s), 2))
+
+
+def _check(places: Sequence[str], points: Sequence[Point]) -> None:
+    """Raise `TrajectoryError` for points that cannot be flown; `places` names each point in the message."""
+    if not points:
+        raise TrajectoryError("holds no waypoint; at least one is needed")
+    for place, point in zip(places, points, strict=True):
+        for column, value, largest in zip(COLUMNS, point, LARGEST, strict=True):
+            if not abs(value) <= largest:
+                raise TrajectoryError(
+                    f"{place}: {column} = {value} must be a finite number of magnitude {largest:g} or less"
+                )
+    for place, before, after in zip(places[1:], points, points[1:], strict=False):
+        if after[0] - before[0] < SHORTEST_LEG_S:
+            raise TrajectoryError(
+                f"{place}: time_s = {after[0]} must be later than the {before[0]} before it, "
+                f"by {SHORTEST_LEG_S:g} or more"
+            )
+
+
+def _read(text: str) -> dict[str, Point]:
+    """Return the point of every row of a CSV file that is not blank, by the number of its line."""
+    rows, points = csv.reader(io.StringIO(text, newline=""), strict=True), {}
+    try:
+        header = [name.strip() for name in next(rows, [])]
+        for column in COLUMNS:
+            if header.count(column) != 1:
+                fault = "appears more than once" if column in header else "is missing"
+                raise TrajectoryError(
+                    f"line 1: column {column} {fault}; the header must name {','.join(COLUMNS)}"
+                )
+        for row in filter(None, rows):
+            line = f"line {rows.line_num}"
+            if len(row) > len(header):
+                raise TrajectoryError(f"{line}: has more fields than the {len(header)} of the header")
+            time_s, x_m, y_m = (_number(row[header.index(name) :][:1], line, name) for name in COLUMNS)
+            points[line] = time_s, x_m, y_m
+    except csv.Error as error:
+        raise TrajectoryError(f"line {rows.line_num}: is not CSV: {error}") from None
+    return points
+
+
+def _number(field: Sequence[str], line: str, column: str) -> float:
+    """Return one field of a CSV row as a number; no field is one missing at the end of the row."""
+    text = "".join(field)
+    if not text.strip():
+        raise TrajectoryError(f"{line}: {column} is missing")
+    try:
+        return float(text)
+    except ValueError:
+        raise TrajectoryError(f"{line}: {column} = {echo(text)} must be a number") from None
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """One trajectory for each of n flights."""
+
+    each: tuple[Trajectory, ...]
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., n, 4)."""
+        return np.stack([trajectory.target(time_s) for trajectory in self.each], axis=-2)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., n, 2)."""
+        return np.stack([trajectory.acceleration(time_s) for trajectory in self.each], axis=-2)
+
+
+CURVES: Final[dict[CurveName, Callable[[float, float], Trajectory]]] = {
+    "bernoulli": Bernoulli,
+    "gerono": Gerono,
+    "lissajous": Lissajous,
+    "circle": Circle,
+    "hover": lambda size_m, rate_rad_s: Hover(),  # noqa: ARG005 - has neither size nor rate
+    "step": lambda size_m, rate_rad_s: PositionStep(size_m, 0.0),  # noqa: ARG005 - has no rate
+}
+"""Curve by name, as a function of size (half-width, radius or step in m) and angular rate in rad/s."""

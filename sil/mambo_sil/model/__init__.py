@@ -1,0 +1,1 @@
+"""From a flight log to a vehicle, from a vehicle to settings, and logs replayed."""

@@ -1,0 +1,163 @@
+"""Derive the settings of a controller with a quadratic cost from a drone, with a reason for each.
+
+Thresholds and factors are measured: docs/explanation/design.md.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_codegen import __version__
+from mambo_codegen.settings.controller_toml import comment
+from mambo_codegen.settings.key import spell
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.sections import FirstOrderAttitude, MamboSensors, MocapSensors, NoSensors
+from mambo_sil.model.derive.response import fit_steps
+
+UPDATE_PERIOD_S: Final = 0.01
+RAMP_S: Final = 0.4
+
+QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
+MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
+
+QUICK_DISTURBANCE_M_S3: Final = 3.0
+CALM_DISTURBANCE_M_S3: Final = 1.0
+LATE_VELOCITY_M_S: Final = 0.15
+LEAST_POSITION_M: Final = 0.001
+"""Noise densities of the observer."""
+
+MOST_THRUST_M_S2: Final = 50.0
+"""Default of ranges.thrust_acceleration_max_m_s2."""
+
+
+@dataclass(frozen=True)
+class Derived:
+    """One key of a controller.toml, its value, and the reason, which becomes its comment."""
+
+    section: str
+    key: str
+    value: float | str
+    reason: str
+
+
+def derive(drone: VehicleFile) -> list[Derived]:
+    """Return the settings for a drone that differ from the defaults, section by section."""
+    attitude = list(_attitude(drone))
+    times_s = [float(each.value) for each in attitude if each.key.endswith(("_lag_s", "_delay_s"))]
+    return [
+        *_horizon(drone),
+        *attitude,
+        Derived("model", "drag_1_s", drone.body.drag_1_s, "As body.drag_1_s"),
+        Derived("model", "attitude", "predicted", "No quick loop through the measured attitude"),
+        Derived("target", "acceleration", "tracked", "Removes most of the tracking error on curves"),
+        Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
+        _response(sum(times_s) / 2.0),
+        *_observer(drone),
+        _tilt_limit(drone),
+        *_thrust_range(drone),
+    ]
+
+
+def controller_text(drone: VehicleFile, source: str) -> str:
+    """Return a controller.toml for the drone of `source`, with the reason of each value as a comment."""
+    lines = [
+        comment(f"For vehicle {source}, derived from its file by mambo-nmpc {__version__}."),
+        comment("A missing key takes the value of preset table1."),
+    ]
+    section = ""
+    for each in derive(drone):
+        if each.section != section:
+            section = each.section
+            lines += ["", f"[{section}]"]
+        lines += [comment(f"{each.reason}."), f"{each.key} = {spell(each.value)}"]
+    return "\n".join(lines) + "\n"
+
+
+def _horizon(drone: VehicleFile) -> Iterator[Derived]:
+    """Yield the update period, the whole number of ticks nearest to 10 ms, and the ramp."""
+    rate_hz = drone.attitude.rate_hz
+    ticks = max(1, round(UPDATE_PERIOD_S * rate_hz))
+    if ticks / rate_hz != UPDATE_PERIOD_S:
+        words = f"{ticks} of the inner loops' ticks, attitude.rate_hz = {rate_hz}"
+        yield Derived("horizon", "update_period_s", ticks / rate_hz, words)
+    yield Derived("horizon", "ramp_s", RAMP_S, "So that the controller sees its tilt limit coming")
+
+
+def _attitude(drone: VehicleFile) -> Iterator[Derived]:
+    """Yield the attitude model: as the file has it, or fitted to the answer of its loops."""
+    if isinstance(drone.attitude, FirstOrderAttitude):
+        for name, axis in (("roll", drone.attitude.roll), ("pitch", drone.attitude.pitch)):
+            yield Derived("model", f"{name}_gain", axis.gain, f"As attitude.{name}.gain")
+            yield Derived("model", f"{name}_lag_s", axis.lag_s, f"As attitude.{name}.lag_s")
+            yield Derived("model", f"{name}_delay_s", axis.dead_time_s, f"As attitude.{name}.dead_time_s")
+        share = drone.attitude.acceleration_per_tilt_g
+        yield Derived("model", "acceleration_per_tilt", share, "As attitude.acceleration_per_tilt_g")
+        return
+    for name, fit in zip(("roll", "pitch"), fit_steps(drone), strict=True):
+        words = f"Fitted to the answer of the attitude loop to a step; leaves {100.0 * fit.error:.1f} % (rms)"
+        yield Derived("model", f"{name}_lag_s", _round(fit.lag_s), words)
+        yield Derived("model", f"{name}_delay_s", _round(fit.delay_s), "Likewise")
+        if fit.integral_1_s:
+            yield Derived("model", f"{name}_integral_1_s", _round(fit.integral_1_s), "Likewise")
+
+
+def _response(slowness_s: float) -> Derived:
+    """Return the response time for a mean lag plus delay."""
+    value = _round(min(max(slowness_s, QUICKEST_RESPONSE_S), SLOWEST_RESPONSE_S))
+    words = "Lag plus delay, the mean of roll and pitch"
+    if slowness_s < QUICKEST_RESPONSE_S:
+        words = "A shorter one passes more noise on to the commands, and is no closer"
+    return Derived("cost", "response_time_s", value, words)
+
+
+def _observer(drone: VehicleFile) -> Iterator[Derived]:
+    """Yield noise densities and age; the Mambo's sensors have the defaults."""
+    sensors = drone.sensors
+    if isinstance(sensors, MocapSensors):
+        density_m = min(max(sensors.position_noise_m, LEAST_POSITION_M), 10.0)
+        words = f"As sensors.position_noise_m, at least {spell(LEAST_POSITION_M)}"
+        yield Derived("observer", "position_noise", density_m, words)
+        words = "Learns wind within tenths of a second"
+        yield Derived("observer", "disturbance_noise", QUICK_DISTURBANCE_M_S3, words)
+        words = "Large, because the filter of the velocity makes it late"
+        yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, words)
+        held_s = max(1.0 / sensors.position_rate_hz - UPDATE_PERIOD_S, 0.0) / 2.0
+        words = "As sensors.position_delay_s" + (
+            ", and half the time that a position is held" if held_s else ""
+        )
+        yield Derived("observer", "age_s", _round(min(sensors.position_delay_s + held_s, 0.2)), words)
+    elif isinstance(sensors, NoSensors):
+        words = (
+            "No sensors in the file: calm with those of the Mambo and with motion capture, best with neither"
+        )
+        yield Derived("observer", "disturbance_noise", CALM_DISTURBANCE_M_S3, words)
+        yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
+
+
+def _tilt_limit(drone: VehicleFile) -> Derived:
+    """Return half the tilt at which the largest thrust carries the weight, within a bound."""
+    ratio = drone.altitude.thrust_max_n / drone.weight_n
+    half_rad = 0.5 * math.acos(1.0 / ratio)
+    words = f"Half the tilt at which the largest thrust, {ratio:.3g} times the weight, still carries it"
+    by_flow = isinstance(drone.sensors, MamboSensors)
+    most_rad = MOST_TILT_BY_FLOW_RAD if by_flow else MOST_TILT_RAD
+    if half_rad > most_rad:
+        why = (
+            "the optical flow drifts in larger tilts" if by_flow else "the model takes a tilt for its tangent"
+        )
+        words += f"; at most {most_rad:g}, since {why}"
+    return Derived("limits", "tilt_rad", _round(max(min(half_rad, most_rad), 0.01)), words)
+
+
+def _thrust_range(drone: VehicleFile) -> Iterator[Derived]:
+    """Yield the largest accepted thrust of a drone that has more than the default."""
+    largest_m_s2 = drone.altitude.thrust_max_n / drone.body.mass_kg
+    if largest_m_s2 > MOST_THRUST_M_S2:
+        words = "The largest thrust over the mass, altitude.thrust_max_n and body.mass_kg"
+        yield Derived("ranges", "thrust_acceleration_max_m_s2", float(math.ceil(largest_m_s2)), words)
+
+
+def _round(value: float) -> float:
+    """Return a value with three digits."""
+    return float(f"{value:.3g}")

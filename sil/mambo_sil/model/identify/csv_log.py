@@ -1,0 +1,167 @@
+"""Read a flight log from CSV: one row a sample, one clock; an empty or NaN cell is a missing sample."""
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.errors import echo
+from mambo_codegen.plain_file import read_plain_file
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import LogError
+from mambo_sil.model.identify.columns import KNOWN, Column, choose_columns
+from mambo_sil.model.identify.signals import OPTIONAL, REQUIRED, TIME, FlightLog, Signal
+
+LARGEST_FILE_BYTES: Final = 100_000_000
+LARGEST_VALUE: Final = 1e15
+_MOST_FAULTS: Final = 5
+_FASTER: Final = "log at 50 to 100 Hz; for a clock in ms write --columns time_s=0.001*COLUMN"
+SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.0002, 0.025
+"""Bounds on the median time between two samples: 5 kHz to 40 Hz. A command that is logged rarely
+would be read as a late one."""
+
+
+LONGEST_OPTIONAL_PERIOD_S: Final = 0.1
+"""Median time between two samples of position, velocity or yaw beyond which they are left out."""
+
+
+def read_csv(
+    path: Path, chosen: Mapping[str, Column], signals: Mapping[str, Sequence[Column]] = KNOWN
+) -> FlightLog:
+    """Read the log at `path`; `chosen` has the columns that the user named, `signals` the known ones of each.
+
+    Raises LogError, all faults.
+    """
+    name = echo(str(path))
+    rows = _rows(read_text(path))
+    header = [column.strip() for column in next(rows, (0, []))[1]]
+    if not any(header):
+        raise LogError((f"{name}: is empty; the first line must name the columns",))
+    columns, faults = choose_columns(header, chosen, signals)
+    if faults:
+        raise LogError(tuple(f"{name}: {fault}" for fault in faults))
+    values, faults = _values(rows, {signal: header.index(each.name) for signal, each in columns.items()})
+    if faults:
+        raise LogError(tuple(f"{name}: {fault}" for fault in faults))
+    return _log(name, columns, values)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a log; raises LogError for a file that cannot be read."""
+    name = echo(str(path))
+    try:
+        content = read_plain_file(path, LARGEST_FILE_BYTES + 1)
+    except FileNotFoundError:
+        raise LogError((f"{name}: there is no such file",)) from None
+    except IsADirectoryError:
+        raise LogError((f"{name}: is a folder; name a log in it, such as its trace.csv",)) from None
+    except OSError as error:
+        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
+    if len(content) > LARGEST_FILE_BYTES:
+        raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: cut it",))
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise LogError(
+            (f"{name}: line {line}: is not UTF-8; save the log as CSV in UTF-8, or name a .ulg for ULog",)
+        ) from None
+
+
+def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield line number and fields of each row; the delimiter is the first line's most frequent one."""
+    first = text.partition("\n")[0]
+    delimiter = max(",;\t", key=first.count)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    while True:
+        try:
+            yield reader.line_num, next(reader)
+        except StopIteration:
+            return
+        except csv.Error:  # a NUL, or a field of more than 131072 characters
+            yield reader.line_num, ["not CSV"]
+
+
+def _values(
+    rows: Iterator[tuple[int, list[str]]], places: Mapping[str, int]
+) -> tuple[dict[str, FloatArray], list[str]]:
+    """Return each signal as (k,), NaN for a missing sample, and the faults; `places` has field numbers."""
+    found: dict[str, list[float]] = {signal: [] for signal in places}
+    faults: list[str] = []
+    more = 0
+    for line, row in rows:
+        if not any(row):
+            continue
+        for signal, place in places.items():
+            text = row[place].strip() if place < len(row) else ""
+            try:
+                value = float(text) if text else math.nan
+            except ValueError:
+                if len(faults) < _MOST_FAULTS:
+                    faults.append(f"line {line + 1}: {signal} = {echo(text)} must be a number")
+                else:
+                    more += 1
+                value = math.nan
+            found[signal].append(value if abs(value) < LARGEST_VALUE else math.nan)
+    if more:
+        faults.append(f"and {more} more fields that are no number")
+    return {signal: np.array(values) for signal, values in found.items()}, faults
+
+
+def _log(name: str, columns: Mapping[str, Column], values: Mapping[str, FloatArray]) -> FlightLog:
+    """Return the log of the columns' values; raises LogError."""
+    time_s = columns[TIME].factor * values[TIME]
+    timed = np.isfinite(time_s)
+    faults, remarks, signals = [], [], {}
+    for signal, column in columns.items():
+        if signal == TIME:
+            continue
+        there = timed & np.isfinite(values[signal])
+        if not there.any():
+            if signal in REQUIRED:
+                faults.append(f"{name}: column {echo(column.name)} holds no number; {signal} is needed")
+            continue
+        if (lost := int(timed.sum() - there.sum())) and signal in REQUIRED:
+            remarks.append(f"{name}: {lost} of {timed.sum()} rows have no {echo(column.name)}")
+        signals[signal] = Signal(time_s[there], column.factor * values[signal][there], column.text)
+    if faults:
+        raise LogError(tuple(faults))
+    return demand_one_clock(FlightLog(name, signals, tuple(remarks)), columns[TIME].text, _FASTER)
+
+
+def demand_one_clock(log: FlightLog, clock: str, fix: str) -> FlightLog:
+    """Return the log without repeated times and rare signals.
+
+    Raises LogError if times fall, or are in another unit.
+    `fix` says how to log faster.
+    """
+    signals, faults, remarks = {}, [], list(log.remarks)
+    for name, signal in log.signals.items():
+        step_s = np.diff(signal.time_s)
+        if (step_s < 0.0).any():
+            at = int(np.argmax(step_s < 0.0))
+            faults.append(
+                f"{log.name}: the time {echo(clock)} falls from {signal.time_s[at]:.10g} to "
+                f"{signal.time_s[at + 1]:.10g} s: the rows are of two clocks or of two flights; "
+                "a log must be of one flight, on one clock"
+            )
+            break
+        fresh = np.append(step_s > 0.0, values=True)
+        period_s = float(np.median(step_s[step_s > 0.0])) if (step_s > 0.0).any() else 0.0
+        rate = f"{echo(signal.column)} has a sample every {period_s:.3g} s by the time {echo(clock)}"
+        if name in OPTIONAL and period_s > LONGEST_OPTIONAL_PERIOD_S:
+            remarks.append(f"{log.name}: {rate}: left out, because that is too rare")
+            continue
+        if name in REQUIRED and not SHORTEST_PERIOD_S <= period_s <= LONGEST_PERIOD_S:
+            faults.append(
+                f"{log.name}: {rate}; that must be {SHORTEST_PERIOD_S:g}..{LONGEST_PERIOD_S:g} s: {fix}"
+            )
+            break
+        signals[name] = Signal(signal.time_s[fresh], signal.value[fresh], signal.column)
+    if faults:
+        raise LogError(tuple(faults))
+    return FlightLog(log.name, signals, tuple(remarks))

@@ -1,0 +1,188 @@
+"""From logs to a model: read, check, cut, fit, judge."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.errors import echo
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import LogError
+from mambo_sil.model.identify.axis import AxisFit, fit_axis, judge_axis
+from mambo_sil.model.identify.checks import EXCITED_RAD, NAMES, check_log, check_units
+from mambo_sil.model.identify.columns import Column
+from mambo_sil.model.identify.csv_log import read_csv
+from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
+from mambo_sil.model.identify.motion import Motion, explained, fit_motion
+from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s
+from mambo_sil.model.identify.signals import POSITION, TILTS, VELOCITY, FlightLog
+from mambo_sil.model.identify.ulog import read_ulog
+
+SHARES: Final = (0.4, 1.5)
+"""Bounds on a plausible acceleration per tilt."""
+
+LEAST_EXPLAINED, GOOD_EXPLAINED = 0.8, 0.9
+"""Share of the motion that tilt must explain. In hover tilt mostly answers gusts, which biases the fit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """Commanded, measured and modelled tilt of the longest stretch, for the picture.
+
+    The model is the one fitted to the first half of each stretch. Pairs are roll, pitch.
+    """
+
+    time_s: FloatArray
+    """(m,), from 0."""
+    command_rad: FloatArray
+    """(2, m)."""
+    tilt_rad: FloatArray
+    model_rad: FloatArray
+    """(2, m); NaN for an axis without a fit."""
+
+
+def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> list[FlightLog]:
+    """Read CSV files and, by their ending .ulg, ULog files; raises LogError with the faults of all."""
+    logs: list[FlightLog] = []
+    faults: list[str] = []
+    ulogs = [path.suffix.lower() == ".ulg" for path in paths]
+    if columns and all(ulogs):
+        faults.append("--columns is for CSV files; a ULog needs none")
+    for path, is_ulog in zip(paths, ulogs, strict=True):
+        if sum(path.resolve() == other.resolve() for other in paths) > 1:
+            faults.append(f"{echo(str(path))}: is named twice; a log counts once")
+            continue
+        try:
+            logs.append(read_ulog(path) if is_ulog else read_csv(path, columns))
+        except LogError as error:
+            faults += error.faults
+    if faults:
+        raise LogError(tuple(dict.fromkeys(faults)))
+    return logs
+
+
+def identify(logs: Sequence[FlightLog]) -> tuple[IdentifySummary, Curves]:
+    """Fit both axes and the motion on all logs.
+
+    Raises LogError with all faults of units, signs and clocks.
+    """
+    pieces, remarks, shared_clock = _check(logs)
+    segments = [segment for piece in pieces for segment in piece]
+    longest = max(segments, key=lambda each: len(each.time_s))
+    fits = [fit_axis(segments, axis) for axis in range(2)]
+    results = [
+        judge_axis(pieces, axis, fits[axis], _white_noise(logs, TILTS[axis : axis + 1])) for axis in range(2)
+    ]
+    motion, why = _fit_motion(segments, shared_clock=shared_clock)
+    remarks += [why] if why else []
+    model = {} if any(each.verdict == "refused" for each in results) else model_keys(results, motion)
+    summary = IdentifySummary(
+        logs=[
+            LogResult(log.name, duration_s(piece), {name: each.column for name, each in log.signals.items()})
+            for log, piece in zip(logs, pieces, strict=True)
+        ],
+        duration_s=duration_s(segments),
+        split_s=float(longest.time_s[longest.first_half][-1] - longest.time_s[0]),
+        roll=results[0],
+        pitch=results[1],
+        motion=motion,
+        noise=Noise(_white_noise(logs, POSITION), _white_noise(logs, VELOCITY)),
+        model=model,
+        remarks=remarks,
+    )
+    return summary, _curves(longest, segments.index(longest), fits)
+
+
+def model_keys(axes: Sequence[AxisResult], motion: Motion | None) -> dict[str, float]:
+    """Return the keys of section [model], rounded to four digits; both axes must be fitted."""
+    keys: dict[str, float] = {}
+    for name, axis in zip(NAMES, axes, strict=True):
+        if (fit := axis.fitted) is None:
+            raise ValueError(f"{name} has no fit")
+        keys |= {f"{name}_gain": fit.gain.value, f"{name}_lag_s": fit.lag_s.value}
+        keys |= {f"{name}_delay_s": fit.delay_s.value}
+        keys |= {f"{name}_integral_1_s": fit.integral_1_s.value} if fit.integral_1_s else {}
+    if motion is not None:
+        keys |= {f"{name}_trim_rad": each.value for name, each in zip(NAMES, motion.trim_rad, strict=True)}
+        keys |= {"acceleration_per_tilt": motion.acceleration_per_tilt.value}
+        keys |= {"drag_1_s": max(motion.drag_1_s.value, 0.0)}
+    return {key: float(f"{value:.4g}") for key, value in keys.items()}
+
+
+def _check(logs: Sequence[FlightLog]) -> tuple[list[list[Segment]], list[str], bool]:
+    """Return the stretches of each log, remarks, and whether tilt and velocity share a clock in all logs."""
+    faults: list[str] = []
+    remarks: list[str] = []
+    pieces, shared_clock = [], True
+    for log in logs:
+        remarks += log.remarks
+        units = check_units(log)
+        faults += units
+        pieces.append([] if units else cut(log))
+        if units:
+            continue
+        if not pieces[-1]:
+            faults.append(
+                f"{log.name}: has no stretch of {SHORTEST_S:g} s in the air without a gap of 0.2 s or a tilt "
+                "beyond 45 degrees; fly longer, or log more reliably"
+            )
+            continue
+        checked = check_log(log, pieces[-1])
+        faults += checked.faults
+        remarks += checked.remarks
+        shared_clock &= checked.one_clock
+    if faults:
+        raise LogError(tuple(faults))
+    return pieces, remarks, shared_clock
+
+
+def _fit_motion(segments: Sequence[Segment], *, shared_clock: bool) -> tuple[Motion | None, str]:
+    """Return the motion, or None; and what a reader must know of it."""
+    moved = [each for each in segments if each.velocity_m_s is not None]
+    why = "tilt and velocity do not share a clock" if not shared_clock else _why_no_motion(moved)
+    motion = None if why else fit_motion(moved)
+    if motion is not None:
+        share = motion.acceleration_per_tilt.value
+        if SHARES[0] <= share <= SHARES[1]:
+            biased = f"tilt explains only {motion.r2:.2f} of the motion: acceleration and drag may be biased"
+            return motion, biased if motion.r2 < GOOD_EXPLAINED else ""
+        why = f"{share:.2f} g per radian; plausible are {SHARES[0]}..{SHARES[1]}"
+    return None, f"acceleration per tilt, drag and trim are not fitted: {why}"
+
+
+def _why_no_motion(moved: Sequence[Segment]) -> str:
+    """Return why stretches that have velocities do not show the motion, or nothing."""
+    if not moved:
+        return "no log has velocity or position"
+    tilt = np.concatenate([each.tilt_rad for each in moved], axis=1)
+    if (tilt.std(axis=1) < EXCITED_RAD).any():
+        return "roll or pitch moves by less than 1 degree"
+    if (share := explained(moved)) < LEAST_EXPLAINED:
+        return f"tilt explains only {share:.2f} of the motion; {LEAST_EXPLAINED} is needed"
+    return ""
+
+
+def _white_noise(logs: Sequence[FlightLog], names: Sequence[str]) -> float:
+    """Return the rms of the white noise of signals, from third differences of samples; NaN if absent."""
+    parts = [
+        np.diff(log.signals[name].value, 3) / math.sqrt(20.0)
+        for log in logs
+        for name in names
+        if name in log.signals
+    ]
+    return float(np.sqrt(np.median(np.concatenate(parts) ** 2) / 0.455)) if parts else math.nan
+
+
+def _curves(segment: Segment, number: int, fits: Sequence[AxisFit | None]) -> Curves:
+    """Return the curves of a stretch."""
+    model = [
+        np.full_like(segment.time_s, np.nan)
+        if fit is None
+        else fit.half.predict(segment, axis, fit.half.offset_rad[number])
+        for axis, fit in enumerate(fits)
+    ]
+    command = np.stack([segment.command_means(axis) for axis in range(2)])
+    return Curves(segment.time_s - segment.time_s[0], command, segment.tilt_rad, np.stack(model))

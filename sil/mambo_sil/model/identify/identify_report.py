@@ -1,0 +1,184 @@
+"""An identification as text, as section [model] of a controller.toml, and as vehicle.toml."""
+
+from typing import Final
+
+from mambo_sil.model.identify.identify import Curves
+from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary
+from mambo_sil.model.identify.response import Interval
+from mambo_sil.model.identify.signals import DEGREE
+from mambo_sil.results.numbers import three_digits
+
+ADVICE: Final = (
+    "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
+    "eight on a Crazyflie; --manoeuvre eight.csv writes its waypoints for another drone"
+)
+AXIS_ROWS: Final = (
+    *("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s"),
+    *("held-out R2", "verdict"),
+)
+CURVE_COLUMNS: Final = (
+    *("time_s", "roll_command_rad", "roll_rad", "roll_model_rad"),
+    *("pitch_command_rad", "pitch_rad", "pitch_model_rad"),
+)
+
+
+def identify_text(summary: IdentifySummary) -> str:
+    """Return an identification as text: the model with its 95 % intervals, then what the logs showed."""
+    lines = [f"{'':28}" + "".join(f"{name:20}" for name in summary.axes)]
+    cells = zip(*(axis_cells(axis) for axis in summary.axes.values()), strict=True)
+    rows = zip(AXIS_ROWS, cells, strict=True)
+    lines += [f"{words:28}" + "".join(f"{cell:20}" for cell in row) for words, row in rows]
+    facts = [*motion_rows(summary), *noise_rows(summary)]
+    lines += [f"{words:28}{value}" for words, value in facts]
+    for name, axis in summary.axes.items():
+        lines += [f"{name} is {axis.verdict}: {reason}" for reason in axis.reasons]
+    for log in summary.logs:
+        renamed = [f"{signal} = {column}" for signal, column in log.columns.items() if column != signal]
+        lines.append(
+            f"{log.name}: {log.duration_s:.1f} s used" + (f"; {', '.join(renamed)}" if renamed else "")
+        )
+    lines += summary.remarks
+    if any(axis.verdict != "good" for axis in summary.axes.values()):
+        lines.append(ADVICE)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def axis_cells(axis: AxisResult) -> list[str]:
+    """Return the values of `AXIS_ROWS` of an axis in words."""
+    fit = axis.fitted
+    r2 = "-" if axis.held_out_r2 != axis.held_out_r2 else f"{axis.held_out_r2:.3f}"
+    if fit is None:
+        return ["-"] * 5 + [r2, axis.verdict]
+    times = [_plus_minus(each, 1e3, 0) for each in (fit.sum_s, fit.lag_s, fit.delay_s)]
+    integral = "-" if fit.integral_1_s is None else _plus_minus(fit.integral_1_s, 1.0, 2)
+    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, r2, axis.verdict]
+
+
+def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
+    """Return name and value of each parameter of the motion."""
+    motion = summary.motion
+    if motion is None:
+        return []
+    trim = ", ".join(_plus_minus(each, 1.0 / DEGREE, 2) for each in motion.trim_rad)
+    return [
+        ("acceleration per tilt", f"{_plus_minus(motion.acceleration_per_tilt, 1.0, 3)} g per radian"),
+        ("drag", f"{_plus_minus(motion.drag_1_s, 1.0, 3)} 1/s"),
+        ("trim of roll, pitch", f"{trim} degrees"),
+        ("motion explained", f"R2 {motion.r2:.3f}; rms left {motion.disturbance_m_s2:.3f} m/s^2"),
+    ]
+
+
+def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
+    """Return name and value of the measured tilts' offset and of each noise."""
+    tilts = ", ".join(f"{axis.tilt_noise_rad / DEGREE:.2f}" for axis in summary.axes.values())
+    offsets = ", ".join(f"{axis.offset_rad / DEGREE:.2f}" for axis in summary.axes.values())
+    rows = [
+        ("roll, pitch at no command", f"{offsets} degrees"),
+        ("white noise of roll, pitch", f"{tilts} degrees"),
+    ]
+    for words, value, unit in (
+        ("white noise of position", summary.noise.position_m, "m"),
+        ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),
+    ):
+        rows += [(words, f"{three_digits(value)} {unit}")] if value == value else []  # noqa: PLR0124 - NaN
+    return rows
+
+
+def model_text(summary: IdentifySummary) -> str:
+    """Return a controller.toml with section [model] and the cost that uses all its keys."""
+    within = _half_widths(summary)
+    lines = [
+        *_heading(summary),
+        '# A controller.toml; or copy section [model] into one that has cost.norm = "quadratic".',
+        "",
+        "[cost]",
+        'norm = "quadratic"',
+        "",
+        "[model]",
+    ]
+    for key, value in summary.model.items():
+        lines.append(f"{key} = {value!r}" + (f"  # +- {within[key]:.2g}" if key in within else ""))
+    return "\n".join(lines) + "\n"
+
+
+def vehicle_text(summary: IdentifySummary) -> str:
+    """Return a vehicle.toml of kind first_order; both axes must have a model."""
+    motion = summary.motion
+    share, drag = "1.0  # not identified", "0.0  # not identified"
+    if motion is not None:
+        share = _round(motion.acceleration_per_tilt.value)
+        drag = _round(max(motion.drag_1_s.value, 0.0))
+    lines = [
+        *_heading(summary),
+        "",
+        "[body]",
+        "mass_kg = 0.1  # not identified: write that of the drone; it matters for payload and pushes",
+        f"drag_1_s = {drag}",
+        "",
+        "[attitude]",
+        'kind = "first_order"',
+        f"acceleration_per_tilt_g = {share}",
+    ]
+    for name, axis in summary.axes.items():
+        if (fit := axis.first_order) is None:
+            raise ValueError(f"{name} has no model")
+        lines.append(
+            f"{name} = {{ gain = {_round(fit.gain)}, lag_s = {_round(fit.lag_s)}, "
+            f"dead_time_s = {_round(fit.delay_s)} }}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def curves_csv(curves: Curves) -> str:
+    """Return the curves as CSV with the columns `CURVE_COLUMNS`."""
+    columns = [curves.time_s]
+    for axis in range(2):
+        columns += [curves.command_rad[axis], curves.tilt_rad[axis], curves.model_rad[axis]]
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    return (
+        "\n".join([",".join(CURVE_COLUMNS), *(",".join(f"{each:.6g}" for each in row) for row in rows)])
+        + "\n"
+    )
+
+
+def finding(summary: IdentifySummary) -> str:
+    """Return the result in one line."""
+    parts = []
+    for name, axis in summary.axes.items():
+        fit = axis.fitted
+        parts.append(
+            f"{name} refused"
+            if fit is None
+            else f"{name} {axis.verdict}: gain {fit.gain.value:.2f}, {1e3 * fit.sum_s.value:.0f} ms"
+        )
+    return "; ".join(parts)
+
+
+def _heading(summary: IdentifySummary) -> list[str]:
+    """Return the first comment lines of a file: what it describes, and from which logs."""
+    first = (
+        f"# Identified by {summary.generator} on {summary.duration_s:.0f} s of flight: {finding(summary)}."
+    )
+    return [first, *(f"# {log.name}, {log.duration_s:.0f} s" for log in summary.logs)]
+
+
+def _half_widths(summary: IdentifySummary) -> dict[str, float]:
+    """Return the half-width of the 95 % interval of each key of the model."""
+    found: dict[str, Interval | None] = {}
+    for name, axis in summary.axes.items():
+        if (fit := axis.fitted) is not None:
+            found |= {f"{name}_gain": fit.gain, f"{name}_lag_s": fit.lag_s, f"{name}_delay_s": fit.delay_s}
+            found |= {f"{name}_integral_1_s": fit.integral_1_s}
+    if (motion := summary.motion) is not None:
+        found |= {"acceleration_per_tilt": motion.acceleration_per_tilt, "drag_1_s": motion.drag_1_s}
+        found |= dict(zip(("roll_trim_rad", "pitch_trim_rad"), motion.trim_rad, strict=True))
+    return {key: each.within for key, each in found.items() if each is not None}
+
+
+def _round(value: float) -> str:
+    """Return a value with four digits, as TOML."""
+    return repr(float(f"{value:.4g}"))
+
+
+def _plus_minus(estimate: Interval, factor: float, decimals: int) -> str:
+    return f"{factor * estimate.value:.{decimals}f} +- {factor * estimate.within:.{decimals}f}"

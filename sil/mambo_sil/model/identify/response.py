@@ -1,0 +1,246 @@
+"""The response of measured to commanded tilt: gain, lag, dead time and, if it pays, an integrator.
+
+    measured = gain * G(command delayed by the dead time) + offset
+    G(s) = 1 / (lag s + 1), with the integrator (s + k) / (lag s^2 + s + k)
+
+Output error: the model is driven by the commands alone. Gain and offsets are solved linearly inside the
+search for the other parameters, of which it takes the logarithms.
+"""
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.signal import lfilter, lfilter_zi
+
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.model.identify.segments import PERIOD_S, Segment
+
+_LOW: Final = np.log([0.005, 0.001, 0.02])
+_HIGH: Final = np.log([2.0, 0.3, 10.0])
+"""Bounds on lag, dead time (s) and integrator (1/s)."""
+
+_STARTS: Final = ((0.1, 0.03, 0.7), (0.05, 0.1, 0.7))
+_STEP: Final = 1e-3
+CORRELATION_S: Final = 1.0
+"""Time over which residuals are taken as correlated (Newey and West 1987)."""
+
+NORMAL_95: Final = 1.96
+WIDENING: Final = 2.0
+DEAD_TIME_WIDENING: Final = 3.0
+SURPLUS_S: Final = 0.005
+"""Factors on the 95 % intervals, and what is added to those of times. Residuals of real logs are correlated
+for longer than the window; with these factors the intervals hold from flight to flight."""
+
+_LEAST_VARIANCE: Final = 1e-12
+"""Least variance of the residuals that intervals assume."""
+
+Masks = Sequence[NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A value and the half-width of its 95 % interval."""
+
+    value: float
+    within: float
+
+
+@dataclass(frozen=True, eq=False)
+class FittedResponse:
+    """Parameters of one axis; `integral_1_s` is 0 without an integrator."""
+
+    gain: float
+    lag_s: float
+    delay_s: float
+    integral_1_s: float
+    offset_rad: tuple[float, ...]
+    """Measured tilt at no command, one value a segment."""
+
+    def predict(self, segment: Segment, axis: int, offset_rad: float) -> FloatArray:
+        """Return the modelled tilt (m,) of a segment."""
+        return self.gain * _unit_response(self.logs, segment, axis) + offset_rad
+
+    @property
+    def lag_at_bound(self) -> bool:
+        """Whether the lag ended at a bound of its search."""
+        return not _LOW[0] + 0.02 < np.log(self.lag_s) < _HIGH[0] - 0.02
+
+    @property
+    def logs(self) -> FloatArray:
+        """The logarithms of lag, dead time and, if there is one, integrator."""
+        values = [self.lag_s, self.delay_s] + ([self.integral_1_s] if self.integral_1_s else [])
+        return np.log(values)
+
+
+def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool) -> FittedResponse:
+    """Fit one axis of all segments at once, on the samples of `masks`."""
+    order = 3 if integrator else 2
+    low, high = _LOW[:order], _HIGH[:order]
+
+    def residual(logs: FloatArray) -> FloatArray:
+        gain, parts = _project(logs, segments, axis, masks)
+        return np.concatenate([tilt - gain * unit for unit, tilt, _, _ in parts])
+
+    found = [
+        least_squares(residual, np.log(start[:order]), bounds=(low, high), x_scale=0.3, diff_step=_STEP)
+        for start in _STARTS
+    ]
+    logs = min(found, key=lambda one: float(one.cost)).x
+    gain, parts = _project(logs, segments, axis, masks)
+    offsets = tuple(tilt_mean - gain * unit_mean for _, _, unit_mean, tilt_mean in parts)
+    values = np.exp(logs).tolist()
+    return FittedResponse(gain, values[0], values[1], values[2] if integrator else 0.0, offsets)
+
+
+def residuals(
+    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks
+) -> list[FloatArray]:
+    """Return measured less modelled tilt of each segment on the samples of `masks`, offsets as fitted."""
+    return [
+        (segment.tilt_rad[axis] - response.predict(segment, axis, offset))[mask]
+        for segment, offset, mask in zip(segments, response.offset_rad, masks, strict=True)
+    ]
+
+
+def root_mean_square(parts: Sequence[FloatArray]) -> float:
+    """Return the rms of all samples."""
+    return float(np.sqrt(np.mean(np.square(np.concatenate(list(parts))))))
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """The best model of an axis without an integrator."""
+
+    gain: float
+    lag_s: float
+    delay_s: float
+
+
+@dataclass(frozen=True)
+class AxisParameters:
+    """Parameters with their 95 % intervals; `sum_s` is lag plus dead time, known better than either."""
+
+    gain: Interval
+    sum_s: Interval
+    lag_s: Interval
+    delay_s: Interval
+    integral_1_s: Interval | None
+
+
+def intervals(
+    response: FittedResponse, segments: Sequence[Segment], axis: int, masks: Masks
+) -> AxisParameters:
+    """Return the intervals of a fit on the same samples, from Newey and West's covariance, widened."""
+    logs = response.logs
+    slopes = _slopes(response, logs, segments, axis, masks)
+    errors = residuals(response, segments, axis, masks)
+    covariance = newey_west(slopes, errors, round(CORRELATION_S / PERIOD_S))
+
+    def half_width(weights: Sequence[float], widening: float) -> float:
+        along = np.zeros(len(covariance))
+        along[: len(weights)] = weights
+        return NORMAL_95 * widening * math.sqrt(max(float(along @ covariance @ along), 0.0))
+
+    lag, delay = response.lag_s, response.delay_s
+    order = len(logs)
+    return AxisParameters(
+        gain=Interval(response.gain, half_width([0.0] * order + [1.0], WIDENING)),
+        sum_s=Interval(lag + delay, half_width([lag, delay], WIDENING) + SURPLUS_S),
+        lag_s=Interval(lag, half_width([lag], WIDENING) + SURPLUS_S),
+        delay_s=Interval(delay, half_width([0.0, delay], DEAD_TIME_WIDENING) + SURPLUS_S),
+        integral_1_s=Interval(response.integral_1_s, half_width([0.0, 0.0, response.integral_1_s], WIDENING))
+        if order == 3
+        else None,
+    )
+
+
+def newey_west(slopes: Sequence[FloatArray], errors: Sequence[FloatArray], window: int) -> FloatArray:
+    """Return the covariance (p, p) of least-squares parameters whose residuals are correlated.
+
+    `slopes` (m, p) and `errors` (m,) are those of each segment; correlations beyond `window` samples, and
+    between segments, are taken as 0 (Newey and West 1987). A combination of parameters that the samples do
+    not show gets the variance 1.
+    """
+    whole = np.concatenate(list(slopes))
+    samples, parameters = whole.shape
+    variance = max(root_mean_square(errors) ** 2, _LEAST_VARIANCE)
+    meat = variance * variance * np.eye(parameters)
+    for slope, error in zip(slopes, errors, strict=True):
+        scores = slope * error[:, np.newaxis]
+        meat += scores.T @ scores
+        for lag in range(1, min(window, len(scores) - 1) + 1):
+            cross = scores[lag:].T @ scores[:-lag]
+            meat += (1.0 - lag / (window + 1.0)) * (cross + cross.T)
+    bread = np.linalg.inv(whole.T @ whole + variance * np.eye(parameters))
+    return np.asarray(bread @ meat @ bread * (samples / max(samples - parameters, 1)))
+
+
+def _unit_response(logs: FloatArray, segment: Segment, axis: int) -> FloatArray:
+    """Return G of the command (m,), which the beginning of the segment finds in steady state."""
+    lag, delay, *rest = np.exp(logs).tolist()
+    command = segment.command_means(axis, delay)
+    if not rest:
+        keep = float(np.exp(-PERIOD_S / lag))
+        top, bottom = np.array([1.0 - keep]), np.array([1.0, -keep])
+    else:
+        (integral,) = rest
+        top, bottom = _integrating_filter(lag, integral)
+    state = lfilter_zi(top, bottom) * command[0]
+    return np.asarray(lfilter(top, bottom, command, zi=state)[0])
+
+
+def _integrating_filter(lag_s: float, integral_1_s: float) -> tuple[FloatArray, FloatArray]:
+    """Return numerator (2,) and denominator (3,) of the response with an integrator to period means.
+
+    The exponential of a 2 x 2 matrix with trace 2 m and the eigenvalues m +- q is
+    e^m (cosh q + sinh q / q (A - m)).
+    """
+    system = PERIOD_S * np.array([[0.0, 1.0], [-integral_1_s / lag_s, -1.0 / lag_s]])
+    middle = -0.5 * PERIOD_S / lag_s
+    q = cmath.sqrt(middle * middle - PERIOD_S * PERIOD_S * integral_1_s / lag_s)
+    ratio = (cmath.sinh(q) / q).real if abs(q) > 1e-9 else 1.0
+    step = math.exp(middle) * (cmath.cosh(q).real * np.eye(2) + ratio * (system - middle * np.eye(2)))
+    drive = np.linalg.solve(system, step - np.eye(2)) @ [0.0, PERIOD_S]
+    read = np.array([integral_1_s, 1.0]) / lag_s
+    trace = step[0, 0] + step[1, 1]
+    top = np.array([read @ drive, read @ (step - trace * np.eye(2)) @ drive])
+    return top, np.array([1.0, -trace, math.exp(2.0 * middle)])
+
+
+def _project(
+    logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
+) -> tuple[float, list[tuple[FloatArray, FloatArray, float, float]]]:
+    """Return the best gain, and of each segment unit response and tilt without their means, and the means."""
+    parts = []
+    for segment, mask in zip(segments, masks, strict=True):
+        unit, tilt = _unit_response(logs, segment, axis)[mask], segment.tilt_rad[axis][mask]
+        unit_mean, tilt_mean = (float(each.mean()) for each in (unit, tilt))
+        parts.append((unit - unit_mean, tilt - tilt_mean, unit_mean, tilt_mean))
+    power = sum(float(unit @ unit) for unit, _, _, _ in parts)
+    gain = sum(float(unit @ tilt) for unit, tilt, _, _ in parts) / max(power, 1e-300)
+    return gain, parts
+
+
+def _slopes(
+    response: FittedResponse, logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
+) -> list[FloatArray]:
+    """Return the derivatives (m, p) of the modelled tilt of each segment: logarithms, gain, each offset."""
+    found = []
+    for number, (segment, mask) in enumerate(zip(segments, masks, strict=True)):
+        columns = []
+        for index in range(len(logs)):
+            step = np.zeros(len(logs))
+            step[index] = 10.0 * _STEP
+            above, below = (_unit_response(logs + sign * step, segment, axis) for sign in (1.0, -1.0))
+            columns.append(response.gain * (above - below)[mask] / (20.0 * _STEP))
+        columns.append(_unit_response(logs, segment, axis)[mask])
+        offsets = np.zeros((int(mask.sum()), len(segments)))
+        offsets[:, number] = 1.0
+        found.append(np.column_stack([*columns, offsets]))
+    return found

@@ -1,0 +1,201 @@
+"""Stretches of flight on a regular grid: commands as they were held, tilts interpolated, tumbles cut out."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.model.identify.signals import (
+    COMMANDS,
+    HEIGHT,
+    POSITION,
+    THRUST,
+    TILTS,
+    VELOCITY,
+    YAW,
+    FlightLog,
+    Signal,
+)
+
+PERIOD_S: Final = 0.01
+"""Period of the grid."""
+
+SETTLE_S: Final = 2.0
+"""Beginning of each stretch that fits and judgements leave out, because the model does not know its past."""
+
+LONGEST_GAP_S: Final = 0.2
+LARGEST_TILT_RAD: Final = math.radians(45.0)
+TUMBLE_MARGIN_S: Final = 0.5
+LOWEST_FLIGHT_M: Final = 0.3
+GROUND_MARGIN_S: Final = 1.5
+SHORTEST_S: Final = SETTLE_S + 2.0
+"""A shorter stretch is left out."""
+
+_VELOCITY_SPAN_S: Final = 0.1
+"""Time over which positions are differentiated where a log has no velocities."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldCommand:
+    """A command that is held from each of its times (k,) to the next; its integral is exact."""
+
+    time_s: FloatArray
+    integral: FloatArray
+    """Integral of the command (k,) from the first time on, in rad s."""
+
+    @classmethod
+    def of(cls, signal: Signal) -> "HeldCommand":
+        """Return the command of a signal; the last value is held for ten more seconds."""
+        time_s = np.append(signal.time_s, signal.time_s[-1] + 10.0)
+        steps = np.concatenate([[0.0], np.cumsum(np.diff(time_s) * signal.value)])
+        first = signal.value[0]
+        return cls(np.concatenate([[time_s[0] - 10.0], time_s]), np.concatenate([[-10.0 * first], steps]))
+
+    def means(self, time_s: FloatArray) -> FloatArray:
+        """Return the mean (m,) over the grid period that ends at each time (m,)."""
+        ends = np.interp(np.append(time_s[0] - PERIOD_S, time_s), self.time_s, self.integral)
+        return np.asarray(np.diff(ends) / PERIOD_S)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """One stretch of flight on the grid; pairs are roll and pitch, or x and y."""
+
+    log: str
+    time_s: FloatArray
+    """(m,)."""
+    command: tuple[HeldCommand, HeldCommand]
+    tilt_rad: FloatArray
+    """(2, m)."""
+    yaw_rad: FloatArray
+    """(m,); 0 where the log has none."""
+    velocity_m_s: FloatArray | None
+    """(2, m); None where the log has neither velocity nor position."""
+    thrust_m_s2: FloatArray | None
+    """Thrust over mass (m,); None where the log has none."""
+
+    def command_means(self, axis: int, delay_s: float = 0.0) -> FloatArray:
+        """Return the command (m,) of an axis, as the grid's period means, `delay_s` late."""
+        return self.command[axis].means(self.time_s - delay_s)
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Which samples (m,) count: those after `SETTLE_S`."""
+        return np.asarray(self.time_s >= self.time_s[0] + SETTLE_S)
+
+    @property
+    def first_half(self) -> NDArray[np.bool_]:
+        """Which of all samples (m,) belong to the first half of the counted ones."""
+        start_s, end_s = self.time_s[0] + SETTLE_S, self.time_s[-1]
+        return np.asarray(self.time_s < 0.5 * (start_s + end_s))
+
+
+def cut(log: FlightLog) -> list[Segment]:
+    """Return the stretches of a log without gap, tumble or ground contact, each of `SHORTEST_S` or more."""
+    moves = next((names for names in (VELOCITY, POSITION) if all(name in log.signals for name in names)), ())
+    names = (*COMMANDS, *TILTS, *moves, *(name for name in (YAW,) if name in log.signals))
+    commands = HeldCommand.of(log.signals[COMMANDS[0]]), HeldCommand.of(log.signals[COMMANDS[1]])
+    found = []
+    for start_s, end_s in _gapless([log.signals[name] for name in names]):
+        if end_s - start_s >= SHORTEST_S:
+            time_s = start_s + PERIOD_S * np.arange(int((end_s - start_s) / PERIOD_S) + 1, dtype=np.float64)
+            found += _cut_stretch(log, commands, time_s)
+    return found
+
+
+def _cut_stretch(
+    log: FlightLog, commands: tuple[HeldCommand, HeldCommand], time_s: FloatArray
+) -> list[Segment]:
+    """Return the stretches of a part (m,) without gaps that have neither tumble nor ground contact."""
+    tilt_rad = np.stack([_onto(time_s, log.signals[name]) for name in TILTS])
+    tumbling = np.asarray((np.abs(tilt_rad) > LARGEST_TILT_RAD).any(axis=0))
+    flown = ~_widen(tumbling, TUMBLE_MARGIN_S)
+    grounded = _grounded(log, time_s)
+    if not grounded.all():
+        flown &= ~_widen(grounded, GROUND_MARGIN_S)
+    velocity = _velocity(log, time_s)
+    yaw = _onto(time_s, log.signals[YAW], turn=True) if YAW in log.signals else np.zeros_like(time_s)
+    thrust = log.signals.get(THRUST)
+    thrust_m_s2 = None if thrust is None else _onto(time_s, thrust)
+    return [
+        Segment(
+            log.name,
+            time_s[a:b],
+            commands,
+            tilt_rad[:, a:b],
+            yaw[a:b],
+            None if velocity is None else velocity[:, a:b],
+            None if thrust_m_s2 is None else thrust_m_s2[a:b],
+        )
+        for a, b in _runs(flown)
+        if (b - a) * PERIOD_S >= SHORTEST_S
+    ]
+
+
+def duration_s(segments: Sequence[Segment]) -> float:
+    """Return the time that all stretches take together."""
+    return sum(len(segment.time_s) for segment in segments) * PERIOD_S
+
+
+def _onto(time_s: FloatArray, signal: Signal, *, turn: bool = False) -> FloatArray:
+    """Interpolate a signal; `turn` is for an angle that may jump by a whole turn."""
+    value = np.unwrap(signal.value) if turn else signal.value
+    return np.interp(time_s, signal.time_s, value)
+
+
+def _gapless(signals: Sequence[Signal]) -> list[tuple[float, float]]:
+    """Return begin and end of every time in which no signal has a gap of more than `LONGEST_GAP_S`."""
+    gaps = []
+    for signal in signals:
+        wide = np.flatnonzero(np.diff(signal.time_s) > LONGEST_GAP_S)
+        gaps += list(zip(signal.time_s[wide].tolist(), signal.time_s[wide + 1].tolist(), strict=True))
+    begin_s = max(float(signal.time_s[0]) for signal in signals)
+    end_s = min(float(signal.time_s[-1]) for signal in signals)
+    found = []
+    for gap_begin_s, gap_end_s in sorted(gaps):
+        found.append((begin_s, min(gap_begin_s, end_s)))
+        begin_s = max(begin_s, gap_end_s)
+    return [*found, (begin_s, end_s)]
+
+
+def _grounded(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:
+    """Return when (m,) the drone is near the ground or its thrust too small to fly, as far as logged."""
+    grounded = np.zeros(len(time_s), np.bool_)
+    if HEIGHT in log.signals:
+        grounded |= _onto(time_s, log.signals[HEIGHT]) > -LOWEST_FLIGHT_M
+    if THRUST in log.signals:
+        grounded |= _onto(time_s, log.signals[THRUST]) < 0.3 * GRAVITY_M_S2
+    return grounded
+
+
+def _velocity(log: FlightLog, time_s: FloatArray) -> FloatArray | None:
+    """Return the velocity (2, m) as logged, else from positions, else None."""
+    if all(name in log.signals for name in VELOCITY):
+        return np.stack([_onto(time_s, log.signals[name]) for name in VELOCITY])
+    if not all(name in log.signals for name in POSITION):
+        return None
+    half = 0.5 * _VELOCITY_SPAN_S
+    return np.stack(
+        [
+            (_onto(time_s + half, log.signals[name]) - _onto(time_s - half, log.signals[name]))
+            / _VELOCITY_SPAN_S
+            for name in POSITION
+        ]
+    )
+
+
+def _widen(marked: NDArray[np.bool_], margin_s: float) -> NDArray[np.bool_]:
+    """Return the marks (m,) with `margin_s` before and after each."""
+    reach = 2 * round(margin_s / PERIOD_S) + 1
+    return np.asarray(np.convolve(marked, np.ones(reach), mode="full")[reach // 2 :][: len(marked)] > 0.5)
+
+
+def _runs(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return begin and end of every run of marks."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -1,0 +1,45 @@
+"""The signals of a flight log, and the record of a log: what the readers write and the fits read."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from mambo_sil.drone.plant.arrays import FloatArray
+
+DEGREE: Final = math.pi / 180.0
+
+TIME: Final = "time_s"
+COMMANDS: Final = ("roll_command_rad", "pitch_command_rad")
+TILTS: Final = ("roll_rad", "pitch_rad")
+REQUIRED: Final = (*COMMANDS, *TILTS)
+YAW: Final = "yaw_rad"
+POSITION: Final = ("x_m", "y_m")
+HEIGHT: Final = "z_m"
+VELOCITY: Final = ("vx_m_s", "vy_m_s")
+THRUST: Final = "thrust_acceleration_m_s2"
+TARGET: Final = ("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s")
+TARGET_ACCELERATION: Final = ("target_ax_m_s2", "target_ay_m_s2")
+OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST)
+"""Optional signals; all signals are in SI units, the world frame is NED, roll is positive to the right and
+pitch is positive with the nose up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """Values (k,) of a signal at increasing times (k,) in s, both finite, and the column they come from."""
+
+    time_s: FloatArray
+    value: FloatArray
+    column: str
+
+
+@dataclass(frozen=True, eq=False)
+class FlightLog:
+    """One log: signals by name, at least those of `REQUIRED`."""
+
+    name: str
+    """Name of the file, fit for a message."""
+    signals: Mapping[str, Signal]
+    remarks: tuple[str, ...] = field(default=())
+    """What the reader left out, in words."""

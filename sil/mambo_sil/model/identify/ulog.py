@@ -1,0 +1,118 @@
+"""Read a flight log of PX4 in the format ULog, with the optional package pyulog."""
+
+import contextlib
+import io
+import shlex
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.errors import echo
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import LogError
+from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
+from mambo_sil.model.identify.signals import FlightLog, Signal
+
+SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
+TRAJECTORY: Final = "trajectory_setpoint"
+_MOTION: Final = {"x_m": "x", "y_m": "y", "z_m": "z", "vx_m_s": "vx", "vy_m_s": "vy"}
+_TARGET: Final[dict[str, tuple[str, ...]]] = {
+    "target_x_m": ("position[0]", "x"),
+    "target_y_m": ("position[1]", "y"),
+    "target_vx_m_s": ("velocity[0]", "vx"),
+    "target_vy_m_s": ("velocity[1]", "vy"),
+    "target_ax_m_s2": ("acceleration[0]",),
+    "target_ay_m_s2": ("acceleration[1]",),
+}
+"""Fields of the target, since PX4 1.14 and before; NaN where PX4 was not given the quantity."""
+_ANGLES: Final = ("roll", "pitch", "yaw")
+_CLOCK: Final = "timestamp"
+_FASTER: Final = "log at 50 Hz or more (SDLOG_PROFILE, high rate)"
+
+
+def read_ulog(path: Path) -> FlightLog:
+    """Read commanded and measured angles, motion and target; PX4 has the frames of this project.
+
+    Raises LogError for a file that is no ULog or lacks a topic, and if pyulog is not installed.
+    """
+    topics = _topics(path)
+    name = echo(str(path))
+    faults = [
+        f"{name}: has no {topic}; log it (SDLOG_PROFILE, default set)"
+        for topic in (SETPOINT, ATTITUDE)
+        if topic not in topics
+    ]
+    if faults:
+        raise LogError(tuple(faults))
+    command, attitude = topics[SETPOINT], topics[ATTITUDE]
+    signals = {}
+    for angle, values in _commands(command).items():
+        signals[f"{angle}_command_rad"] = _signal(command, values, f"{SETPOINT}.{angle}")
+    for angle, values in zip(_ANGLES, _euler_rad([attitude[f"q[{i}]"] for i in range(4)]), strict=True):
+        values = np.unwrap(values) if angle == "yaw" else values  # noqa: PLW2901 - the same angle
+        signals[f"{angle}_rad"] = _signal(attitude, values, f"{ATTITUDE}.q")
+    motion = topics.get(MOTION, {})
+    for signal, field in _MOTION.items():
+        if field in motion:
+            signals[signal] = _signal(motion, motion[field], f"{MOTION}.{field}")
+    target = topics.get(TRAJECTORY, {})
+    for signal, fields in _TARGET.items():
+        for field in fields:
+            if field in target and np.isfinite(target[field]).any():
+                signals[signal] = _signal(target, target[field], f"{TRAJECTORY}.{field}")
+    empty = [signal for signal, each in signals.items() if not len(each.time_s)]
+    if faults := [f"{name}: {signals[each].column} holds no number" for each in empty if each[:4] != "velo"]:
+        raise LogError(tuple(faults))
+    return demand_one_clock(FlightLog(name, signals), _CLOCK, _FASTER)
+
+
+def _topics(path: Path) -> dict[str, dict[str, FloatArray]]:
+    """Return the fields of the first instance of each topic."""
+    name = echo(str(path))
+    try:
+        from pyulog import ULog  # noqa: PLC0415 - an optional extra
+    except ImportError:
+        install = shlex.join([sys.executable, "-m", "pip", "install", "pyulog"])
+        raise LogError((f"{name}: reading ULog needs pyulog; install it: {install}",)) from None
+    try:
+        if path.stat().st_size > LARGEST_FILE_BYTES:
+            raise LogError((f"{name}: is larger than 100 MB; some minutes of flight suffice: log less",))
+        with path.open("rb") as file, contextlib.redirect_stdout(io.StringIO()):  # it prints its errors
+            log: Any = ULog(file, [SETPOINT, ATTITUDE, MOTION, TRAJECTORY])
+    except OSError as error:
+        raise LogError((f"{name}: cannot be read: {error.strerror}",)) from error
+    except Exception as error:  # whatever a damaged file makes of the parser
+        raise LogError((f"{name}: is no ULog: {echo(str(error))}",)) from error
+    return {
+        each.name: {field: np.asarray(values, np.float64) for field, values in each.data.items()}
+        for each in log.data_list
+        if each.multi_id == 0
+    }
+
+
+def _commands(setpoint: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return the commanded roll and pitch: roll_body and pitch_body, or those of the quaternion q_d."""
+    direct = [setpoint.get(f"{angle}_body") for angle in _ANGLES[:2]]
+    if all(each is not None and np.isfinite(each).any() for each in direct):
+        return {angle: each for angle, each in zip(_ANGLES, direct, strict=False) if each is not None}
+    parts = [setpoint.get(f"q_d[{i}]", np.full_like(setpoint[_CLOCK], np.nan)) for i in range(4)]
+    return dict(zip(_ANGLES[:2], _euler_rad(parts)[:2], strict=True))
+
+
+def _euler_rad(q: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return roll, pitch, yaw, each (k,), of a quaternion w, x, y, z, each (k,), from body to NED."""
+    w, x, y, z = q
+    return (
+        np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+        np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def _signal(topic: Mapping[str, FloatArray], values: FloatArray, column: str) -> Signal:
+    """Return the finite values of a field over the topic's time stamps, in microseconds."""
+    there = np.isfinite(values)
+    return Signal(1e-6 * topic[_CLOCK][there], values[there], column)

@@ -1,0 +1,140 @@
+"""Feed the inputs in a flight log through the compiled controller, next to the commands of the log."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from mambo_codegen.errors import echo
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from mambo_sil.errors import LogError
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.model.identify.columns import KNOWN, Column
+from mambo_sil.model.identify.csv_log import read_csv
+from mambo_sil.model.identify.signals import (
+    COMMANDS,
+    DEGREE,
+    TARGET,
+    TARGET_ACCELERATION,
+    THRUST,
+    YAW,
+    FlightLog,
+)
+from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
+
+STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
+SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
+    **KNOWN,
+    "target_x_m": (Column("target_x_m"), Column("ctrltarget.x")),
+    "target_y_m": (Column("target_y_m"), Column("ctrltarget.y", -1.0)),
+    "target_vx_m_s": (Column("target_vx_m_s"), Column("ctrltarget.vx")),
+    "target_vy_m_s": (Column("target_vy_m_s"), Column("ctrltarget.vy", -1.0)),
+    "target_ax_m_s2": (Column("target_ax_m_s2"), Column("ctrltarget.ax")),
+    "target_ay_m_s2": (Column("target_ay_m_s2"), Column("ctrltarget.ay", -1.0)),
+    "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
+    "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
+}
+"""Known columns of each signal: those of trace.csv, and of the Crazyflie, whose y has the other sign. The
+commands are those of the controller itself."""
+
+_SAME_PERIOD: Final = 0.1
+"""Share by which the period of a log may differ from the update period, and its rows be the updates."""
+
+
+@dataclass(frozen=True, eq=False)
+class LogReplay:
+    """Commands of a log and of the compiled controller on its inputs, at the k updates."""
+
+    time_s: FloatArray
+    logged_rad: FloatArray
+    """Roll and pitch (k, 2)."""
+    replayed_rad: FloatArray
+    status: IntArray
+    """Status of each update (k,)."""
+    resampled: bool
+    """Whether the log has another rate than the controller: inputs are interpolated, commands held."""
+    remarks: tuple[str, ...]
+
+
+def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) -> LogReplay:
+    """Replay the log at `path`; `columns` has those that the user named.
+
+    The controller starts level, without an estimate, as after nmpc_init(). Raises LogError.
+    """
+    is_given = settings.target.acceleration == "given"
+    wanted = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
+    log = _read(path, columns, (*STATE, *wanted))
+    time_s, resampled = _updates(log, settings.horizon.update_period_s)
+    if len(time_s) < 2:
+        raise LogError((f"{log.name}: has no two updates of {settings.horizon.update_period_s:g} s",))
+    inputs = _interpolated if resampled else _held
+    state, target = inputs(log, STATE, time_s), inputs(log, wanted, time_s)
+    thrust_m_s2 = (
+        _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), GRAVITY_M_S2)
+    )
+    controller = CompiledController(settings)
+    steps = [controller.step(state[k : k + 1], target[k : k + 1], thrust_m_s2[k]) for k in range(len(time_s))]
+    return LogReplay(
+        time_s,
+        _held(log, COMMANDS, time_s),
+        np.concatenate([step.command_rad for step in steps]).astype(np.float64),
+        np.concatenate([step.status for step in steps]),
+        resampled,
+        log.remarks,
+    )
+
+
+def _read(path: Path, columns: Mapping[str, Column], wanted: tuple[str, ...]) -> FlightLog:
+    """Return the log, which has the signals `wanted`; raises LogError."""
+    is_ulog = path.suffix.lower() == ".ulg"
+    if is_ulog and columns:
+        raise LogError((f"{echo(str(path))}: --columns is for CSV files; a ULog needs none",))
+    known = {
+        name: each for name, each in SIGNALS.items() if name in wanted or name not in TARGET_ACCELERATION
+    }
+    log = read_ulog(path) if is_ulog else read_csv(path, columns, known)
+    missing = [name for name in wanted if name not in log.signals]
+    if missing and is_ulog:
+        raise LogError(
+            (
+                f"{log.name}: has no {missing[0]}; log {MOTION} and {TRAJECTORY} (SDLOG_PROFILE, high rate), "
+                "and give PX4 position and velocity of the target",
+            )
+        )
+    if missing:
+        names = ", ".join(column.name for column in SIGNALS[missing[0]])
+        raise LogError(
+            (f"{log.name}: has no column for {missing[0]} ({names}); name it: --columns {missing[0]}=COLUMN",)
+        )
+    return log
+
+
+def _updates(log: FlightLog, period_s: float) -> tuple[FloatArray, bool]:
+    """Return the times of the updates, and whether they are not those of the logged commands."""
+    begin_s = max(signal.time_s[0] for signal in log.signals.values())
+    end_s = min(signal.time_s[-1] for signal in log.signals.values())
+    time_s = log.signals[COMMANDS[0]].time_s
+    if abs(float(np.median(np.diff(time_s))) - period_s) <= _SAME_PERIOD * period_s:
+        return time_s[(time_s >= begin_s) & (time_s <= end_s)], False
+    return begin_s + period_s * np.arange(1 + int((end_s - begin_s) / period_s)), True
+
+
+def _held(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
+    """Return signals at times (k,), each held from one sample to the next: (k, signals)."""
+    signals = [log.signals[name] for name in names]
+    places = [np.searchsorted(signal.time_s, time_s, side="right") - 1 for signal in signals]
+    return np.stack([signal.value[at] for signal, at in zip(signals, places, strict=True)], axis=1)
+
+
+def _interpolated(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
+    """Return signals at times (k,), between two samples on a straight line: (k, signals)."""
+    columns = []
+    for name in names:
+        signal = log.signals[name]
+        value = np.unwrap(signal.value) if name == YAW else signal.value
+        columns.append(np.interp(time_s, signal.time_s, value))
+    return np.stack(columns, axis=1)

@@ -1,0 +1,88 @@
+"""The record of a study: what the command prints, and the summary in its folder."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from mambo_codegen.atomic import put
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.experiment.campaign.store import convert_os_errors
+from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv, pareto_front
+from mambo_sil.model.tune.study import FinishedTrial, study_name
+from mambo_sil.model.tune.tuning_file import Tuning, round_value
+from mambo_sil.results.folders import SUMMARY
+from mambo_sil.results.summary import Summary
+
+CONTROLLER: Final = "controller.toml"
+FRONT: Final = "front"
+
+
+class TuneSummary(Summary):
+    """A finished study; `base` is the trial with the base's settings, None while another machine flies it."""
+
+    command = "tune"
+
+    study: str
+    """The study's name in its database."""
+    seed: int
+    flights: int
+    """Flights of each trial."""
+    vehicle: VehicleFile = NOMINAL
+    trials: int
+    base: FinishedTrial | None
+    chosen: FinishedTrial
+    rule: str
+    front: list[FinishedTrial]
+
+
+def summarise(tuning: Tuning, trials: Sequence[FinishedTrial]) -> TuneSummary:
+    """Return the record of finished trials; values are rounded as in the controller.toml of a trial."""
+    front = pareto_front(trials)
+    base = find_base(tuning, trials)
+    return TuneSummary(
+        study=study_name(tuning),
+        seed=tuning.file.seed,
+        flights=tuning.file.flights,
+        vehicle=tuning.drone,
+        trials=len(trials),
+        base=_rounded(base[0]) if base else None,
+        chosen=_rounded(choose(front)),
+        rule=RULE,
+        front=[_rounded(one) for one in front],
+    )
+
+
+def find_base(tuning: Tuning, trials: Sequence[FinishedTrial]) -> list[FinishedTrial]:
+    """Return the trial with the base's settings: the first one, unless machines share the study."""
+    return [one for one in trials if one.values == tuning.start][:1]
+
+
+def finish(tuning: Tuning, trials: Sequence[FinishedTrial], folder: Path) -> TuneSummary:
+    """Write Pareto front, picture, chosen controller and, last, the summary; raises UnwritableError."""
+    from mambo_sil.model.tune.tuning_plots import draw_front  # noqa: PLC0415 - loaded when drawing
+
+    summary = summarise(tuning, trials)
+    with convert_os_errors(folder):
+        put(folder / f"{FRONT}.csv", front_csv(pareto_front(trials)).encode())
+        draw_front(trials, find_base(tuning, trials), folder / FRONT)
+        put(folder / CONTROLLER, controller_text(tuning, trials).encode())
+        put(folder / SUMMARY, summary.text().encode())
+    return summary
+
+
+def tune_text(summary: TuneSummary) -> str:
+    """Return base and chosen trial as text, and the rule of the choice."""
+    named = {"base": summary.base, "chosen": summary.chosen}
+    lines = [
+        f"{name:8} trial {one.number:<6} IAE {one.iae_m_s:8.4g} m s   command variation "
+        f"{one.command_variation_rad:9.4g} rad per update   {one.crashed} of {summary.flights} crashed"
+        for name, one in named.items()
+        if one is not None
+    ]
+    return "\n".join([*lines, f"chosen by the rule: {summary.rule}"])
+
+
+def _rounded(trial: FinishedTrial) -> FinishedTrial:
+    return replace(trial, values={path: round_value(value) for path, value in trial.values.items()})

@@ -1,0 +1,90 @@
+"""What the page's sliders change: for each position of a slider, the members of the engine's records."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.representation import WEIGHTS
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.disturbances import Disturbances
+from mambo_sil.drone.sensors.mocap import MotionCapture
+from mambo_sil.drone.vehicles.sections import FirstOrderAttitude
+from mambo_sil.flight.engine.records import flight_records
+from mambo_sil.flight.loop import Flight
+
+_WIND: Final = ("gust_mean_m_s", "gust_sigma_m_s", "gust_decay", "gust_x", "gust_roots")
+_FACTORS: Final = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class Dial:
+    """One slider: its values, where it starts, and the numbers that each value writes, by member.
+
+    `key` is its name in the fragment of the page's address. `drone` is the index of the only drone that it
+    changes; None: it changes all.
+    """
+
+    key: str
+    label: str
+    unit: str
+    values: list[float]
+    start: int
+    members: dict[str, list[Any]]
+    drone: int | None = None
+
+
+def dials(flight: Flight) -> list[Dial]:
+    """Return the sliders of wind, sensor noise and motor lag for a drone that flies as `flight`.
+
+    Without sensor noise the page gives the controllers the true state.
+    """
+    sensors, vehicle = flight.sensors, flight.vehicle
+    assert isinstance(sensors, MotionCapture)
+    steps, degrees, own_s = np.arange(0.0, 10.5, 0.5), np.arange(0.0, 360.0, 15.0), vehicle.drone.motor_lag_s
+    lags_s = np.union1d(np.arange(0, 21) / 200.0, own_s)
+    windy, heading = Disturbances(steps), Disturbances(0.0, np.radians(degrees))
+    noisy, lagging = replace(sensors, noise_scale=steps), replace(vehicle, motor_lag_s=lags_s)
+    direction = "Wind direction (0\N{DEGREE SIGN} right, 90\N{DEGREE SIGN} down)"
+    noise, times = "Sensor noise (motion capture)", "\N{MULTIPLICATION SIGN}"
+    own = int(np.searchsorted(lags_s, own_s))
+
+    def members(count: int, names: Sequence[str], **changes: Any) -> dict[str, list[Any]]:
+        """Return members of the records of flights that differ from `flight`."""
+        records = flight_records(replace(flight, flights=count, seeds=None, **changes), np.zeros((count, 4)))
+        return {name: records[name].reshape(count, -1).tolist() for name in names}
+
+    found = [
+        Dial("wind", "Wind", "m/s", steps.tolist(), 0, members(len(steps), _WIND, disturbances=windy)),
+        Dial(
+            *("towards", direction, "\N{DEGREE SIGN}", degrees.tolist(), 6),
+            members(len(degrees), ("gust_heading",), disturbances=heading),
+        ),
+        Dial("noise", noise, times, steps.tolist(), 0, members(len(steps), ("noise",), sensors=noisy)),
+    ]
+    if not isinstance(vehicle.drone.attitude, FirstOrderAttitude):
+        lags_ms = [round(float(1000.0 * lag_s), 6) for lag_s in lags_s]
+        decays = members(len(lags_s), ("rotor_decay",), vehicle=lagging)
+        found.append(Dial("lag", "Motor lag", "ms", lags_ms, own, decays))
+    return found
+
+
+def weight_dial(settings: Settings, title: str, drone: int) -> Dial:
+    """Return the slider of the effort weight of a 1-norm, with weights in the numbers of its C."""
+    numbers, cost = Design(settings).numbers, settings.cost
+    base = cost.effort_weight or 1.0
+    values = [factor * base for factor in _FACTORS if factor * base <= numbers.effort_limit]
+    if cost.effort_weight not in values:
+        values = sorted([*values, cost.effort_weight])
+    weights = numbers.quantize(np.array([[cost.tracking_weight, value] for value in values]), WEIGHTS)
+    return Dial(
+        f"effort{drone + 1}",
+        f"Effort weight of {title}",
+        "per rad",
+        values,
+        values.index(cost.effort_weight),
+        {"weights": weights.tolist()},
+        drone,
+    )

@@ -1,0 +1,150 @@
+"""The page: modules, records, sliders and digests as data of one HTML file."""
+
+import base64
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from typing import Any, Final
+
+from pydantic import BaseModel, ConfigDict
+
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.build import ffi, record_type
+from mambo_sil.flight.engine.native import pd_function
+from mambo_sil.flight.loop import Flight
+from mambo_sil.pages.playground import proof
+from mambo_sil.pages.playground.dials import Dial, dials, weight_dial
+from mambo_sil.pages.playground.page_controllers import PageController, period_s
+from mambo_sil.pages.playground.wasm_build import module
+from mambo_sil.results.html_page import render_page
+from mambo_sil.results.summary import Summary
+
+STYLES: Final = ("style.css", "playground.css")
+SCRIPTS: Final = (
+    *("module.js", "proof.js", "drone.js", "target.js", "world.js", "scenario.js"),
+    *("field.js", "plots.js", "controls.js", "playground.js"),
+)
+"""The files of the page's script, in their order."""
+_PD_HUES: Final = {"pd": 1, "pd-feedforward": 2}
+"""Colours of the PDs on all pages."""
+_DASHES: Final = ((), (7, 3), (2, 3), (9, 3, 2, 3))
+"""Lengths of dashes and gaps of each controller's line, in pixels, for whoever cannot tell colours."""
+_CIRCLE: Final = (1.2, 0.8)
+"""Radius in m and rate in rad/s."""
+
+
+class FlownController(BaseModel):
+    """One controller of a page. `trace_sha256` is `Trace.digest` of the flight that proves the bits."""
+
+    model_config = ConfigDict(frozen=True)
+
+    source: str
+    settings: str | None
+    """Digest of the settings; None for a PD."""
+    wasm_bytes: int
+    trace_sha256: str
+
+
+class PlaygroundSummary(Summary):
+    """A page on which controllers fly."""
+
+    command = "playground"
+
+    page: str
+    """Name of the HTML file."""
+    bytes: int
+    vehicle: VehicleFile
+    controllers: list[FlownController]
+
+
+def playground_page(
+    found: Sequence[PageController], drone: VehicleFile, progress: Callable[[float], None]
+) -> tuple[str, list[FlownController]]:
+    """Return the HTML page on which the controllers fly a drone, and what it says of each.
+
+    Raises FlightError if the drone and the update period do not fit, BuildError and CacheError.
+    """
+    flight = proof.proof_flight(drone, period_s(found))
+    flown, drones = [], []
+    for number, (one, hue) in enumerate(zip(found, _hues(found), strict=True)):
+        wasm, digest = module(one), proof.native_digest(flight, one)
+        settings = one.kind.digest if isinstance(one.kind, Settings) else None
+        flown.append(
+            FlownController(source=one.source, settings=settings, wasm_bytes=len(wasm), trace_sha256=digest)
+        )
+        drones.append(
+            _drone(one) | {"hue": hue, "dash": _DASHES[number], "wasm": _text(wasm), "digest": digest}
+        )
+        progress((number + 1) / len(found))
+    sliders = _sliders(flight, found)
+    context = {
+        "data": _simulation(flight) | {"drones": drones, "dials": [asdict(dial) for dial in sliders]},
+        "flown": list(zip(drones, flown, strict=True)),
+        "dials": sliders,
+        "vehicle": drone.name,
+        "duration_s": proof.DURATION_S,
+        "generator": PlaygroundSummary.model_fields["generator"].default,
+    }
+    return render_page("playground.html.j2", context, "playground", STYLES, SCRIPTS), flown
+
+
+def _hues(found: Sequence[PageController]) -> list[int]:
+    """Return the number of each controller's colour; that of a PD is the same on every page."""
+    taken = {_PD_HUES[one.source] for one in found if one.source in _PD_HUES}
+    others = (hue for hue in (0, 3, 1, 2) if hue not in taken)
+    return [_PD_HUES[one.source] if one.source in _PD_HUES else next(others) for one in found]
+
+
+def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
+    weights = [
+        weight_dial(one.kind, one.title, number)
+        for number, one in enumerate(found)
+        if isinstance(one.kind, Settings) and one.kind.cost.norm == "1-norm"
+    ]
+    return [*dials(proof.calm(flight)), *weights]
+
+
+def _drone(one: PageController) -> dict[str, Any]:
+    """Return title, type of the C's numbers, and in base64 the constants of a PD."""
+    if isinstance(one.kind, Settings):
+        return {"title": one.title, "scalar": one.kind.code.scalar, "constants": None}
+    constants = pd_function(pd_controller(one.kind))[1]
+    return {"title": one.title, "scalar": "float64", "constants": _text(bytes(ffi.buffer(constants)))}
+
+
+def _simulation(flight: Flight) -> dict[str, Any]:
+    """Return what all drones of the page share; records and arrays in base64."""
+    quiet_simulation, quiet = proof.records(proof.calm(flight))
+    simulation, own = proof.records(flight)
+    read = proof.inputs(flight)
+    return {
+        "period_s": flight.update_period_s,
+        "ticks": flight.ticks_per_update,
+        "offsets": {
+            "simulation": _offsets("engine_simulation_t"),
+            "flight": _offsets("engine_flight_t"),
+        },
+        "simulation": _text(quiet_simulation.tobytes()),
+        "flight": _text(quiet.tobytes()),
+        "curves": {"eight": (proof.HALF_WIDTH_M, proof.RATE_RAD_S), "circle": _CIRCLE},
+        "proof": {
+            "updates": len(read.targets),
+            "simulation": _text(simulation.tobytes()),
+            "flight": _text(own.tobytes()),
+            "targets": _text(read.targets.tobytes()),
+            "sensors": _text(read.sensors.tobytes()),
+            "gusts": _text(read.gusts.tobytes()),
+        },
+    }
+
+
+def _offsets(record: str) -> dict[str, int]:
+    """Return the offset of each member of a record, in bytes."""
+    fields = record_type(record).fields
+    assert fields is not None
+    return {name: int(field[1]) for name, field in fields.items()}
+
+
+def _text(content: bytes) -> str:
+    return base64.b64encode(content).decode()

@@ -1,0 +1,84 @@
+"""Compile a controller with the engine of the simulation to WebAssembly, by clang and lld."""
+
+import hashlib
+import shutil
+from importlib import resources
+from pathlib import Path
+from typing import Final
+
+from mambo_codegen.bundle.flags import COMPILE_FLAGS
+from mambo_codegen.bundle.render import render
+from mambo_codegen.errors import BuildError
+from mambo_codegen.settings.model import Settings
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.flight.controllers.build import glue, with_default_prefix
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.build import texts
+from mambo_sil.flight.engine.native import pd_function
+from mambo_sil.pages.playground.page_controllers import PageController
+from mambo_sil.results.cache import build_cached
+
+ENGINE_CALLS: Final = (
+    *("engine_begin", "engine_update", "engine_start_sensors", "engine_fly"),
+    *("playground_controller", "playground_flying_bytes", "playground_eight", "playground_circle"),
+    "__heap_base",
+)
+"""What the page calls in every module; it puts its records behind __heap_base."""
+CONTROLLER_CALLS: Final = ("nmpc_batch_init", "nmpc_batch_instance_bytes")
+"""What it calls besides in one with generated C; with a 1-norm also nmpc_host_set_weights."""
+
+_FLAGS: Final = (*COMPILE_FLAGS, "--target=wasm32", "-ffreestanding", "-nostdlib", "-Wl,--no-entry")
+_UNUSED: Final = ("evaluation.c", "faults.c")
+"""No page evaluates flights, or injects faults, whose C wants the standard library."""
+_INCLUDES: Final = ("-I.", "-Iinclude", "-Isrc")
+
+
+def module(one: PageController) -> bytes:
+    """Return the WebAssembly of one drone; raises BuildError and CacheError."""
+    files, calls, step = program(one)
+    exports = [f"-Wl,--export={name}" for name in calls]
+    units = sorted(path for path in files if path.endswith(".c"))
+    arguments = [*_FLAGS, *_INCLUDES, f"-DCONTROLLER={step}", *exports, *units, "-o", "drone.wasm"]
+    compiler = _compiler()
+
+    def build(folder: Path) -> Path:
+        for path, text in files.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_text(text, "utf-8")
+        compiler.run(arguments, folder)
+        return folder / "drone.wasm"
+
+    key = hashlib.sha256(repr((files, arguments, compiler.identity())).encode()).hexdigest()[:32]
+    return build_cached(f"playground_{key}.wasm", build).read_bytes()
+
+
+def _compiler() -> Toolchain:
+    """Return clang, which calls wasm-ld; raises BuildError if one of them is missing."""
+    for tool, package in (("clang", "clang"), ("wasm-ld", "lld")):
+        if shutil.which(tool) is None:
+            raise BuildError(
+                f"{tool} not found: the page is compiled to WebAssembly with clang and wasm-ld; "
+                f"install it (Debian: {package})"
+            )
+    return Toolchain(("clang",))
+
+
+def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
+    """Return the C by path, the functions that the page calls, and the step of the controller."""
+    engine = {path: text for path, text in texts().items() if path not in _UNUSED}
+    files = engine | {
+        "playground.c": _text("pages.playground", "playground.c"),
+        "math.h": _text("pages.playground", "math.h"),
+        "freestanding.c": _text("board.firmware", "freestanding.c"),
+    }
+    controller = one.kind
+    if not isinstance(controller, Settings):
+        return files, ENGINE_CALLS, pd_function(pd_controller(controller))[0]
+    bundle = render(with_default_prefix(controller), with_digest=False)
+    files |= {path: text for path, text in bundle.items() if path.startswith(("include/", "src/"))} | glue()
+    weights = () if controller.cost.norm == "quadratic" else ("nmpc_host_set_weights",)
+    return files, (*ENGINE_CALLS, *CONTROLLER_CALLS, *weights), "nmpc_host_step"
+
+
+def _text(room: str, name: str) -> str:
+    return resources.files(f"mambo_sil.{room}").joinpath(name).read_text("utf-8")

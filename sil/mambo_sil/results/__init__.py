@@ -1,0 +1,1 @@
+"""Results: folders, compile cache, summaries, and the style of pictures and numbers."""

@@ -1,0 +1,86 @@
+"""The compile cache: one private folder, one file a build, named by the hash of all that made it.
+
+The name begins with the hash of the content. So a file that a full disk or a crash has cut short is
+recognised and built anew: to load it would kill the process.
+"""
+
+import contextlib
+import hashlib
+import os
+import shutil
+import stat
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from mambo_sil.errors import CacheError
+
+_WORK: Final = "build-"
+_ABANDONED_S: Final = 3600.0
+"""Age beyond which the work folder of a build is regarded as left by a killed process."""
+
+
+def cache_folder() -> Path:
+    """Return the cache folder, which is made for this user alone where there is none.
+
+    It is $XDG_CACHE_HOME/mambo-nmpc, by default ~/.cache/mambo-nmpc. Raises CacheError if it cannot be made,
+    or if others may write to it: compiled code is loaded from there.
+    """
+    try:
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mambo-nmpc"
+    except RuntimeError:
+        raise CacheError("this user has no home folder for the compile cache; set XDG_CACHE_HOME") from None
+    if not folder.is_absolute():
+        raise CacheError(f"the cache folder {folder} must be an absolute path; set XDG_CACHE_HOME")
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = folder.stat()
+    except OSError as error:
+        raise CacheError(
+            f"cannot use the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME"
+        ) from error
+    if status.st_uid != os.getuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        raise CacheError(
+            f"others may write to the cache folder {folder}, from which compiled code is loaded; "
+            "take that right from them (chmod go-w), or set XDG_CACHE_HOME to a folder of yours"
+        )
+    return folder
+
+
+def build_cached(name: str, build: Callable[[Path], Path]) -> Path:
+    """Return the path of the cached file `name`; build it if it is missing or damaged.
+
+    `build(folder)` builds in an empty folder and returns the path of its result, which is then renamed into
+    place. So two processes may build the same file at once, and a killed one leaves no partial file. Raises
+    CacheError if the cache folder cannot be used.
+    """
+    folder = cache_folder()
+    try:
+        for path in folder.glob(f"*-{name}"):
+            if path.name == _content_name(path, name):
+                return path
+        _clear_abandoned(folder)
+        with tempfile.TemporaryDirectory(prefix=_WORK, dir=folder) as work:
+            made = build(Path(work))
+            with made.open("rb") as file:
+                os.fsync(file.fileno())
+            return made.replace(folder / _content_name(made, name))
+    except OSError as error:
+        raise CacheError(
+            f"cannot build in the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME"
+        ) from error
+
+
+def _content_name(path: Path, name: str) -> str:
+    """Return the name under which the cache holds the content of `path` as `name`."""
+    return f"{hashlib.sha256(path.read_bytes()).hexdigest()[:32]}-{name}"
+
+
+def _clear_abandoned(folder: Path) -> None:
+    """Remove the work folders of builds that were killed."""
+    for work in folder.glob(f"{_WORK}*"):
+        with contextlib.suppress(FileNotFoundError):  # its build has just finished
+            if time.time() - work.stat().st_mtime > _ABANDONED_S:
+                shutil.rmtree(work, ignore_errors=True)

@@ -1,0 +1,74 @@
+"""HTML pages in one style that need no other file; all text from files is escaped."""
+
+import base64
+import contextlib
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import jinja2
+from markupsafe import Markup
+
+from mambo_codegen.atomic import put
+from mambo_codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_sil.results.numbers import digits_or_dash, fixed_or_dash, three_digits_or_dash
+
+_MARK: Final = b'<meta name="generator" content="mambo-nmpc">'
+"""Marks a page of ours, which may be overwritten."""
+
+
+def render_page(
+    template: str,
+    context: Mapping[str, Any],
+    folder: str = "report",
+    styles: Sequence[str] = ("style.css",),
+    scripts: Sequence[str] = ("flight.js",),
+) -> str:
+    """Render a template of a folder of templates; values are escaped unless they are of type `Markup`.
+
+    The folder may use the templates and the style of `report`. The content security policy of the
+    page forbids network access and every script but `scripts`, which are joined to one.
+    """
+    loader = jinja2.ChoiceLoader(
+        [jinja2.PackageLoader("mambo_templates", name) for name in dict.fromkeys((folder, "report"))]
+    )
+    environment = jinja2.Environment(
+        loader=loader,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"digits": digits_or_dash, "three": three_digits_or_dash, "fixed": fixed_or_dash}
+    style, script = (
+        "".join(loader.get_source(environment, name)[0] for name in names) for names in (styles, scripts)
+    )
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    own = {"style": Markup(style), "script": Markup(script), "script_digest": digest}
+    return environment.get_template(template).render({**context, **own})
+
+
+@contextlib.contextmanager
+def new_page(output: Path, what: str) -> Iterator[Callable[[str], int]]:
+    """Yield a function that writes a page to `output` and returns its size in bytes.
+
+    Raises FileExistsRefusedError, before anything is computed, if there is a file that is no page of ours;
+    `what` says what is expected. Raises UnwritableError if the file system refuses.
+    """
+    name = echo(str(output))
+
+    def write(text: str) -> int:
+        page = text.encode("utf-8", "replace")  # a folder's name may be invalid UTF-8
+        put(output, page)
+        return len(page)
+
+    try:
+        if output.is_file() and _MARK not in output.read_bytes()[:1000]:
+            raise FileExistsRefusedError(
+                f"{name}: exists and is no {what} of mambo-nmpc; name another file with -o"
+            )
+        yield write
+    except OSError as error:
+        raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}") from error

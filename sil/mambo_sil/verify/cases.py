@@ -1,0 +1,350 @@
+"""The cases that the run-time checks run: random tapes, and tapes for every limit and special value."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.design import Design
+from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.numbers.literals import SCALARS, Scalar
+from mambo_codegen.numbers.representation import COMMAND, WEIGHTS
+from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.calls import (
+    NULL_COMMAND,
+    NULL_FIRST,
+    NULL_SECOND,
+    NULL_SELF,
+    ApiFunction,
+    Outcomes,
+    Tape,
+    answers,
+    calls,
+    step_quantities,
+)
+from mambo_sil.verify.inputs import StepInputs, random_steps
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.floating]
+
+RANDOM_TAPES: Final = 1000
+
+
+@lru_cache(maxsize=2)
+def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
+    """Return the tapes of all cases, and the outcomes of the reference for each."""
+    rng, is_quadratic = np.random.default_rng(0), Design(settings).is_quadratic
+    tapes = (
+        *random_tapes(settings, RANDOM_TAPES),
+        *_limits(settings, rng),
+        *_nulls(settings, rng),
+        *_quadrants(settings, rng),
+        *([] if is_quadratic else _convergence(settings)),
+        *([] if is_quadratic else _zero_errors(settings)),
+        *(_outages(settings, rng) if is_quadratic else []),
+        *_largest_inputs(settings, rng),
+        *_target_motion(settings),
+    )
+    return tapes, tuple(answers(settings, tapes))
+
+
+def random_tapes(settings: Settings, n: int) -> list[Tape]:
+    """Return `n` tapes of eight steps with random inputs, a reset, and a change of weights or of the command.
+
+    Every fourth tape holds each input for two steps. In every fifth tape the drone is so close to the target
+    that the last bits of the prediction constants matter.
+    """
+    rng = np.random.default_rng(0)
+    draws = [_rows(inputs) for inputs in random_steps(settings, n, 8, rng)]
+    with np.errstate(invalid="ignore"):
+        for drawn in draws:
+            drawn[::5, 0:4] = drawn[::5, 7:11] + (1e-3 * (drawn[::5, 0:4] - drawn[::5, 7:11]))
+            drawn[::5, 4:6] *= 1e-3
+    steps = [
+        np.where((np.arange(n) % 4 == 3)[:, None], draws[index // 2 * 2], drawn)
+        for index, drawn in enumerate(draws)
+    ]
+    command = rng.uniform(-1.5, 1.5, (n, 2)) * settings.limits.tilt_rad
+    command[::5, 0] = rng.choice([np.nan, np.inf, 4.0, -4.0], len(command[::5]))
+    weights = 10.0 ** rng.uniform(-3, 6, (n, 2))
+    weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
+    weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
+    quadratic = Design(settings).is_quadratic
+    columns = [
+        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[:3]),
+        calls(settings, ApiFunction.RESET, command),
+        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[3:5]),
+        calls(settings, ApiFunction.SET_COMMAND, command[::-1])
+        if quadratic
+        else calls(settings, ApiFunction.SET_WEIGHTS, weights),
+        *(calls(settings, ApiFunction.STEP, rows) for rows in steps[5:]),
+    ]
+    return list(np.stack(columns, axis=1))
+
+
+def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Set one input to a limit of its range, to the number next to the limit, or to a special value.
+
+    One good step precedes the step with that input, and two follow.
+    """
+    ranges, tilt = settings.ranges, settings.limits.tilt_rad
+    symmetric = [
+        *[ranges.position_m] * 2,
+        *[ranges.velocity_m_s] * 2,
+        *[ATTITUDE_LIMIT_RAD] * 2,
+        YAW_LIMIT_RAD,
+        *[ranges.position_m] * 2,
+        *[ranges.velocity_m_s] * 2,
+    ]
+    bounds = [(-limit, limit) for limit in symmetric]
+    most_m_s2 = ranges.thrust_acceleration_max_m_s2
+    bounds.append((ranges.thrust_acceleration_min_m_s2, most_m_s2))
+    quantities = step_quantities(Design(settings))
+    bounds += [(-most_m_s2, most_m_s2)] * (len(quantities) - len(bounds))
+    for index, (quantity, ends) in enumerate(zip(quantities, bounds, strict=True)):
+        for value in _around(settings, quantity, *ends):
+            good = _good_steps(settings, rng, 4)
+            good[1, index] = value
+            yield calls(settings, ApiFunction.STEP, good)
+    numbers = Design(settings).numbers
+    pairs: list[tuple[ApiFunction, Sequence[str], Sequence[float], Sequence[float]]] = [
+        (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit))
+    ]
+    if Design(settings).is_quadratic:
+        pairs = [
+            (ApiFunction.SET_COMMAND, COMMAND, (-limit,) * 2, (limit,) * 2)
+            for limit in (ATTITUDE_LIMIT_RAD, tilt)
+        ]
+    pairs += [
+        (ApiFunction.RESET, COMMAND, (-limit,) * 2, (limit,) * 2) for limit in (ATTITUDE_LIMIT_RAD, tilt)
+    ]
+    for function, names, lows, highs in pairs:
+        for index in range(2):
+            for value in _around(settings, names[index], lows[index], highs[index]):
+                pair = np.full((1, 2), 0.1 * tilt)
+                pair[0, index] = value
+                yield _surround(settings, rng, calls(settings, function, pair))
+
+
+def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Pass every combination of null pointers to every function; initialise a used controller."""
+    every = NULL_SELF | NULL_FIRST | NULL_SECOND | NULL_COMMAND
+    for function, pointers in (
+        (ApiFunction.STEP, every),
+        (ApiFunction.RESET, NULL_SELF | NULL_FIRST),
+        (ApiFunction.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
+        (ApiFunction.INIT, NULL_SELF),
+    ):
+        for nulls in range(pointers + 1):
+            made = calls(settings, function, np.array([[0.1, 0.2]]), nulls)
+            yield _surround(settings, rng, made)
+
+
+def _quadrants(settings: Settings, rng: np.random.Generator) -> list[Tape]:
+    """Yaw by eighths of a turn and neighbouring numbers, where the quadrant of the sine changes."""
+    scalar = _floating(settings)
+    eighths = np.unique([*range(-64, 65), *range(-1303, 1304, 4)])
+    yaws = [(eighths * (np.pi / 4)).astype(scalar)]
+    for _ in range(3):
+        yaws = [
+            np.nextafter(yaws[0], scalar(-np.inf)),
+            *yaws,
+            np.nextafter(yaws[-1], scalar(np.inf)),
+        ]
+    columns = []
+    for yaw in yaws:
+        good = _good_steps(settings, rng, len(eighths))
+        good[:, 6] = yaw
+        columns.append(calls(settings, ApiFunction.STEP, good))
+    return list(np.stack(columns, axis=1))
+
+
+def _convergence(settings: Settings) -> list[Tape]:
+    """Choose weights with which the cost changes by the tolerance between two iterations, up to rounding.
+
+    Close to the target the first iteration overshoots, and the cost changes by about the tracking weight
+    times a constant. Bisection finds the largest weight with which the search converges; that weight and its
+    neighbours are the cases. In fixed point one unit of that weight changes the cost by many units, so
+    bisection also finds the effort weight, whose unit is finer than that of the cost.
+    """
+    n, scalar, numbers = 16, _floating(settings), Design(settings).numbers
+    near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
+    steps = np.zeros((n, 12))
+    steps[:, 0:2] = near_m * np.linspace(1, 2, n)[:, None]
+    steps[:, 6] = np.linspace(-3, 3, n)
+    steps[:, 11] = hover_thrust(settings)
+
+    def tapes(weights: Floats, effort: Floats) -> list[Tape]:
+        pairs = np.stack([weights, effort], axis=1)
+        columns = calls(settings, ApiFunction.SET_WEIGHTS, pairs), calls(settings, ApiFunction.STEP, steps)
+        return list(np.stack(columns, axis=1))
+
+    def between(made: Callable[[Floats], list[Tape]], most: float) -> tuple[Floats, Floats]:
+        resting, moving = np.zeros(n, scalar), np.full(n, most, scalar)
+        for _ in range(4 * np.finfo(scalar).nmant):
+            weights = (resting + moving) / scalar(2)
+            rests = np.array([outcome["iterations"][1] == 1 for outcome in answers(settings, made(weights))])
+            resting, moving = np.where(rests, weights, resting), np.where(rests, moving, weights)
+        return resting, moving
+
+    without = np.zeros(n)
+    resting, moving = between(lambda weights: tapes(weights, without), numbers.tracking_limit)
+    found = []
+    for _ in range(8):
+        found += tapes(moving, without)
+        moving = np.nextafter(moving, scalar(0))
+    if numbers.bits is not None:
+        for effort in between(lambda weights: tapes(resting, weights), numbers.effort_limit):
+            found += tapes(resting, effort)
+    return found
+
+
+def _zero_errors(settings: Settings) -> Iterator[Tape]:
+    """Let the predicted error be exactly 0 after one step, from both sides along both axes."""
+    scalar = _floating(settings)
+    advance_m = scalar(settings.horizon.prediction_step_s) * scalar(1)
+    for axis in range(2):
+        for way in (-1, 1):
+            steps = np.zeros((1, 12))
+            steps[0, axis], steps[0, 2 + axis] = -way * advance_m, way
+            steps[0, 11] = hover_thrust(settings)
+            yield calls(settings, ApiFunction.STEP, steps)
+
+
+def _outages(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """Refuse states for as long as the estimate lasts, and a step less or more; then come good steps again.
+
+    The targets are good in one tape and refused in another, so that both kinds of step are repeated.
+    """
+    limit = Design(settings).observer.outage_steps
+    for refused in (1, max(1, limit - 1), limit, limit + 1, limit + 3):
+        for target in (0.0, np.nan):
+            steps = _good_steps(settings, rng, refused + 6)
+            steps[:, 7:11] = steps[0, 7:11]
+            steps[2 : 2 + refused, 0] = np.nan
+            steps[2 : 2 + refused, 7] += target
+            yield calls(settings, ApiFunction.STEP, steps)
+
+
+def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
+    """In fixed point set every input to a limit of its range, where intermediate values are largest.
+
+    Then start one unit below the tilt limit with a target that wants more tilt: the smallest change of tilt.
+    """
+    numbers = Design(settings).numbers
+    if numbers.bits is None:
+        return
+    limits = Design(settings).limits
+    most = np.array(
+        [
+            *[limits.position] * 2,
+            *[limits.velocity] * 2,
+            *[limits.attitude] * 2,
+            limits.yaw,
+            *[limits.position] * 2,
+            *[limits.velocity] * 2,
+            limits.thrust_most,
+        ]
+    )
+    quantities = step_quantities(Design(settings))
+    most = np.append(most, [limits.thrust_most] * (len(quantities) - len(most)))
+    steps = numbers.to_si(most * rng.choice([-1, 1], (512, len(most))), *quantities)
+    steps[:, 11] = np.abs(steps[:, 11])
+    steps[::2, 6] = rng.choice([-1, 1], 256) * np.pi / 4 + rng.choice([-1, 1], 256) * np.pi / 2
+    yield from calls(settings, ApiFunction.STEP, steps).reshape(-1, 4)
+
+    near_rad = settings.limits.tilt_rad - math.ldexp(1, -numbers.bits["angle"])
+    signs = np.array(list(itertools.product((-1, 1), repeat=4)))
+    pulled = np.zeros((len(signs), 12))
+    pulled[:, 0:2] = signs[:, 2:] * min(1.0, settings.ranges.position_m)
+    pulled[:, 11] = hover_thrust(settings)
+    columns = (
+        calls(settings, ApiFunction.RESET, near_rad * signs[:, :2]),
+        calls(settings, ApiFunction.STEP, pulled),
+    )
+    yield from np.stack(columns, axis=1)
+
+
+def _target_motion(settings: Settings) -> Iterator[Tape]:
+    """For a tracker change the target's velocity by its limit and the numbers next to it, either way.
+
+    If the acceleration is given, set it to its limit and the numbers next to that. Then accelerate the target
+    to and fro along both axes, so that acceleration and jerk reach their limits, with a reset on the way.
+    """
+    tracker, ranges = Design(settings).tracker, settings.ranges
+    if tracker is None:
+        return
+
+    def steps(motion: Array) -> Tape:
+        rows = np.zeros((len(motion), 14 if tracker.is_given else 12))
+        if tracker.is_given:
+            rows[:, 12:] = motion
+        else:
+            rows[:, 2:4] = rows[:, 9:11] = np.clip(motion, -ranges.velocity_m_s, ranges.velocity_m_s)
+        rows[:, 0], rows[:, 11] = 1e-3, hover_thrust(settings)
+        return calls(settings, ApiFunction.STEP, rows)
+
+    limit = tracker.input_limit
+    for value in _around(settings, tracker.input_quantity, -limit, limit):
+        if np.isfinite(value):
+            for columns in ([1, 0], [0, 1]):
+                yield steps(np.outer([0.0, value, value, 0.0], columns))
+    motion = limit * np.repeat([0.5, 0.9, -0.9, 0.99, -0.99, 0.2], 8)
+    if not tracker.is_given:
+        motion = np.cumsum(motion)
+    both = motion[:, None] * [1.0, -0.7]
+    again = calls(settings, ApiFunction.RESET, np.zeros((1, 2)))
+    yield np.concatenate([steps(both), again, steps(both[::-1])])
+
+
+def _surround(settings: Settings, rng: np.random.Generator, made: Tape) -> Tape:
+    """Put a call between good steps; the refused step after it shows the last command."""
+    steps = calls(settings, ApiFunction.STEP, _good_steps(settings, rng, 4))
+    refused = calls(settings, ApiFunction.STEP, np.full((1, 12), np.nan))
+    return np.concatenate([steps[:2], made, refused, steps[2:]])
+
+
+def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
+    """Draw inputs of steps within the ranges (n, k), in the order of `step_quantities`."""
+    ranges = settings.ranges
+    position_m, speed_m_s = min(1.0, ranges.position_m / 4), min(1.0, ranges.velocity_m_s / 4)
+    scale = np.array([position_m] * 2 + [speed_m_s] * 2 + [0.3, 0.3, 3.0])
+    state = rng.uniform(-1, 1, (n, 7)) * scale
+    target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
+    low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
+    steps = np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
+    tracker = Design(settings).tracker
+    if tracker and tracker.is_given:
+        steps = np.concatenate([steps, rng.uniform(-0.5, 0.5, (n, 2)) * tracker.input_limit], axis=1)
+    return steps
+
+
+def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
+    """Return both limits of a range, their neighbours, NaN, infinities, zeros and the smallest numbers."""
+    scalar, numbers = _floating(settings), Design(settings).numbers
+    ends = np.array([low, high], scalar)
+    beyond = np.array([-np.inf, np.inf], scalar)
+    neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]
+    if numbers.bits is not None:
+        ends = numbers.to_si(numbers.quantize(ends[:, None], (quantity,)), quantity)[:, 0]
+        unit = np.ldexp([-1.0, 1.0], -numbers.bits[quantity])
+        neighbours = [ends + unit, ends - unit]
+    tiny = np.finfo(scalar).smallest_subnormal
+    odd = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, tiny, -tiny], scalar)
+    return np.concatenate([ends, *neighbours, odd]).astype(np.float64)
+
+
+def _floating(settings: Settings) -> Scalar:
+    """Return the scalar type, or float64 for fixed point; neighbours of a number are found in it."""
+    return np.float64 if settings.code.scalar == "fixed" else SCALARS[settings.code.scalar]
+
+
+def _rows(inputs: StepInputs) -> Array:
+    """Join the inputs into rows (n, k), in the order of `step_quantities`."""
+    target = inputs.target
+    return np.concatenate([inputs.state, target[:, :4], inputs.thrust[:, None], target[:, 4:]], axis=1)

@@ -1,0 +1,115 @@
+"""Inputs of steps: random values from a seed, and special cases that random values miss."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.design import Design
+from mambo_codegen.settings.model import Settings
+
+Array = NDArray[np.float64]
+
+NOT_IN_RANGE = (np.nan, np.inf, -np.inf, 1e30, -1e30)
+
+
+@dataclass(frozen=True)
+class StepInputs:
+    """Inputs of one step of n controllers: state (n, 7), target (n, 4) or (n, 6), thrust (n,)."""
+
+    state: Array
+    target: Array
+    thrust: Array
+
+
+def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepInputs:
+    """Draw inputs with errors from 0.1 mm to 10 m; make a tenth of them special cases."""
+    ranges = settings.ranges
+    scale = 10.0 ** rng.uniform(-4, 1, (n, 1))
+    target = rng.normal(0, 1, (n, 4)) * [2, 2, 1, 1]
+    error = rng.normal(0, 1, (n, 4)) * scale
+    state = np.concatenate(
+        [
+            target + error,
+            rng.uniform(-0.5, 0.5, (n, 2)),
+            rng.choice([1.0, 10.0, 1000.0], (n, 1)) * rng.uniform(-1, 1, (n, 1)),
+        ],
+        axis=1,
+    )
+    state[:, 0:2] = np.clip(state[:, 0:2], -ranges.position_m, ranges.position_m)
+    state[:, 2:4] = np.clip(state[:, 2:4], -ranges.velocity_m_s, ranges.velocity_m_s)
+    target[:, 0:2] = np.clip(target[:, 0:2], -ranges.position_m, ranges.position_m)
+    target[:, 2:4] = np.clip(target[:, 2:4], -ranges.velocity_m_s, ranges.velocity_m_s)
+    low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
+    thrust = rng.uniform(low, high, n)
+    thrust[::3] = np.clip(9.81, low, high)
+
+    for row in np.flatnonzero(rng.random(n) < 0.1):
+        _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
+    tracker = Design(settings).tracker
+    if tracker and tracker.is_given:
+        target = np.concatenate([target, _accelerations(tracker.input_limit, high, n, rng)], axis=1)
+    return StepInputs(state, target, thrust)
+
+
+def _accelerations(limit_m_s2: float, range_m_s2: float, n: int, rng: np.random.Generator) -> Array:
+    """Draw accelerations (n, 2) of targets, some beyond the tracker's limit or the range of the input."""
+    drawn = rng.uniform(-1.25 * limit_m_s2, 1.25 * limit_m_s2, (n, 2))
+    special = rng.random((n, 2)) < 0.05
+    edges = [0.0, -0.0, limit_m_s2, -limit_m_s2, range_m_s2, -range_m_s2, 1.001 * range_m_s2, *NOT_IN_RANGE]
+    return np.where(special, rng.choice(edges, (n, 2)), np.clip(drawn, -range_m_s2, range_m_s2))
+
+
+def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generator) -> list[StepInputs]:
+    """Draw the inputs of consecutive steps of n controllers, independent of each other.
+
+    For a tracker that measures it, two targets in three change their velocity little from step to step; one
+    in five of these changes is a jump.
+    """
+    drawn = [random_inputs(settings, n, rng) for _ in range(steps)]
+    tracker = Design(settings).tracker
+    if tracker is None or tracker.is_given:
+        return drawn
+    limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_input
+    with np.errstate(invalid="ignore"):
+        for before, now in itertools.pairwise(drawn):
+            moved = before.target[:, 2:] + rng.uniform(-change_m_s, change_m_s, (n, 2))
+            near = (rng.random((n, 1)) < 2 / 3) & np.isfinite(moved) & np.isfinite(now.target[:, 2:])
+            now.target[:, 2:] = np.where(near, np.clip(moved, -limit_m_s, limit_m_s), now.target[:, 2:])
+    return drawn
+
+
+def _make_special(
+    settings: Settings, state: Array, target: Array, thrust: Array, rng: np.random.Generator
+) -> None:
+    """Make one row a special case, in place."""
+    ranges = settings.ranges
+    bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25, 3.25, 1024.0])
+    match rng.integers(10):
+        case 0:  # no error: every gradient is zero
+            state[:4] = target
+            state[4:6] = 0
+        case 1:  # an error along one axis only, yaw 0
+            state[:4] = target
+            state[0] += 0.1
+            state[4:] = 0
+        case 2:  # equal errors, equal gradients
+            state[:4] = target + 0.25
+        case 3:  # yaws where the quadrant of the sine changes, and large ones
+            turned = rng.integers(-600, 601) * np.pi / 2
+            state[6] = rng.choice([turned, -1000.0, 1000.0, -1024.0, 1024.0, 0.0, -0.0])
+        case 4:  # at the limit of a range, and just beyond
+            axis = rng.integers(7)
+            state[axis] = rng.choice([-1, 1]) * bounds[axis] * rng.choice([1, 1.001])
+        case 5:  # as far from the target as the ranges allow
+            state[:2], target[:2] = ranges.position_m, -ranges.position_m
+        case 6:
+            state[rng.integers(7)] = rng.choice(NOT_IN_RANGE)
+        case 7:
+            target[rng.integers(4)] = rng.choice(NOT_IN_RANGE)
+        case 8:
+            low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
+            thrust[0] = rng.choice([*NOT_IN_RANGE, 0.0, -0.0, -9.81, low, high])
+        case _:  # errors below the smallest normal number
+            target[:], state[:4] = 0, rng.normal(0, 1, 4) * 1e-40

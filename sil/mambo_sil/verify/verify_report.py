@@ -1,0 +1,89 @@
+"""The results of a verification as a record, as text and as an HTML page."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pydantic import Field
+
+from mambo_codegen.settings.controller_toml import to_toml
+from mambo_codegen.settings.model import Settings
+from mambo_sil.results.html_page import render_page
+from mambo_sil.results.summary import Summary
+from mambo_sil.verify.check import CheckOutcome
+from mambo_sil.verify.checks import CHECKS
+
+PAGE: Final = "verify.html"
+
+
+@dataclass(frozen=True)
+class Verified:
+    """A check that ran, and its result; `figures` are for programs."""
+
+    name: str
+    about: str
+    outcome: CheckOutcome
+    evidence: str
+    figures: Mapping[str, Any]
+    tools: Mapping[str, str]
+
+
+class VerifySummary(Summary):
+    """The results of `verify`; `files` has the SHA-256 of every file in the folder."""
+
+    command = "verify"
+
+    source: str
+    digest: str
+    scalar: str
+    verdict: CheckOutcome
+    not_run: list[str]
+    checks: list[Verified]
+    tools: dict[str, str]
+    settings: str
+    files: dict[str, str] = Field(default_factory=dict)
+
+
+def verdict(found: Sequence[Verified]) -> CheckOutcome:
+    """Return the worst outcome of all checks."""
+    outcomes = {one.outcome for one in found}
+    worst_first = (CheckOutcome.FAILED, CheckOutcome.INCOMPLETE, CheckOutcome.PASSED)
+    return next(outcome for outcome in worst_first if outcome in outcomes)
+
+
+def line(one: Verified) -> str:
+    """Format one check as a line."""
+    return f"{one.name:12}{one.outcome:12}{one.evidence}"
+
+
+def closing(found: Sequence[Verified]) -> str:
+    """Format the verdict and the list of checks that did not run."""
+    counted = Counter(one.outcome for one in found)
+    counts = ", ".join(f"{counted[outcome]} {outcome}" for outcome in CheckOutcome if counted[outcome])
+    left_out = _left_out(found)
+    return f"verdict: {verdict(found)} ({counts})" + (f"; not run: {', '.join(left_out)}" if left_out else "")
+
+
+def summarise(found: Sequence[Verified], source: str, settings: Settings) -> VerifySummary:
+    """Return the summary of all checks, without the digests of the files."""
+    return VerifySummary(
+        source=source,
+        digest=settings.short_digest,
+        scalar=settings.code.scalar,
+        verdict=verdict(found),
+        not_run=_left_out(found),
+        checks=list(found),
+        tools=dict(sorted((tool, version) for one in found for tool, version in one.tools.items())),
+        settings=to_toml(settings),
+    )
+
+
+def page(summary: VerifySummary) -> str:
+    """Render the summary as one HTML page that needs no other file."""
+    return render_page("verify.html.j2", {"summary": summary})
+
+
+def _left_out(found: Sequence[Verified]) -> list[str]:
+    ran = {one.name for one in found}
+    return [entry.name for entry in CHECKS if entry.name not in ran]

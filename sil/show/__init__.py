@@ -1,1 +1,0 @@
-"""Presentation of results: style of pictures, HTML pages, sections of the report, format of numbers."""

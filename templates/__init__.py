@@ -1,1 +1,0 @@
-"""The Jinja templates of a bundle, as text; `mambo_nmpc.codegen.render` is their only reader."""

@@ -1,0 +1,176 @@
+"""Same bits: every build has the digest of the reference; other settings and wrong C have other digests."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_codegen import boards
+from mambo_codegen.bundle.digest import TICKS, episode_count, episode_inputs, self_test_digest
+from mambo_codegen.bundle.render import render
+from mambo_codegen.design import Design
+from mambo_codegen.errors import BuildError
+from mambo_codegen.reference import ReferenceController, Status
+from mambo_codegen.settings.controller_toml import read, with_option
+from mambo_codegen.toolchain import host_toolchain
+from mambo_sil.board.emulated import GUEST, digest_emulated
+from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, builder, clang_builder
+from mambo_sil.board.footprint.same_bits import (
+    BOARD_COMPILERS,
+    HOST_COMPILERS,
+    REFERENCE,
+    count_builds,
+    run_everywhere,
+)
+from mambo_sil.flight.controllers.build import batch_source, load_library
+from mambo_sil.flight.controllers.compiled import digest_compiled
+from tests.support.cases import SCALARS, settings_case
+from tests.support.one_norm import ONE_NORM
+from tests.support.tools import board_builder, require, toolchain
+
+MAMBO = ONE_NORM
+EMULATED = ("mambo", "rp2040", "crazyflie", "teensy41", "rv32")
+GENERATED = Path(__file__).parents[3] / "generated"
+
+FAULTS = {
+    "another order": (
+        "src/nmpc_math.c",
+        "rest + (rest * (square * sine_rest))",
+        "rest + ((rest * square) * sine_rest)",
+    ),
+    "another sign": ("src/nmpc_cost.c", "effort_gradient = -weight", "effort_gradient = weight"),
+}
+"""Faults by name: file, the line, what it becomes."""
+
+
+@pytest.mark.parametrize(
+    ("names", "scalar"),
+    [
+        (("crazyflie",), "float32"),
+        *(pytest.param(EMULATED, scalar, marks=pytest.mark.long) for scalar in SCALARS),
+    ],
+)
+def test_every_build_has_the_digest_of_the_reference(names: tuple[str, ...], scalar: str) -> None:
+    """Host and boards, with all compilers and optimisations, with and without an FPU."""
+    for compiler in HOST_COMPILERS:
+        require(compiler, compiler)
+    for name in names:
+        board_builder(name)
+    settings = with_option(MAMBO, "code.scalar", scalar)
+    chosen = [boards.load(name) for name in names]
+    found = list(run_everywhere(settings, chosen, 3))
+    builds = [("host", compiler) for compiler in HOST_COMPILERS]
+    for board in chosen:
+        builds += [(board.name, builder(board).toolchain.command[0]), (board.name, "clang")]
+    assert [(one.where, one.compiler, one.optimisation) for one in found] == [
+        (REFERENCE, "NumPy", ""),
+        *((*build, flag) for build in builds for flag in OPTIMISATIONS),
+    ]
+    assert len(found) == count_builds(chosen)
+    assert {one.digest for one in found} == {f"0x{self_test_digest(Design(settings), 3):08X}"}
+
+
+@pytest.mark.parametrize(("fault", "compiler"), list(zip(FAULTS, BOARD_COMPILERS, strict=True)))
+def test_a_wrong_bundle_has_another_digest(fault: str, compiler: str, tmp_path: Path) -> None:
+    """A changed order of additions changes the digest."""
+    board_builder("crazyflie")
+    require(compiler, compiler)
+    path, line, instead = FAULTS[fault]
+    files = render(MAMBO, with_digest=False)
+    assert files[path].count(line) == 1
+    wrong = files | {path: files[path].replace(line, instead)}
+    digests = []
+    for bundle in (files, wrong):
+        build = BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2")
+        elf = build.guest(bundle, batch_source(), GUEST, tmp_path)
+        digests.append(digest_emulated(MAMBO, elf, "cortex-m4", 2))
+    assert digests[0] == self_test_digest(Design(MAMBO), 2) != digests[1]
+
+
+def test_other_settings_and_other_steps_have_other_digests() -> None:
+    """A change of one bit of a weight, of the optimizer or of the scalar type changes the digest."""
+    heavier = float(np.nextafter(np.float32(MAMBO.cost.tracking_weight), np.float32(np.inf)))
+    changed = [
+        with_option(MAMBO, "cost.tracking_weight", heavier),
+        with_option(MAMBO, "optimizer.variant", "irprop-"),
+        with_option(MAMBO, "code.scalar", "float64"),
+    ]
+    digests = [self_test_digest(Design(settings), 3) for settings in (MAMBO, *changed)]
+    assert len({*digests, self_test_digest(Design(MAMBO), 4)}) == len(digests) + 1
+
+
+@pytest.mark.parametrize("scalar", ["float32", "float64"])
+@pytest.mark.parametrize("index", [0, 3, 7, 9])
+def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:
+    """The digests are equal for extreme horizons and narrow ranges too."""
+    settings = settings_case(index, scalar)
+    library = load_library(render(settings, with_digest=False), toolchain("gcc"))
+    assert digest_compiled(library, 5) == self_test_digest(Design(settings), 5)
+
+
+def test_self_test_steps_end_in_every_way() -> None:
+    """About one step in thirteen is refused, for each reason; some converge, some reach the tilt limit."""
+    episode = np.arange(50, dtype=np.uint32)
+    reference = ReferenceController(Design(MAMBO), len(episode))
+    steps = [reference.step(*inputs) for inputs in episode_inputs(Design(MAMBO), episode)]
+    assert len(steps) == TICKS
+    status = np.array([step.status for step in steps])
+    assert set(status.flat) == {Status.OK, Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST}
+    assert 0.05 < np.mean(status != Status.OK) < 0.11
+    assert 0.005 < np.mean([step.converged for step in steps]) < 0.5
+    assert {int(count) for step in steps for count in step.iterations} == {0, 1, 2, 3, 4, 5}
+    limit = np.float32(MAMBO.limits.tilt_rad)
+    assert 0.05 < np.mean([np.abs(step.command_rad) == limit for step in steps]) < 0.5
+
+
+def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
+    """Inputs are uniformly distributed and uncorrelated, and differ between episodes."""
+    inputs = list(episode_inputs(Design(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
+    yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
+    yaw = yaw[np.abs(yaw) <= 100]
+    shares = np.histogram(yaw, bins=10, range=(-100, 100))[0] / len(yaw)
+    assert np.all(np.abs(shares - 0.1) < 0.015)
+    targets = np.concatenate([target[:, 0] for _, target, _ in inputs])
+    assert len(np.unique(targets)) > 0.99 * len(targets)
+    assert np.all(np.abs(np.corrcoef(inputs[0][1], rowvar=False) - np.eye(4))[:3, :3] < 0.2)
+
+
+def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A build that cannot run has a reason instead of a digest; the reference always runs."""
+    monkeypatch.setenv("PATH", str(tmp_path))
+    found = list(run_everywhere(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
+    assert found[0].digest == f"0x{self_test_digest(Design(MAMBO), 1):08X}"
+    reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
+    assert all(one.digest is None for one in found[1:])
+    assert ("host", "clang", "clang is missing") in reasons
+    for where, compiler, package in (
+        ("crazyflie", "gcc", "gcc-arm-none-eabi"),
+        ("crazyflie", "clang", "clang"),
+        ("mega", "gcc", "gcc-avr"),
+    ):
+        assert any((one[0], one[1]) == (where, compiler) and package in one[2] for one in reasons)
+
+
+def test_clang_needs_the_compiler_of_the_board_to_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clang has no libgcc for a board, so the message names the package that has it."""
+    (tmp_path / "clang").symlink_to(require("clang", "clang"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BuildError, match="gcc-arm-none-eabi"):
+        clang_builder(boards.load("crazyflie"), "-O2")
+
+
+@pytest.mark.parametrize("name", ["mambo", "mambo-float64", "table1"])
+def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
+    """The committed C computes the digest in its header, over all steps."""
+    settings = read(GENERATED / name / "controller.toml")
+    files = {
+        path.relative_to(GENERATED / name).as_posix(): path.read_text("utf-8")
+        for path in (GENERATED / name).rglob("*.[ch]")
+    }
+    stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
+    assert stated
+    library = load_library(files, toolchain(host_toolchain().command[0]))
+    assert digest_compiled(library, episode_count(settings)) == int(stated[1], 16)

@@ -1,0 +1,159 @@
+"""The firmware for processor in the loop: it compiles everywhere, and flies bit for bit in QEMU."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mambo_codegen import boards
+from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import to_toml, with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.board.firmware.elf import load
+from mambo_sil.board.firmware.firmware_build import ENTRY, builder
+from mambo_sil.board.firmware.stack import bound_stack
+from tests.support.command import run
+from tests.support.serial_line import Line, build_firmware, serial_line
+from tests.support.tools import require_module
+
+CASES = [
+    ("host", "mambo", "float32"),
+    ("host", "mambo", "float64"),
+    ("host", "mambo-1norm", "fixed"),
+]
+LONG_CASES = [
+    ("host", "mambo-1norm", "float32"),
+    ("host", "mambo-1norm", "float64"),
+    ("host", "mambo", "fixed"),
+    ("crazyflie", "mambo-1norm", "float32"),
+    ("crazyflie", "mambo", "fixed"),
+    ("crazyflie", "mambo-1norm", "fixed"),
+    ("mega", "mambo", "fixed"),
+    ("mega", "mambo-1norm", "fixed"),
+]
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    require_module("serial")
+    monkeypatch.chdir(tmp_path)
+
+
+def flown(line: Line, source: str, *options: str, code: int = 0) -> dict[str, Any]:
+    """Fly with the board on `line`; return the summary."""
+    said, _ = run("fly", source, "--port", line.port, *options, "--no-pictures", "--json", code=code)
+    summary: dict[str, Any] = json.loads(said)
+    return summary
+
+
+def demand_same_bits(summary: dict[str, Any], steps: int, board: str) -> None:
+    """Demand a flight of `steps` on `board` that has the bits of this machine, over a line without damage.
+
+    On a busy machine a reply may be late, and its request repeated.
+    """
+    assert (summary["steps"], summary["different_steps"], summary["self_test_difference"]) == (steps, 0, 0)
+    assert (summary["same_digest"], summary["same_bits_as_host"]) == (True, True)
+    assert summary["board_says"] == board
+    assert set(summary["link_faults"]) <= {"repeated"}
+
+
+@pytest.mark.parametrize(
+    ("board", "preset", "scalar"),
+    [*CASES, *(pytest.param(*case, marks=pytest.mark.long) for case in LONG_CASES)],
+)
+def test_every_scalar_type_and_norm_flies_bit_for_bit(
+    board: str, preset: str, scalar: str, tmp_path: Path
+) -> None:
+    """The self-test, 400 steps with good and bad inputs, a short flight; no warning of the compiler."""
+    settings = with_option(presets.preset(preset), "code.scalar", scalar)
+    with serial_line(build_firmware(settings, board, tmp_path / "pil")) as line:
+        summary = flown(line, preset, "--scalar", scalar, "--duration-s", "0.2")
+    names = {"host": "host process", "crazyflie": "STM32F405", "mega": "Arduino Mega 2560"}
+    demand_same_bits(summary, 21, names[board])
+
+
+def test_a_given_acceleration_of_the_target_is_sent_too(tmp_path: Path) -> None:
+    """The target of such a controller has two more numbers."""
+    settings = with_option(presets.preset("mambo"), "target.acceleration", "given")
+    (tmp_path / "given.toml").write_text(to_toml(settings), "utf-8")
+    with serial_line(build_firmware(settings, "host", tmp_path / "pil")) as line:
+        summary = flown(line, "given.toml", "--duration-s", "0.2")
+    demand_same_bits(summary, 21, "host process")
+
+
+def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
+    """The same trace, byte for byte, and a page of it; through a pseudo terminal as through a socket."""
+    elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
+    near, far = os.openpty()
+    with subprocess.Popen([elf], stdin=near, stdout=near) as process:
+        options = ["--duration-s", "1", "--wind", "0.2,0.1", "-o"]
+        said, _ = run("fly", "--port", os.ttyname(far), *options, "board")
+        process.kill()
+    os.close(near)
+    os.close(far)
+    assert "all bits of 101 steps equal those of this machine" in said
+    run("fly", *options, "desk")
+    assert (tmp_path / "board" / "trace.csv").read_bytes() == (tmp_path / "desk" / "trace.csv").read_bytes()
+    run("report", "board", "-o", "page.html")
+    assert "host process, /dev/pts" in (tmp_path / "page.html").read_text("utf-8")
+
+
+def test_the_whole_digest_is_computed_on_the_board(tmp_path: Path) -> None:
+    """By same-bits: that of the reference, and with wrong C another one, exit 1."""
+    elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
+    with serial_line(elf) as line:
+        said, _ = run("same-bits", "--port", line.port, "--steps", "2000")
+    reference, board, verdict = said.splitlines()
+    assert reference.split() == ["reference", "NumPy", board.split()[-1]]
+    assert board.startswith("board       host process")
+    assert verdict.startswith("2 of 2 builds have the digest of the reference over 2000 self-test steps")
+
+    def weigh_otherwise(files: dict[str, str]) -> None:
+        files["pil.c"] = files["pil.c"].replace("(int)number, get(body)", "(int)number + 1, get(body)")
+
+    other = build_firmware(presets.preset("mambo"), "host", tmp_path / "other", weigh_otherwise)
+    with serial_line(other) as line:
+        said, _ = run("same-bits", "--port", line.port, "--steps", "200", code=1)
+    assert "1 of 2 builds have the digest" in said
+
+
+def stack_bound(settings: Settings, folder: Path) -> int:
+    """Return the bound of the stack of a step on the Crazyflie."""
+    board = boards.load("crazyflie")
+    elf = builder(board).firmware(render(settings, with_digest=False), folder)
+    return bound_stack(load(elf), ENTRY).bytes
+
+
+@pytest.mark.long
+def test_the_stm32_flies_and_measures(tmp_path: Path) -> None:
+    """Counted cycles; a painted stack within the bound, which also has the frame of the caller."""
+    settings = presets.preset("mambo")
+    with serial_line(build_firmware(settings, "crazyflie", tmp_path / "pil")) as line:
+        summary = flown(line, "mambo", "--duration-s", "0.5")
+    demand_same_bits(summary, 51, "STM32F405")
+    cycles = summary["cycles"]
+    assert 0 < cycles["median"] <= cycles["most"] < 2**24
+    assert 0 <= cycles["least"] <= cycles["median"], "QEMU's counter now and then stands still for a step"
+    bound = stack_bound(settings, tmp_path / "bound")
+    assert bound - 32 <= summary["stack_bytes"]
+    assert summary["stack_bytes"] <= bound or summary["link_faults"], "a repeated request interrupts a step"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("board", "duration_s", "name"), [("crazyflie", 13, "STM32F405"), ("mega", 4, "Arduino Mega 2560")]
+)
+def test_a_long_flight_has_the_bits_of_the_desk(
+    board: str, duration_s: int, name: str, tmp_path: Path
+) -> None:
+    """A figure of eight of Table II, which takes 12.6 s, on the STM32F405; a third of it on the Mega.
+
+    The 100 s of Table II are this figure eight times; `docs/evidence/pil.md` reports them, flown once.
+    """
+    with serial_line(build_firmware(presets.preset("mambo"), board, tmp_path / "pil")) as line:
+        summary = flown(line, "mambo", "--duration-s", str(duration_s))
+    demand_same_bits(summary, 100 * duration_s + 1, name)

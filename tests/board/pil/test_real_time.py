@@ -1,0 +1,133 @@
+"""Flights by the clock of a process or of a board in QEMU: their bits and counts, never their timing."""
+
+import json
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.board.pil.connection import Connection
+from mambo_sil.board.pil.port import open_port
+from mambo_sil.board.pil.timed import TimedController
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.trajectories import CURVES
+from tests.support.command import run
+from tests.support.serial_line import Faults, build_firmware, edited, serial_line
+from tests.support.tools import require_module
+
+SETTINGS: Final = presets.preset("mambo")
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    require_module("serial")
+    monkeypatch.chdir(tmp_path)
+
+
+def demand_consistent(summary: dict[str, Any], periods: int) -> None:
+    """Demand the bits of the desk in a flight of so many periods, and counts that make these up."""
+    assert (summary["different_steps"], summary["self_test_difference"]) == (0, 0)
+    assert (summary["same_digest"], summary["same_bits_as_host"]) == (True, True)
+    timed = summary["real_time"]
+    made = summary["steps"] + timed["lost_replies"]
+    assert summary["statuses"]["OK"] <= summary["steps"]
+    assert sum(summary["statuses"].values()) == periods + 1
+    assert made + timed["overruns"] >= periods
+    assert 0 <= timed["late_inputs"] <= made
+    assert timed["board_period_s"] == 0.01
+    assert timed["delay_s"]["least"] >= 0.0
+
+
+def test_a_flight_by_the_clock_of_a_process_is_told(tmp_path: Path) -> None:
+    """In text, summary and report; a flight on request has nothing of it."""
+    with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil")) as line:
+        options = ["--port", line.port, "--duration-s", "0.3", "--no-pictures"]
+        said, _ = run("fly", *options, "--real-time", "-o", "timed")
+        free = json.loads(run("fly", *options, "--json", "-o", "free")[0])
+    summary = json.loads((tmp_path / "timed" / "summary.json").read_text("utf-8"))
+    demand_consistent(summary, 30)
+    assert f"all bits of {summary['steps']} steps equal those of this machine" in said
+    timed = summary["real_time"]
+    made = summary["steps"] + timed["lost_replies"]
+    told = (
+        f"{timed['late_inputs']} of {made} steps with late inputs, {timed['lost_replies']} replies lost, "
+        f"{timed['overruns']} periods without a step"
+    )
+    assert "  real time          a step every 10 ms of the board's clock, " in said
+    assert told in said
+    assert free["real_time"] is None
+    run("report", "timed", "-o", "page.html")
+    assert told in (tmp_path / "page.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("board", "scalar"),
+    [
+        pytest.param("crazyflie", "float32", marks=pytest.mark.long),
+        pytest.param("mega", "float32", marks=pytest.mark.long),
+        pytest.param("crazyflie", "fixed", marks=pytest.mark.long),
+    ],
+)
+def test_boards_in_qemu_fly_by_their_own_clock(board: str, scalar: str, tmp_path: Path) -> None:
+    """On a busy machine inputs are late and periods have no step: every bit is the same all the same.
+
+    No file of a board knows the scalar type, so one board flies both.
+    """
+    settings = with_option(SETTINGS, "code.scalar", scalar)
+    with serial_line(build_firmware(settings, board, tmp_path / "pil")) as line:
+        options = ["--port", line.port, "--scalar", scalar, "--duration-s", "0.5", "--no-pictures", "--json"]
+        demand_consistent(json.loads(run("fly", *options, "--real-time")[0]), 50)
+
+
+def test_a_step_that_is_slower_than_the_period_is_told(tmp_path: Path) -> None:
+    """A period of 2 us, which is over before a reply is sent: periods without a step, and every bit."""
+    change = edited("pil.h", "#define PIL_PERIOD_NS 10000000UL", "#define PIL_PERIOD_NS 2000UL")
+    with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil", change)) as line:
+        options = ["--port", line.port, "--duration-s", "1", "--no-pictures", "--json"]
+        summary = json.loads(run("fly", *options, "--real-time")[0])
+    timed = summary["real_time"]
+    assert timed["overruns"] > 0
+    assert timed["board_period_s"] == 2e-6
+    assert summary["steps"] + timed["overruns"] >= 100
+    assert (summary["different_steps"], summary["same_bits_as_host"]) == (0, True)
+
+
+def test_a_board_with_other_bits_fails(tmp_path: Path) -> None:
+    """Exit 1, with the first step."""
+    change = edited(
+        "pil.c", "    ended =", "    command.roll_rad *= (self->steps < 7) ? 1.0f : 0.999f;\n    ended ="
+    )
+    with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil", change)) as line:
+        options = ["--port", line.port, "--duration-s", "0.2", "--no-pictures"]
+        said, _ = run("fly", *options, "--real-time", code=1)
+    assert "STEPS HAVE OTHER BITS THAN ON THIS MACHINE, FIRST STEP 7" in said
+
+
+def test_an_unplugged_board_leaves_no_flight(tmp_path: Path) -> None:
+    """Exit 2; a flight on request would wait for the board."""
+    elf = build_firmware(SETTINGS, "host", tmp_path / "pil")
+    with serial_line(elf, Faults(unplugged=frozenset({40}))) as line:
+        options = ["--port", line.port, "--duration-s", "2", "--no-pictures", "-o", "out"]
+        _, refused = run("fly", *options, "--real-time", code=2)
+    assert f"--port {line.port}: lost: " in refused
+    assert "; a flight in real time cannot be repeated, so none is written" in refused
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_board_whose_clock_was_left_running_is_taken_over(tmp_path: Path) -> None:
+    """By the next flight, on request or by the clock: what it still sends is not taken for an answer."""
+    flight = Flight(CURVES["bernoulli"](2.0, 0.5), duration_s=0.2)
+    with serial_line(build_firmware(SETTINGS, "host", tmp_path / "pil")) as line:
+        left = Connection(line.port, partial(open_port, line.port, 1), SETTINGS, say=print)
+        port = left._port
+        fly(flight, TimedController(SETTINGS, left))
+        port.close()
+        with closing(Connection(line.port, partial(open_port, line.port, 1), SETTINGS, say=print)) as board:
+            controller = TimedController(SETTINGS, board)
+            fly(flight, controller)
+    assert controller.different == []
+    assert controller.arrivals[0].number == 0

@@ -1,0 +1,47 @@
+"""docs/reference/vehicles.md: its example flies, and it names every key."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles.model import form
+from tests.support.command import run
+
+DOCUMENT = (Path(__file__).parents[3] / "docs" / "reference" / "vehicles.md").read_text("utf-8")
+MOST_LINES = 25
+
+
+@pytest.fixture
+def example(tmp_path: Path) -> Path:
+    """Return the file that the document has a reader save."""
+    blocks = re.findall(r"```toml\n(.*?)```", DOCUMENT, re.DOTALL)
+    assert len(blocks) == 1
+    path = tmp_path / "my-drone.toml"
+    path.write_text(blocks[0])
+    return path
+
+
+@pytest.mark.parametrize("sensors", ["none", "mocap"])
+def test_the_example_is_short_and_flies(example: Path, sensors: str, tmp_path: Path) -> None:
+    """Within 25 lines, without a crash."""
+    assert len(example.read_text().splitlines()) <= MOST_LINES
+    flags = ["--duration-s", "20", "--no-pictures", "--sensors", sensors, "-o", str(tmp_path / "flight")]
+    text, _ = run("fly", "--vehicle", str(example), *flags)
+    assert "IAE" in text
+    assert '"name": "my-drone"' in (tmp_path / "flight" / "summary.json").read_text()
+
+
+def test_every_key_is_documented() -> None:
+    """Of every kind of attitude loop and of sensors."""
+    for attitude in ("mambo", "cascade", "first_order"):
+        for sensors in ("none", "mambo", "mocap"):
+            for path in form(attitude, sensors).keys:
+                assert path.rpartition(".")[2] in DOCUMENT, path
+
+
+def test_every_shipped_drone_is_documented() -> None:
+    """In the first table."""
+    for name in presets.names():
+        assert f"\n| `{name}` | " in DOCUMENT

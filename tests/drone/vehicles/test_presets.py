@@ -1,0 +1,141 @@
+"""vehicle.toml: what is shipped, what is refused, and the schema."""
+
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError
+from mambo_codegen.settings.toml_file import parse_document
+from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles.model import VehicleFile
+
+FLOWN = """\
+[body]
+mass_kg = 0.1
+drag_1_s = 0.1
+
+[attitude]
+kind = "first_order"
+roll = { gain = 0.9, lag_s = 0.06, dead_time_s = 0.05 }
+pitch = { gain = 0.9, lag_s = 0.06 }
+"""
+"""The least that a drone needs."""
+
+
+def refusals(text: str) -> tuple[str, ...]:
+    """Return the faults of a vehicle.toml."""
+    with pytest.raises(InvalidSettingsError) as caught:
+        presets.parse(text, "drone", "drone.toml")
+    return caught.value.faults
+
+
+def changed(old: str, new: str) -> str:
+    """Return `FLOWN` with a change."""
+    assert old in FLOWN
+    return FLOWN.replace(old, new)
+
+
+@pytest.mark.parametrize("name", presets.names())
+def test_a_shipped_drone_reads_and_fits_its_schema(name: str) -> None:
+    """Its first line says what it is, and every value but those of kinds and rates has a source."""
+    drone = presets.load(name)
+    assert drone.name == name
+    assert presets.description(name)
+    document = parse_document(presets.text_of(name), name)
+    jsonschema.validate(document, VehicleFile.json_schema())
+    assert VehicleFile.model_validate(drone.model_dump()) == drone
+
+
+def test_a_drone_reads_from_a_file(tmp_path: Path) -> None:
+    """It is called as the file; what it leaves out follows from its mass."""
+    path = tmp_path / "my-drone.toml"
+    path.write_text(FLOWN)
+    drone = presets.load(str(path))
+    assert drone.name == "my-drone"
+    assert drone.step_s == 0.005
+    assert (drone.altitude.p_n_m, drone.altitude.d_n_s_m) == (1.0, 0.5)
+    assert drone.altitude.thrust_max_n == pytest.approx(2.0 * 0.981)
+    assert drone.sensors.kind == "none"
+    jsonschema.validate(parse_document(FLOWN, "drone"), VehicleFile.json_schema())
+
+
+def test_an_unknown_drone_is_refused_with_the_most_similar_one() -> None:
+    """And with all that there are."""
+    with pytest.raises(SourceNotFoundError, match=r"mamba is neither .* \(did you mean mambo\?\)"):
+        presets.load("mamba")
+
+
+MOCAP = "position_noise_m = 0.0\nvelocity_filter_s = 0.0\nattitude_noise_rad = 0.0\n"
+FAULTS: dict[str, tuple[str, list[str]]] = {
+    "out of range, unknown": (
+        changed("mass_kg = 0.1", "mass_kg = -1\nmas = 3"),
+        [
+            "body.mass_kg = -1 must lie in 0.001..100",
+            "body.mas is not a setting; did you mean mass_kg?",
+        ],
+    ),
+    "in a table": (
+        changed("lag_s = 0.06 }", "lag = 3 }"),
+        [
+            "attitude.pitch.lag_s is missing; add it, it must lie in 0.001..2: "
+            "Time constant of the first-order lag.",
+            "attitude.pitch.lag is not a setting; did you mean lag_s?",
+        ],
+    ),
+    "no kind": (
+        changed('kind = "first_order"', ""),
+        [
+            'attitude.kind is missing; add it, it must be "mambo" or "cascade" or "first_order": '
+            "decides which other keys the section has"
+        ],
+    ),
+    "unknown kind": (
+        changed("first_order", "second_order"),
+        ['attitude.kind = "second_order" must be "mambo" or "cascade" or "first_order"'],
+    ),
+    "no sections": (
+        "body = 3\nattitude = 4\n[mambo]\n",
+        [
+            "body = 3 must be a section; write [body] and its keys below",
+            "attitude = 4 must be a section; write [attitude] and its keys below",
+            "mambo is not a section; there are body, rotors, attitude, altitude, sensors",
+        ],
+    ),
+    "torques without rotors": (
+        changed('kind = "first_order"', 'kind = "mambo"')
+        .replace("gain = 0.9, lag_s = 0.06, dead_time_s = 0.05", "p_n_m = 1.0, d_n_m_s = 1.0")
+        .replace("gain = 0.9, lag_s = 0.06", "p_n_m = 1.0, d_n_m_s = 1.0")
+        + "yaw = { p_n_m = 1.0, d_n_m_s = 1.0 }\nintegral_limit_rad_s = 1.0\n",
+        [
+            *(
+                f"body.inertia_{axis}_kg_m2 is missing; add it, it must lie in 1e-9..100: "
+                f"Moment of inertia about the {which} axis."
+                for axis, which in (("x", "forward"), ("y", "right"), ("z", "down"))
+            ),
+            "rotors is missing; write [rotors] and its keys below: Four equal rotors in X configuration.",
+        ],
+    ),
+    "inertia without torques": (
+        changed("mass_kg = 0.1", "mass_kg = 0.1\ninertia_x_kg_m2 = 1e-5"),
+        [
+            'body.inertia_x_kg_m2 = 1e-05 must be left out: attitude.kind = "first_order" has no torques',
+        ],
+    ),
+    "too weak": (
+        FLOWN + "[altitude]\np_n_m = 1.0\nd_n_s_m = 1.0\nthrust_max_n = 0.98\n",
+        ["altitude.thrust_max_n = 0.98 must be more than 0.981, the weight of body.mass_kg"],
+    ),
+    "a rate that does not divide": (
+        FLOWN + f'[sensors]\nkind = "mocap"\nposition_rate_hz = 60\n{MOCAP}',
+        ["sensors.position_rate_hz = 60 must be a divisor of 200 (attitude.rate_hz)"],
+    ),
+    "a name": ("name = 'x'\n" + FLOWN, ["name is not a key; remove it, the file's name is the name"]),
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
+def test_a_fault_names_file_key_value_rule_and_fix(what: str) -> None:
+    """All faults of a file at once."""
+    text, expected = FAULTS[what]
+    assert list(refusals(text)) == [f"drone.toml: {fault}" for fault in expected]

@@ -1,0 +1,490 @@
+"""Draws, campaign.toml and statistics of campaigns, without flying."""
+
+import math
+import re
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from statistics import NormalDist, median
+
+import numpy as np
+import pytest
+
+from mambo_codegen.errors import MamboNmpcError, UnreadableFileError
+from mambo_sil.drone.plant.airframe import MAMBO
+from mambo_sil.drone.vehicles import presets
+from mambo_sil.experiment.campaign import campaign_file
+from mambo_sil.experiment.campaign.campaign_flights import INDICES
+from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
+from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
+from mambo_sil.experiment.campaign.statistics import (
+    improvement,
+    improvements,
+    proportion,
+    quantiles,
+    worst_flights,
+)
+
+ROOT = Path(__file__).parents[3]
+WIDE = Domain(-1e3, 1e3)
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write a campaign.toml."""
+    path = folder / "campaign.toml"
+    path.write_text(text)
+    return path
+
+
+def faults(folder: Path, text: str) -> list[str]:
+    """Return the messages on a campaign.toml, without its name."""
+    path = written(folder, text)
+    with pytest.raises(MamboNmpcError) as caught:
+        campaign_file.read(path)
+    parts = [line.partition("campaign.toml: ") for line in str(caught.value).splitlines()]
+    assert all(found for _, found, _ in parts)
+    return [fault for _, _, fault in parts]
+
+
+@pytest.mark.parametrize(
+    ("value", "share", "expected"),
+    [
+        (3.5, 0.9, 3.5),
+        ({"uniform": [2.0, 4.0]}, 0.25, 2.5),
+        ({"log_uniform": [0.5, 2.0]}, 0.5, 1.0),
+        ({"normal": [1.0, 2.0]}, 0.5, 1.0),
+        ({"normal": [1.0, 2.0]}, NormalDist().cdf(1.0), 3.0),
+        ({"normal": [1.0, 0.0]}, 0.3, 1.0),
+        ({"choice": [7, 8, 9]}, 0.0, 7.0),
+        ({"choice": [7, 8, 9]}, 0.34, 8.0),
+        ({"choice": [7, 8, 9]}, 0.999, 9.0),
+    ],
+)
+def test_quantiles_of_the_distributions(value: object, share: float, expected: float) -> None:
+    """The quantile is the value below which the given share of draws lies."""
+    assert parse(value, WIDE).quantile(share) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.999999, 1.0 - 2.0**-53])
+def test_a_normal_distribution_is_truncated_at_its_domain(share: float) -> None:
+    """Draws stay in the domain, and quantiles are those of the truncated distribution, not of clipping."""
+    domain = Domain(0.0, 1.0)
+    cut = parse({"normal": [0.5, 10.0]}, domain)
+    assert 0.0 <= cut.quantile(share) <= 1.0
+    assert cut.quantile(0.5) == pytest.approx(0.5)
+    assert cut.quantile(0.1) == pytest.approx(0.1, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "value", [3.5, {"uniform": [2.0, 4.0]}, {"normal": [1.0, 2.0]}, {"choice": [1.0, 2.0]}]
+)
+def test_a_distribution_is_written_as_it_is_read(value: object) -> None:
+    """campaign.json has the notation of campaign.toml."""
+    assert parse(value, WIDE).document() == value
+
+
+def test_a_draw_depends_on_seed_and_flight_only() -> None:
+    """Draws depend neither on other flights nor on the distributions of other parameters."""
+    assert draw(5, 17, PARAMETERS) == draw(5, 17, PARAMETERS)
+    assert draw(5, 17, PARAMETERS) != draw(5, 18, PARAMETERS)
+    assert draw(5, 17, PARAMETERS) != draw(6, 17, PARAMETERS)
+    fixed = PARAMETERS | {"mass_kg": parse(0.07, PARAMETERS["mass_kg"].domain)}
+    assert draw(5, 17, fixed) == draw(5, 17, PARAMETERS) | {"mass_kg": 0.07}
+
+
+def test_curves_are_drawn(tmp_path: Path) -> None:
+    """Name, size and rate, each from its number of the stream; heading and all else are drawn as before."""
+    plain = campaign_file.default()
+    curves = campaign_file.read(
+        written(
+            tmp_path,
+            """
+            [flight]
+            trajectory = { choice = ["circle", "step"] }
+            size_m = { uniform = [1, 2] }
+            rate_rad_s = { log_uniform = [0.5, 1.0] }
+            """,
+        )
+    )
+    drawn = [curves.draw(flight) for flight in range(200)]
+    for flight, one in enumerate(drawn):
+        others = {"trajectory": "bernoulli", "size_m": 2.0, "rate_rad_s": 0.5}
+        assert one | others == plain.draw(flight)
+        flown = campaign_file.scenario(curves.flight, one)
+        assert (flown.trajectory, flown.size_m, flown.rate_rad_s) == tuple(one[name] for name in others)
+    assert 70 < sum(one["trajectory"] == "circle" for one in drawn) < 130
+    assert 1.0 <= min(one["size_m"] for one in drawn) < 1.1
+    assert 0.9 < max(one["rate_rad_s"] for one in drawn) <= 1.0
+    assert max(one["yaw_rad"] for one in drawn) > 3.0 > -3.0 > min(one["yaw_rad"] for one in drawn)
+    assert curves.document()["flight"]["trajectory"] == {"choice": ["circle", "step"]}
+    assert plain.document()["flight"]["trajectory"] == "bernoulli"
+
+
+def test_draws_are_those_of_earlier_versions() -> None:
+    """New parameters use new numbers: the first flight of the default campaign keeps its draws."""
+    drawn = draw(0, 0, PARAMETERS)
+    shares = np.random.Generator(np.random.Philox(np.random.SeedSequence(0, spawn_key=(0,)).spawn(2)[0]))
+    first, *_, last = shares.random(37)
+    assert drawn["mass_kg"] == 0.063 + first * (0.08 - 0.063)
+    assert list(PARAMETERS)[36] == "push_time_s"
+    pushed = draw(0, 0, PARAMETERS | {"push_time_s": parse({"uniform": [0.0, 1.0]}, WIDE)})
+    assert pushed["push_time_s"] == last
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2.0, "2"),
+        ({"uniform": [1.0, 2.5]}, "1 .. 2.5"),
+        ({"normal": [1.0, 0.1]}, "1 +- 0.1"),
+        ({"choice": [1.0, 2.0]}, "1 or 2"),
+    ],
+)
+def test_a_distribution_is_said_in_words(value: object, text: str) -> None:
+    """For the report, and for the comment of a tuned controller."""
+    assert parse(value, WIDE).text() == text
+
+
+def test_names_are_drawn_and_said() -> None:
+    """A distribution over names is written and said with them."""
+    names = Domain.of_names(("a", "b", "c"))
+    assert (names.low, names.high, names.whole) == (0, 2, True)
+    found = parse({"choice": ["c", "a"]}, names)
+    assert [names.value(found.quantile(share)) for share in (0.0, 0.49, 0.5, 0.99)] == ["c", "c", "a", "a"]
+    assert found.document() == {"choice": ["c", "a"]}
+    assert found.text() == "c or a"
+    assert parse("b", names).document() == parse("b", names).text() == "b"
+
+
+def test_whole_numbers_are_drawn_as_integers() -> None:
+    """A table shows 2, not 2.0."""
+    assert repr(Domain(0, 9, whole=True).value(2.0)) == "2"
+    assert repr(Domain(0, 9).value(2.0)) == "2.0"
+
+
+CONSTANT = {name: replace(default, kind="constant") for name, default in PARAMETERS.items()}
+
+
+def test_seeds_of_flights_differ() -> None:
+    """2000 flights have 2000 seeds, and so different noise."""
+    assert len({draw(0, flight, CONSTANT)["seed"] for flight in range(2000)}) == 2000
+
+
+def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
+    """Over 1000 flights mean, limits, shares of a choice and correlation are those of the distributions."""
+    drawn = CONSTANT | {name: PARAMETERS[name] for name in ("mass_kg", "command_delay_ticks", "yaw_rad")}
+    flights = [draw(0, flight, drawn) for flight in range(1000)]
+    mass_kg = np.array([flight["mass_kg"] for flight in flights])
+    assert 0.063 <= mass_kg.min() < 0.0632
+    assert 0.0798 < mass_kg.max() <= 0.08
+    assert mass_kg.mean() == pytest.approx(0.0715, abs=0.0005)
+    ticks = [flight["command_delay_ticks"] for flight in flights]
+    assert all(280 < ticks.count(delay) < 390 for delay in (0, 1, 2))
+    yaw_rad = np.array([flight["yaw_rad"] for flight in flights])
+    assert abs(np.corrcoef(mass_kg, yaw_rad)[0, 1]) < 0.1
+
+
+def test_every_parameter_changes_the_scenario() -> None:
+    """Each parameter at a limit of its domain gives a valid scenario that differs from the nominal one."""
+    section = campaign_file.default().flight
+    plain = campaign_file.scenario(section, draw(0, 0, CONSTANT))
+    for name, parameter in PARAMETERS.items():
+        for limit in (parameter.domain.low, parameter.domain.high):
+            extreme = CONSTANT | {name: Distribution("constant", (limit,), parameter.domain)}
+            changed = campaign_file.scenario(section, draw(0, 0, extreme))
+            assert (changed != plain) == (limit != CONSTANT[name].numbers[0]), name
+
+
+def test_scales_apply_to_the_nominal_mambo() -> None:
+    """The thrust scale applies to rotor thrust and torque, the inertia scale to one axis."""
+    drawn = draw(0, 0, PARAMETERS) | {"thrust_scale": 0.5, "inertia_scale_y": 2.0}
+    flown = campaign_file.scenario(campaign_file.default().flight, drawn)
+    assert flown.thrust_factor_n_s2 == 0.5 * MAMBO.thrust_factor_n_s2
+    assert flown.torque_factor_n_m_s2 == 0.5 * MAMBO.torque_factor_n_m_s2
+    assert flown.inertia_kg_m2[1] == 2.0 * MAMBO.inertia_kg_m2[1]
+
+
+def test_an_empty_file_is_the_default_campaign(tmp_path: Path) -> None:
+    """The defaults are both PDs and preset mambo, 100 s on the figure of eight, derotated sensors."""
+    read = campaign_file.read(written(tmp_path, ""))
+    assert read == campaign_file.default()
+    assert [(entrant.name, entrant.kind) for entrant in read.entrants] == [
+        ("pd", "pd"),
+        ("pd-feedforward", "pd-feedforward"),
+        ("mambo", "nmpc"),
+    ]
+    assert read.file.flight.duration_s == 100.0
+    assert read.file.flight.sensors == "mambo-derotated"
+
+
+def test_a_controller_may_be_a_file_beside_the_campaign(tmp_path: Path) -> None:
+    """The path is relative to campaign.toml, and the name is the stem of the file."""
+    (tmp_path / "calm.toml").write_text("[cost]\neffort_weight = 1000\n")
+    read = campaign_file.read(written(tmp_path, 'controllers = ["table1", "calm.toml"]'))
+    assert [entrant.name for entrant in read.entrants] == ["table1", "calm"]
+    assert read.entrants[1].settings.cost.effort_weight == 1000.0
+
+
+def test_a_campaign_is_identified_by_its_values(tmp_path: Path) -> None:
+    """Writing out a default keeps the identity of a campaign; another distribution changes it."""
+    same = campaign_file.read(written(tmp_path, "seed = 0\n[draws]\nmass_kg = { uniform = [0.063, 0.08] }\n"))
+    assert same.document() == campaign_file.default().document()
+    other = campaign_file.read(written(tmp_path, "[draws]\nmass_kg = 0.063\n"))
+    assert other.document()["draws"]["mass_kg"] == 0.063
+
+
+BAD = {
+    "seed = -1": "seed = -1 must lie in 0..9223372036854775807",
+    'seed = "x"': 'seed = "x" must be a valid integer',
+    "sed = 1": "sed is not a key of this file; did you mean seed?",
+    "draws = 3": "draws = 3 must be a section; write [draws] and its keys below",
+    "[draws]\nmas_kg = 1": "draws.mas_kg is not a parameter; did you mean mass_kg?",
+    "[draws]\nwind = 3": "draws.wind is not a parameter; did you mean wind_x_m_s2, wind_y_m_s2",
+    "[draws]\nmass_kg = 60": "draws.mass_kg = 60 must lie in 0.01..1",
+    "[draws]\nmass_kg = nan": "draws.mass_kg = NaN must lie in 0.01..1",
+    "[draws]\nmass_kg = { uniform = [0.08, 0.06] }": "[0.08, 0.06] } must have the lower limit first",
+    "[draws]\nmass_kg = { uniform = [0.08] }": "must have two numbers",
+    "[draws]\nmass_kg = { uniform = [0.05, 9] }": "must lie in 0.01..1",
+    "[draws]\nmass_kg = { gamma = [1, 2] }": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = [0.06, 0.08]": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = true": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = { choice = [] }": "must have 1 to 1000 values",
+    "[draws]\nmass_kg = { uniform = [] }": "must have two numbers",
+    '[draws]\nmass_kg = { uniform = [0.06, "x"] }': "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = { choice = [true] }": "must be a number, { uniform = [low, high] }",
+    "[draws]\nmass_kg = { choice = 0.07 }": "must be a number, { uniform = [low, high] }",
+    "[draws]\nwind_x_m_s2 = { normal = [0, -1] }": "must have a standard deviation of 0 or more",
+    "[draws]\nnoise_scale = { log_uniform = [0, 1] }": "must have limits above 0",
+    "[draws]\ncommand_delay_ticks = 1.5": "must be whole numbers",
+    "[draws]\ncommand_delay_ticks = { uniform = [0, 2] }": "must be a whole number or { choice",
+    "[flight]\nduration_s = 0": "flight.duration_s = 0 must lie in 1..3600",
+    '[flight]\ntrajectory = "spiral"': 'flight.trajectory = "spiral" must be one of bernoulli, gerono',
+    '[flight]\ntrajectory = { choice = ["circle", "spiral"] }': "must be one of bernoulli, gerono, lissajous",
+    "[flight]\ntrajectory = { choice = [] }": "hover, step, or { choice = [name, ...] } of them",
+    "[flight]\ntrajectory = { uniform = [0, 1] }": "or { choice = [name, ...] } of them",
+    '[flight]\ntrajectory = { choice = ["circle"], uniform = [0, 1] }': "or { choice = [name, ...] } of them",
+    "[flight]\ntrajectory = 3": "flight.trajectory = 3 must be one of bernoulli",
+    "[flight]\nsize_m = { uniform = [1, 5000] }": "must lie in -1000..1000",
+    "[draws]\nsize_m = 1": "draws.size_m is not a parameter",
+    "controllers = []": "controllers = [] must name 1 to 10 controllers",
+    'controllers = ["mamba"]': "controllers: mamba is neither a preset nor a file (did you mean mambo?)",
+    'controllers = ["pd", "pd"]': "controllers: two are called pd",
+    'controllers = ["pd-feedforward.toml"]': "and _, other than pd and pd-feedforward: results are named",
+    'controllers = ["odd.toml"]': "controllers: odd.toml: horizon.update_period_s = 0.007 must be a whole",
+    'controllers = ["wrong.toml"]': "wrong.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)",
+    'controllers = ["a b.toml"]': "controllers: a b.toml must have a name of at most 40 letters",
+}
+
+
+@pytest.mark.parametrize(
+    ("domain", "value"), [(WIDE, 1.0), (Domain.of_names(("a", "b")), "b")], ids=["numbers", "names"]
+)
+def test_a_choice_has_one_to_a_thousand_values(domain: Domain, value: float | str) -> None:
+    """Of numbers and of names; the same value may stand more than once, and is drawn more often."""
+    for count in (1, 1000):
+        assert len(parse({"choice": [value] * count}, domain).numbers) == count
+    for count in (0, 1001):
+        with pytest.raises(ValueError, match="must"):
+            parse({"choice": [value] * count}, domain)
+
+
+def test_limits_belong_to_their_domain() -> None:
+    """A range may be a single value; a mean may lie at a limit, and its deviation may go beyond."""
+    assert parse({"uniform": [-1e3, 1e3]}, WIDE).quantile(0.0) == -1e3
+    assert parse({"uniform": [2.0, 2.0]}, WIDE).quantile(0.9) == 2.0
+    assert parse({"normal": [1e3, 2e3]}, WIDE).quantile(0.9) < 1e3
+    assert parse({"log_uniform": [1e-300, 1e-300]}, WIDE).quantile(0.9) == 1e-300
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_an_error_names_key_value_and_rule(text: str, tmp_path: Path) -> None:
+    """One error in campaign.toml gives one line."""
+    (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.007\n")
+    (tmp_path / "wrong.toml").write_text("[horizon]\ncontrol = 11\n")
+    (tmp_path / "a b.toml").write_text("")
+    (tmp_path / "pd-feedforward.toml").write_text("")
+    (fault,) = faults(tmp_path, text)
+    assert BAD[text] in fault
+
+
+def test_all_errors_are_reported_together(tmp_path: Path) -> None:
+    """Three errors in campaign.toml give three lines."""
+    assert len(faults(tmp_path, "seed = -1\n[draws]\nmass_kg = 0\nyaw = 1\n")) == 3
+
+
+def test_a_missing_campaign_is_named(tmp_path: Path) -> None:
+    """A campaign.toml that does not exist raises `UnreadableFileError`."""
+    with pytest.raises(UnreadableFileError, match="no such file"):
+        campaign_file.read(tmp_path / "absent.toml")
+
+
+def table(**columns: list[float]) -> dict[str, np.ndarray]:
+    """Return a table of controllers a and b with the given columns; by default nothing crashes."""
+    n = len(next(iter(columns.values())))
+    healthy = {f"{name}_crashed": [0.0] * n for name in "ab"}
+    return {name: np.array(values, np.float64) for name, values in (healthy | columns).items()}
+
+
+def test_a_proportion_has_the_interval_of_clopper_and_pearson() -> None:
+    """For 0 of 10 the upper limit solves (1 - p)^10 = 2.5 %; the interval for 10 of 10 mirrors it."""
+    none, every = proportion(0, 10), proportion(10, 10)
+    limit = 1.0 - 0.025 ** (1 / 10)
+    assert [none.low, none.high] == pytest.approx([0.0, limit])
+    assert [every.low, every.high] == pytest.approx([1.0 - limit, 1.0])
+    assert proportion(3, 12).share == 0.25
+
+
+@pytest.mark.parametrize(("count", "flights"), [(1, 2), (3, 12), (40, 41), (7, 500)])
+def test_the_limits_of_a_proportion_leave_two_and_a_half_percent_on_each_side(
+    count: int, flights: int
+) -> None:
+    """With the lower limit as probability, `count` or more have that chance; with the upper one, no more."""
+
+    def chance(counts: range, share: float) -> float:
+        return sum(math.comb(flights, k) * share**k * (1.0 - share) ** (flights - k) for k in counts)
+
+    found = proportion(count, flights)
+    assert chance(range(count, flights + 1), found.low) == pytest.approx(0.025, rel=1e-9)
+    assert chance(range(count + 1), found.high) == pytest.approx(0.025, rel=1e-9)
+
+
+def test_quantiles_are_values_of_the_sample() -> None:
+    """Quantiles are not interpolated, so an infinite value affects only quantiles that select it."""
+    values = np.array([4.0, math.inf, 1.0, 3.0, 2.0])
+    found = quantiles(values)
+    assert (found["0"], found["0.25"], found["0.5"], found["0.75"]) == (1.0, 2.0, 3.0, 4.0)
+    assert (found["0.95"], found["1"]) == (math.inf, math.inf)
+
+
+def test_improvement_is_the_median_of_the_ratios() -> None:
+    """Median and share of better flights are those of the ratios flight by flight."""
+    found = improvement(
+        table(a_iae_m_s=[2.0, 9.0, 4.0, 1.0, 8.0], b_iae_m_s=[1.0, 3.0, 1.0, 2.0, 8.0]), "a", "b", "iae_m_s"
+    )
+    assert found is not None
+    assert found.median == 2.0  # of 2, 3, 4, 0.5, 1
+    assert (found.better.count, found.better.flights) == (3, 5)
+    assert 0.5 <= found.low <= 2.0 <= found.high <= 4.0
+
+
+def test_the_interval_of_the_median_covers_it_and_narrows() -> None:
+    """For lognormal ratios the interval contains exp(mu) and has about the asymptotic width."""
+    ratios = np.exp(np.random.default_rng(1).normal(math.log(3.0), 0.5, 1000))
+    found = improvement(table(a_iae_m_s=ratios.tolist(), b_iae_m_s=[1.0] * 1000), "a", "b", "iae_m_s")
+    assert found is not None
+    assert found.low < 3.0 < found.high
+    width = 2.0 * 1.96 * 3.0 * 0.5 * math.sqrt(math.pi / 2.0 / 1000)
+    assert found.high - found.low == pytest.approx(width, rel=0.25)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+def test_the_interval_of_the_median_is_that_of_all_resamples(n: int) -> None:
+    """Its ends are quantiles of the medians of all n^n resamples, each equally probable."""
+    ratios = [float(2**k) for k in range(n)]
+    medians = sorted(median(resample) for resample in product(ratios, repeat=n))
+    found = improvement(table(a_iae_m_s=ratios, b_iae_m_s=[1.0] * n), "a", "b", "iae_m_s")
+    assert found is not None
+    ends = [medians[math.ceil(tail * len(medians)) - 1] for tail in (0.025, 0.975)]
+    assert [found.low, found.high] == ends
+
+
+def test_a_crash_is_infinitely_bad() -> None:
+    """A controller that crashes is worse in that flight; flights in which both crash are left out."""
+    columns = table(
+        a_iae_m_s=[1.0, 1.0, 1.0, 1.0],
+        b_iae_m_s=[0.5, 0.5, 0.5, 0.5],
+        a_crashed=[0.0, 1.0, 0.0, 1.0],
+        b_crashed=[0.0, 0.0, 1.0, 1.0],
+    )
+    found = improvement(columns, "a", "b", "iae_m_s")
+    assert found is not None
+    assert found.flights == 3
+    assert found.median == 2.0  # of 2, infinite, 0
+    assert found.better.count == 2
+    hopeless = table(a_iae_m_s=[1.0], b_iae_m_s=[1.0], a_crashed=[1.0], b_crashed=[1.0])
+    assert improvement(hopeless, "a", "b", "iae_m_s") is None
+
+
+def test_the_worst_flights_are_crashes_then_the_largest_iae() -> None:
+    """At most five flights are returned; a lost flight, whose IAE is NaN, is among the crashes."""
+    columns = table(a_iae_m_s=[1.0, 7.0, math.nan, 3.0, 2.0, 9.0], a_crashed=[0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    assert worst_flights(columns, "a") == [2, 3, 5, 1, 4]
+
+
+def test_statistics_are_reproducible() -> None:
+    """The same table gives the same statistics, bootstrap intervals included."""
+    rng = np.random.default_rng(2)
+    columns = {f"{name}_{index}": rng.uniform(1.0, 2.0, 20) for name in "ab" for index in INDICES}
+    columns |= {f"{name}_{key}": np.zeros(20) for name in "ab" for key in ("crashed", "refused_updates")}
+    assert improvements(columns, "ab", sensed=False) == improvements(columns, "ab", sensed=False)
+
+
+def test_every_parameter_is_documented() -> None:
+    """docs/reference/campaign-toml.md names every parameter."""
+    text = (ROOT / "docs" / "reference" / "campaign-toml.md").read_text("utf-8")
+    missing = [name for name in PARAMETERS if f"`{name}`" not in text]
+    assert missing == []
+
+
+def documented(text: str) -> tuple[str, list[float]]:
+    """Return kind and numbers of a distribution as docs/reference/campaign-toml.md writes it."""
+    numbers = [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text.partition(" tick")[0])]
+    match text.partition(" ")[0].rstrip(","):
+        case "uniform":
+            return "uniform", numbers or [-math.pi, math.pi]
+        case "log-uniform":
+            return "log_uniform", numbers
+        case "normal":
+            return "normal", [0.0, *numbers]
+        case _:
+            return ("choice" if len(numbers) > 1 else "constant"), numbers
+
+
+def test_the_documented_defaults_are_those_of_the_default_campaign() -> None:
+    """Each row of [draws] in docs/reference/campaign-toml.md has kind and numbers of its parameters."""
+    text = (ROOT / "docs" / "reference" / "campaign-toml.md").read_text("utf-8")
+    rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| ([^|]+) \| [^|]*\|$", text, re.MULTILINE)
+    table = {name: documented(words) for names, words in rows for name in re.findall(r"\w+", names)}
+    known = {name: found for name, found in table.items() if name in PARAMETERS}
+    assert list(known) == [
+        name for name in PARAMETERS if name not in campaign_file.FlightSection.model_fields
+    ]
+    for name, (kind, numbers) in known.items():
+        assert (PARAMETERS[name].kind, list(PARAMETERS[name].numbers)) == (kind, numbers), name
+
+
+def numbers(campaign: campaign_file.Campaign, name: str) -> tuple[float, ...]:
+    """Return the numbers of the distribution of a parameter."""
+    return campaign_file.distributions(campaign.file.flight, campaign.file.draws)[name].numbers
+
+
+def test_draws_of_mass_drag_and_motor_lag_are_relative_to_the_drone() -> None:
+    """The same shares of its values as of the Mambo's; all others are the same."""
+    mambo, other = campaign_file.default(), campaign_file.default("crazyflie")
+    assert numbers(mambo, "mass_kg") == (0.063, 0.08)
+    np.testing.assert_allclose(numbers(other, "mass_kg"), [0.03, 0.03 * 0.08 / 0.063], rtol=1e-12)
+    np.testing.assert_allclose(numbers(other, "drag_1_s"), [0.5 * 0.244, 1.5 * 0.244], rtol=1e-12)
+    assert numbers(mambo, "motor_lag_s") == (0.0, 0.05)
+    np.testing.assert_allclose(numbers(other, "motor_lag_s"), [0.8 * 0.072, 1.2 * 0.072], rtol=1e-12)
+    changed = {name for name in PARAMETERS if numbers(mambo, name) != numbers(other, name)}
+    assert changed == {"mass_kg", "drag_1_s", "motor_lag_s"}
+
+
+def test_a_file_names_its_drone(tmp_path: Path) -> None:
+    """A shipped one, or a file beside it; its draws are absolute, and its sensors must be the drone's."""
+    path = written(tmp_path, '[flight]\nvehicle = "crazyflie"\n[draws]\nmass_kg = 0.05\n')
+    named = campaign_file.read(path)
+    assert (named.drone.name, named.file.flight.sensors) == ("crazyflie", "mocap")
+    assert numbers(named, "mass_kg") == (0.05,)
+    (tmp_path / "my.toml").write_text(presets.text_of("generic"))
+    assert campaign_file.read(written(tmp_path, '[flight]\nvehicle = "my.toml"\n')).drone.name == "my"
+    assert faults(tmp_path, '[flight]\nvehicle = "my"\n') == [
+        "flight.vehicle: my is neither a shipped vehicle nor a file; vehicles are "
+        f"{', '.join(presets.names())}, and `mambo-nmpc vehicles NAME` prints one to start from"
+    ]
+    assert faults(tmp_path, '[flight]\nvehicle = "crazyflie"\nsensors = "mambo"\n') == [
+        'flight.sensors = "mambo" must be "none" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'
+    ]
+    both = written(tmp_path, '[flight]\nvehicle = "mambo"\nsensors = "mambo"\n')
+    assert campaign_file.read(both, "crazyflie").file.flight.sensors == "mocap"
+    assert campaign_file.read(both, "mambo").file.flight.sensors == "mambo"

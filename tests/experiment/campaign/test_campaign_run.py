@@ -1,0 +1,389 @@
+"""Campaigns give the same bytes for any workers, batches and interruptions; folders are protected."""
+
+import csv
+import json
+import os
+import resource
+import shlex
+import shutil
+import signal
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from mambo_codegen.errors import INTERRUPTED, TERMINATED, ForeignFilesError, UnwritableError
+from mambo_sil.errors import BusyError, FlightError, WorkerError
+from mambo_sil.experiment.campaign import campaign_file
+from mambo_sil.experiment.campaign.campaign_flights import fly_batch
+from mambo_sil.experiment.campaign.campaign_run import fly_missing, open_campaign, table_columns
+from mambo_sil.experiment.campaign.executors import Pool, cluster, processes, report_share
+from mambo_sil.flight.scenario import read_record
+from tests.support.command import command, run
+from tests.support.tools import require_module
+
+FLIGHTS = 6
+CAMPAIGN = 'seed = 4\ncontrollers = ["pd", "mambo"]\n[flight]\nduration_s = 1.0\n'
+
+
+@pytest.fixture(scope="module", name="source")
+def _source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a campaign of short flights."""
+    path = tmp_path_factory.mktemp("source") / "campaign.toml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+@pytest.fixture(scope="module", name="whole")
+def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Run that campaign without interruption on one process."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    run("campaign", str(source), "--flights", str(FLIGHTS), "--workers", "1", "-o", str(folder))
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return name and bytes of every file below `folder`."""
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def fly_on_threads(
+    source: Path,
+    folder: Path,
+    flights: int = FLIGHTS,
+    *,
+    batch: int = 100,
+    progress: Callable[[int], None] = lambda _: None,
+) -> bytes:
+    """Fly on two threads of this process, and return the table."""
+    campaign = campaign_file.read(source)
+    with open_campaign(campaign, folder) as store, ThreadPoolExecutor(2) as threads:
+        fly_missing(campaign, store, flights, Pool(threads, 2, lambda _: None), progress, batch=batch)
+        store.put_in_order()
+    return (folder / "flights.csv").read_bytes()
+
+
+@pytest.mark.parametrize("batch", [2, 100])
+def test_the_table_depends_neither_on_batches_nor_on_workers(
+    batch: int, source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """One process and two threads, with any batch size, give the same bytes."""
+    assert fly_on_threads(source, tmp_path, batch=batch) == (whole / "flights.csv").read_bytes()
+
+
+def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Path) -> None:
+    """The table has draws and results of each flight, and there is a record per flight and controller."""
+    names = set(contents(whole))
+    records = {f"flights/{flight:06}-{name}.json" for flight in range(FLIGHTS) for name in ("pd", "mambo")}
+    assert names == {"campaign.json", "flights.csv", "summary.json", "campaign.png", "campaign.svg"} | records
+    rows = list(csv.DictReader((whole / "flights.csv").read_text().splitlines()))
+    assert [int(row["flight"]) for row in rows] == list(range(FLIGHTS))
+    assert tuple(rows[0])[1:-1] == table_columns(campaign_file.read(source))
+    assert 0.063 <= float(rows[0]["mass_kg"]) <= 0.08
+    record = read_record(whole / "flights" / "000002-mambo.json")
+    assert record.scenario.mass_kg == float(rows[2]["mass_kg"])
+    assert record.trace_sha256 == rows[2]["mambo_trace_sha256"]
+    summary = json.loads((whole / "summary.json").read_text())
+    assert summary["flights"] == FLIGHTS
+    assert summary["controllers"]["mambo"]["crashed"]["count"] == 0
+    assert len(summary["worst"]["pd"]) == 5
+
+
+@pytest.mark.long
+def test_a_worst_flight_replays_bit_for_bit(whole: Path, tmp_path: Path) -> None:
+    """`fly --replay` repeats it with the Python reference, alone, with the same bits as the C in a batch."""
+    worst = json.loads((whole / "summary.json").read_text())["worst"]["mambo"][0]
+    record, out = str(whole / worst["record"]), str(tmp_path)
+    summary = json.loads(run("fly", "--replay", record, "--json", "--no-pictures", "-o", out)[0])
+    assert summary["same_bits_as_recorded"] is True
+    assert summary["metrics"]["iae_m_s"] == worst["iae_m_s"]
+
+
+STOPPED = """
+import os, signal
+from mambo_nmpc.__main__ import main
+from mambo_sil.experiment.campaign.store import FlightStore
+add = FlightStore.add
+def add_and_stop(self, rows):
+    add(self, rows)
+    STOP
+FlightStore.add = add_and_stop
+main()
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("stop", "code"),
+    [
+        ("os.kill(os.getpid(), signal.SIGKILL)", -signal.SIGKILL),
+        ("os.killpg(0, signal.SIGINT)", INTERRUPTED),
+        ("os.kill(os.getpid(), signal.SIGTERM)", TERMINATED),
+    ],
+    ids=["killed", "Ctrl-C, which also signals the workers", "terminated"],
+)
+def test_a_stopped_campaign_resumes_to_the_same_bytes(
+    stop: str, code: int, source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """It keeps finished flights and leaves no worker; resumed on two workers it has the results of one."""
+    arguments = ("campaign", source, "--flights", FLIGHTS, "--workers", 2, "-o", tmp_path)
+    done = command(*arguments, script=STOPPED.replace("STOP", stop))
+    assert (done.returncode, done.stdout) == (code, "")
+    if code != -signal.SIGKILL:
+        message = f"stopped with 3 of {FLIGHTS} flights finished; the same command continues from there\n"
+        assert done.stderr.endswith(message)
+        assert done.stderr.count("\n") == 1
+    before = (tmp_path / "flights.csv").read_text().splitlines()
+    assert len(before) == 1 + 3
+    assert "ratio of pd to the other" in run(*map(str, arguments))[0]
+    assert contents(tmp_path) == contents(whole)
+    assert set(before) <= set((tmp_path / "flights.csv").read_text().splitlines())
+
+
+def test_a_campaign_resumes_after_a_full_disk(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The disk truncates a line of the table; the next run drops that line and flies the rest."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def fill(finished: int) -> None:
+        if finished == 2:
+            size = (tmp_path / "flights.csv").stat().st_size
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
+
+    try:
+        with pytest.raises(UnwritableError, match=r"flights\.csv.*: File too large; the finished flights"):
+            fly_on_threads(source, tmp_path, batch=1, progress=fill)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not (tmp_path / "flights.csv").read_bytes().endswith(b"\n")
+    assert fly_on_threads(source, tmp_path) == (whole / "flights.csv").read_bytes()
+
+
+def test_a_finished_campaign_may_be_extended(source: Path, whole: Path, tmp_path: Path) -> None:
+    """It flies the missing flights only and equals one of the full size; fewer flights are refused."""
+    fly_on_threads(source, tmp_path, 2)
+    finished: list[int] = []
+    table = fly_on_threads(source, tmp_path, FLIGHTS, batch=1, progress=finished.append)
+    assert finished == [2, 3, 4, 5, 6]
+    assert table == (whole / "flights.csv").read_bytes()
+    with pytest.raises(FlightError, match="already has flight 5; --flights must be 6 or more"):
+        fly_on_threads(source, tmp_path, 4)
+
+
+def test_a_finished_campaign_needs_no_worker_and_keeps_its_records(
+    source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """With nothing to fly no scheduler is asked, and only a record that is missing or damaged is written."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    (folder / "flights" / "000001-pd.json").unlink()
+    (folder / "flights" / "000002-pd.json").write_text("{")
+    kept = folder / "flights" / "000003-pd.json"
+    kept.write_text("{ " + kept.read_text().removeprefix("{"))
+    edited = kept.read_bytes()
+    options = ("--flights", str(FLIGHTS), "--scheduler", "tcp://127.0.0.1:1", "-o", str(folder), "--json")
+    assert run("campaign", str(source), *options)[0] == (folder / "summary.json").read_text()
+    assert kept.read_bytes() == edited
+    kept.write_bytes((whole / "flights" / "000003-pd.json").read_bytes())
+    assert contents(folder) == contents(whole)
+
+
+def test_unfinished_flights_are_counted(source: Path, tmp_path: Path) -> None:
+    """The share of a running batch counts as flights."""
+    campaign, amounts = campaign_file.read(source), set[float]()
+    with open_campaign(campaign, tmp_path) as store, ThreadPoolExecutor(1) as thread:
+        pool = Pool(thread, 2, lambda _: None, shares=lambda: 0.5)
+        fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, running=amounts.add)
+    assert amounts == {0.5 * FLIGHTS / 2}
+
+
+def report_half(fifo: str) -> None:
+    """Report half of a task, and wait until somebody opens `fifo`."""
+    report_share(0.5)
+    Path(fifo).read_text()
+
+
+def test_a_worker_process_reports_its_share(tmp_path: Path) -> None:
+    """The pool sees the share while the task runs."""
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    seen: list[float] = []
+
+    def look(shares: float) -> None:
+        seen.append(shares)
+        if seen.count(0.5) == 1 and shares == 0.5:
+            fifo.write_text("")
+
+    with processes(1) as pool:
+        assert list(pool.run(report_half, [(str(fifo),)], look)) == [(0, None)]
+    assert 0.5 in seen
+
+
+def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The message names the first difference, and no file changes."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    (tmp_path / "other.toml").write_text(CAMPAIGN.replace("seed = 4", "seed = 5"))
+    (tmp_path / "third.toml").write_text(CAMPAIGN + "[draws]\nmass_kg = 0.07\n")
+    for name, difference in (
+        ("other", "seed = 4 instead of 5"),
+        ("third", "draws.mass_kg = .* instead of 0.07"),
+    ):
+        with pytest.raises(ForeignFilesError, match=f"holds another campaign, with {difference}"):
+            fly_on_threads(tmp_path / f"{name}.toml", folder)
+    assert contents(folder) == contents(whole)
+    assert fly_on_threads(source, folder) == (whole / "flights.csv").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["thesis.tex", "campaign.json", "flights.csv"])
+def test_a_folder_with_other_files_is_refused(name: str, source: Path, tmp_path: Path) -> None:
+    """A foreign file that has the name of a result does not mark a folder of results."""
+    (tmp_path / name).write_text("{}")
+    with pytest.raises(ForeignFilesError, match="not from a mambo-nmpc campaign"):
+        fly_on_threads(source, tmp_path)
+    assert contents(tmp_path) == {name: b"{}"}
+
+
+@pytest.mark.parametrize("line", [b"x,1\n", b"0\n", b""])
+def test_an_edited_table_is_refused(line: bytes, source: Path, whole: Path, tmp_path: Path) -> None:
+    """A foreign line, a short line or a repeated line stops the campaign before it flies."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    table = folder / "flights.csv"
+    lines = table.read_bytes().splitlines(keepends=True)
+    table.write_bytes(b"".join([*lines[:3], line or lines[1]]))
+    with pytest.raises(ForeignFilesError, match="line 4 is not a line of this campaign"):
+        fly_on_threads(source, folder)
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "rule"),
+    [
+        ("flight", "9" * 5000, "flight: 9999.* must be the number of a flight"),
+        ("flight", "0", "flight: 0 must not be that of an earlier line"),
+        ("mass_kg", "0.07", r"mass_kg: 0\.07 must be 0\.0\d+, the draw of flight 2"),
+        ("seed", "5", r"seed: 5 must be \d+, the draw of flight 2"),
+        ("pd_iae_m_s", "1.0", "line_sha256: .* must be the digest of the line: a result was changed"),
+        ("pd_iae_m_s", "fast", "pd_iae_m_s: fast must be a number"),
+        ("pd_iae_m_s", "", "pd_iae_m_s: an empty cell must be a number"),
+        ("mambo_crashed", "x" * 200_000, r"mambo_crashed: x+\.\.\.x+ must be a number"),
+        ("mambo_trace_sha256", "0" * 64, "line_sha256: .* must be the digest of the line"),
+        ("line_sha256", "", "line_sha256: .* must be the digest of the line"),
+    ],
+)
+def test_an_edited_cell_is_refused(
+    column: str, cell: str, rule: str, *, source: Path, whole: Path, tmp_path: Path
+) -> None:
+    """A number, draw or result that the campaign did not write is named with file, line and column."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    table = folder / "flights.csv"
+    lines = [line.split(",") for line in table.read_text().splitlines()]
+    lines[3][lines[0].index(column)] = cell
+    table.write_text("".join(",".join(line) + "\n" for line in lines))
+    edited = table.read_bytes()
+    message = rf"flights\.csv: line 4 is not a line of this campaign, the table was edited: {rule}.*; restore"
+    with pytest.raises(ForeignFilesError, match=message):
+        fly_on_threads(source, folder)
+    assert table.read_bytes() == edited
+
+
+def test_one_run_at_a_time(source: Path, tmp_path: Path) -> None:
+    """A second run in the same folder raises `BusyError`."""
+    with open_campaign(campaign_file.read(source), tmp_path), pytest.raises(BusyError, match="another run"):
+        fly_on_threads(source, tmp_path)
+
+
+def test_a_dead_worker_is_reported(source: Path, tmp_path: Path) -> None:
+    """A worker process that ends, for instance for lack of memory, raises `WorkerError`."""
+    campaign = campaign_file.read(source)
+    with (
+        open_campaign(campaign, tmp_path) as store,
+        pytest.raises(WorkerError, match="a worker process has died; the finished flights are kept"),
+        processes(1) as pool,
+    ):
+        list(pool.run(os._exit, [(1,)]))
+    assert store.lines == {}
+
+
+def test_workers_of_another_version_are_refused() -> None:
+    """Another version might give other flights, so it raises `WorkerError`."""
+    with pytest.raises(WorkerError, match=r"a worker has mambo-nmpc .*, the campaign 0\.0\.0"):
+        fly_batch("0.0.0", [], {}, [])
+
+
+def test_scheduler_and_workers_exclude_each_other(tmp_path: Path) -> None:
+    """With --scheduler the cluster determines the workers, so --workers is an error."""
+    options = ("--scheduler", "tcp://127.0.0.1:1", "--workers", "2", "-o", str(tmp_path / "out"))
+    assert "leave out --workers" in run("campaign", *options, code=2)[1]
+    assert not (tmp_path / "out").exists()
+
+
+def test_missing_dask_is_named(tmp_path: Path) -> None:
+    """The message says how to install it for the Python that runs; no folder is made."""
+    script = "import sys; sys.modules['distributed'] = None; from mambo_sil.cli.app import main; main()"
+    done = command("campaign", "--scheduler", "tcp://127.0.0.1:1", folder=tmp_path, script=script)
+    assert (done.returncode, done.stdout) == (2, "")
+    install = shlex.join([sys.executable, "-m", "pip", "install", "distributed"])
+    assert done.stderr == f"--scheduler needs Dask; install it: {install}\n"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("scheme", ["tls", "ucx"])
+def test_an_address_that_needs_more_is_reported(scheme: str) -> None:
+    """Certificates of TLS and the package for UCX are named, with an address that needs neither."""
+    require_module("distributed")
+    message = (
+        rf"^--scheduler {scheme}://127\.0\.0\.1:1: Dask cannot use .*certificates.*tcp://host:8786 needs"
+    )
+    with pytest.raises(WorkerError, match=message), cluster(f"{scheme}://127.0.0.1:1"):
+        pass
+
+
+def test_a_bad_address_is_reported() -> None:
+    """The message shows the form of an address."""
+    require_module("distributed")
+    with pytest.raises(WorkerError, match=r"missing port number.*as in tcp://host:8786"), cluster("garbage"):
+        pass
+
+
+@pytest.mark.long
+def test_an_unreachable_scheduler_is_reported_within_seconds() -> None:
+    """An address where nothing listens raises `WorkerError`."""
+    require_module("distributed")
+    with pytest.raises(WorkerError, match="no Dask scheduler answers there"), cluster("127.0.0.1:1"):
+        pass
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")  # Dask itself warns
+def test_a_dask_cluster_gives_the_results_of_one_process(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The workers of a cluster give the same bytes."""
+    require_module("distributed")
+    from distributed import LocalCluster  # noqa: PLC0415 - an optional extra
+
+    campaign = campaign_file.read(source)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as local:
+        with open_campaign(campaign, tmp_path) as store, cluster(local.scheduler_address) as pool:
+            assert pool.workers == 2
+            fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, batch=2)
+            store.put_in_order()
+        assert (tmp_path / "flights.csv").read_bytes() == (whole / "flights.csv").read_bytes()
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")  # Dask itself warns
+def test_a_scheduler_may_die_when_all_has_flown() -> None:
+    """The results are there: the pool is left without an error."""
+    require_module("distributed")
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - an optional extra
+
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as local,
+        cluster(local.scheduler_address) as pool,
+    ):
+        assert list(pool.run(pow, [(2, 3)])) == [(0, 8)]
+        local.close()
+        client: Client = pool.executor._client  # type: ignore[attr-defined] # Dask's executor
+        client.close()  # as it does after some seconds without a scheduler

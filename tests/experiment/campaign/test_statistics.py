@@ -1,0 +1,140 @@
+"""Statistics of a campaign: tables read, intervals of the median, and which indices are compared."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_sil.errors import ResultsError
+from mambo_sil.experiment.campaign.campaign_flights import INDICES, SEEN, SEEN_INDICES
+from mambo_sil.experiment.campaign.statistics import (
+    COMPARED,
+    distributions,
+    improvement,
+    improvements,
+    quantiles,
+    read_table,
+)
+
+TABLE = "flight,trajectory,mass_kg,pd_trace_sha256\n0,circle,0.07,ab\n1,hover,nan,cd\n"
+
+
+def test_a_table_is_read_by_column(tmp_path: Path) -> None:
+    """Columns of numbers only; a last line without its end is left out."""
+    path = tmp_path / "flights.csv"
+    path.write_text(TABLE + "2,circle,0.0")
+    found = read_table(path)
+    assert list(found) == ["flight", "mass_kg"]
+    assert found["flight"].tolist() == [0.0, 1.0]
+    np.testing.assert_array_equal(found["mass_kg"], [0.07, math.nan])
+
+
+@pytest.mark.parametrize("text", ["", "flight", TABLE.partition("\n")[0] + "\n"])
+def test_a_table_without_flights_has_no_columns(tmp_path: Path, text: str) -> None:
+    """Nothing, part of the header, or the header alone."""
+    path = tmp_path / "flights.csv"
+    path.write_text(text)
+    assert read_table(path) == {}
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("2,circle,0.07\n", "line 4 must have 4 cells, not 3"),
+        ("2,circle,0.07,ab,1\n", "line 4 must have 4 cells, not 5"),
+        ("2,circle,heavy,ab\n", "line 4, mass_kg: heavy must be a number"),
+    ],
+)
+def test_a_table_with_another_line_is_refused(tmp_path: Path, line: str, fault: str) -> None:
+    """File, line, column and rule are named."""
+    path = tmp_path / "flights.csv"
+    path.write_text(TABLE + line)
+    with pytest.raises(ResultsError, match=rf"flights\.csv: is not the table of a campaign: {fault}; run"):
+        read_table(path)
+
+
+def test_what_cannot_be_read_is_no_table(tmp_path: Path) -> None:
+    """A folder, a missing file, and bytes that are no text."""
+    (tmp_path / "bytes").write_bytes(b"\xff\n")
+    for name in (".", "absent", "bytes"):
+        with pytest.raises(ResultsError, match=r"is not the table of a campaign: .*; run campaign again"):
+            read_table(tmp_path / name)
+
+
+def test_quantiles_are_named_by_their_shares() -> None:
+    """Extremes, 90 %, quartiles and median."""
+    assert list(quantiles(np.arange(3.0))) == ["0", "0.05", "0.25", "0.5", "0.75", "0.95", "1"]
+
+
+def compared(ratios: list[float]) -> tuple[float, float]:
+    """Return the interval of the median of ratios."""
+    n = len(ratios)
+    table = {"a_iae_m_s": np.array(ratios), "b_iae_m_s": np.ones(n), "a_crashed": np.zeros(n)}
+    found = improvement(table | {"b_crashed": np.zeros(n)}, "a", "b", "iae_m_s")
+    assert found is not None
+    return float(found.low), float(found.high)
+
+
+@pytest.mark.parametrize("n", [9, 10, 40, 41])
+def test_the_interval_of_the_median_of_two_values_follows_from_the_binomial_distribution(n: int) -> None:
+    """A resample's number of small values is binomial: they are its median if there are more than n / 2."""
+    judged = 0
+    for small in range(1, n):
+        chances = [math.comb(n, k) * (small / n) ** k * (1 - small / n) ** (n - k) for k in range(n + 1)]
+        at_most_1 = sum(chance for k, chance in enumerate(chances) if 2 * k > n)
+        at_most_2 = sum(
+            chance for k, chance in enumerate(chances) if 2 * k >= n
+        )  # half the values: mean of both
+        if min(abs(at - end) for at in (at_most_1, at_most_2) for end in (0.025, 0.975)) < 0.004:
+            continue  # within the spread of the drawn resamples
+        judged += 1
+        expected = [1.0 if at_most_1 >= end else 2.0 if at_most_2 >= end else 3.0 for end in (0.025, 0.975)]
+        assert list(compared([1.0] * small + [3.0] * (n - small))) == expected
+    assert judged > n / 2
+
+
+def test_an_index_of_0_is_infinitely_better() -> None:
+    """A ratio to it is no error and no warning."""
+    table = {"a_iae_m_s": np.ones(3), "b_iae_m_s": np.zeros(3)} | {
+        f"{name}_crashed": np.zeros(3) for name in "ab"
+    }
+    found = improvement(table, "a", "b", "iae_m_s")
+    assert found is not None
+    assert (found.median, found.better.count) == (math.inf, 3)
+
+
+def test_a_single_ratio_has_no_interval() -> None:
+    """One flight says nothing of the spread; two flights have one."""
+    assert all(map(math.isnan, compared([2.0])))
+    assert compared([1.0, 2.0]) == (1.0, 2.0)
+
+
+@pytest.mark.parametrize("sensed", [False, True])
+def test_all_controllers_are_compared_with_the_first(sensed: bool) -> None:
+    """By the indices of Table II, then by those of the estimated error; where all crash, by none."""
+    indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES)]
+    table = {
+        f"{name}_{index}": np.full(4, value)
+        for name, value in zip("abc", (6.0, 2.0, 3.0), strict=True)
+        for index in indices
+    }
+    table |= {f"{name}_{key}": np.zeros(4) for name in "abc" for key in ("crashed", "refused_updates")}
+    table["b_crashed"][1], table["c_refused_updates"][:3] = 1.0, 7.0
+    found = improvements(table, "abc", sensed=sensed)
+    names = [*COMPARED, *(SEEN + index for index in COMPARED if sensed)]
+    assert [(one.controller, one.index) for one in found] == [
+        (name, index) for name in "bc" for index in names
+    ]
+    assert [one.median for one in found] == [3.0] * len(names) + [2.0] * len(names)
+    assert [one.better.count for one in found] == [3] * len(names) + [4] * len(names)
+    spread = distributions(table, "abc", sensed=sensed)
+    assert [(one.crashed.count, one.refused_an_input.count) for one in spread.values()] == [
+        (0, 0),
+        (1, 0),
+        (0, 3),
+    ]
+    assert list(spread["b"].quantiles) == (indices if sensed else list(INDICES))
+    assert spread["b"].quantiles["iae_m_s"]["1"] == math.inf
+    hopeless = table | {f"{name}_crashed": np.ones(4) for name in "ab"}
+    assert {one.controller for one in improvements(hopeless, "abc", sensed=sensed)} == {"c"}

@@ -1,0 +1,131 @@
+"""Blocks of the engine have the bits of NumPy on any numbers, also on those that no flight brings."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_sil.drone.plant import elementary, loops
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.disturbances import Disturbances
+from mambo_sil.drone.plant.first_order import FirstOrderDrone
+from mambo_sil.drone.plant.randomness import Purpose, generators
+from mambo_sil.drone.plant.vehicle import Moment, Seen, Vehicle, VehicleState, truth
+from mambo_sil.drone.sensors.estimators import Suite
+from mambo_sil.drone.sensors.instruments import NOISES, Sensors
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.experiment.faults.injection import Applied, FaultyController
+from mambo_sil.flight.engine.build import LANES, texts
+from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight
+from mambo_sil.flight.trajectories import Hover
+from tests.support.engines import (
+    NUMBERS,
+    TICKS,
+    any_states,
+    build,
+    estimates,
+    injected,
+    lanes_here,
+    tabulate,
+    ticked,
+    truths,
+)
+from tests.support.faults import SHOWN, any_inputs
+from tests.support.scenarios import LATE, LIMITED
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(lanes, marks=[] if lanes != 2 else pytest.mark.long) for lanes in LANES],
+)
+def engine(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the engine with access to its blocks."""
+    if request.param not in lanes_here():
+        pytest.skip(f"the processor has no {request.param} lanes")
+    return build(texts(), tmp_path_factory.mktemp("engine"), lanes=request.param)
+
+
+def unified(values: FloatArray) -> bytes:
+    """Return the bits of an array in which every NaN is the same."""
+    return np.where(np.isnan(values), np.nan, values).tobytes()
+
+
+def test_elementary_functions(engine: Path) -> None:
+    """Sine, cosine, arc tangent and arc sine of 50,000 numbers, corners among them."""
+    with np.errstate(all="ignore"):
+        arcs = [elementary.arc_tangent(NUMBERS), elementary.arc_sine(NUMBERS)]
+        expected = np.stack([*elementary.sine_cosine(NUMBERS), *arcs], axis=-1)
+    assert unified(tabulate(engine)) == unified(expected)
+
+
+@pytest.mark.parametrize("derotated", [False, True])
+@pytest.mark.parametrize("noise_scale", [0.0, 1.0])
+def test_sensors_and_estimators(engine: Path, noise_scale: float, derotated: bool) -> None:
+    """True states that jump, spin and fall as no flight does."""
+    sensors = Sensors(noise_scale, (0.1, -0.2, 0.3), (0.01, -0.02, 0.03), derotated)
+    given = truths()
+    rows = np.moveaxis(given.reshape(4, TICKS, 4, 3), 0, -1)
+    with np.errstate(all="ignore"):
+        suite = Suite(sensors, (5, 5, 5, 5), Seen(*rows[0]))
+        seen = [suite.estimate(Seen(*row)) for row in rows]
+    expected = np.array([[one.position_m, one.velocity_m_s, one.euler_rad, one.rates_rad_s] for one in seen])
+    draws = generators((5,), Purpose.SENSORS)[0].standard_normal((TICKS, NOISES))
+    found = estimates(engine, Flight(Hover(), duration_s=1.0, sensors=sensors), given, draws)
+    assert unified(found) == unified(np.moveaxis(expected, -1, 0).reshape(4, TICKS, 12))
+
+
+@pytest.mark.parametrize("drone", [NOMINAL, LIMITED, LATE], ids=lambda drone: drone.attitude.kind)
+def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
+    """Inner loops, mixer, rotors, rigid body and integrator from states that no flight has."""
+    rows = any_states()
+    body, rotors, memory, command, thrust_n, heading, payload, air, share = np.split(
+        rows.T, [12, 16, 25, 27, 28, 29, 30, 32]
+    )
+    vehicle = replace(Vehicle.of(drone), wind_m_s2=(0.5, -0.2))
+    first_order = isinstance(vehicle.loop, FirstOrderDrone)
+    known = np.resize(memory[:2], (vehicle.loop.rows, TICKS)) if first_order else memory[: vehicle.loop.rows]
+    before = VehicleState(body, rotors, known)
+    with np.errstate(all="ignore"):
+        seen = truth(before)
+        moment = Moment(share[0], payload[0], (air[0], air[1]))
+        after = vehicle.step(before, command, thrust_n[0], heading[0], seen=seen, moment=moment)
+        demanded_n = loops.altitude_thrust(
+            drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
+        )
+    kept = memory.copy()
+    if not first_order:
+        kept[: vehicle.loop.rows] = after.memory
+    expected = np.concatenate(
+        [after.body, after.rotor_speed_rad_s, kept, demanded_n[np.newaxis], seen.velocity_m_s]
+    )
+    flight = Flight(Hover(), duration_s=1.0, vehicle=vehicle, disturbances=Disturbances(wind_speed_m_s=1.0))
+    assert unified(ticked(engine, flight, rows)) == unified(expected.T)
+
+
+class Probe:
+    """The controller `record` of the blocks in Python, with the memory (1, 8) of its calls."""
+
+    def __init__(self) -> None:
+        self.memory = np.zeros((1, 8), np.uint8)
+        self.inputs: list[FloatArray] = []
+
+    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Applied:
+        """Record the inputs and count the call."""
+        calls = self.memory.view(np.int64)[0]
+        calls += 1
+        self.inputs.append(np.concatenate([state[0], target[0], thrust_acceleration_m_s2]))
+        return Applied(np.array([[1.0, -2.0]]) * calls, np.where(calls % 3 == 0, 1, 0))
+
+
+@pytest.mark.parametrize("number", range(len(SHOWN)))
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_faults(engine: Path, number: int) -> None:
+    """What the controller receives, the command that reaches the drone, and the status."""
+    probe, inputs = Probe(), any_inputs()
+    faulty = FaultyController(probe, [SHOWN[number]], probe.memory)
+    applied = [faulty.step(row[:, :7], row[:, 7:13], row[:, 13]) for row in inputs[:, np.newaxis]]
+    outputs = [np.concatenate([one.command_rad[0], one.status]) for one in applied]
+    expected = np.concatenate([np.array(probe.inputs), np.array(outputs)], axis=1)
+    assert unified(injected(engine, SHOWN[number], inputs)) == unified(expected)

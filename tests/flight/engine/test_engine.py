@@ -1,0 +1,199 @@
+"""The engine computes the bits of the NumPy simulation, whatever is flown and however it is compiled."""
+
+import re
+import subprocess
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mambo_codegen.design import Design
+from mambo_codegen.reference import ReferenceController
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.toolchain import Toolchain
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.plant.link import Link
+from mambo_sil.flight import loop
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import PdController, PdFeedForwardController, pd_controller
+from mambo_sil.flight.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
+from mambo_sil.flight.engine.evaluation import evaluate_compiled
+from mambo_sil.flight.engine.simulate import fly, fly_compiled
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.names import PD_NAMES, SENSORS_OF
+from mambo_sil.flight.scenario import Scenario, flight_of
+from mambo_sil.flight.trajectories import Bernoulli
+from mambo_sil.results.shared_library import LIBRARY_FLAGS
+from tests.support.engines import lanes_here
+from tests.support.evaluations import LIMIT_RAD, bits, traces
+from tests.support.one_norm import ONE_NORM
+from tests.support.scenarios import BATCHES, TRUTH, drones, scenarios
+from tests.support.tools import require, toolchain
+
+MAMBO = ONE_NORM
+PERIOD_S = MAMBO.horizon.update_period_s
+SCALARS = ("float32", "float64", "fixed")
+BUILDS = [
+    *(Toolchain((name,), level) for name in ("gcc", "clang") for level in ("-O0", "-O2", None)),
+    Toolchain(("gcc", "-mavx2", "-mfma")),
+    Toolchain(("clang", "-mavx2", "-mfma"), "-O2"),
+]
+
+
+DEFAULT_BUILDS = (Toolchain(("gcc",)), Toolchain(("clang",), "-O0"))
+
+
+def controller(kind: str, flight: Flight) -> CompiledController | PdController | PdFeedForwardController:
+    """Make controllers for a flight: a PD, or preset mambo in a scalar type."""
+    for name in PD_NAMES:
+        if kind == name:
+            return pd_controller(name)
+    return CompiledController(with_option(MAMBO, "code.scalar", kind, "test"), flight.flights)
+
+
+def assert_same_bits(flight: Flight, kind: str) -> None:
+    """Fly in C, in every number of lanes, and in NumPy, and compare every array."""
+    theirs = loop.fly(flight, controller(kind, flight))
+    for lanes in lanes_here():
+        ours = fly_compiled(load(toolchain("gcc"), lanes), flight, controller(kind, flight))
+        assert type(ours) is type(theirs)
+        for column in fields(theirs):
+            found, expected = getattr(ours, column.name), getattr(theirs, column.name)
+            assert found.tobytes() == expected.tobytes(), (lanes, column.name)
+
+
+@pytest.mark.parametrize("kind", [*PD_NAMES, *SCALARS])
+@pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)
+def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...], kind: str) -> None:
+    """Every array of the trace: every disturbance, sensor, gate, and flights that are lost."""
+    assert_same_bits(flight_of(batch, PERIOD_S), kind)
+
+
+@settings(max_examples=40)
+@given(data=st.data())
+def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
+    """One to nine drawn flights of any drone, without sensors or through them."""
+    drone = data.draw(drones())
+    shared = {
+        "duration_s": 0.5,
+        "vehicle": drone,
+        "sensors": data.draw(st.sampled_from(SENSORS_OF[drone.sensors.kind])),
+        "start": "take-off" if data.draw(st.integers(0, 9)) == 0 else "hover",
+    }
+    batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=9))
+    assert_same_bits(flight_of(batch, PERIOD_S), data.draw(st.sampled_from([*PD_NAMES, *SCALARS])))
+
+
+def digests(engine: Any) -> list[str]:
+    """Fly every batch in `engine`; return the digests of all flights, and evaluations of any traces."""
+    found = [bits(evaluate_compiled(engine, trace, LIMIT_RAD, NOMINAL)) for trace in traces()]
+    for batch in BATCHES.values():
+        flight = flight_of(batch, PERIOD_S)
+        for name in PD_NAMES:
+            trace = fly_compiled(engine, flight, pd_controller(name))
+            found += [trace.digest(index) for index in range(len(batch))]
+    return found
+
+
+@pytest.fixture(scope="module")
+def known() -> list[str]:
+    """Return the digests of the engine as it is used for a single flight."""
+    return digests(load(toolchain("gcc")))
+
+
+@pytest.mark.parametrize("lanes", LANES)
+@pytest.mark.parametrize(
+    "build",
+    [
+        pytest.param(
+            build,
+            id=" ".join((*build.command, build.optimisation or "-O3")),
+            marks=[] if build in DEFAULT_BUILDS else [pytest.mark.long],
+        )
+        for build in BUILDS
+    ],
+)
+def test_every_build_has_the_same_bits(build: Toolchain, lanes: int, known: list[str]) -> None:
+    """Compilers, optimisations, numbers of lanes, and a processor with fused operations."""
+    require(build.command[0], build.command[0])
+    if lanes not in lanes_here():
+        pytest.skip(f"the processor has no {lanes} lanes")
+    engine = load(build, lanes)
+    assert engine.engine_lanes() == lanes
+    assert digests(engine) == known
+
+
+@pytest.mark.parametrize(
+    "lanes", [pytest.param(lanes, marks=[pytest.mark.long] * (lanes != 4)) for lanes in LANES]
+)
+@pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=pytest.mark.long)])
+def test_no_operation_is_fused(compiler: str, lanes: int, tmp_path: Path) -> None:
+    """Even where the compiler may use them, for they round once instead of twice."""
+    path = require(compiler, compiler)
+    for name, text in texts().items():
+        (tmp_path / name).write_text(text, "utf-8")
+    flags = ["-mavx2", "-mfma", "-mavx512vl", *FLAGS, *LANES[lanes], *LIBRARY_FLAGS]
+    subprocess.run([path, *flags, *SOURCES, "-o", "engine.so", *LIBRARIES], cwd=tmp_path, check=True)
+    code = subprocess.run(
+        [require("objdump", "binutils"), "-d", "engine.so"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert re.search(r"\bvmulsd\b" if lanes == 1 else r"\bvmulpd\b", code)
+    assert not re.search(r"\bvf(n?m)(add|sub)", code)
+
+
+@pytest.mark.parametrize(
+    "lanes", [pytest.param(lanes, marks=[pytest.mark.long] * (lanes != 1)) for lanes in LANES]
+)
+@pytest.mark.parametrize("compiler", ["gcc", pytest.param("clang", marks=pytest.mark.long)])
+def test_the_engine_compiles_without_a_warning(compiler: str, lanes: int, tmp_path: Path) -> None:
+    """Of gcc and of clang, in every number of lanes."""
+    for name, text in texts().items():
+        (tmp_path / name).write_text(text, "utf-8")
+    warnings = ["-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Wundef", "-Wmissing-prototypes", "-Werror"]
+    command = [require(compiler, compiler), "-std=c99", "-O2", *LANES[lanes], *warnings, "-c", *SOURCES]
+    subprocess.run(command, cwd=tmp_path, check=True)
+
+
+def test_what_is_no_c_flies_in_numpy() -> None:
+    """A controller in Python, and a delay longer than the engine holds."""
+    flight = Flight(Bernoulli(2.0, 0.5), duration_s=0.2)
+    reference = fly(flight, ReferenceController(Design(MAMBO)))
+    assert reference.same_bits(fly(flight, CompiledController(MAMBO)))
+    late = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, link=Link(delay_ticks=201))
+    assert fly(late, PdController()).same_bits(loop.fly(late, PdController()))
+
+
+def test_without_a_compiler_the_flight_is_the_same_and_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A warning that names what is missing."""
+    flight = Flight(Bernoulli(2.0, 0.5), duration_s=0.2)
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.warns(UserWarning, match="no C compiler found.*the simulation runs in NumPy"):
+        trace = fly(flight, PdController())
+    assert trace.same_bits(loop.fly(flight, PdController()))
+
+
+def test_progress_reaches_the_end() -> None:
+    """One call for each group of flights."""
+    shares: dict[int, list[float]] = {lanes: [] for lanes in lanes_here()}
+    for lanes, found in shares.items():
+        engine = load(toolchain("gcc"), lanes)
+        fly_compiled(engine, flight_of(TRUTH, PERIOD_S), PdController(), found.append)
+    expected = {1: [0.2, 0.4, 0.6, 0.8, 1.0], 2: [0.4, 0.8, 1.0], 4: [0.8, 1.0]}
+    assert len(TRUTH) == 5
+    assert shares == {lanes: expected[lanes] for lanes in shares}
+
+
+def test_a_batch_flies_in_lanes_and_a_single_flight_does_not() -> None:
+    """The processor's most lanes, or one."""
+    assert lanes_for(1, toolchain("gcc")) == 1
+    assert lanes_for(2, toolchain("gcc")) == max(lanes_here())

@@ -1,0 +1,185 @@
+"""Small faults of the engine's C change a flight or a block, except those with a reason.
+
+python -m tests.engine.test_mutants FILE ...   try every fault of some files and print which are not noticed
+"""
+
+import faulthandler
+import hashlib
+import operator
+import os
+import re
+import resource
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import numpy as np
+import pytest
+
+from mambo_codegen.errors import BuildError
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.sensors.instruments import NOISES, Sensors
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.build import FLAGS as ENGINE_FLAGS
+from mambo_sil.flight.engine.build import HEADERS, LANES, LIBRARIES, SOURCES, ffi, texts
+from mambo_sil.flight.engine.evaluation import evaluate_compiled
+from mambo_sil.flight.engine.simulate import fly_compiled
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.names import PD_NAMES
+from mambo_sil.flight.scenario import flight_of
+from mambo_sil.flight.trajectories import Hover
+from mambo_sil.results.shared_library import LIBRARY_FLAGS
+from tests.support.engine_reasons import reason
+from tests.support.engines import BLOCKS, TICKS, estimates, injected, tabulate, truths
+from tests.support.evaluations import LIMIT_RAD, bits
+from tests.support.evaluations import traces as evaluated
+from tests.support.faults import (
+    CHANGES,
+    FAULTS,
+    PATIENCE,
+    SHOWN,
+    any_inputs,
+    faulty_controller,
+    faulty_flight,
+)
+from tests.support.mutants import Mutant, mutants
+from tests.support.one_norm import ONE_NORM
+from tests.support.scenarios import BATCHES
+from tests.support.tools import toolchain
+
+PERIOD_S: Final = 0.01
+STRIDE: Final = 12
+"""The test tries one fault in so many; all of them take twenty minutes."""
+LIMIT_S: Final = 2
+"""Processor time of a mutant; the flights take a tenth of a second."""
+FLAGS: Final = (
+    *(*ENGINE_FLAGS, "-O0", "-w", "-ftrivial-auto-var-init=pattern"),
+    *("-fsanitize=bounds", "-fsanitize-undefined-trap-on-error"),
+)
+"""A variable without a value is not 0, and a read beside an array is a crash."""
+LOOP_AND_BLOCKS: Final = "loop_and_blocks.c"
+INCLUDES: Final = '#include "loop.c"\n#include "blocks.c"\n'
+"""Both include most headers."""
+UNITS: Final = (LOOP_AND_BLOCKS, *(name for name in SOURCES if name != "loop.c"))
+LANES_TRIED: Final = (2, 1)
+FILES: Final = sorted({*SOURCES, *HEADERS} - {"engine.h", "loop.h", "records.h"})
+
+
+def digests(path: Path) -> Iterator[str]:
+    """Yield the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
+    engine: Any = ffi.dlopen(str(path))
+    flights = [flight_of(batch, PERIOD_S) for batch in BATCHES.values()]
+    settings = ONE_NORM
+    traces = (
+        fly_compiled(engine, flight, controller)
+        for flight, controller in (
+            *((flight, pd_controller(name)) for name in PD_NAMES for flight in flights),
+            *((flight, CompiledController(settings, flight.flights)) for flight in flights[:2]),
+        )
+    )
+    for trace in traces:
+        yield from (trace.digest(index) for index in range(trace.flights))
+    for fault in SHOWN:
+        yield hashlib.sha256(injected(path, fault, any_inputs()).tobytes()).hexdigest()
+    faulty, reweighted = faulty_controller(settings, FAULTS, CHANGES, PATIENCE)
+    trace = fly_compiled(engine, faulty_flight(FAULTS), faulty)
+    yield from (trace.digest(index) for index in range(trace.flights))
+    yield from (str(reweighted.answers), str(engine.engine_fastest_lanes()))
+    sensed = Flight(Hover(), duration_s=1.0, sensors=Sensors(derotated=True))
+    draws = np.random.default_rng(1).standard_normal((TICKS, NOISES))
+    for each in evaluated():
+        yield bits(evaluate_compiled(engine, each, LIMIT_RAD, NOMINAL))
+    yield hashlib.sha256(tabulate(path).tobytes()).hexdigest()
+    yield hashlib.sha256(estimates(path, sensed, truths(), draws).tobytes()).hexdigest()
+
+
+def survives(path: Path, expected: list[str]) -> bool:
+    """Return whether the engine at `path` computes what is expected; it may also crash or hang."""
+    child = os.fork()
+    if child == 0:
+        faulthandler.disable()  # a crash is an answer, not a report
+        with Path(os.devnull).open("w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT_S, LIMIT_S))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        os._exit(0 if all(map(operator.eq, digests(path), expected)) else 1)  # ends at the first difference
+    return os.waitpid(child, 0)[1] == 0
+
+
+class Bench:
+    """Builds the engine with one file changed at a time; what does not include that file is compiled once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.files = texts()
+        self._folder = folder
+        for name, text in (self.files | {"blocks.c": BLOCKS, LOOP_AND_BLOCKS: INCLUDES}).items():
+            (folder / name).write_text(text, "utf-8")
+        for lanes in LANES_TRIED:
+            for unit in UNITS:
+                self._compile(unit, lanes)
+        expected, same = ([*digests(self._link(f"right-{lanes}.so", lanes))] for lanes in LANES_TRIED)
+        assert same == expected
+        self._expected = expected
+
+    def alive(self, mutant: Mutant) -> bool:
+        """Return whether a mutant compiles and computes what is expected, in two lanes and in one."""
+        file = self._folder / mutant.file
+        units = [unit for unit in UNITS if mutant.file in self._included(unit)]
+        file.write_text(mutant.apply(self.files[mutant.file]), "utf-8")
+        try:
+            return all(self._survives(units, lanes) for lanes in LANES_TRIED)
+        except BuildError:
+            return False
+        finally:
+            file.write_text(self.files[mutant.file], "utf-8")
+
+    def _survives(self, changed: Sequence[str], lanes: int) -> bool:
+        for unit in changed:
+            self._compile(unit, lanes, "changed")
+        return survives(self._link("wrong.so", lanes, changed), self._expected)
+
+    def _compile(self, unit: str, lanes: int, kind: str = "right") -> None:
+        self._gcc(*LANES[lanes], "-c", unit, "-o", f"{kind}-{lanes}-{unit}.o")
+
+    def _link(self, name: str, lanes: int, changed: Sequence[str] = ()) -> Path:
+        objects = (f"{'changed' if unit in changed else 'right'}-{lanes}-{unit}.o" for unit in UNITS)
+        self._gcc(*objects, "-o", name, *LIBRARIES)
+        return self._folder / name
+
+    def _gcc(self, *arguments: str) -> None:
+        toolchain("gcc").run([*FLAGS, *LIBRARY_FLAGS, *arguments], self._folder)
+
+    def _included(self, name: str) -> set[str]:
+        """Return a file and all that it includes."""
+        found = re.findall(r'^#include "(.*)"$', (self._folder / name).read_text("utf-8"), re.MULTILINE)
+        return {name}.union(*map(self._included, found))
+
+
+def unnoticed(bench: Bench, name: str, stride: int) -> list[Mutant]:
+    """Return which of the faults of one file, one in `stride`, change nothing."""
+    found = mutants(name, bench.files[name])[::stride]
+    assert found
+    return [mutant for mutant in found if bench.alive(mutant)]
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """Compile the engine as it is, in one lane and in two."""
+    return Bench(tmp_path_factory.mktemp("engine"))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", FILES)
+def test_a_fault_changes_a_flight(name: str, bench: Bench) -> None:
+    """Operators, constants, indices, conditions and statements."""
+    assert [mutant.key for mutant in unnoticed(bench, name, STRIDE) if reason(mutant.key) is None] == []
+
+
+if __name__ == "__main__":
+    with TemporaryDirectory() as place:
+        for file in sys.argv[1:] or FILES:
+            for one in unnoticed(Bench(Path(place)), file, 1):
+                print(one.key, reason(one.key) or f"NO REASON: {one.wrong_line}", sep=": ", flush=True)

@@ -1,0 +1,205 @@
+"""What the fits find in logs with a known truth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mambo_sil.model.identify.identify import identify
+from mambo_sil.model.identify.identify_record import IdentifySummary
+from mambo_sil.model.identify.response import AxisParameters, Interval
+from tests.support.logs import Array, Flown, Truth, drop_and_jitter, fly, log_of
+
+TRUTH = Truth()
+
+
+def found(*logs: dict[str, Array]) -> IdentifySummary:
+    """Identify logs."""
+    return identify([log_of(each, f"log{number}.csv") for number, each in enumerate(logs)])[0]
+
+
+def fits(summary: IdentifySummary) -> list[AxisParameters]:
+    """Return the fits of roll and pitch."""
+    return [fit for axis in summary.axes.values() if (fit := axis.fitted)]
+
+
+def demand_truth(summary: IdentifySummary, truth: Truth) -> None:
+    """Demand lag plus dead time within 10 ms and the gain within 0.02 on both axes."""
+    assert len(fits(summary)) == 2
+    for axis, fit in enumerate(fits(summary)):
+        assert abs(fit.sum_s.value - truth.lag_s[axis] - truth.delay_s[axis]) < 0.010
+        assert abs(fit.gain.value - truth.gain[axis]) < 0.02
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_thirty_seconds_of_the_figure_of_eight_suffice(seed: int) -> None:
+    """With noise, gusts and 10 % lost rows, wrong times and another zero of time; motion and trim, too."""
+    flown = fly(TRUTH, Flown(), 1, seed)[0]
+    random = np.random.default_rng(seed)
+    for log in (flown, drop_and_jitter(flown, random)):
+        summary = found(log)
+        demand_truth(summary, TRUTH)
+        assert [axis.verdict for axis in summary.axes.values()] == ["good", "good"]
+        assert [fit.integral_1_s for fit in fits(summary)] == [None, None]
+        assert summary.motion is not None
+        assert abs(summary.motion.acceleration_per_tilt.value - TRUTH.acceleration_per_tilt) < 0.04
+        assert abs(summary.motion.drag_1_s.value - TRUTH.drag_1_s) < 0.08
+        for trim, truth in zip(summary.motion.trim_rad, TRUTH.trim_rad, strict=True):
+            assert abs(trim.value - truth) < 0.01
+
+
+def test_one_frequency_cannot_tell_lag_from_dead_time() -> None:
+    """Their sum and the gain are found; the interval of the lag says so, and the verdict is weak."""
+    time_s, lag_s = 0.01 * np.arange(3000.0), 0.14
+    random = np.random.default_rng(1)
+    phase = 1.2 * (time_s - 0.005)
+    command = 0.1 * np.sin(phase + 0.006)
+    share = 1.0 / (1.0 + (1.2 * lag_s) ** 2)
+    later = phase - 1.2 * 0.03
+    tilt = 0.1 * share * (np.sin(later) - 1.2 * lag_s * np.cos(later)) + 0.002 * random.normal(size=3000)
+    log = {"time_s": time_s, "roll_command_rad": command, "pitch_command_rad": command}
+    summary = found(log | {"roll_rad": tilt, "pitch_rad": tilt})
+    for axis, fit in zip(summary.axes.values(), fits(summary), strict=True):
+        assert axis.verdict == "weak"
+        assert any("the lag is known within" in reason for reason in axis.reasons)
+        assert abs(fit.gain.value - 1.0) < fit.gain.within < 0.05
+        assert abs(fit.sum_s.value - lag_s - 0.03) < fit.sum_s.within < 0.02
+        assert abs(fit.lag_s.value - lag_s) < fit.lag_s.within
+
+
+@pytest.mark.parametrize(
+    "truth",
+    [
+        Truth(gain=(1.0, 1.0), lag_s=(0.14, 0.15), delay_s=(0.03, 0.02)),
+        Truth(gain=(0.7, 1.2), lag_s=(0.25, 0.02), delay_s=(0.005, 0.1)),
+    ],
+)
+def test_other_drones_are_found_as_well(truth: Truth) -> None:
+    """Slow ones, quick ones, and one whose axes differ."""
+    demand_truth(found(fly(truth, Flown(), 1)[0]), truth)
+
+
+def test_a_heading_that_turns_is_told_from_one_that_does_not() -> None:
+    """Tilt and motion are related by yaw; yaw is only needed for the motion."""
+    turning = fly(TRUTH, Flown(yaw_rate_rad_s=0.1), 1)[0]
+    summary = found(turning)
+    demand_truth(summary, TRUTH)
+    assert summary.motion is not None
+    assert not any("sense of yaw" in remark for remark in summary.remarks)
+    del turning["yaw_rad"]
+    blind = found(turning)
+    demand_truth(blind, TRUTH)
+    assert blind.motion is None
+    assert any("no yaw: taken as 0" in remark for remark in blind.remarks)
+
+
+def test_positions_serve_where_velocities_are_missing() -> None:
+    """They are differentiated."""
+    log = fly(TRUTH, Flown(), 1)[0]
+    del log["vx_m_s"], log["vy_m_s"]
+    motion = found(log).motion
+    assert motion is not None
+    assert abs(motion.acceleration_per_tilt.value - TRUTH.acceleration_per_tilt) < 0.05
+
+
+def test_several_logs_are_pooled() -> None:
+    """Three logs have narrower intervals than the first of them; each may have an offset of its own."""
+    logs = fly(TRUTH, Flown(duration_s=20.0), 3)
+    logs[1]["roll_rad"] = logs[1]["roll_rad"] + 0.03
+    one, three = found(logs[0]), found(*logs)
+    demand_truth(three, TRUTH)
+    assert three.duration_s == pytest.approx(60.0, abs=0.1)
+    for alone, pooled in zip(fits(one), fits(three), strict=True):
+        assert pooled.gain.within < 0.8 * alone.gain.within
+        assert pooled.sum_s.within < alone.sum_s.within
+
+
+def test_the_model_section_has_what_was_found() -> None:
+    """Four digits of each, without a key for the integrator that was not worth it."""
+    summary = found(fly(TRUTH, Flown(), 1)[0])
+    roll = fits(summary)[0]
+    assert summary.model["roll_gain"] == float(f"{roll.gain.value:.4g}")
+    assert summary.model["roll_delay_s"] == float(f"{roll.delay_s.value:.4g}")
+    assert "roll_integral_1_s" not in summary.model
+    assert {"pitch_lag_s", "pitch_trim_rad", "acceleration_per_tilt", "drag_1_s"} < summary.model.keys()
+
+
+def test_stretches_without_flight_are_left_out() -> None:
+    """A tumble, a gap and the time on the ground, each with garbage in it."""
+    log = dict(fly(TRUTH, Flown(duration_s=45.0), 1)[0])
+    log = {name: values.copy() for name, values in log.items()}
+    height = np.full(len(log["time_s"]), -1.0)
+    log["roll_rad"][1500:1510] = 2.0
+    log["pitch_rad"][1500:1510] = -3.0
+    height[:500] = 0.0
+    log["roll_rad"][:500] = 0.3 * np.sin(np.arange(500.0))
+    log["z_m"] = height
+    kept = np.ones(len(height), np.bool_)
+    kept[3000:3060] = False
+    summary = found({name: values[kept] for name, values in log.items()})
+    demand_truth(summary, TRUTH)
+    assert 34.0 < summary.duration_s < 38.0
+
+
+def test_a_clock_that_jumps_is_a_gap() -> None:
+    """By a second, or by fifty years, as when a clock is set in flight."""
+    log = fly(TRUTH, Flown(duration_s=40.0), 1)[0]
+    late = log["time_s"] + np.where(np.arange(4000) < 2000, 0.0, 1.7e9)
+    summary = found(log | {"time_s": late})
+    demand_truth(summary, TRUTH)
+    assert summary.duration_s == pytest.approx(40.0, abs=0.1)
+
+
+def test_an_outage_of_the_position_is_cut_out() -> None:
+    """A second without velocity, and a velocity that is too rare to be used."""
+    columns = fly(TRUTH, Flown(), 1)[0]
+    log = log_of(columns)
+    kept = np.abs(columns["time_s"] - 15.0) > 0.5
+    signals = dict(log.signals)
+    for name in ("vx_m_s", "vy_m_s"):
+        signal = signals[name]
+        signals[name] = replace(signal, time_s=signal.time_s[kept], value=signal.value[kept])
+    summary = identify([replace(log, signals=signals)])[0]
+    demand_truth(summary, TRUTH)
+    assert summary.duration_s == pytest.approx(29.0, abs=0.1)
+    assert summary.motion is not None
+    assert abs(summary.motion.acceleration_per_tilt.value - TRUTH.acceleration_per_tilt) < 0.04
+
+
+def demand_cover(estimates: list[Interval], truths: list[float], least: float) -> None:
+    """Demand that a share of the intervals covers the truth, and that they are not wide without need."""
+    inside = [abs(one.value - truth) <= one.within for one, truth in zip(estimates, truths, strict=True)]
+    assert np.mean(inside) >= least
+    errors = [abs(one.value - truth) for one, truth in zip(estimates, truths, strict=True)]
+    assert np.mean([one.within for one in estimates]) < 12.0 * np.mean(errors)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("truth", "flown"),
+    [
+        (TRUTH, Flown()),
+        (TRUTH, Flown(size_m=0.5, gusts_m_s2=0.2)),
+        (replace(TRUTH, lag_s=(0.14, 0.14), delay_s=(0.03, 0.03)), Flown(duration_s=20.0)),
+    ],
+)
+def test_intervals_cover_the_truth_in_ninety_of_a_hundred(truth: Truth, flown: Flown) -> None:
+    """Of gain, sum, lag and dead time of both axes, with lost rows and wrong times; and of the motion."""
+    random = np.random.default_rng(5)
+    summaries = [found(drop_and_jitter(log, random)) for log in fly(truth, flown, 100, 7)]
+    for axis in range(2):
+        whole = [fits(summary)[axis] for summary in summaries]
+        sums = truth.lag_s[axis] + truth.delay_s[axis]
+        demand_cover([fit.gain for fit in whole], [truth.gain[axis]] * 100, 0.9)
+        demand_cover([fit.sum_s for fit in whole], [sums] * 100, 0.9)
+        plain = [fit for fit in whole if fit.integral_1_s is None]
+        assert len(plain) >= 90
+        demand_cover([fit.lag_s for fit in plain], [truth.lag_s[axis]] * len(plain), 0.9)
+        demand_cover([fit.delay_s for fit in plain], [truth.delay_s[axis]] * len(plain), 0.9)
+    motions = [summary.motion for summary in summaries if summary.motion]
+    assert len(motions) == 100
+    shares = [motion.acceleration_per_tilt for motion in motions]
+    demand_cover(shares, [truth.acceleration_per_tilt] * 100, 0.9)
+    demand_cover([motion.drag_1_s for motion in motions], [truth.drag_1_s] * 100, 0.9)
+    for axis in range(2):
+        demand_cover([motion.trim_rad[axis] for motion in motions], [truth.trim_rad[axis]] * 100, 0.9)

@@ -1,0 +1,100 @@
+"""Logs of the simulated Mambo: what is identified is what its stock loops are."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_sil.drone.sensors.instruments import Sensors
+from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.loop import Flight, Outcome, fly
+from mambo_sil.flight.traces import write_csv
+from mambo_sil.flight.trajectories import Waypoints
+from mambo_sil.model.identify.columns import KNOWN, Column
+from mambo_sil.model.identify.identify import identify, read_logs
+from mambo_sil.model.identify.identify_record import IdentifySummary
+from mambo_sil.model.identify.manoeuvre import SINES_HZ, waypoints_csv
+from mambo_sil.model.identify.response import FittedResponse
+from mambo_sil.model.identify.segments import PERIOD_S, HeldCommand, Segment
+from mambo_sil.model.identify.signals import COMMANDS, Signal
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Commanded:
+    """A command and its status."""
+
+    command_rad: Array
+    status: NDArray[np.int64]
+
+
+@dataclass
+class WithSines:
+    """The PD controller with a sum of sines on its commands."""
+
+    pd: PdController = field(default_factory=PdController)
+    updates: int = 0
+
+    def step(self, state: Array, target: Array, thrust_acceleration_m_s2: Array) -> Outcome:
+        """Return the command of the PD, with the sines of this update added."""
+        outcome = self.pd.step(state, target, thrust_acceleration_m_s2)
+        phase = 2.0 * np.pi * 0.01 * self.updates * np.array(SINES_HZ)
+        self.updates += 1
+        sines = 0.01 * np.array([np.sin(phase + np.arange(6.0) ** 2).sum(), np.cos(phase).sum()])
+        return Commanded(np.asarray(outcome.command_rad, np.float64) + sines, outcome.status)
+
+
+@pytest.fixture(scope="module")
+def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Fly the manoeuvre through noisy sensors, and write trace.csv."""
+    folder = tmp_path_factory.mktemp("flight")
+    (folder / "eight.csv").write_text(waypoints_csv(), "utf-8")
+    flight = Flight(Waypoints.read(folder / "eight.csv"), duration_s=20.0, sensors=Sensors(derotated=True))
+    write_csv(fly(flight, WithSines()), folder / "trace.csv")
+    return folder / "trace.csv"
+
+
+def rise_s(summary: IdentifySummary, name: str, share: float) -> float:
+    """Return when the identified response to a step first reaches a share of it."""
+    fit = summary.axes[name].fitted
+    assert fit is not None
+    integral = 0.0 if fit.integral_1_s is None else fit.integral_1_s.value
+    time_s = PERIOD_S * np.arange(400.0)
+    step = HeldCommand.of(Signal(np.array([0.0, 1.0]), np.array([0.0, 1.0]), "step"))
+    zero = np.zeros_like(time_s)
+    segment = Segment("", time_s, (step, step), np.stack([zero, zero]), zero, None, None)
+    response = FittedResponse(1.0, fit.lag_s.value, fit.delay_s.value, integral, (0.0,))
+    risen = response.predict(segment, 0, 0.0)
+    above = int(np.argmax(risen > share))
+    return float(np.interp(share, risen[above - 1 : above + 1], time_s[above - 1 : above + 1])) - 1.0
+
+
+@pytest.mark.long
+def test_the_stock_loops_are_identified(trace: Path) -> None:
+    """Through noise: gain 1, the integrator, and the rise times of docs/explanation/plant.md."""
+    summary = identify(read_logs([trace], {}))[0]
+    loops = {"roll": (1.0, 0.245, 0.415), "pitch": (0.77, 0.155, 0.25)}
+    for name, (integral_1_s, most_s, nearly_s) in loops.items():
+        axis = summary.axes[name]
+        assert axis.verdict == "good"
+        assert axis.fitted is not None
+        assert axis.fitted.integral_1_s is not None
+        assert axis.other_error_rad > 2.0 * axis.held_out_error_rad
+        assert abs(axis.fitted.gain.value - 1.0) < 0.02
+        assert abs(axis.fitted.integral_1_s.value - integral_1_s) < 0.3
+        assert abs(rise_s(summary, name, 0.63) - most_s) < 0.01
+        assert abs(rise_s(summary, name, 0.9) - nearly_s) < 0.01
+        assert f"{name}_integral_1_s" in summary.model
+
+
+@pytest.mark.long
+def test_the_drag_of_the_plant_is_identified(trace: Path) -> None:
+    """From the true motion: 0.067 1/s, and g per radian."""
+    columns = {name: Column(name) for name in KNOWN if name not in COMMANDS}
+    motion = identify(read_logs([trace], columns))[0].motion
+    assert motion is not None
+    assert abs(motion.acceleration_per_tilt.value - 1.0) < 0.001
+    assert abs(motion.drag_1_s.value - 0.067) < 0.002

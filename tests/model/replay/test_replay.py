@@ -1,0 +1,209 @@
+"""The command `replay`: whether the commands in a log are those of a controller."""
+
+import csv
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mambo_sil.flight.trajectories import Bernoulli
+from mambo_sil.model.identify.signals import TARGET, TARGET_ACCELERATION
+from tests.support.command import run
+from tests.support.logs import ulog
+
+FLOWN = ("fly", "--duration-s", "4", "--no-pictures")
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def replayed(*arguments: str, code: int = 0) -> dict[str, Any]:
+    """Replay a log; return the summary."""
+    summary: dict[str, Any] = json.loads(run("replay", *arguments, "--json", code=code)[0])
+    return summary
+
+
+def trace_rows() -> list[dict[str, str]]:
+    """Return the rows of the last flight."""
+    return list(csv.DictReader(Path("flight/trace.csv").read_text("utf-8").splitlines()))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["mambo"],
+        ["mambo", "--scalar", "fixed"],
+        ["mambo-1norm", "--scalar", "float64"],
+    ],
+)
+def test_a_simulated_flight_is_repeated_bit_for_bit(options: list[str]) -> None:
+    """Its trace is a log: with take-off, whose thrust is refused, gusts, and the states that sensors saw."""
+    run(*FLOWN, *options, "--start", "take-off", "--sensors", "mambo", "--wind", "gusts")
+    summary = replayed("flight/trace.csv", *options)
+    assert (summary["steps"], summary["equal_steps"], summary["first_different_s"]) == (901, 901, None)
+    assert summary["refused"] >= 70
+
+
+def test_another_controller_is_told_apart() -> None:
+    """Exit 1: its commands are others; of the same one in another scalar type only the last digits are."""
+    run(*FLOWN)
+    said, _ = run("replay", "flight/trace.csv", "mambo-1norm", code=1)
+    assert said.startswith("NOT THIS CONTROLLER, or not its inputs: it explains ")
+    summary = replayed("flight/trace.csv", "--scalar", "float64")
+    assert summary["equal_steps"] < 10
+    assert min(summary["explained"]) > 0.999999
+
+
+def test_where_a_log_begins_to_differ_is_told() -> None:
+    """One command with another last digit."""
+    run(*FLOWN)
+    rows = trace_rows()
+    rows[123]["roll_command_rad"] = repr(math.nextafter(float(rows[123]["roll_command_rad"]), 1.0))
+    with Path("edited.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    summary = replayed("edited.csv")
+    assert (summary["equal_steps"], summary["first_different_s"]) == (400, pytest.approx(1.23))
+    assert summary["largest_s"][0] == pytest.approx(1.23)
+
+
+def crazyflie_log(rows: list[dict[str, str]], commands: str) -> Iterator[list[object]]:
+    """Yield a log as a Crazyflie's client writes it: its frame, degrees, ms, three blocks."""
+    degrees = math.degrees(1.0)
+    blocks = {
+        commands: {"roll": ("roll_command_rad", degrees), "pitch": ("pitch_command_rad", degrees)},
+        "ctrltarget": {
+            "x": ("target_x_m", 1.0),
+            "y": ("target_y_m", -1.0),
+            "vx": ("target_vx_m_s", 1.0),
+            "vy": ("target_vy_m_s", -1.0),
+        },
+        "stateEstimate": {
+            "x": ("x_m", 1.0),
+            "y": ("y_m", -1.0),
+            "vx": ("vx_m_s", 1.0),
+            "vy": ("vy_m_s", -1.0),
+            "roll": ("roll_rad", degrees),
+            "pitch": ("pitch_rad", degrees),
+            "yaw": ("yaw_rad", -degrees),
+        },
+    }
+    names = [f"{block}.{name}" for block, columns in blocks.items() for name in columns]
+    yield ["Timestamp", *names]
+    for number, row in enumerate(rows):
+        for delay, (block, columns) in enumerate(blocks.items()):
+            values = {f"{block}.{name}": f"{k * float(row[of]):.7g}" for name, (of, k) in columns.items()}
+            yield [10 * number + delay, *(values.get(name, "") for name in names)]
+
+
+@pytest.mark.parametrize("commands", ["nmpc", "mine"])
+def test_a_crazyflie_log_is_replayed_without_options(commands: str, tmp_path: Path) -> None:
+    """Seven digits, blocks one after the other; an own prefix is named by --columns."""
+    run(*FLOWN, "crazyflie", "--vehicle", "crazyflie", "--wind", "0.3,0.2", "--yaw-rad", "0.4")
+    with Path("flight.csv").open("w", newline="") as file:
+        csv.writer(file).writerows(crazyflie_log(trace_rows(), commands))
+    named = [f"{axis}_command_rad=deg*mine.{axis}" for axis in ("roll", "pitch")]
+    options = ["--columns", ",".join(named)] if commands == "mine" else []
+    summary = replayed("flight.csv", "crazyflie", *options)
+    assert min(summary["explained"]) > 0.99
+    assert max(summary["rms_rad"]) < 0.003
+    assert {path.name for path in (tmp_path / "replayed").iterdir()} == {
+        *("replay.csv", "replay.png", "replay.svg", "summary.json")
+    }
+    run("report", "replayed", "-o", "page.html")
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert "this controller explains" in page
+    assert 'aria-label="Roll and pitch command over time' in page
+
+
+def trace_columns() -> dict[str, NDArray[np.float64]]:
+    """Return the columns of the last flight, with the acceleration of its target, the eight."""
+    rows = trace_rows()
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    acceleration = Bernoulli(2.0, 0.5).acceleration(columns["time_s"])
+    return columns | {name: acceleration[:, k] for k, name in enumerate(TARGET_ACCELERATION)}
+
+
+@pytest.mark.parametrize(
+    ("source", "target"), [("mambo", TARGET), ("given.toml", (*TARGET, *TARGET_ACCELERATION))]
+)
+def test_a_ulog_is_replayed(source: str, target: tuple[str, ...]) -> None:
+    """Single precision and a quaternion cost the last digits; an acceleration is read if it is given."""
+    write_given()
+    run(*FLOWN, source, "--wind", "0.3,0.2")
+    Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=False, target=target))
+    summary = replayed("flight.ulg", source)
+    assert (summary["steps"], summary["resampled"]) == (401, False)
+    assert min(summary["explained"]) > 0.9999
+
+
+def test_a_given_acceleration_is_read_from_a_table() -> None:
+    """In the columns that no trace has; without them the log is refused."""
+    write_given()
+    run(*FLOWN, "given.toml")
+    columns = trace_columns()
+    rows = np.stack(list(columns.values()), axis=1).tolist()
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    Path("flight.csv").write_text("\n".join(lines), "utf-8")
+    summary = replayed("flight.csv", "given.toml")
+    assert summary["equal_steps"] == summary["steps"] == 401
+    message = "has no column for target_ax_m_s2 (target_ax_m_s2, ctrltarget.ax); name it"
+    assert message in run("replay", "flight/trace.csv", "given.toml", code=2)[1]
+
+
+def test_a_ulog_without_the_target_is_refused() -> None:
+    """PX4 may be given a position alone; and a ULog has no columns to name."""
+    run(*FLOWN)
+    missing: dict[str, tuple[str, ...]] = {"target_x_m": (), "target_vx_m_s": TARGET[:2]}
+    for name, target in missing.items():
+        message = f"has no {name}; log vehicle_local_position and trajectory_setpoint"
+        Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=True, target=target))
+        assert message in run("replay", "flight.ulg", code=2)[1]
+    assert "a ULog needs none" in run("replay", "flight.ulg", "--columns", "x_m=x", code=2)[1]
+
+
+def write_given() -> None:
+    """Write preset mambo with the target's acceleration given to given.toml."""
+    run("init", "-o", "given.toml")
+    text = Path("given.toml").read_text("utf-8")
+    Path("given.toml").write_text(text.replace('= "tracked"', '= "given"'), "utf-8")
+
+
+def test_a_log_of_another_rate_is_interpolated() -> None:
+    """Every second row: the controller runs at its own rate."""
+    run(*FLOWN)
+    lines = Path("flight/trace.csv").read_text("utf-8").splitlines(keepends=True)
+    Path("rare.csv").write_text("".join([lines[0], *lines[1::2]]), "utf-8")
+    summary = replayed("rare.csv")
+    assert summary["resampled"]
+    assert summary["steps"] == 401
+    assert min(summary["explained"]) > 0.9
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.csv"], "none.csv: there is no such file"),
+        (
+            ["short.csv"],
+            "short.csv: has no column for target_x_m (target_x_m, ctrltarget.x); name it: --columns",
+        ),
+        (["flight.ulg"], "flight.ulg: is no ULog"),
+        (["short.csv", "--columns", "targt_x_m=x"], "must begin with target_x_m"),
+    ],
+)
+def test_a_log_that_cannot_be_replayed_is_refused(arguments: list[str], message: str, tmp_path: Path) -> None:
+    """Exit 2, and nothing is written."""
+    (tmp_path / "short.csv").write_text("time_s,roll_command_rad\n0,0\n", "utf-8")
+    (tmp_path / "flight.ulg").write_bytes(b"ULog")
+    before = sorted(tmp_path.iterdir())
+    assert message in run("replay", *arguments, code=2)[1]
+    assert sorted(tmp_path.iterdir()) == before
