@@ -15,11 +15,11 @@ from mambo_codegen import errors
 from mambo_codegen.settings import controller_toml, presets
 from tests.support.command import run
 
-COMMAND = "from mambo_codegen import cli, command; app = command.root(); cli.register(app); app()"
+COMMAND = "from mambo_sil.cli import command, generate; app = command.root(); generate.register(app); app()"
 INTERRUPTED = """
-from mambo_codegen import cli, command
+from mambo_sil.cli import command, generate
 app = command.root()
-cli.register(app)
+generate.register(app)
 @app.command()
 def stop(): raise KeyboardInterrupt
 app()

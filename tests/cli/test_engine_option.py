@@ -61,10 +61,10 @@ COMMANDS = (
 )
 SCRIPT = """\
 from mambo_sil.cli.app import main
-from mambo_sil.experiment.faults import flights
+from mambo_sil.experiment.faults import fault_flights
 from mambo_sil.experiment.table2 import table2
 
-flights.DURATION_S, table2.DURATION_S = 31.0, 2.0
+fault_flights.DURATION_S, table2.DURATION_S = 31.0, 2.0
 main()
 """
 """The command, with shorter flights: their number and their calls are the same."""

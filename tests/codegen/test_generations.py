@@ -25,7 +25,7 @@ MINE = {"src/mine.txt": "mine", "build/nmpc.o": "\0"}
 STOPPED_RUNS = """
 import json, os, shutil, signal, sys
 from pathlib import Path
-from mambo_codegen import bundle
+from mambo_codegen.bundle import bundle
 
 start, root, how, force = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], sys.argv[4] == "True"
 files = json.load(sys.stdin)
@@ -61,7 +61,7 @@ for operation in range(1, 1000):
 EDITED_MEANWHILE = """
 import json, sys
 from pathlib import Path
-from mambo_codegen import bundle
+from mambo_codegen.bundle import bundle
 from mambo_codegen.errors import ForeignFilesError
 
 folder, edited = Path(sys.argv[1]), []
@@ -82,7 +82,7 @@ except ForeignFilesError as error:
 FULL_DISK = """
 import json, resource, sys
 from pathlib import Path
-from mambo_codegen import bundle
+from mambo_codegen.bundle import bundle
 from mambo_codegen.errors import UnwritableError
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))

@@ -54,5 +54,5 @@ CHECKS: Final = (
         "fuzzing",
     ),
     Entry("bits", "gcc and clang at all optimisation levels: same bits as the reference", _COMPILERS, "bits"),
-    Entry("faults", "flights with faults: bounded commands, and recovery", (), "faults"),
+    Entry("faults", "flights with faults: bounded commands, and recovery", (), "fault_check"),
 )
