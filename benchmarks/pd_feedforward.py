@@ -148,7 +148,7 @@ def main() -> None:
     rows = [row("the paper's PD", None, stock)]
     rows += [row(name, gains, found[gains]) for name, gains in (("least error", closest), ("chosen", chosen))]
     print(f"\nmedian IAE as seen, m s (command variation, rad); {len(found)} candidates\n\n{table(rows)}")
-    print(f"\nsil/mambo_sil/flight/controllers/pd.py has {'the chosen gains' if chosen == GAINS else f'other gains: {GAINS}'}")
+    print(f"\ncontrollers/pd.py has {'the chosen gains' if chosen == GAINS else f'other gains: {GAINS}'}")
 
 
 if __name__ == "__main__":
