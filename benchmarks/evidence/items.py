@@ -69,7 +69,7 @@ def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], 
         data=(_MAMBO, f"{_HERE}/{name}.toml"),
         read=read_campaign,
         tables=tables,
-        pictures={f"{name}.{kind}": f"campaign/campaign.{kind}" for kind in ("png", "svg")} if drawn else {},
+        pictures={f"{name}.png": "campaign/campaign.png"} if drawn else {},
     )
 
 
@@ -82,7 +82,7 @@ ITEMS: Final = (
         data=(_MAMBO,),
         read=read_table2,
         tables={"table2": table2, "table2-quarter": table2_quarter},
-        pictures={"figure3.png": "table2/figure3.png", "figure3.svg": "table2/figure3.svg"},
+        pictures={"figure3.png": "table2/figure3.png"},
     ),
     Item(
         name="sensors",
@@ -142,7 +142,7 @@ ITEMS: Final = (
         data=(_MAMBO, "sil/mambo_sil/experiment/regress/data/suites/envelope.toml"),
         read=read_envelope,
         tables={"envelope": envelope},
-        pictures={"envelope.png": "envelope.png", "envelope.svg": "envelope.svg"},
+        pictures={"envelope.png": "envelope.png"},
         draw=draw_envelope,
     ),
     _campaign(
@@ -198,6 +198,6 @@ ITEMS: Final = (
             "faults-1norm": faults(_ONE_NORM),
             "faults-compared": faults_compared,
         },
-        pictures={"faults.png": "mambo/faults.png", "faults.svg": "mambo/faults.svg"},
+        pictures={"faults.png": "mambo/faults.png"},
     ),
 )
