@@ -69,9 +69,7 @@ tools:
 
 generated: $(SETUP)
 	$(BIN)/mambo-nmpc generate mambo -o generated/mambo
-	$(BIN)/mambo-nmpc generate mambo --scalar float64 -o generated/mambo-float64
 	$(BIN)/mambo-nmpc generate mambo --scalar fixed -o generated/mambo-fixed
-	$(BIN)/mambo-nmpc generate mambo-1norm -o generated/mambo-1norm
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1
 
 docs: $(SETUP_DOCS)

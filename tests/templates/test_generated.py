@@ -12,9 +12,7 @@ from mambo_codegen.settings.controller_toml import read, with_option
 GENERATED = Path(__file__).parents[2] / "generated"
 BUNDLES = {
     "mambo": ("mambo", "float32"),
-    "mambo-float64": ("mambo", "float64"),
     "mambo-fixed": ("mambo", "fixed"),
-    "mambo-1norm": ("mambo-1norm", "float32"),
     "table1": ("table1", "float32"),
 }
 

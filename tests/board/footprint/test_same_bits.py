@@ -12,7 +12,8 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.design import Design
 from mambo_codegen.errors import BuildError
 from mambo_codegen.reference import ReferenceController, Status
-from mambo_codegen.settings.controller_toml import read, with_option
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.emulated import GUEST, digest_emulated
 from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, builder, clang_builder
@@ -31,7 +32,6 @@ from tests.support.tools import board_builder, require, toolchain
 
 MAMBO = ONE_NORM
 EMULATED = ("mambo", "rp2040", "crazyflie", "teensy41", "rv32")
-GENERATED = Path(__file__).parents[3] / "generated"
 
 FAULTS = {
     "another order": (
@@ -162,14 +162,13 @@ def test_clang_needs_the_compiler_of_the_board_to_link(
         clang_builder(boards.load("crazyflie"), "-O2")
 
 
-@pytest.mark.parametrize("name", ["mambo", "mambo-float64", "table1"])
-def test_a_committed_bundle_has_the_digest_in_its_header(name: str) -> None:
-    """The committed C computes the digest in its header, over all steps."""
-    settings = read(GENERATED / name / "controller.toml")
-    files = {
-        path.relative_to(GENERATED / name).as_posix(): path.read_text("utf-8")
-        for path in (GENERATED / name).rglob("*.[ch]")
-    }
+@pytest.mark.parametrize(
+    ("preset", "scalar"), [("mambo", "float32"), ("mambo", "float64"), ("table1", "float32")]
+)
+def test_a_bundle_has_the_digest_in_its_header(preset: str, scalar: str) -> None:
+    """The generated C computes the digest in its header, over all steps."""
+    settings = with_option(presets.load(preset), "code.scalar", scalar)
+    files = {path: text for path, text in render(settings).items() if path.endswith((".c", ".h"))}
     stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
     assert stated
     library = load_library(files, toolchain(host_toolchain().command[0]))
