@@ -1,1 +1,1 @@
-"""Measurements of time, footprint and plan quality, beside other MPC generators and solvers."""
+"""Measurements of time, footprint and flights, beside other MPC generators and solvers."""

@@ -61,11 +61,11 @@ def silence() -> None:
         os.dup2(nowhere.fileno(), 1)
 
 
-def plans(library: Path, inputs: Array, *, follows: bool) -> tuple[Array, Array, list[int]]:
+def plans(library: Path, inputs: Array, *, follows: bool) -> tuple[Array, list[int]]:
     """Plan for each of `inputs` (n, 6), error and last command, in order.
 
-    If `follows`, the last command is that of the previous plan, initially 0. Returns the last commands
-    (n, 2), the plans (n, 4), and the number of heap calls of each update.
+    If `follows`, the last command is that of the previous plan, initially 0. Returns the plans
+    (n, 4) and the number of heap calls of each update.
     """
     loaded = ctypes.CDLL(str(library))
     heap = ctypes.c_ulong.in_dll(loaded, "heap_calls")
@@ -79,4 +79,4 @@ def plans(library: Path, inputs: Array, *, follows: bool) -> tuple[Array, Array,
         before = heap.value
         loaded.run(*(row.ctypes.data_as(ctypes.c_void_p) for row in (error, last, moves)))
         calls.append(heap.value - before)
-    return lasts, found, calls
+    return found, calls

@@ -1,4 +1,4 @@
-"""Time of an update on this machine and quality of its plan: ours, a plain roll-out and the peers.
+"""Time of an update on this machine, largest tilt planned and memory: ours, a plain roll-out and the peers.
 
 Every contender is generated once, built portably and for this machine, and tried in a process of its own. One
 process then times all of them: in every round each contender passes through each set of states. Table and
@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from scipy.stats import trim_mean
 
 from benchmarks.host_builds import build, plans, silence, sizes
-from benchmarks.optimum import excess
-from benchmarks.ours import ONE_NORM, PEERS_MODEL, Ours, bundle, rollout
+from benchmarks.ours import ONE_NORM, PEERS_MODEL, bundle, rollout
 from benchmarks.peers_setups import PEERS
 from benchmarks.programs import BENCHMARKS, ROOT, NotHereError, Program, run_tool
 from benchmarks.states import Inputs, state_sets
@@ -47,8 +46,6 @@ _SLOW_NS: Final = 20_000
 _SLOW_COUNT: Final = 200
 """Number of states of each set for contenders that take longer than _SLOW_NS."""
 _SWEPT_BYTES: Final = 64 << 20
-_SAMPLE: Final = 5
-"""Every _SAMPLE-th plan is compared with the optimum."""
 _SAME_RAD: Final = 1e-6
 _FOLDER: Final = ROOT / "build/bench"
 
@@ -92,29 +89,16 @@ def prepare(program: Program, sets: dict[str, Inputs], work: Path) -> tuple[Row,
             tried = pool.submit(_plan_sets, library, sets).result()
     except BrokenProcessPool:
         return replace(row, absent="crashes"), {}, None
-    planned = {name: plan for name, (_, plan, _) in tried.items()}
+    planned = {name: plan for name, (plan, _) in tried.items()}
     code, ram = sizes(library)
-    quality = {
+    memory = {
         "contender": program.title,
-        "above the optimum, W": _describe_excess(program, sets["W"], tried["W"]),
-        "along C": _describe_excess(program, sets["C"], tried["C"]),
         "largest tilt": f"{max(np.abs(plan).max() for plan in planned.values()):.4f}",
         "code": f"{code:,}",
         "RAM": f"{ram:,}",
-        "heap": _describe_heap(tried["W"][2]),
+        "heap": _describe_heap(tried["W"][1]),
     }
-    return replace(row, quality=quality), libraries, planned
-
-
-def _describe_excess(program: Program, inputs: Inputs, tried: Any) -> str:
-    """Return median and 99th percentile of the excess of the plans' cost over the optimum."""
-    if program.cost == "quadratic, other problem":
-        return "-"
-    last, planned, _ = tried
-    settings = program.settings if isinstance(program, Ours) else PEERS_MODEL
-    given = np.concatenate([inputs[:, :4], last], 1)
-    shares = excess(program.cost, settings, given[::_SAMPLE], planned[::_SAMPLE])
-    return f"{100 * np.median(shares):.2f} / {100 * np.percentile(shares, 99):.2f} %"
+    return replace(row, memory=memory), libraries, planned
 
 
 def _describe_heap(calls: list[int]) -> str:

@@ -30,14 +30,14 @@ Timing = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Row:
-    """Results of a contender: cells of the table of quality, and times by flags.
+    """Results of a contender: cells of the table of memory, and times by flags.
 
     `absent` is the reason if nothing was measured.
     """
 
     program: Program
     versions: dict[str, str] = field(default_factory=dict)
-    quality: dict[str, str] = field(default_factory=dict)
+    memory: dict[str, str] = field(default_factory=dict)
     times: dict[str, Timing] = field(default_factory=dict)
     absent: str = ""
 
@@ -109,8 +109,8 @@ def write_report(
     for flags in FLAGS:
         parts += [f"`{flags}`, ns per update, median / 99th percentile:", _times_table(rows, flags)]
     parts += ["Aims, from the least to the most over W, T, F and C:", _aims_table(rows)]
-    parts += ["Quality of the plans, and memory (bytes, x86-64, `-O2`):"]
-    parts += [table([row.quality for row in rows if row.quality])]
+    parts += ["Largest tilt planned, and memory (bytes, x86-64, `-O2`):"]
+    parts += [table([row.memory for row in rows if row.memory])]
     same = "; ".join(f"{title}, {count} states" for title, count in agreement.items())
     versions: dict[str, str] = {}
     for row in rows:

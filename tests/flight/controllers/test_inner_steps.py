@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from mambo_codegen.design import Design
-from mambo_codegen.reference import ReferenceController, Status
+from mambo_codegen.reference import Memory, ReferenceController, Status, Step
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.inner_steps import step_watched
+from mambo_sil.flight.controllers.inner_steps import InnerSteps, WatchedController
 from mambo_sil.verify.inputs import random_inputs
 from tests.support.cases import SCALARS
 from tests.support.one_norm import ONE_NORM
@@ -24,6 +24,16 @@ def inputs(settings: Settings) -> tuple[Any, Any, Any]:
     """Draw state, target and thrust of N steps."""
     drawn = random_inputs(settings, N, np.random.default_rng(0))
     return drawn.state, drawn.target, drawn.thrust
+
+
+def step_watched(
+    settings: Settings, memory: Memory, state: Any, target: Any, thrust: Any
+) -> tuple[Step, InnerSteps]:
+    """Step N reference controllers once from `memory`; returns the step and its iterations."""
+    watched = WatchedController(settings, N)
+    watched.controller.memory = memory
+    step = watched.step(state, target, thrust)
+    return step, watched.steps[-1]
 
 
 @pytest.mark.parametrize("settings", [*SETTINGS.values(), presets.load("table1")], ids=[*SETTINGS, "table1"])

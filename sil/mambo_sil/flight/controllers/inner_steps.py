@@ -10,7 +10,7 @@ from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, sign
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
 from mambo_codegen.methods.one_norm.optimizer import Evaluate, Rprop, Search
-from mambo_codegen.reference import Memory, ReferenceController, Step
+from mambo_codegen.reference import ReferenceController, Step
 from mambo_codegen.settings.model import Settings
 
 
@@ -80,20 +80,6 @@ class WatchedController:
             return cost, gradient
 
         return rprop.minimize(watch, start)
-
-
-def step_watched(
-    settings: Settings,
-    memory: Memory,
-    state: ArrayLike,
-    target: ArrayLike,
-    thrust_acceleration_m_s2: ArrayLike,
-) -> tuple[Step, InnerSteps]:
-    """Step n reference controllers once from `memory`; returns the step and its iterations."""
-    watched = WatchedController(settings, len(memory.command_rad))
-    watched.controller.memory = memory
-    step = watched.step(state, target, thrust_acceleration_m_s2)
-    return step, watched.steps[-1]
 
 
 def write_inner_steps(watched: WatchedController, path: Path) -> None:
