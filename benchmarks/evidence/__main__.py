@@ -1,23 +1,36 @@
 """Make tables and pictures of docs/evidence: those named, or all that are older than the code."""
 
+import argparse
 import sys
 
-from benchmarks.evidence.item import EvidenceError, make, write_tables
+from benchmarks.evidence.item import EvidenceError, changes, make, restamp, write_tables
 from benchmarks.evidence.items import ITEMS
 
 
-def main(names: list[str]) -> int:
-    """Make the named items, or those older than the code; return the exit code."""
-    items = {item.name: item for item in ITEMS}
-    unknown = [name for name in names if name not in items]
+def main(arguments: list[str]) -> int:
+    """Make or restamp the named items, or those older than the code; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.evidence", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(item.name for item in ITEMS))
+    parser.add_argument(
+        "--restamp", action="store_true", help="run nothing, record that what has changed moves no figure"
+    )
+    given = parser.parse_args(arguments)
+    unknown = [name for name in given.names if name not in {item.name for item in ITEMS}]
     if unknown:
-        print(f"{unknown[0]}: is no item of evidence; there are {', '.join(items)}", file=sys.stderr)
+        print(
+            f"{unknown[0]}: is no item of evidence; there are {', '.join(item.name for item in ITEMS)}",
+            file=sys.stderr,
+        )
         return 2
     try:
         for item in ITEMS:
-            if item.name in names or (not names and item.changed()):
-                make(item, print)
-            elif not names:
+            if given.names and item.name not in given.names:
+                continue
+            changed = changes(item)
+            if given.names or changed:
+                print(f"{item.name}: changed since it was made: {', '.join(changed) or 'nothing'}")
+                (restamp if given.restamp else make)(item, print)
+            else:
                 written = write_tables(item)
                 print(
                     f"{item.name}: is as new as the code"

@@ -1,7 +1,7 @@
 """One item of evidence: its commands, its figures, the tables and pictures in docs/evidence, and its stamp.
 
 The stamp docs/evidence/data/NAME.json holds the figures without rounding, from which the tables are written
-again without a flight, and digests of what the figures depend on.
+again without a flight, the commit at which they were made, and ids of what they depend on.
 """
 
 import json
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.evidence.sources import ROOT, parts
+from benchmarks.evidence.sources import ROOT, controller_digests, git, object_ids
 from mambo_sil.results.folders import finite
 
 PAGES: Final = ROOT / "docs" / "evidence"
@@ -37,8 +37,7 @@ class Item:
 
     commands:    as a user types them at the root of the repository; each writes below build/evidence/NAME.
     controllers: presets and files whose C flies or is measured, as `mambo` or `mambo --scalar fixed`.
-    modules:     entry points of what computes the figures, and what draws the pictures.
-    data:        patterns of other files that the figures depend on.
+    paths:       folders and files of the repository that compute the figures.
     read:        returns the figures in the folder of the results.
     tables:      return Markdown of figures, by the name of the file in docs/evidence/data.
     pictures:    files of the results, by their name in docs/evidence.
@@ -48,8 +47,7 @@ class Item:
     name: str
     commands: tuple[str, ...]
     controllers: tuple[str, ...]
-    modules: tuple[str, ...]
-    data: tuple[str, ...]
+    paths: tuple[str, ...]
     read: Callable[[Path], Figures]
     tables: Mapping[str, Callable[[Figures], str]]
     pictures: Mapping[str, str] = field(default_factory=dict)
@@ -57,24 +55,12 @@ class Item:
 
     @property
     def stamp(self) -> Path:
-        """The file with figures and digests."""
+        """The file with figures, and with ids of what they depend on."""
         return DATA / f"{self.name}.json"
 
-    @property
-    def remake(self) -> str:
-        """The command that makes the item anew."""
-        return f"python -m benchmarks.evidence {self.name}"
-
-    def parts(self) -> dict[str, str]:
-        """Return the digests of what the figures depend on now."""
-        return parts(self.controllers, self.modules, self.data, self.commands)
-
-    def changed(self) -> list[str]:
-        """Return what has changed since the figures were made."""
-        if not self.stamp.is_file():
-            return ["everything: it was never made"]
-        then, now = read_stamp(self)["parts"], self.parts()
-        return [part for part in sorted(then.keys() | now.keys()) if then.get(part) != now.get(part)]
+    def ids(self) -> dict[str, dict[str, str]]:
+        """Return what the figures depend on now: digests of the generated C, git's ids of the paths."""
+        return {"controllers": controller_digests(self.controllers), "paths": object_ids(self.paths)}
 
     def texts(self, figures: Figures) -> dict[str, str]:
         """Return the tables by file name."""
@@ -87,12 +73,25 @@ def read_stamp(item: Item) -> Figures:
     return stamp
 
 
+def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+    """Return the names whose ids differ."""
+    return [name for name in sorted(then.keys() | now.keys()) if then.get(name) != now.get(name)]
+
+
+def changes(item: Item) -> list[str]:
+    """Return the controllers and paths that have changed since the stamp was written."""
+    if not item.stamp.is_file():
+        return ["everything: it was never made"]
+    stamp, now = read_stamp(item), item.ids()
+    return [name for kind, ids in now.items() for name in differences(stamp[kind], ids)]
+
+
 def make(item: Item, say: Callable[[str], None]) -> None:
     """Run the commands of an item; write tables, pictures and the stamp. Raises EvidenceError."""
     results = ROOT / RESULTS / item.name
     shutil.rmtree(results, ignore_errors=True)
     results.mkdir(parents=True)
-    depends = item.parts()  # before the commands, lest a source that is changed meanwhile passes for theirs
+    ids = item.ids()  # before the commands, lest a source that is changed meanwhile passes for theirs
     start, before = time.monotonic(), _processor_time_s()
     for number, command in enumerate(item.commands):
         say(f"{item.name}: {command}")
@@ -107,13 +106,33 @@ def make(item: Item, say: Callable[[str], None]) -> None:
         "commands": list(item.commands),
         "duration_s": round(time.monotonic() - start),
         "processor_time_s": round(_processor_time_s() - before),
-        "parts": depends,
+        "commit": git("rev-parse", "HEAD"),
+        "restamped": [],
+        **ids,
         "figures": figures,
     }
     DATA.mkdir(parents=True, exist_ok=True)
-    item.stamp.write_text(json.dumps(stamp, indent=1, allow_nan=False) + "\n", "utf-8")
+    _write_stamp(item, stamp)
     write_tables(item)
     say(f"{item.name}: {', '.join((*item.texts(figures), *item.pictures))}, {stamp['duration_s']} s")
+
+
+def restamp(item: Item, say: Callable[[str], None]) -> None:
+    """Record that what has changed moves no figure. Nothing is run: that is the word of who does this."""
+    stamp, changed = read_stamp(item), changes(item)
+    stamp |= {
+        "commands": list(item.commands),
+        "restamped": sorted({*stamp["restamped"], *changed}),
+    } | item.ids()
+    _write_stamp(item, stamp)
+    say(
+        f"{item.name}: restamped, nothing was run; the figures are those of commit {stamp['commit'][:9]}, "
+        f"and changed since: {', '.join(stamp['restamped']) or 'nothing'}"
+    )
+
+
+def _write_stamp(item: Item, stamp: Figures) -> None:
+    item.stamp.write_text(json.dumps(stamp, indent=1, allow_nan=False) + "\n", "utf-8")
 
 
 def write_tables(item: Item) -> list[str]:

@@ -38,11 +38,12 @@ from benchmarks.evidence.tables import (
 
 _HERE: Final = "benchmarks/evidence"
 _ONE_NORM: Final = f"{_HERE}/one-norm.toml"
-_MAMBO: Final = "sil/mambo_sil/drone/vehicles/data/vehicles/mambo.toml"
+_FLIGHT: Final = ("sil/mambo_sil/drone", "sil/mambo_sil/flight")
+_EXPERIMENT: Final = "sil/mambo_sil/experiment"
 _MEASURED: Final = ("mambo", "mambo --scalar float64", "mambo --scalar fixed", "mambo-1norm")
 _ON_EACH: Final = ("pd", "pd-feedforward", "mambo-1norm", "mambo", "crazyflie")
 _FLOWN: Final = ("mambo", "mambo-1norm", "table1")
-_STYLE: Final = "mambo_sil.results.style"
+_STYLE: Final = "sil/mambo_sil/results/style.py"
 _FIXED: Final = f"{_HERE}/mambo-1norm-fixed.toml"
 
 
@@ -61,12 +62,7 @@ def _campaign(name: str, options: str, tables: Mapping[str, Callable[[Figures], 
         name=name,
         commands=(f"mambo-nmpc campaign {_HERE}/{name}.toml {options}-o {RESULTS}/{name}/campaign",),
         controllers=_FLOWN,
-        modules=(
-            "mambo_sil.experiment.campaign.campaign_run",
-            "mambo_sil.experiment.campaign.statistics",
-            *(("mambo_sil.experiment.campaign.campaign_plots", _STYLE) if drawn else ()),
-        ),
-        data=(_MAMBO, f"{_HERE}/{name}.toml"),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/campaign", f"{_HERE}/{name}.toml", *((_STYLE,) if drawn else ())),
         read=read_campaign,
         tables=tables,
         pictures={f"{name}.png": "campaign/campaign.png"} if drawn else {},
@@ -78,8 +74,7 @@ ITEMS: Final = (
         name="table2",
         commands=(f"mambo-nmpc table2 -o {RESULTS}/table2/table2",),
         controllers=(*_FLOWN, "table1-printed"),
-        modules=("mambo_sil.experiment.table2.table2", "mambo_sil.experiment.table2.table2_plots", _STYLE),
-        data=(_MAMBO,),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/table2", _STYLE),
         read=read_table2,
         tables={"table2": table2, "table2-quarter": table2_quarter},
         pictures={"figure3.png": "table2/figure3.png"},
@@ -88,8 +83,7 @@ ITEMS: Final = (
         name="sensors",
         commands=(f"mambo-nmpc table2 --sensors -o {RESULTS}/sensors/sensors",),
         controllers=("mambo", "table1"),
-        modules=("mambo_sil.experiment.table2.sensed",),
-        data=(_MAMBO,),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/table2"),
         read=read_sensors,
         tables={"sensors": sensors},
     ),
@@ -97,8 +91,7 @@ ITEMS: Final = (
         name="conditions",
         commands=_regress("conditions", f"{_HERE}/conditions.toml", *CONTROLLERS, _ONE_NORM, _FIXED),
         controllers=(*_FLOWN, _ONE_NORM, _FIXED),
-        modules=("mambo_sil.experiment.regress.suite_flights", "mambo_sil.experiment.regress.suite_file"),
-        data=(_MAMBO, f"{_HERE}/conditions.toml"),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/conditions.toml"),
         read=read_suite((*CONTROLLERS, "one-norm", "mambo-1norm-fixed")),
         tables={
             "conditions": conditions({name: title(name) for name in CONTROLLERS}),
@@ -115,8 +108,7 @@ ITEMS: Final = (
         name="vehicles",
         commands=_regress("vehicles", f"{_HERE}/vehicles.toml", *_ON_EACH),
         controllers=_ON_EACH[2:],
-        modules=("mambo_sil.experiment.regress.suite_flights", "mambo_sil.experiment.regress.suite_file"),
-        data=("sil/mambo_sil/drone/vehicles/data/vehicles/*.toml", f"{_HERE}/vehicles.toml"),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/vehicles.toml"),
         read=read_suite(_ON_EACH),
         tables={"vehicles": vehicles},
     ),
@@ -124,8 +116,7 @@ ITEMS: Final = (
         name="spread",
         commands=("python -m benchmarks.spread",),
         controllers=_FLOWN,
-        modules=("benchmarks.spread",),
-        data=(_MAMBO,),
+        paths=(*_FLIGHT, "benchmarks/spread.py"),
         read=read_printed,
         tables={"spread": spread},
     ),
@@ -133,13 +124,7 @@ ITEMS: Final = (
         name="envelope",
         commands=_regress("envelope", "envelope", *CONTROLLERS),
         controllers=_FLOWN,
-        modules=(
-            "mambo_sil.experiment.regress.suite_flights",
-            "mambo_sil.experiment.regress.suite_file",
-            "benchmarks.evidence.pictures",
-            _STYLE,
-        ),
-        data=(_MAMBO, "sil/mambo_sil/experiment/regress/data/suites/envelope.toml"),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/pictures.py", _STYLE),
         read=read_envelope,
         tables={"envelope": envelope},
         pictures={"envelope.png": "envelope.png"},
@@ -161,12 +146,11 @@ ITEMS: Final = (
             f"mambo-nmpc footprint mambo-1norm -o {RESULTS}/footprint/1norm",
         ),
         controllers=_MEASURED,
-        modules=("mambo_sil.board.footprint.measure",),
-        data=(
-            "codegen/mambo_codegen/data/boards/*.toml",
+        paths=(
+            *_FLIGHT,
+            "sil/mambo_sil/board/footprint",
+            "codegen/mambo_codegen/data/boards",
             "codegen/mambo_codegen/bundle/flags.py",
-            "codegen/mambo_codegen/boards.py",
-            _MAMBO,
         ),
         read=read_footprints(dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))),
         tables={
@@ -186,12 +170,7 @@ ITEMS: Final = (
             f"mambo-nmpc faults {_ONE_NORM} -o {RESULTS}/faults/one-norm",
         ),
         controllers=("mambo", "mambo-1norm", _ONE_NORM),
-        modules=(
-            "mambo_sil.experiment.faults.fault_flights",
-            "mambo_sil.experiment.faults.faults_plots",
-            _STYLE,
-        ),
-        data=(_MAMBO,),
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/faults", _STYLE),
         read=read_faults({"mambo": "mambo", "mambo-1norm": "mambo-1norm", _ONE_NORM: "one-norm"}),
         tables={
             "faults": faults("mambo"),

@@ -1,19 +1,33 @@
 """Tables and pictures of the manual are those of this code, and README says what they say."""
 
-import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from benchmarks.evidence import item as evidence
 from benchmarks.evidence import sources
-from benchmarks.evidence.item import DATA, PAGES, EvidenceError, Item, read_stamp, run
+from benchmarks.evidence.item import (
+    DATA,
+    PAGES,
+    EvidenceError,
+    Item,
+    changes,
+    differences,
+    make,
+    read_stamp,
+    restamp,
+    run,
+)
 from benchmarks.evidence.items import ITEMS
+from benchmarks.evidence.sources import controller_digests, generated, object_ids, plain_c
 from benchmarks.ours import ONE_NORM
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
+from tests.support.tools import require
 
 ROOT = Path(__file__).parents[2]
 INCLUDE = re.compile(r"^\[Table: [^\]]+\]\([./\w-]*data/([\w-]+\.md)\)$", re.MULTILINE)
@@ -21,10 +35,19 @@ NAMES = [item.name for item in ITEMS]
 
 
 @pytest.mark.parametrize("item", ITEMS, ids=NAMES)
-def test_figures_are_as_new_as_the_code(item: Item) -> None:
-    """What they depend on has not changed since they were made; if it has, this names the command."""
-    changed = item.changed()
-    assert changed == [], f"older than {', '.join(changed)}; make it anew: {item.remake}"
+def test_figures_are_those_of_the_generated_c(item: Item) -> None:
+    """The C of no controller has changed since they were made; if it has, this names the command."""
+    changed = differences(read_stamp(item)["controllers"], controller_digests(item.controllers))
+    assert changed == [], (
+        f"made with another C of {', '.join(changed)}: python -m benchmarks.evidence {item.name}"
+    )
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=NAMES)
+def test_the_stamp_has_every_path_of_the_item(item: Item) -> None:
+    """And each exists: a folder that moves is named anew in its items, which are then restamped."""
+    assert sorted(read_stamp(item)["paths"]) == sorted(item.paths)
+    assert [path for path in item.paths if not (ROOT / path).exists()] == []
 
 
 @pytest.mark.parametrize("item", ITEMS, ids=NAMES)
@@ -53,66 +76,54 @@ def test_files_of_settings_are_presets_but_for_what_their_names_say() -> None:
     assert presets.load(str(ROOT / "benchmarks/evidence/mambo-1norm-fixed.toml")) == fixed
 
 
-PYTHON = '"""Words."""\n\nX = 1  # words\n\n\ndef f() -> str:\n    """Words."""\n    return "# no comment"\n'
-
-
-@pytest.mark.parametrize("other", ["  # others", '"""Others."""\n\n\n', "\n\n# more\n"])
-def test_words_for_readers_are_no_part_of_python(other: str) -> None:
-    """Comments, docstrings and blank lines may change."""
-    changed = {
-        "  # others": PYTHON.replace("  # words", other),
-        '"""Others."""\n\n\n': PYTHON.replace('"""Words."""\n\n', other),
-        "\n\n# more\n": PYTHON + other,
-    }[other]
-    assert changed != PYTHON
-    assert sources.plain_python(changed) == sources.plain_python(PYTHON)
-    assert sources.plain_python(PYTHON) == 'X = 1\ndef f() -> str:\n    return "# no comment"'
-
-
-@pytest.mark.parametrize(("old", "new"), [("1", "2"), ("# no", "# a"), ("f()", "g()"), ("return", "yield")])
-def test_code_is_part_of_python(old: str, new: str) -> None:
-    """A number, a text, a name, a statement."""
-    assert sources.plain_python(PYTHON.replace(old, new)) != sources.plain_python(PYTHON)
-
-
 C = '/* Words. */\n#define A 1.0f /* more */\n\nconst char *b = "/* no comment */"; // words\n'
 
 
 def test_comments_are_no_part_of_c() -> None:
     """Neither are spaces; a constant is, and a text that looks like a comment."""
-    plain = sources.plain_c(C)
+    plain = plain_c(C)
     assert plain == '#define A 1.0f\nconst char *b = "/* no comment */";'
-    assert sources.plain_c(C.replace("Words", "Others").replace("A 1", "A   1")) == plain
-    assert sources.plain_c(C.replace("1.0f", "1.5f")) != plain
-    assert sources.plain_c(C.replace("no comment", "comment")) != plain
+    assert plain_c(C.replace("Words", "Others").replace("A 1", "A   1")) == plain
+    assert plain_c(C.replace("1.0f", "1.5f")) != plain
+    assert plain_c(C.replace("no comment", "comment")) != plain
 
 
-def test_figures_depend_on_what_their_modules_import() -> None:
-    """On the engine in C and on the plant, but not on the command line, on files and on formats."""
-    found = {
-        path.relative_to(ROOT).as_posix() for path in sources.reached(["mambo_sil.experiment.table2.table2"])
-    }
-    assert {
-        "sil/mambo_sil/flight/engine/loop.c",
-        "sil/mambo_sil/flight/engine/rigid_body.h",
-        "sil/mambo_sil/drone/plant/rotors.py",
-    } <= found
-    assert {
-        "sil/mambo_sil/flight/controllers/pd.py",
-        "sil/mambo_sil/flight/metrics.py",
-        "sil/mambo_sil/experiment/table2/table2.py",
-    } <= found
-    assert "codegen/mambo_codegen/numbers/gravity.py" in found
-    inert = (
-        "codegen/mambo_codegen/settings",
-        "codegen/mambo_codegen/bundle/render",
-        "codegen/mambo_codegen/__init__",
-        "sil/mambo_sil/cli",
-        "sil/mambo_sil/results",
-    )
-    assert not [path for path in found if path.startswith(inert)]
-    with pytest.raises(ValueError, match="no such module"):
-        sources.reached(["mambo_sil.experiment.table2.table3"])
+def test_a_changed_file_changes_the_id_of_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also before it is committed, and back again; the index of the repository stays as it is."""
+    require("git", "git")
+    monkeypatch.setattr(sources, "ROOT", tmp_path)
+    (tmp_path / "folder").mkdir()
+    file, other = tmp_path / "folder/file.py", tmp_path / "other.py"
+    file.write_text("X = 1\n", "utf-8")
+    other.write_text("X = 1\n", "utf-8")
+    sources.git("init", "--quiet")
+    first = object_ids(["folder", "other.py"])
+    assert sources.git("cat-file", "-p", first["other.py"]) == "X = 1"
+    file.write_text("X = 2\n", "utf-8")
+    assert differences(first, object_ids(["folder", "other.py"])) == ["folder"]
+    file.write_text("X = 1\n", "utf-8")
+    assert object_ids(["folder", "other.py"]) == first
+    assert sources.git("ls-files") == ""
+
+
+def test_restamping_runs_nothing_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures and the commit at which they were made stay; what has changed since is listed."""
+    require("git", "git")
+    monkeypatch.setattr(evidence, "DATA", tmp_path)
+    made = Item("made", (), ("mambo",), ("benchmarks/spread.py",), lambda _: {"x": 1}, {})
+    assert changes(made) == ["everything: it was never made"]
+    said: list[str] = []
+    make(made, said.append)
+    stamp = read_stamp(made)
+    assert (changes(made), stamp["restamped"]) == ([], [])
+    now = replace(made, paths=("benchmarks/markdown.py",), commands=("python -c 'raise SystemExit(2)'",))
+    assert changes(now) == ["benchmarks/markdown.py", "benchmarks/spread.py"]
+    restamp(now, said.append)
+    after = read_stamp(now)
+    assert changes(now) == []
+    assert after["restamped"] == ["benchmarks/markdown.py", "benchmarks/spread.py"]
+    assert [after[key] for key in ("figures", "commit")] == [stamp[key] for key in ("figures", "commit")]
+    assert "restamped, nothing was run; the figures are those of commit" in said[-1]
 
 
 def test_figures_depend_on_the_generated_c_and_not_on_its_names(tmp_path: Path) -> None:
@@ -121,25 +132,12 @@ def test_figures_depend_on_the_generated_c_and_not_on_its_names(tmp_path: Path) 
     other, same = tmp_path / "other.toml", tmp_path / "same.toml"
     other.write_text(text.replace("0.055", "0.056"), "utf-8")
     same.write_text(f"# The same, in other words.\n{text}", "utf-8")
-    now = sources.generated("benchmarks/evidence/one-norm.toml")
-    assert now == sources.generated(str(same))
-    assert now != sources.generated(str(other))
+    now = generated("benchmarks/evidence/one-norm.toml")
+    assert now == generated(str(same))
+    assert now != generated(str(other))
     assert ONE_NORM.short_digest not in now
     assert "nmpc_optimizer_minimize" in now
-    assert sources.generated("mambo") != sources.generated("mambo --scalar fixed")
-
-
-def test_a_change_is_named() -> None:
-    """By the folder or the controller that has changed."""
-    item = next(item for item in ITEMS if item.name == "table2")
-    now = item.parts()
-    assert {
-        "commands",
-        "controller mambo",
-        "sil/mambo_sil/flight/engine",
-        "sil/mambo_sil/drone/plant",
-    } <= now.keys()
-    assert now == json.loads(json.dumps(now))
+    assert generated("mambo") != generated("mambo --scalar fixed")
 
 
 def test_a_command_that_refuses_is_an_error() -> None:
