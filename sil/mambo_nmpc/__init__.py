@@ -10,16 +10,20 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from mambo_codegen.errors import MamboNmpcError
     from mambo_sil.drone.plant.vehicle import Vehicle
+    from mambo_sil.errors import ArgumentError
     from mambo_sil.flight.api.controller import Controller
     from mambo_sil.flight.api.flights import Flown, fly
     from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.flight.api.states import DroneState, TargetState
 
 __all__ = [
+    "ArgumentError",
     "Controller",
     "DroneState",
     "Flown",
+    "MamboNmpcError",
     "TargetState",
     "Vehicle",
     "attitude_of_quaternion",
@@ -28,9 +32,11 @@ __all__ = [
 ]
 
 _HOMES: Final = {
+    "ArgumentError": "mambo_sil.errors",
     "Controller": "mambo_sil.flight.api.controller",
     "DroneState": "mambo_sil.flight.api.states",
     "Flown": "mambo_sil.flight.api.flights",
+    "MamboNmpcError": "mambo_codegen.errors",
     "TargetState": "mambo_sil.flight.api.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
     "attitude_of_quaternion": "mambo_sil.flight.api.frames",

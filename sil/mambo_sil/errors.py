@@ -3,6 +3,10 @@
 from mambo_codegen.errors import MamboNmpcError
 
 
+class ArgumentError(MamboNmpcError, ValueError):
+    """An argument of a Python call is wrong; the message names argument, value and what is allowed."""
+
+
 class TrajectoryError(MamboNmpcError):
     """A trajectory is invalid; the message names file, line and rule."""
 

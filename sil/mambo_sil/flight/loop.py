@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
+from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray, PerFlight
@@ -143,7 +144,7 @@ class Flight:
 
         Raises `FlightError` if the number of trajectories is not the number of flights.
         """
-        return self._for_each_flight(self.trajectory.target(self.times_s()))
+        return self._for_each_flight("target", self.trajectory.target(self.times_s()), 4)
 
     @cached_property
     def given_targets(self) -> FloatArray:
@@ -155,13 +156,21 @@ class Flight:
         targets = self.targets()
         given = np.empty((self.flights, len(targets), 6)).swapaxes(0, 1)
         given[..., :4] = targets
-        given[..., 4:] = self._for_each_flight(self.trajectory.acceleration(self.times_s()))
+        given[..., 4:] = self._for_each_flight(
+            "acceleration", self.trajectory.acceleration(self.times_s()), 2
+        )
         return given
 
-    def _for_each_flight(self, values: FloatArray) -> FloatArray:
-        """Return values of one trajectory (k, m), or of each (k, n, m), as (k, n, m)."""
-        if values.ndim == 2:
-            return np.broadcast_to(values[:, np.newaxis, :], (len(values), self.flights, values.shape[1]))
+    def _for_each_flight(self, method: str, values: FloatArray, columns: int) -> FloatArray:
+        """Return what a method of one trajectory gives (k, m), or of each (k, n, m), as (k, n, m)."""
+        values, k = as_numbers(f"trajectory.{method}()", values), len(self.times_s())
+        if values.shape == (k, columns):
+            return np.broadcast_to(values[:, np.newaxis, :], (k, self.flights, columns))
+        if values.ndim != 3 or (len(values), values.shape[2]) != (k, columns):
+            raise FlightError(
+                f"trajectory.{method}(): has shape {values.shape} for {k} times; "
+                f"it must be ({k}, {columns}), or ({k}, n, {columns}) for n flights"
+            )
         if values.shape[1] != self.flights:
             raise FlightError(f"flights = {self.flights} must be {values.shape[1]}, one for each trajectory")
         return values

@@ -20,6 +20,8 @@ ControllerName = Literal["nmpc", PdName, "reference"]
 EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""
 
+STARTS: Final[tuple[Start, ...]] = get_args(Start)
+SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
 PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"

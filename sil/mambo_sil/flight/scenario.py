@@ -40,6 +40,11 @@ from mambo_sil.flight.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 1
 LARGEST_FILE_BYTES: Final = 1_000_000
+LARGEST_SEED: Final = 2**63 - 1
+LARGEST_SIZE_M: Final = 1000.0
+LARGEST_RATE_RAD_S: Final = 100.0
+LONGEST_S: Final = 3600.0
+LARGEST_YAW_RAD: Final = 1000.0
 
 Two = tuple[float, float]
 Three = tuple[float, float, float]
@@ -68,13 +73,13 @@ class Scenario(_Record):
     vehicle: VehicleFile = NOMINAL
     """The drone: its inner loops and mixer are always those of its file."""
 
-    seed: int = Field(0, ge=0, lt=2**63)
+    seed: int = Field(0, ge=0, le=LARGEST_SEED)
     """Seed of sensor noise, gusts and dropped updates."""
 
     trajectory: CurveName = "bernoulli"
-    size_m: float = Field(2.0, ge=-1000.0, le=1000.0)
-    rate_rad_s: float = Field(0.5, ge=-100.0, le=100.0)
-    duration_s: float = Field(100.0, gt=0.0, le=3600.0)
+    size_m: float = Field(2.0, ge=-LARGEST_SIZE_M, le=LARGEST_SIZE_M)
+    rate_rad_s: float = Field(0.5, ge=-LARGEST_RATE_RAD_S, le=LARGEST_RATE_RAD_S)
+    duration_s: float = Field(100.0, gt=0.0, le=LONGEST_S)
 
     start: Start = "hover"
     start_offset_m: Three = (0.0, 0.0, 0.0)
@@ -83,7 +88,7 @@ class Scenario(_Record):
     """In the world frame."""
     start_tilt_rad: Two = (0.0, 0.0)
     """Roll and pitch."""
-    yaw_rad: float = Field(0.0, ge=-1000.0, le=1000.0)
+    yaw_rad: float = Field(0.0, ge=-LARGEST_YAW_RAD, le=LARGEST_YAW_RAD)
     yaw_rate_rad_s: float = 0.0
 
     mass_kg: float = Field(_AS_THE_VEHICLE, gt=0.0)
@@ -192,7 +197,7 @@ def choose_sensors(
     match drone.sensors:
         case MocapSensors() as figures if name == "mocap":
             return MotionCapture(figures, parameters.get("noise_scale", 1.0))
-        case MamboSensors() as figures if name != "mocap":
+        case MamboSensors() as figures if name in SENSORS_OF["mambo"]:
             return Sensors(figures=figures, derotated=name == "mambo-derotated", **parameters)
     raise FlightError(
         f"sensors = {spell(name)} must be {' or '.join(map(spell, SENSORS_OF[drone.sensors.kind]))}: "

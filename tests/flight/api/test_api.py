@@ -2,8 +2,10 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,14 +17,17 @@ from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_nmpc import (
+    ArgumentError,
     Controller,
     DroneState,
+    MamboNmpcError,
     TargetState,
     Vehicle,
     attitude_of_quaternion,
     command_in_frame,
     fly,
 )
+from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -43,7 +48,7 @@ AXES: dict[FrameName, NDArray[np.float64]] = {
 def test_the_examples_of_the_document_run() -> None:
     """One after another, as a reader types them; their assertions hold."""
     blocks = [block.partition("```")[0] for block in DOCUMENT.read_text("utf-8").split("```python\n")[1:]]
-    assert len(blocks) == 4
+    assert len(blocks) == 5
     names: dict[str, object] = {}
     for block in blocks:
         exec(compile(block, str(DOCUMENT), "exec"), names)
@@ -111,8 +116,123 @@ def test_wrong_shapes_are_refused_by_name() -> None:
         TargetState(np.zeros(3), np.zeros(2))
     with pytest.raises(ValueError, match="target: has 1 drones; the controller was made for 2"):
         Controller.from_preset("crazyflie", 2).step(LEVEL, TargetState(np.zeros(2), np.zeros(2)))
-    with pytest.raises(ValueError, match="n = 0 must be 1 or more"):
+    with pytest.raises(ValueError, match="n = 0 must be a whole number in 1"):
         Controller.from_preset("crazyflie", 0)
+
+
+class Moving:
+    """A trajectory of a program's own, whose arrays have given shapes."""
+
+    def __init__(self, target: tuple[int, ...], acceleration: tuple[int, ...]) -> None:
+        self._shapes = target, acceleration
+
+    def target(self, time_s: Any) -> Any:  # noqa: ARG002 - the same at all times
+        """Return zeros."""
+        return np.zeros(self._shapes[0])
+
+    def acceleration(self, time_s: Any) -> Any:  # noqa: ARG002 - the same at all times
+        """Return zeros."""
+        return np.zeros(self._shapes[1])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"sensors": "x"}, 'sensors = "x" must be "none" or "mambo" or "mambo-derotated" or "mocap"'),
+        ({"sensors": None}, "sensors = None must be"),
+        ({"sensors": "mocap"}, 'sensors = "mocap" must be "none" or "mambo"'),
+        ({"start": "landed"}, 'start = "landed" must be "hover" or "take-off"'),
+        (
+            {"trajectory": "eight"},
+            'trajectory = "eight" must be "bernoulli", "gerono", "lissajous", "circle"',
+        ),
+        ({"trajectory": None}, "trajectory = None must be"),
+        ({"trajectory": Circle}, "trajectory = .* or an object with the methods target and acceleration"),
+        ({"trajectory": Moving((101, 4), (2, 101))}, r"acceleration\(\): has shape \(2, 101\) for 101 times"),
+        ({"trajectory": Moving((101, 2, 4), (101, 2))}, "flights = 1 must be 2"),
+        *(({"size_m": value}, r"size_m = .* must lie in -1000\.\.1000") for value in (np.nan, 1e300)),
+        *(({"rate_rad_s": value}, r"rate_rad_s = .* must lie in -100\.\.100") for value in (np.nan, 1e300)),
+        *(({"duration_s": value}, r"duration_s = .* in 0\.\.3600") for value in (np.nan, -1.0, 1e300)),
+        ({"duration_s": 0.0}, "duration_s = 0 must be finite and at least"),
+        ({"size_m": "2"}, 'size_m = "2" must be numbers'),
+        ({"size_m": [1.0, 2.0]}, r"size_m: has shape \(2,\); it must be \(\)"),
+        ({"yaw_rad": [0.0, 0.1]}, r"yaw_rad: has shape \(2,\); it must be \(1,\)"),
+        ({"yaw_rad": np.nan}, "yaw_rad = nan must lie"),
+        *(
+            ({"seeds": value}, "seeds = .* must be whole numbers in 0")
+            for value in (3, (), (-1,), (0.5,), "1")
+        ),
+        ({"vehicle": replace(Vehicle(), motor_lag_s=np.zeros(3))}, r"motor_lag_s: has shape \(3,\)"),
+        ({"vehicle": "mambo"}, 'vehicle = "mambo" must be a Vehicle'),
+        ({"controller": "mambo"}, 'controller = "mambo" must be a Controller'),
+    ],
+)
+def test_a_wrong_argument_of_fly_is_refused_by_name(wrong: dict[str, Any], message: str) -> None:
+    """With its value and what is allowed; nothing else flies in its place."""
+    given: dict[str, Any] = {
+        "controller": Controller.from_preset("mambo"),
+        "vehicle": Vehicle(),
+        "duration_s": 1.0,
+    }
+    with pytest.raises(MamboNmpcError, match=message) as found:
+        fly(**(given | wrong))
+    assert isinstance(found.value, ArgumentError | FlightError)
+
+
+@pytest.mark.parametrize(
+    ("call", "arguments", "message"),
+    [
+        *((Vehicle, (MAMBO, lag), r"must lie in 0\.\.1") for lag in (-1.0, np.nan, 1e300)),
+        (Vehicle, (MAMBO, 0.0, np.array([0.1, np.nan])), r"drag_1_s = .* must lie in 0\.\.100"),
+        (Vehicle, (MAMBO, 0.0, 0.1, (0.5,)), r"wind_m_s2 = \(0\.5,\) must be a tuple of two"),
+        (Vehicle, (MAMBO, 0.0, 0.1, (0.0, 1e300)), r"wind_m_s2 along y = 1e\+300 must lie in -100\.\.100"),
+        (Vehicle, ("mambo",), 'airframe = "mambo" must be an Airframe; Vehicle.from_preset'),
+        (Vehicle.from_preset, (3,), "name = 3 must be one of crazyflie"),
+        (Vehicle.from_file, (None,), "path = None must be the path of a vehicle.toml"),
+        (Controller, ("mambo",), 'settings = "mambo" must be Settings; from_preset'),
+        (Controller, (ONE_NORM, 1.5), "n = 1.5 must be a whole number"),
+        (Controller, (ONE_NORM, True), "n = True must be a whole number"),
+        (Controller.from_preset, (None,), "name = None must be one of crazyflie"),
+        (Controller.from_file, (5,), "path = 5 must be the path of a controller.toml"),
+        (DroneState, (None, [0, 0], [0, 0, 0]), "position_m = None must be numbers"),
+        (DroneState, ([[0, 0], [1]], [0, 0], [0, 0, 0]), "position_m = .* must be numbers"),
+        (TargetState, ("ab", [0, 0]), 'position_m = "ab" must be numbers'),
+        (TargetState, ([1j, 0], [0, 0]), "position_m = .* must be numbers"),
+        (command_in_frame, ("ned", [0, 0]), 'frame = "ned" must be "NED" or "ENU" or "NWU"'),
+        (command_in_frame, ([0, 0], "NED"), r"frame = \[0, 0\] must be"),
+        (command_in_frame, ("ENU", 0.1), r"command_rad: has shape \(\); it must be \(\.\.\., 2\)"),
+        (TargetState.in_frame, ("FLU", [0, 0], [0, 0]), 'frame = "FLU"'),
+        (DroneState.in_frame, ("NWU", [0, 0, 0], [0], [0, 0, 0]), "velocity_m_s: has shape"),
+        (DroneState.in_frame, ("NWU", [0, 0], [0, 0], [0, 0]), "attitude_rad: has shape"),
+        *(
+            (attitude_of_quaternion, ([0.0, 0.0, 0.0, length],), "quaternion = .* must have length 1")
+            for length in (0.0, 0.9, 1.1, 2.0, 1e300)
+        ),
+    ],
+)
+def test_a_wrong_argument_is_refused_by_name(
+    call: Callable[..., object], arguments: tuple[Any, ...], message: str
+) -> None:
+    """By an ArgumentError, which is also a ValueError."""
+    with pytest.raises(ArgumentError, match=message) as found:
+        call(*arguments)
+    assert isinstance(found.value, MamboNmpcError)
+    assert isinstance(found.value, ValueError)
+
+
+def test_wrong_arguments_of_a_step_are_refused_by_name() -> None:
+    """State and target swapped, and arrays that would be spread over drones or axes."""
+    controller = Controller.from_preset("crazyflie", 2)
+    with pytest.raises(ArgumentError, match=r"state = .* must be a DroneState"):
+        controller.step(AHEAD, LEVEL)  # type: ignore[arg-type]
+    with pytest.raises(
+        ArgumentError, match=r"thrust_acceleration_m_s2: has shape \(3,\); it must be \(\) or"
+    ):
+        controller.step(LEVEL, AHEAD, [9.81, 9.81, 9.81])
+    with pytest.raises(ArgumentError, match=r"command_rad: has shape \(1,\); it must be \(2,\) or \(2, 2\)"):
+        controller.set_command([0.1])
+    with pytest.raises(ArgumentError, match="command_rad = None must be numbers"):
+        controller.reset(None)  # type: ignore[arg-type]
 
 
 def test_a_target_may_tell_its_acceleration() -> None:

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from mambo_sil.arguments import require, require_kind, require_per_flight
 from mambo_sil.drone.plant.airframe import MAMBO, NOMINAL, Airframe, airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.cascade import CascadeLoop
@@ -32,6 +33,10 @@ from mambo_sil.drone.vehicles.sections import CascadeAttitude, FirstOrderAttitud
 
 STEP_S: Final = NOMINAL.step_s
 """The Mambo's tick: integration step and period of its inner loops; motor commands are held over it."""
+
+LARGEST_LAG_S: Final = 1.0
+LARGEST_DRAG_1_S: Final = 100.0
+LARGEST_WIND_M_S2: Final = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +97,22 @@ class Vehicle:
     wind_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
     drone: VehicleFile = NOMINAL
 
+    def __post_init__(self) -> None:
+        """Raise ArgumentError for values outside the ranges of a vehicle.toml, and for other types."""
+        require_kind("airframe", self.airframe, Airframe, "an Airframe; Vehicle.from_preset makes a Vehicle")
+        require_kind("drone", self.drone, VehicleFile, "a VehicleFile")
+        pair = isinstance(self.wind_m_s2, tuple) and len(self.wind_m_s2) == 2
+        require(pair, "wind_m_s2", self.wind_m_s2, "be a tuple of two, along x and y")
+        self.require_flights(None)
+
+    def require_flights(self, flights: int | None) -> None:
+        """Raise ArgumentError unless every array has one value for each flight; None: any number of them."""
+        require_per_flight("motor_lag_s", self.motor_lag_s, 0.0, LARGEST_LAG_S, flights)
+        require_per_flight("drag_1_s", self.drag_1_s, 0.0, LARGEST_DRAG_1_S, flights)
+        for axis, wind_m_s2 in zip("xy", self.wind_m_s2, strict=True):
+            name = f"wind_m_s2 along {axis}"
+            require_per_flight(name, wind_m_s2, -LARGEST_WIND_M_S2, LARGEST_WIND_M_S2, flights)
+
     @classmethod
     def of(cls, drone: VehicleFile) -> "Vehicle":
         """Return a drone as it is described."""
@@ -99,7 +120,8 @@ class Vehicle:
 
     @classmethod
     def from_preset(cls, name: str) -> "Vehicle":
-        """Return a shipped drone; raises SourceNotFoundError."""
+        """Return a shipped drone; raises SourceNotFoundError, ArgumentError for what is no text."""
+        require_kind("name", name, str, f"one of {', '.join(presets.names())}")
         return cls.of(presets.preset(name))
 
     @classmethod
@@ -108,6 +130,7 @@ class Vehicle:
 
         Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
         """
+        require_kind("path", path, (str, Path), "the path of a vehicle.toml")
         return cls.of(presets.read(Path(path)))
 
     @cached_property

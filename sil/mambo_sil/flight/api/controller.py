@@ -1,7 +1,7 @@
 """Controllers for programs: the generated C of some settings, compiled for this machine, for n drones."""
 
 from pathlib import Path
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,26 +11,31 @@ from mambo_codegen.reference import ExactStep, Step
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
+from mambo_sil.arguments import is_whole, of_shape, require, require_kind
+from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.api.states import DroneState, TargetState
 from mambo_sil.flight.controllers.compiled import CompiledController
+
+LARGEST_N: Final = 1_000_000
 
 
 class Controller:
     """n independent controllers with the same settings; the first call of `step` needs no past.
 
     The C is generated and compiled when the controller is made, and cached; that needs a C compiler.
-    Raises BuildError and CacheError if it cannot be.
+    Raises BuildError and CacheError if it cannot be, ArgumentError for wrong arguments.
     """
 
     def __init__(self, settings: Settings, n: int = 1) -> None:
-        if n < 1:
-            raise ValueError(f"n = {n} must be 1 or more")
+        require_kind("settings", settings, Settings, "Settings; from_preset and from_file read them")
+        require(is_whole(n, 1, LARGEST_N), "n", n, f"be a whole number in 1..{LARGEST_N}")
         self.settings, self.n = settings, n
         self._compiled = CompiledController(settings, n)
 
     @classmethod
     def from_preset(cls, name: str, n: int = 1) -> Self:
         """Return controllers with the settings of a preset; raises SourceNotFoundError."""
+        require_kind("name", name, str, f"one of {', '.join(presets.names())}")
         return cls(presets.preset(name), n)
 
     @classmethod
@@ -39,6 +44,7 @@ class Controller:
 
         Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
         """
+        require_kind("path", path, (str, Path), "the path of a controller.toml")
         return cls(controller_toml.read(Path(path)), n)
 
     @property
@@ -60,25 +66,28 @@ class Controller:
         The result has `command_rad` (n, 2), roll and pitch, never beyond the tilt limit, and `status` (n,):
         0, or why an input was refused, such as NaN or a position out of range
         (`codegen.reference.Status`). A quadratic cost adds `saturated`, a 1-norm `cost` and `plan_rad`.
-        Raises ValueError for records of another number of drones, and for targets without acceleration where
-        the settings have `target.acceleration = "given"`.
+        Raises ArgumentError for records of another number of drones, for other shapes, and for targets
+        without acceleration where the settings have `target.acceleration = "given"`.
         """
+        require_kind("state", state, DroneState, "a DroneState")
+        require_kind("target", target, TargetState, "a TargetState")
         for name, record in (("state", state), ("target", target)):
             if len(record.position_m) != self.n:
-                raise ValueError(
+                raise ArgumentError(
                     f"{name}: has {len(record.position_m)} drones; the controller was made for {self.n}"
                 )
         aims = [target.position_m, target.velocity_m_s]
         if self.settings.target.acceleration == "given":
             if target.acceleration_m_s2 is None:
-                raise ValueError(
+                raise ArgumentError(
                     'target: acceleration_m_s2 is missing; the settings have target.acceleration = "given"'
                 )
             aims.append(target.acceleration_m_s2)
+        thrusts = of_shape("thrust_acceleration_m_s2", thrust_acceleration_m_s2, (), (self.n,))
         outcome: Step | ExactStep = self._compiled.step(
             np.concatenate([state.position_m, state.velocity_m_s, state.attitude_rad], axis=1),
             np.concatenate(aims, axis=1),
-            np.broadcast_to(np.asarray(thrust_acceleration_m_s2, np.float64), (self.n,)),
+            np.broadcast_to(thrusts, (self.n,)),
         )
         return outcome
 
@@ -92,14 +101,14 @@ class Controller:
     def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Tell that `command_rad`, (n, 2) or one pair for all, was sent in place of the last commands.
 
-        Returns a status (n,). Raises ValueError for a 1-norm, whose C has no such function.
+        Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no such function.
         """
         norm = self.settings.cost.norm
         if norm != "quadratic":
-            raise ValueError(
+            raise ArgumentError(
                 f'set_command needs cost.norm = "quadratic"; that of the controller is {spell(norm)}'
             )
         return self._compiled.set_command(self._commands(command_rad))
 
     def _commands(self, command_rad: ArrayLike) -> NDArray[np.float64]:
-        return np.broadcast_to(np.asarray(command_rad, np.float64), (self.n, 2))
+        return np.broadcast_to(of_shape("command_rad", command_rad, (2,), (self.n, 2)), (self.n, 2))

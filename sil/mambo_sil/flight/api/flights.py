@@ -1,11 +1,21 @@
 """Flights for programs: the closed loop of a controller's C and a simulated vehicle."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mambo_codegen.settings.key import spell
+from mambo_sil.arguments import (
+    is_whole,
+    require,
+    require_choice,
+    require_kind,
+    require_number,
+    require_per_flight,
+)
 from mambo_sil.drone.plant.arrays import PerFlight
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.api.controller import Controller
@@ -14,8 +24,15 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine import simulate
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import Metrics, measure
-from mambo_sil.flight.names import CurveName, SensorsName, Start
-from mambo_sil.flight.scenario import choose_sensors
+from mambo_sil.flight.names import SENSORS_NAMES, STARTS, CurveName, SensorsName, Start
+from mambo_sil.flight.scenario import (
+    LARGEST_RATE_RAD_S,
+    LARGEST_SEED,
+    LARGEST_SIZE_M,
+    LARGEST_YAW_RAD,
+    LONGEST_S,
+    choose_sensors,
+)
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Trajectory
 
@@ -56,18 +73,48 @@ def fly(
     seeds:      of sensor noise, one for each of n flights.
     start:      hovering at the first point, or on the ground 5 s earlier ("take-off").
 
-    Raises FlightError if these do not fit together.
+    Raises ArgumentError for a wrong argument, FlightError if they do not fit together.
     """
+    require_kind("controller", controller, Controller, "a Controller")
+    require_kind("vehicle", vehicle, Vehicle, "a Vehicle")
+    require_number("size_m", size_m, -LARGEST_SIZE_M, LARGEST_SIZE_M)
+    require_number("rate_rad_s", rate_rad_s, -LARGEST_RATE_RAD_S, LARGEST_RATE_RAD_S)
+    require_number("duration_s", duration_s, 0.0, LONGEST_S)
+    require_choice("sensors", sensors, SENSORS_NAMES)
+    require_choice("start", start, STARTS)
+    given = _as_seeds(seeds)
+    require_per_flight("yaw_rad", yaw_rad, -LARGEST_YAW_RAD, LARGEST_YAW_RAD, len(given))
+    vehicle.require_flights(len(given))
     flight = Flight(
-        CURVES[trajectory](size_m, rate_rad_s) if isinstance(trajectory, str) else trajectory,
+        _curve(trajectory, size_m, rate_rad_s),
         duration_s=duration_s,
-        flights=len(seeds),
+        flights=len(given),
         start=start,
         yaw_rad=yaw_rad,
         vehicle=vehicle,
         update_period_s=controller.update_period_s,
-        seeds=tuple(seeds),
+        seeds=given,
         sensors=choose_sensors(sensors, vehicle.drone),
     )
     trace = simulate.fly(flight, CompiledController(controller.settings, flight.flights))
     return Flown(trace, measure(trace), detect_crashes(trace, vehicle.drone))
+
+
+def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:
+    """Return the curve called `trajectory`, or `trajectory` itself; raises ArgumentError for others."""
+    for name, curve in CURVES.items():
+        if isinstance(trajectory, str) and trajectory == name:
+            return curve(size_m, rate_rad_s)
+    methods = (getattr(trajectory, name, None) for name in ("target", "acceleration"))
+    flown = not isinstance(trajectory, type) and all(map(callable, methods))
+    rule = f"be {', '.join(map(spell, CURVES))} or an object with the methods target and acceleration"
+    require(flown, "trajectory", trajectory, rule)
+    return cast("Trajectory", trajectory)
+
+
+def _as_seeds(seeds: object) -> tuple[int, ...]:
+    """Return the seeds of the flights; raises ArgumentError."""
+    given = tuple(seeds) if isinstance(seeds, Iterable) else ()
+    good = len(given) > 0 and all(is_whole(seed, 0, LARGEST_SEED) for seed in given)
+    require(good, "seeds", seeds, f"be whole numbers in 0..{LARGEST_SEED}, one or more in a sequence")
+    return tuple(map(int, given))

@@ -6,7 +6,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 
 
@@ -14,7 +16,7 @@ from mambo_sil.flight.api.frames import FrameName, attitude_to_ned, horizontal_t
 class DroneState:
     """The states of n drones; for one drone the arrays may be (2,), (2,) and (3,).
 
-    Raises ValueError, which names the array, for other shapes.
+    Raises ArgumentError, which names the array, for other shapes and for what is no number.
     """
 
     position_m: FloatArray
@@ -37,8 +39,8 @@ class DroneState:
         Vectors are (n, 2) or (n, 3), of which z is left out, angles (n, 3).
         """
         return cls(
-            horizontal_to_ned(frame, position_m),
-            horizontal_to_ned(frame, velocity_m_s),
+            horizontal_to_ned(frame, position_m, "position_m"),
+            horizontal_to_ned(frame, velocity_m_s, "velocity_m_s"),
             attitude_to_ned(frame, attitude_rad),
         )
 
@@ -47,7 +49,7 @@ class DroneState:
 class TargetState:
     """Where n drones shall be now; for one drone the arrays may be (2,).
 
-    Raises ValueError, which names the array, for other shapes.
+    Raises ArgumentError, which names the array, for other shapes and for what is no number.
     """
 
     position_m: FloatArray
@@ -77,19 +79,21 @@ class TargetState:
     ) -> Self:
         """Return targets whose vectors (n, 2) or (n, 3) are in another frame."""
         return cls(
-            horizontal_to_ned(frame, position_m),
-            horizontal_to_ned(frame, velocity_m_s),
-            None if acceleration_m_s2 is None else horizontal_to_ned(frame, acceleration_m_s2),
+            horizontal_to_ned(frame, position_m, "position_m"),
+            horizontal_to_ned(frame, velocity_m_s, "velocity_m_s"),
+            None
+            if acceleration_m_s2 is None
+            else horizontal_to_ned(frame, acceleration_m_s2, "acceleration_m_s2"),
         )
 
 
 def _fill(record: Any, fields: dict[str, ArrayLike], columns: dict[str, int]) -> None:
-    """Set the fields of a record to arrays (n, columns); raises ValueError unless all have the same n."""
+    """Set the fields of a record to arrays (n, columns); raises ArgumentError unless all have the same n."""
     n = None
     for name, values in fields.items():
-        array = np.atleast_2d(np.asarray(values, np.float64))
+        array = np.atleast_2d(as_numbers(name, values))
         n = len(array) if n is None else n
         if array.shape != (n, columns[name]):
             given = np.shape(values)
-            raise ValueError(f"{name}: has shape {given}; it must be ({n}, {columns[name]})")
+            raise ArgumentError(f"{name}: has shape {given}; it must be ({n}, {columns[name]})")
         object.__setattr__(record, name, array)
