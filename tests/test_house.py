@@ -19,7 +19,7 @@ EXACT_ROOMS = ("drone", "flight", "board.pil", *(f"experiment.{name}" for name i
 ROUNDED = {
     "mambo_sil.flight.animation",
     "mambo_sil.flight.api.frames",
-    "mambo_sil.experiment.faults.faults_section",
+    "mambo_sil.experiment.faults.faults_report",
 }
 # NumPy and math have these with other bits on other processors.
 INEXACT = {

@@ -14,12 +14,15 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint
-from mambo_sil.board.footprint.sweep import Point, SweepSummary, budgets
+from mambo_sil.board.footprint.sweep import Point, budgets
+from mambo_sil.board.footprint.sweep_report import SweepSummary
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn, WorstFlight
 from mambo_sil.experiment.campaign.statistics import Distributions, Improvement, Proportion
-from mambo_sil.experiment.faults.fault_flights import End, FaultsSummary, Verdict
-from mambo_sil.experiment.regress.regress_report import Check, FlightResult, RegressSummary
+from mambo_sil.experiment.faults.fault_flights import End, Verdict
+from mambo_sil.experiment.faults.faults_report import FaultsSummary
+from mambo_sil.experiment.regress.limits import Check, FlightResult
+from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedRow, SensedSummary
 from mambo_sil.experiment.table2.table2 import CASES, Claim, Table2Row, Table2Summary
 from mambo_sil.flight import flight_report
@@ -30,9 +33,8 @@ from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD, PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace, write_npz
-from mambo_sil.model.identify.identify import Curves
+from mambo_sil.model.identify.curves import Curves, curves_csv
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
-from mambo_sil.model.identify.identify_report import curves_csv
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, FirstOrder, Interval
 from mambo_sil.verify import verify_report

@@ -23,8 +23,8 @@ def faults(
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.drone.vehicles import presets
     from mambo_sil.errors import FlightError
-    from mambo_sil.experiment.faults.fault_flights import End, FaultsSummary, fly_faults
-    from mambo_sil.experiment.faults.faults_report import table, write_csv
+    from mambo_sil.experiment.faults.fault_flights import End, fly_faults
+    from mambo_sil.experiment.faults.faults_report import FaultsSummary, table, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
     from mambo_sil.results.folders import new_results
 

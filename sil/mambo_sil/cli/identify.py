@@ -47,11 +47,12 @@ def identify(
         raise typer.BadParameter("name a flight log, or --manoeuvre FILE", param_hint="LOG...")
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.model.identify.columns import parse_columns
+    from mambo_sil.model.identify.curves import curves_csv
     from mambo_sil.model.identify.identify import identify as fit
     from mambo_sil.model.identify.identify import read_logs
     from mambo_sil.model.identify.identify_plots import draw_fit
     from mambo_sil.model.identify.identify_record import CURVES, MODEL, PICTURES, VEHICLE, IdentifySummary
-    from mambo_sil.model.identify.identify_report import curves_csv, identify_text, model_text, vehicle_text
+    from mambo_sil.model.identify.identify_report import identify_text, model_text, vehicle_text
     from mambo_sil.results.folders import SUMMARY, new_results
 
     chosen = parse_columns(columns)
@@ -62,7 +63,7 @@ def identify(
         bar.stage("drawing")
         with new_results(output, IdentifySummary.command, (CURVES, *PICTURES, MODEL, VEHICLE)) as folder:
             (folder / CURVES).write_text(curves_csv(curves), "utf-8")
-            draw_fit(folder / CURVES, summary, folder / "fit")
+            draw_fit(folder / CURVES, summary.split_s, summary.verdicts, folder / "fit")
             if summary.good:
                 (folder / MODEL).write_text(model_text(summary), "utf-8")
                 (folder / VEHICLE).write_text(vehicle_text(summary), "utf-8")

@@ -41,14 +41,14 @@ def regress(
         read_baseline,
         record_baseline,
     )
-    from mambo_sil.experiment.regress.junit import junit_xml
+    from mambo_sil.experiment.regress.limits import RECORDS
     from mambo_sil.experiment.regress.regress_plots import draw_regress
     from mambo_sil.experiment.regress.regress_report import (
         JUNIT,
         PICTURES,
-        RECORDS,
         RegressSummary,
         judge,
+        junit_xml,
         regress_text,
         write_records,
     )
@@ -68,7 +68,7 @@ def regress(
         summary = judge(chosen, entrant, rows, baseline, path)
         write_records(summary, chosen, entrant, rows, folder)
         (folder / JUNIT).write_bytes(junit_xml(summary))
-        draw_regress(summary, folder / "regress")
+        draw_regress(summary.flights, folder / "regress")
         summary = summary.model_copy(update={"files": digests(folder)})
         summary.write(folder)
     show(summary, regress_text(summary, str(output)), as_json=as_json)

@@ -28,7 +28,7 @@ def replay(
 ) -> None:
     """Compare the commands in a log with those of the compiled controller; exit 1 if it is not what flew."""
     from mambo_sil.model.identify.columns import parse_columns
-    from mambo_sil.model.replay.log_replay import SIGNALS, replay_log
+    from mambo_sil.model.replay.log_replay import SIGNALS, replay_log, write_curves
     from mambo_sil.model.replay.replay_plots import draw_replay
     from mambo_sil.model.replay.replay_report import (
         CURVES,
@@ -36,7 +36,6 @@ def replay(
         LogReplaySummary,
         replay_text,
         summarise,
-        write_curves,
     )
     from mambo_sil.results.folders import SUMMARY, new_results
 

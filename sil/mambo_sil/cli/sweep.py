@@ -35,15 +35,8 @@ def sweep(
 ) -> None:
     """Measure footprint and tracking error over a grid of horizons and iterations."""
     from mambo_codegen import boards
-    from mambo_sil.board.footprint.sweep import (
-        Grid,
-        SweepSummary,
-        budgets,
-        closest_fit,
-        measure_grid,
-        point_text,
-        write_points,
-    )
+    from mambo_sil.board.footprint.sweep import Grid, budgets, measure_grid
+    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.drone.vehicles import presets
     from mambo_sil.experiment.campaign.executors import processes

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mambo_sil.flight.animation import animate
 from mambo_sil.flight.metrics import horizontal_error_m
 from mambo_sil.flight.traces import Trace
 from mambo_sil.results.pictures import inline, save
@@ -58,6 +59,14 @@ def _label_column(column: NDArray[Any]) -> None:
         axes.set_ylabel(label)
     for axes in (column[0], column[2]):
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
+
+
+def page_pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
+    """Return animation and pictures of flights for a page, if there are any flights."""
+    return {
+        "animation": animate(flights) if flights else None,
+        "columns": flight_columns(flights) if flights else [],
+    }
 
 
 def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:

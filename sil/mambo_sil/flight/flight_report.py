@@ -1,6 +1,7 @@
-"""The summary of a flight as a record and as text."""
+"""The summary of a flight as a record, as text and as a section of the report."""
 
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,15 +14,16 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.model import VehicleFile
 from mambo_sil.flight.crashes import Crash, first_crash
 from mambo_sil.flight.metrics import TRANSIENT_S, Metrics, measure
+from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
-from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.flight.traces import SensedTrace, Trace, read_existing
+from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 _UNITS = {"_m2_s2": "m^2 s^2", "_m2_s": "m^2 s", "_m_s2": "m s^2", "_m_s": "m s", "_rad_s": "rad s"}
 _UNITS |= {"_rad": "rad", "_m": "m"}
 
 
-class FlightSummary(Summary):
+class FlightSummary(ReportedSummary):
     """The results of any flight."""
 
     controller: str
@@ -53,6 +55,35 @@ class FlightSummary(Summary):
         controlled = not self.lost and self.crash is None and not self.mostly_refused
         return controlled and self.same_bits_as_host is not False
 
+    def _section(
+        self, folder: Path, names: tuple[str, str], facts: dict[str, str], bad: list[str]
+    ) -> Section:
+        """Return the section of the report; `names` has those of drone and section, `bad` what is wrong."""
+        from mambo_sil.flight.flight_plots import page_pictures  # noqa: PLC0415 - loaded when drawing
+
+        flights, missing = read_existing(folder, {names[0]: "trace.npz"})
+        if self.crash is not None:
+            bad = [*bad, f"the drone crashed at {self.crash.time_s:.2f} s: {self.crash.how}"]
+        if self.lost:
+            bad = [*bad, "the drone was lost before the end of the flight"]
+        elif self.mostly_refused:
+            bad = [*bad, "the controller refused more than half of its inputs"]
+        columns = self.columns
+        tracked = {"rms error": self.metrics.get("rms_error_m"), "largest": self.metrics.get("max_error_m")}
+        content = {
+            "facts": facts,
+            "refusals": self.refusals,
+            "titles": list(columns),
+            "metrics": [
+                (*named(key), [values.get(key) for values in columns.values()]) for key in self.metrics
+            ],
+            **page_pictures(flights),
+        }
+        finding = "; ".join(bad) or ", ".join(
+            f"{words} {value:.3g} m" for words, value in tracked.items() if value
+        )
+        return Section("fly", names[1], not bad, finding, content, missing, moves=bool(flights))
+
     @model_serializer(mode="wrap")
     def _without_missing_columns(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
         optional = ("metrics_without_transient", "metrics_as_seen")
@@ -81,6 +112,29 @@ class FlySummary(FlightSummary):
     start: str
     duration_s: float
 
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report on this flight; raises TraceError."""
+        facts, bad = {}, []
+        if self.board is not None:
+            bits = ", bit for bit as on the host" if self.same_bits_as_host else ""
+            facts["flown on"] = f"the emulated core of {self.board}{bits}"
+            if self.same_bits_as_host is False:
+                bad = [f"the trace of {self.board} differs from that of the host"]
+        return self._flown_section(folder, facts, bad)
+
+    def _flown_section(self, folder: Path, facts: dict[str, str], bad: list[str]) -> Section:
+        """Return the section with the parameters of the flight, further facts and what is wrong."""
+        name = PD_TITLES.get(self.controller, f"NMPC, {self.source}")
+        parameters = {
+            **_course(self),
+            "controller": _controller(self.controller, f"{self.settings[:16]} of {self.source}"),
+            "start": f"{self.start}, heading {self.yaw_rad:g} rad",
+            "disturbances": "steady acceleration {:g}, {:g} m/s²".format(*self.wind_m_s2)
+            + f"; wind with gusts {self.wind_speed_m_s:g} m/s; motor lag {self.motor_lag_s:g} s",
+        }
+        titles = (name, f"Flight: {name}, {self.trajectory}")
+        return self._section(folder, titles, parameters | facts, bad)
+
 
 class ReplaySummary(FlightSummary):
     """The results of repeating a recorded flight."""
@@ -95,6 +149,32 @@ class ReplaySummary(FlightSummary):
     def good(self) -> bool:
         """Whether the drone stayed under control, and the flight equals the recorded one in every bit."""
         return super().good and self.same_bits_as_recorded is not False
+
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report on this flight; raises TraceError."""
+        name = PD_TITLES.get(self.controller, "NMPC")
+        facts = {
+            "record": self.replay,
+            **_course(self.scenario),
+            "controller": _controller(self.controller, self.settings[:16]),
+            "seed": str(self.scenario.seed),
+        }
+        bad = ["the trace differs from the recorded one"] if self.same_bits_as_recorded is False else []
+        return self._section(folder, (name, f"Replay: {name}, {self.replay}"), facts, bad)
+
+
+def _controller(name: str, settings: str) -> str:
+    """Return the controller's name, with its settings if it has any: a PD has none."""
+    return name if name in PD_TITLES else f"{name}, settings {settings}"
+
+
+def _course(flown: FlySummary | Scenario) -> dict[str, str]:
+    shape = "" if flown.trajectory.endswith(".csv") else f", {flown.size_m:g} m, {flown.rate_rad_s:g} rad/s"
+    return {
+        "vehicle": flown.vehicle.name,
+        "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",
+        "state": "true" if flown.sensors == "none" else f"estimated, sensors {flown.sensors}",
+    }
 
 
 def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:

@@ -1,9 +1,11 @@
-"""The base of the record of a command: printed, written as the summary of its result folder, read back."""
+"""The base of the record of a command: printed, written as the summary of its result folder, reported."""
 
 import json
 import math
+from abc import abstractmethod
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
@@ -30,3 +32,34 @@ class Summary(BaseModel):
     def write(self, folder: Path) -> None:
         """Write the summary of a result folder."""
         (folder / SUMMARY).write_text(self.text(), "utf-8")
+
+
+@dataclass(frozen=True)
+class Section:
+    """The part of a page of the report on one result folder.
+
+    template: name of a template in the folder report, without `_` and `.html.j2`; `content` is its context.
+    good:     whether the result is good; None if there is no verdict.
+    finding:  the result in one line.
+    missing:  files missing in the folder, whose content the section would show.
+    moves:    whether the section has an animation, which needs the page's script.
+    """
+
+    template: str
+    title: str
+    good: bool | None
+    finding: str
+    content: Any
+    missing: list[str] = field(default_factory=list)
+    moves: bool = False
+
+
+class ReportedSummary(Summary):
+    """A summary in a result folder that the command `report` reads."""
+
+    @abstractmethod
+    def section(self, folder: Path, /) -> Section:
+        """Return the section of the report on the result in `folder`; raises ResultsError and TraceError.
+
+        The results may be incomplete: files other than the summary may be missing.
+        """

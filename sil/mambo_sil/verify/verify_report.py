@@ -1,8 +1,9 @@
-"""The results of a verification as a record, as text and as an HTML page."""
+"""The results of a verification as a record, as text, as an HTML page and as a section of the report."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from pydantic import Field
@@ -10,7 +11,7 @@ from pydantic import Field
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import Summary
+from mambo_sil.results.summary import ReportedSummary, Section
 from mambo_sil.verify.check import CheckOutcome
 from mambo_sil.verify.checks import CHECKS
 
@@ -29,7 +30,7 @@ class Verified:
     tools: Mapping[str, str]
 
 
-class VerifySummary(Summary):
+class VerifySummary(ReportedSummary):
     """The results of `verify`; `files` has the SHA-256 of every file in the folder."""
 
     command = "verify"
@@ -43,6 +44,14 @@ class VerifySummary(Summary):
     tools: dict[str, str]
     settings: str
     files: dict[str, str] = Field(default_factory=dict)
+
+    def section(self, _folder: Path) -> Section:
+        """Return the section of the report on this verification."""
+        passed = sum(check.outcome is CheckOutcome.PASSED for check in self.checks)
+        finding = f"{self.verdict}: {passed} of {len(self.checks)} checks passed"
+        finding += f"; not run: {', '.join(self.not_run)}" if self.not_run else ""
+        title = f"Verification of {self.source}"
+        return Section("verify", title, self.verdict is CheckOutcome.PASSED, finding, self)
 
 
 def verdict(found: Sequence[Verified]) -> CheckOutcome:

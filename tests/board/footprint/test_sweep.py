@@ -14,7 +14,8 @@ from mambo_codegen.boards import Board
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.footprint.footprint_plots import draw_sweep
-from mambo_sil.board.footprint.sweep import Grid, Point, closest_fit, measure_grid, write_points
+from mambo_sil.board.footprint.sweep import Grid, Point, measure_grid
+from mambo_sil.board.footprint.sweep_report import closest_fit, write_points
 from mambo_sil.experiment.campaign.executors import processes
 from tests.support.command import run
 from tests.support.one_norm import ONE_NORM

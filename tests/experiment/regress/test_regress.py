@@ -18,14 +18,14 @@ from mambo_sil.experiment.regress.baseline import (
     read_baseline,
     record_baseline,
 )
-from mambo_sil.experiment.regress.junit import junit_xml
+from mambo_sil.experiment.regress.limits import RECORDS
 from mambo_sil.experiment.regress.regress_plots import _rows, _shares, draw_regress
 from mambo_sil.experiment.regress.regress_report import (
     MOST_SHOWN,
-    RECORDS,
     RegressSummary,
     group_rows,
     judge,
+    junit_xml,
     regress_text,
     write_records,
 )
@@ -423,7 +423,7 @@ def test_a_picture_of_many_groups_has_the_rows_closest_to_their_limits(tmp_path:
     path.write_text("\n".join(groups), "utf-8")
     found = load_suite(str(path))
     rows = [row(number / 100) for number in range(200)]
-    png, svg = draw_regress(judge(found, mambo(), rows, None, path), tmp_path / "many")
+    png, svg = draw_regress(judge(found, mambo(), rows, None, path).flights, tmp_path / "many")
     assert png.read_bytes().startswith(b"\x89PNG")
     drawn = svg.read_text("utf-8")
     assert "group-199: iae_m_s" in drawn
@@ -436,7 +436,7 @@ def test_a_suite_without_bounds_has_a_picture_without_rows(tmp_path: Path) -> No
     path.write_text("[baseline]\n[flights.free]\nduration_s = 10.0\n", "utf-8")
     found = load_suite(str(path))
     summary = judge(found, mambo(), [row(1.0)], None, tmp_path / "none")
-    _, svg = draw_regress(summary, tmp_path / "free")
+    _, svg = draw_regress(summary.flights, tmp_path / "free")
     assert "holds: 0" in svg.read_text("utf-8")
 
 
@@ -446,10 +446,10 @@ def test_the_picture_shows_shares_of_limits_within_its_edges(tmp_path: Path) -> 
         tmp_path, more="[flights.calm]\nseed = [1, 2]\nbounds = { refused_updates = 0, ise_m2_s = 4 }"
     )
     rows = [row(1.5), row(1e-9), row(math.nan), row(1.0), row(1.0, ise_m2_s=1e9)]
-    shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows)).items()}
+    shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows).flights).items()}
     assert shares == {"eight: iae_m_s": [0.5, 0.01, 100.0], "calm: ise_m2_s": [0.25, 100.0]}
     rows[3] = row(1.0, refused_updates=1, crashed=1)
-    shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows)).items()}
+    shares = {name: _shares(checks) for name, checks in _rows(judged(found, rows).flights).items()}
     assert shares["calm: refused_updates"] == shares["calm: crashed"] == [100.0]
 
 

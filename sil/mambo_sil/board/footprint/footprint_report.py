@@ -1,8 +1,9 @@
-"""Footprints as a record, as text and as a page: the same figures, three times."""
+"""Footprints as a record, as text, as a page and as a section of the report."""
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from pathlib import Path
 
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.gate import Forbidden
@@ -12,7 +13,7 @@ from mambo_sil.board.footprint.counts import InstructionCounts
 from mambo_sil.board.footprint.measure import Footprint, Limit
 from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import Summary
+from mambo_sil.results.summary import ReportedSummary, Section
 
 _HEAD = (
     "board",
@@ -90,7 +91,7 @@ class BoardFootprint:
         ]
 
 
-class FootprintSummary(Summary):
+class FootprintSummary(ReportedSummary):
     """Footprints on boards."""
 
     command = "footprint"
@@ -100,6 +101,17 @@ class FootprintSummary(Summary):
     scalar: str
     optimisation: str
     boards: list[BoardFootprint]
+
+    def section(self, _folder: Path) -> Section:
+        """Return the section of the report on these footprints."""
+        fits = sum(board.fits for board in self.boards)
+        finding = f"fits {fits} of {len(self.boards)} boards"
+        measured = [board.on_board for board in self.boards if board.on_board is not None]
+        different = [one.board_says for one in measured if one.different_steps]
+        if different:
+            finding += f"; other bits on {different[0]}"
+        good = fits == len(self.boards) and not different
+        return Section("footprint", f"Footprint of {self.source}", good, finding, self)
 
 
 def summarise(footprints: Sequence[Footprint], source: str, settings: Settings) -> FootprintSummary:

@@ -1,11 +1,9 @@
 """Sweep horizons and iterations: footprint on a board, and tracking of the Table II case."""
 
-import csv
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any, Final
 
 from mambo_codegen.boards import Board
@@ -21,7 +19,7 @@ from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import EngineName
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number
 
 COUNTED_TICKS: Final = 60
 
@@ -62,20 +60,6 @@ class Point:
     fits: bool
 
 
-class SweepSummary(Summary):
-    """A grid of horizons and iterations; `budget` is what `budgets` returns."""
-
-    command = "sweep"
-
-    source: str
-    settings: str
-    board: str
-    vehicle: VehicleFile = NOMINAL
-    budget: dict[str, Number]
-    points: list[Point]
-    closest_fit: Point | None
-
-
 def measure_grid(
     settings: Settings,
     board: Board,
@@ -113,20 +97,6 @@ def budgets(board: Board, update_period_s: float) -> dict[str, float]:
     }
 
 
-def closest_fit(points: Sequence[Point]) -> Point | None:
-    """Return the fitting point that is not lost with the least IAE, of equal ones the shortest horizons."""
-    fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
-    return min(fitting, key=lambda p: (p.iae_m_s, p.prediction, p.control, p.iterations), default=None)
-
-
-def write_points(points: Sequence[Point], path: Path) -> None:
-    """Write a CSV file with one line for each point."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(point) for point in points)
-
-
 def _measure_point(
     job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int], engine: EngineName
 ) -> Point:
@@ -152,14 +122,4 @@ def _measure_point(
         time_ms=math.nan if footprint.time_s is None else 1000 * footprint.time_s[1],
         iae_m_s=float(metrics.iae_m_s[0]),
         fits=footprint.fits and footprint.complete,
-    )
-
-
-def point_text(point: Point) -> str:
-    """Spell a point in a line."""
-    return (
-        f"prediction {point.prediction:2}  control {point.control:2}  iterations {point.iterations:3}  "
-        f"flash {point.flash_bytes} B  RAM {point.ram_bytes} B  stack {point.stack_bytes:g} B  "
-        f"instructions {point.instructions:g}  IAE {point.iae_m_s:.4g} m s  "
-        f"{'fits' if point.fits else 'not shown to fit'}"
     )

@@ -1,7 +1,8 @@
-"""The summary of a flight with the controller on a board, as a record and as text."""
+"""The summary of a flight with the controller on a board: record, text and section of the report."""
 
 import statistics
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final, Self
 
 from pydantic import BaseModel, ConfigDict
@@ -11,6 +12,7 @@ from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.timed import Arrival, TimedController
 from mambo_sil.flight.flight_report import FlySummary, flight_text
+from mambo_sil.results.summary import Section
 
 CLOCK_TOLERANCE: Final = 0.01
 """Share by which the clocks of board and desk may differ: a ceramic resonator is half as bad."""
@@ -93,6 +95,24 @@ class BoardFlightSummary(FlySummary):
     link_faults: dict[str, int]
     """On the link: damaged, repeated, reconnected, restarts; in real time damaged and doubled."""
     real_time: RealTime | None = None
+
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report on this flight; raises TraceError."""
+        found, cycles, trip = difference(self), self.cycles, self.round_trip_s
+        facts = {
+            "flown on": f"{self.board_says}, {self.port}"
+            + (", bit for bit as on this machine" if found is None else ""),
+            "cycles of a step": f"{cycles.least:.0f} / {cycles.median:.0f} / {cycles.most:.0f} "
+            f"(least, median, most) at {self.clock_hz / 1e6:g} MHz",
+            "stack of a step": f"{self.stack_bytes} B",
+            "link": link_text(self)
+            + ("" if trip is None else f"; request to reply {1e3 * trip.median:.3g} ms (median)"),
+        }
+        if self.emulated is not None:
+            facts["emulated"] = emulated_text(self)
+        if self.real_time is not None:
+            facts["real time"] = "; ".join(real_time_text(self.real_time, self.steps))
+        return self._flown_section(folder, facts, [] if found is None else [found])
 
 
 def board_fields(board: Connection, controller: BoardController | TimedController) -> dict[str, object]:

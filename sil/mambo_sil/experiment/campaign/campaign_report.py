@@ -1,9 +1,9 @@
-"""Results of a campaign: summary, text and records for replay."""
+"""Results of a campaign: summary, text, section of the report, and records for replay."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pydantic import BaseModel
 
@@ -23,10 +23,12 @@ from mambo_sil.experiment.campaign.statistics import (
 )
 from mambo_sil.experiment.campaign.store import TABLE, FlightStore, convert_os_errors
 from mambo_sil.experiment.campaign.table import FLIGHT
+from mambo_sil.flight.flight_report import named
+from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.numbers import digits
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 RECORDS: Final = "flights"
 PICTURE: Final = "campaign"
@@ -49,6 +51,11 @@ class Drawn(BaseModel, extra="allow", frozen=True):
     flight: FlightSection
     controllers: list[NamedController]
 
+    @property
+    def title(self) -> str:
+        """The title of the campaign's section of the report."""
+        return f"Campaign, {self.flight.trajectory.text()}"
+
 
 @dataclass(frozen=True)
 class WorstFlight:
@@ -61,7 +68,7 @@ class WorstFlight:
     record: str
 
 
-class CampaignSummary(Summary):
+class CampaignSummary(ReportedSummary):
     """A finished campaign."""
 
     command = "campaign"
@@ -72,11 +79,54 @@ class CampaignSummary(Summary):
     improvements: list[Improvement]
     worst: dict[str, list[WorstFlight]]
 
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report; raises ResultsError for a table that cannot be read."""
+        found = self.controllers
+        content = {
+            **_content(folder, self.campaign, _flights(folder)),
+            "summary": self,
+            "indices": {
+                name: [(*named(index), values) for index, values in one.quantiles.items()]
+                for name, one in found.items()
+            },
+            "improvements": [(named(one.index)[0], one) for one in self.improvements],
+        }
+        crashes = ", ".join(f"{one.crashed.count} with {name}" for name, one in found.items())
+        finding = f"{self.flights} flights; crashed: {crashes}"
+        good = all(one.crashed.count == 0 for name, one in found.items() if name not in PD_TITLES)
+        return Section("campaign", self.campaign.title, good, finding, content, _missing(folder))
 
-class UnfinishedCampaign(Drawn, Summary):
+
+class UnfinishedCampaign(Drawn, ReportedSummary):
     """The summary of a campaign that is not finished."""
 
     command = "campaign"
+
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report; raises ResultsError for a table that cannot be read."""
+        flights = _flights(folder)
+        so_far = len(next(iter(flights.values()), ()))
+        finding = f"not finished, {so_far} flights so far; the same command resumes it"
+        nothing: dict[str, Any] = {"summary": None, "indices": {}, "improvements": []}
+        content = _content(folder, self, flights) | nothing
+        return Section("campaign", self.title, None, finding, content, _missing(folder))
+
+
+def _missing(folder: Path) -> list[str]:
+    return [] if (folder / TABLE).is_file() else [TABLE]
+
+
+def _flights(folder: Path) -> Table:
+    """Read the flights in `folder`, none if there is no table; raises ResultsError."""
+    return {} if _missing(folder) else read_table(folder / TABLE)
+
+
+def _content(folder: Path, drawn: Drawn, flights: Table) -> dict[str, Any]:
+    """Return what the page shows of every campaign: its parameters, and pictures of its flights."""
+    from mambo_sil.experiment.campaign.campaign_plots import distribution_panels  # noqa: PLC0415 - loaded when drawing
+
+    pictures = distribution_panels(flights, [controller.name for controller in drawn.controllers])
+    return {"drawn": drawn, "folder": str(folder), "pictures": pictures}
 
 
 def summarise(campaign: Campaign, table: Table) -> CampaignSummary:

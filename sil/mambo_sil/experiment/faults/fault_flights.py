@@ -34,7 +34,7 @@ from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, saturated_
 from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Hover, Trajectories, Trajectory
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number
 
 DURATION_S: Final = 100.0
 ONSETS_S: Final = (20.0, 23.1, 26.3, 29.4)
@@ -96,17 +96,6 @@ class Verdict:
     saturated_share: Number
     recovery_s: Number
     end: End
-
-
-class FaultsSummary(Summary):
-    """Flights with faults."""
-
-    command = "faults"
-
-    source: str
-    settings: str
-    vehicle: VehicleFile = NOMINAL
-    flights: list[Verdict]
 
 
 @dataclass(frozen=True, eq=False)

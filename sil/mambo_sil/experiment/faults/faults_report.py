@@ -1,4 +1,4 @@
-"""Verdicts on flights with faults as Markdown table and CSV."""
+"""Verdicts on flights with faults as a record, as Markdown table, as CSV and as a section of the report."""
 
 import csv
 import math
@@ -7,7 +7,47 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Final
 
-from mambo_sil.experiment.faults.fault_flights import COURSES, ORDER, Verdict, all_statuses
+from mambo_sil.drone.plant.airframe import NOMINAL
+from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.experiment.faults.fault_flights import COURSES, ORDER, End, Verdict, all_statuses
+from mambo_sil.results.summary import ReportedSummary, Section
+
+_LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
+_SHORTEST_BAR_M: Final = 0.01
+
+
+class FaultsSummary(ReportedSummary):
+    """Flights with faults."""
+
+    command = "faults"
+
+    source: str
+    settings: str
+    vehicle: VehicleFile = NOMINAL
+    flights: list[Verdict]
+
+    def section(self, _folder: Path) -> Section:
+        """Return the section of the report: one row per fault, both courses side by side."""
+        courses = list(dict.fromkeys(flight.course for flight in self.flights))
+        errors_m = [flight.largest_error_m for flight in self.flights]
+        largest_m = max((error_m for error_m in errors_m if math.isfinite(error_m)), default=0.0)
+        rows: dict[str, list[tuple[Verdict, float]]] = {}
+        for flight in self.flights:
+            percent = _bar_percent(flight.largest_error_m, largest_m)
+            rows.setdefault(flight.fault, []).append((flight, percent))
+        ends = [flight.end for flight in self.flights]
+        counts = ", ".join(f"{ends.count(end)} {end}" for end in dict.fromkeys(ends))
+        finding = f"{len(ends)} flights with {len(rows)} faults: {counts}"
+        content = {"summary": self, "courses": courses, "rows": list(rows.items())}
+        title = f"Faults in flight, {self.source}, vehicle {self.vehicle.name}"
+        return Section("faults", title, End.CRASHED not in ends, finding, content)
+
+
+def _bar_percent(error_m: float, largest_m: float) -> float:
+    """Return the length of a bar in % on a logarithmic scale from 0.01 m to the largest error."""
+    if not error_m > _SHORTEST_BAR_M or largest_m <= _SHORTEST_BAR_M:
+        return 0.0
+    return round(100.0 * math.log(error_m / _SHORTEST_BAR_M) / math.log(largest_m / _SHORTEST_BAR_M), 1)
 
 
 def table(verdicts: Sequence[Verdict]) -> str:
@@ -29,9 +69,6 @@ def table(verdicts: Sequence[Verdict]) -> str:
         for course in COURSES
     )
     return "\n".join("| " + " | ".join(row) + " |" for row in rows) + f"\n\nBack means within: {bands}."
-
-
-_LARGEST: Final = ("largest_command_rad", "largest_tilt_rad")
 
 
 def write_csv(verdicts: Sequence[Verdict], path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Results of a suite: each metric against its limit, the summary, text, and records for replay."""
+"""Results of a suite: summary, text, section of the report, JUnit XML, and records for replay."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,59 +6,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Final
+from xml.etree import ElementTree
 
 from pydantic import Field
 
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_file import Entrant
-from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, INDICES, REFUSED, SATURATED, Row
-from mambo_sil.experiment.regress.baseline import Baseline, Recorded
+from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATURATED, Row
+from mambo_sil.experiment.regress.baseline import Baseline
+from mambo_sil.experiment.regress.limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.numbers import digits
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import ReportedSummary, Section
 
-RECORDS: Final = "flights"
 JUNIT: Final = "junit.xml"
 PICTURES: Final = ("regress.png", "regress.svg")
 MOST_SHOWN: Final = 10
 """Failed flights that text and page list; the summary has all."""
 
 
-@dataclass(frozen=True)
-class Check:
-    """One metric of a flight against its limit, the smaller of bound and recorded value plus tolerance."""
-
-    metric: str
-    now: Number
-    bound: float | None
-    then: float | None
-    """The recorded value, if it is compared."""
-    limit: float
-    holds: bool
-
-
-@dataclass(frozen=True)
-class FlightResult:
-    """One flight of a suite; `same_bits` is None unless its trace was compared with the recorded one."""
-
-    group: str
-    name: str
-    metrics: dict[str, Number]
-    checks: list[Check]
-    same_bits: bool | None
-    record: str | None
-    """File for `fly --replay`; only of a failed flight."""
-
-    @property
-    def failures(self) -> list[str]:
-        """What failed, in words."""
-        found = [_explain(check) for check in self.checks if not check.holds]
-        return found + (["the trace differs from the recorded one"] if self.same_bits is False else [])
-
-
-class RegressSummary(Summary):
+class RegressSummary(ReportedSummary):
     """The results of `regress`; `files` has the SHA-256 of every file in the folder."""
 
     command = "regress"
@@ -82,6 +51,23 @@ class RegressSummary(Summary):
         """The flights that failed."""
         return [flight for flight in self.flights if flight.failures]
 
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report on this suite."""
+        from mambo_sil.experiment.regress.regress_plots import limits_panel  # noqa: PLC0415 - loaded when drawing
+
+        content = {
+            "folder": str(folder),
+            "controller": f"{self.controller}, settings {self.settings[:16]}, "
+            f"vehicle {' and '.join(self.vehicles)}",
+            "rows": list(group_rows(self)),
+            "failed": self.failed[:MOST_SHOWN],
+            "more": max(len(self.failed) - MOST_SHOWN, 0),
+            "remarks": remarks(self),
+            "picture": limits_panel(self.flights),
+        }
+        title = f"Regression tests, {self.suite} with {self.controller}"
+        return Section("regress", title, not self.failed, finding(self), content)
+
 
 def judge(
     suite: FlightSuite, entrant: Entrant, rows: Sequence[Row], baseline: Baseline | None, path: Path
@@ -89,7 +75,7 @@ def judge(
     """Compare the results of a suite with its bounds, and with the baseline at `path` if there is one."""
     held = baseline.flights if baseline is not None else {}
     results = [
-        _result(suite, number, row, held.get(flight.name, {}))
+        judge_flight(suite, number, row, held.get(flight.name, {}))
         for number, (flight, row) in enumerate(zip(suite.flights, rows, strict=True))
     ]
     return RegressSummary(
@@ -99,58 +85,9 @@ def judge(
         settings=entrant.settings.digest,
         baseline=str(path) if baseline is not None else None,
         settings_then=baseline.settings if baseline is not None else None,
-        better=sum(_is_better(result, suite) for result in results),
+        better=sum(is_better(result, suite) for result in results),
         flights=results,
     )
-
-
-def _result(suite: FlightSuite, number: int, row: Row, held: Recorded) -> FlightResult:
-    """Return the result of flight `number` with its recorded values `held`, if it has any."""
-    flight = suite.flights[number]
-    counts: dict[str, Number] = {name: int(row[name]) for name in (CRASHED, REFUSED)}
-    metrics = counts | {name: float(row[name]) for name in (*INDICES, SATURATED)}
-    checks = [
-        _check(name, now, flight.bounds.get(name), suite.tolerances.get(name), held.get(name))
-        for name, now in metrics.items()
-        if name in flight.bounds or (name in suite.tolerances and held.get(name) is not None)
-    ]
-    same_bits = row[DIGEST] == held[DIGEST] if suite.same_bits and held else None
-    failed = same_bits is False or not all(check.holds for check in checks)
-    record = f"{RECORDS}/{number:04}-{flight.group}.json" if failed else None
-    return FlightResult(flight.group, flight.name, metrics, checks, same_bits, record)
-
-
-def _check(
-    metric: str, now: float, bound: float | None, tolerance: float | None, held: float | str | None
-) -> Check:
-    """Compare a metric; one that is NaN, because the flight was lost, exceeds every limit."""
-    limits, then = [] if bound is None else [bound], None
-    if tolerance is not None and held is not None:
-        then = float(held)
-        limits.append(then * (1.0 + tolerance))
-    limit = min(limits)
-    return Check(metric, now, bound, then, limit, now <= limit)
-
-
-def _is_better(result: FlightResult, suite: FlightSuite) -> bool:
-    return any(
-        check.then is not None and check.now < check.then * (1.0 - suite.tolerances[check.metric])
-        for check in result.checks
-    )
-
-
-def _explain(check: Check) -> str:
-    """Return what is wrong with a metric: its value, its bound and its recorded value."""
-    if check.metric == CRASHED:
-        return CRASHED
-    limits = []
-    if check.bound is not None:
-        limits.append(f"bound {digits(check.bound)}")
-    if check.then is not None:
-        limits.append(f"recorded {digits(check.then)}")
-    if check.limit != check.bound:
-        limits[-1] += f", so at most {digits(check.limit)}"
-    return f"{check.metric} = {digits(check.now)} ({'; '.join(limits)})"
 
 
 def write_records(
@@ -250,3 +187,20 @@ def regress_text(summary: RegressSummary, folder: str) -> str:
         lines.append(f"and {len(summary.failed) - MOST_SHOWN} more failed flights, all in {JUNIT}")
     lines.append(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")
     return "\n".join([*lines, *remarks(summary)])
+
+
+def junit_xml(summary: RegressSummary) -> bytes:
+    """Return a summary as JUnit XML, which CI servers read: each flight is a test case of its group."""
+    name = echo(f"{summary.suite}.{summary.controller}")
+    counts = {"tests": str(len(summary.flights)), "failures": str(len(summary.failed)), "errors": "0"}
+    root = ElementTree.Element("testsuites", counts)
+    suite = ElementTree.SubElement(root, "testsuite", {"name": name, **counts, "skipped": "0"})
+    for flight in summary.flights:
+        case = ElementTree.SubElement(
+            suite, "testcase", {"classname": f"{name}.{flight.group}", "name": flight.name}
+        )
+        if flight.failures:
+            failure = ElementTree.SubElement(case, "failure", {"message": "; ".join(flight.failures)})
+            failure.text = f"replay it: mambo-nmpc fly --replay {flight.record}, in the result folder"
+    ElementTree.indent(root)
+    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"

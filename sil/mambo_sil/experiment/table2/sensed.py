@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -27,7 +28,7 @@ from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES, EngineName
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.results.numbers import digits
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 PRESETS: Final = ("mambo", "table1")
 """Presets that are compared with the PDs."""
@@ -61,7 +62,7 @@ class SensedRow:
     drift_m: Number
 
 
-class SensedSummary(Summary):
+class SensedSummary(ReportedSummary):
     """The Table II case with sensors and estimators."""
 
     command = "table2 --sensors"
@@ -69,6 +70,12 @@ class SensedSummary(Summary):
     scalar: str | None
     """Scalar type that replaces that of the presets, if any."""
     rows: list[SensedRow]
+
+    def section(self, _folder: Path) -> Section:
+        """Return the section of the report on these flights."""
+        lost, flown = (sum(getattr(row, key) for row in self.rows) for key in ("lost", "flights"))
+        content = {"rows": self.rows, "indices": INDICES}
+        return Section("sensed", "Table II with sensors", lost == 0, f"{flown} flights, {lost} lost", content)
 
 
 def fly_sensed(

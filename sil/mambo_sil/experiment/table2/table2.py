@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -13,16 +14,17 @@ from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES, EngineName
-from mambo_sil.flight.traces import Trace
+from mambo_sil.flight.traces import Trace, read_existing
 from mambo_sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
 from mambo_sil.results.numbers import digits, three_digits
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")
 UNITS: Final = ("m s", "m^2 s", "m^2 s^2", "m s^2")
 PRINTED_PD: Final = (63.02, 47.86, 2460.0, 3200.0)
 PRINTED_NMPC: Final = (19.11, 5.27, 204.23, 862.77)
 PRINTED_IMPROVEMENT: Final = (3.3, 9.1, 12.0, 3.7)
+_PRINTED: Final = [(PD, PRINTED_PD, None), ("NMPC", PRINTED_NMPC, PRINTED_IMPROVEMENT)]
 
 CASES: Final[dict[str, Trajectory]] = {
     "Bernoulli 0.5 rad/s": Bernoulli(2.0, 0.5),
@@ -62,7 +64,7 @@ class Claim:
     evidence: str
 
 
-class Table2Summary(Summary):
+class Table2Summary(ReportedSummary):
     """Results of the command `table2`."""
 
     command = "table2"
@@ -72,6 +74,32 @@ class Table2Summary(Summary):
     cases: list[str]
     rows: list[Table2Row]
     claims: list[Claim]
+
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report, with the flights of the PDs and of `mambo`; raises TraceError."""
+        from mambo_sil.flight.flight_plots import page_pictures  # noqa: PLC0415 - loaded when drawing
+
+        controllers = list(dict.fromkeys(row.controller for row in self.rows))
+        pds = PD_TITLES.values()
+        nmpc = [name for name in controllers if name not in pds]
+        shown = next((name for name in ("mambo", *nmpc) if name in nmpc), None)
+        wanted = {name: name for name in pds if name in controllers}
+        if shown is not None:
+            wanted[f"NMPC, {shown}"] = shown
+        flights, missing = read_existing(
+            folder, {title: f"{name.lower()}.npz" for title, name in wanted.items()}
+        )
+        cases = list(dict.fromkeys(row.case for row in self.rows))
+        tables = [
+            (case, _PRINTED if case == cases[0] else [], [row for row in self.rows if row.case == case])
+            for case in cases
+        ]
+        held = sum(claim.holds for claim in self.claims)
+        finding = f"{held} of {len(self.claims)} claims of the paper hold as flown here"
+        content = {"indices": INDICES, "tables": tables, "claims": self.claims, **page_pictures(flights)}
+        return Section(
+            "table2", "Table II of the paper", None, finding, content, missing, moves=bool(flights)
+        )
 
 
 def report_part(progress: Callable[[float], None], part: int, parts: int) -> Callable[[float], None]:

@@ -2,19 +2,18 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from mambo_codegen.errors import echo
-from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.axis import AxisFit, fit_axis, judge_axis
 from mambo_sil.model.identify.checks import EXCITED_RAD, NAMES, check_log, check_units
 from mambo_sil.model.identify.columns import Column
 from mambo_sil.model.identify.csv_log import read_csv
+from mambo_sil.model.identify.curves import Curves
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion, explained, fit_motion
 from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s
@@ -26,22 +25,6 @@ SHARES: Final = (0.4, 1.5)
 
 LEAST_EXPLAINED, GOOD_EXPLAINED = 0.8, 0.9
 """Share of the motion that tilt must explain. In hover tilt mostly answers gusts, which biases the fit."""
-
-
-@dataclass(frozen=True, eq=False)
-class Curves:
-    """Commanded, measured and modelled tilt of the longest stretch, for the picture.
-
-    The model is the one fitted to the first half of each stretch. Pairs are roll, pitch.
-    """
-
-    time_s: FloatArray
-    """(m,), from 0."""
-    command_rad: FloatArray
-    """(2, m)."""
-    tilt_rad: FloatArray
-    model_rad: FloatArray
-    """(2, m); NaN for an axis without a fit."""
 
 
 def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> list[FlightLog]:

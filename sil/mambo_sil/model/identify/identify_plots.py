@@ -1,6 +1,6 @@
 """The picture of an identification: command, measured and modelled tilt, and the half that was held out."""
 
-import csv
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -10,10 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.errors import ResultsError
 from mambo_sil.model.identify.checks import NAMES
-from mambo_sil.model.identify.identify_record import IdentifySummary
-from mambo_sil.model.identify.identify_report import CURVE_COLUMNS
+from mambo_sil.model.identify.curves import read_curves
 from mambo_sil.model.identify.signals import DEGREE
 from mambo_sil.results.pictures import inline, save
 from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, GRID, INK, TARGET, style
@@ -22,43 +20,34 @@ SHOWN_S: Final = 6.0
 """Time shown before and after the split."""
 
 
-def draw_fit(curves: Path, summary: IdentifySummary, stem: Path) -> tuple[Path, Path]:
-    """Draw the curves of a fit.csv; write stem.png and stem.svg. Raises ResultsError."""
+def draw_fit(curves: Path, split_s: float, verdicts: Mapping[str, str], stem: Path) -> tuple[Path, Path]:
+    """Draw the curves of a fit.csv, with the verdict on each axis; write stem.png and stem.svg.
+
+    The model was fitted up to `split_s`. Raises ResultsError.
+    """
     with style():
-        return save(_figure(read_curves(curves), summary, 2.4 * COLUMN_INCHES), stem)
+        return save(_figure(read_curves(curves), split_s, verdicts, 2.4 * COLUMN_INCHES), stem)
 
 
-def fit_panel(curves: Path, summary: IdentifySummary) -> Markup:
+def fit_panel(curves: Path, split_s: float, verdicts: Mapping[str, str]) -> Markup:
     """Return the same picture for a page; raises ResultsError."""
     with style():
         return inline(
-            _figure(read_curves(curves), summary, 2.0 * COLUMN_INCHES),
+            _figure(read_curves(curves), split_s, verdicts, 2.0 * COLUMN_INCHES),
             "Roll and pitch over time: commanded, measured and modelled, on fitted and on held-out samples",
         )
 
 
-def read_curves(path: Path) -> dict[str, FloatArray]:
-    """Return the columns (m,) of a fit.csv; raises ResultsError."""
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            header, *rows = csv.reader(file)
-        table = np.array(rows, np.float64).reshape(-1, len(CURVE_COLUMNS))
-    except (OSError, ValueError, csv.Error) as error:
-        raise ResultsError(f"{path}: is not what identify writes: {error}; run identify again") from error
-    if tuple(header) != CURVE_COLUMNS or not len(table):
-        raise ResultsError(f"{path}: is not what identify writes; run identify again")
-    return dict(zip(CURVE_COLUMNS, table.T, strict=True))
-
-
-def _figure(curves: dict[str, FloatArray], summary: IdentifySummary, width: float) -> Figure:
+def _figure(
+    curves: dict[str, FloatArray], split_s: float, verdicts: Mapping[str, str], width: float
+) -> Figure:
     figure = Figure(figsize=(width, 4.6), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True)
-    time_s, split_s = curves["time_s"], summary.split_s
+    time_s = curves["time_s"]
     shown = np.abs(time_s - split_s) <= SHOWN_S
     for axes, name in zip(panels, NAMES, strict=True):
         _draw_axis(axes, {key: values[shown] for key, values in curves.items()}, name, split_s)
-        axis = summary.axes[name]
-        axes.set_title(f"{name}: {axis.verdict}", loc="left", parse_math=False)
+        axes.set_title(f"{name}: {verdicts[name]}", loc="left", parse_math=False)
     panels[-1].set_xlabel("time, s")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))

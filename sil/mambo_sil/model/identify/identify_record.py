@@ -1,11 +1,14 @@
-"""The record of an identification: what the command prints, and the summary in its folder."""
+"""The record of an identification: its summary, what it found in words, and the section of the report."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Literal
 
 from mambo_sil.model.identify.motion import Motion
-from mambo_sil.model.identify.response import AxisParameters, FirstOrder
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.model.identify.response import AxisParameters, FirstOrder, Interval
+from mambo_sil.model.identify.signals import DEGREE
+from mambo_sil.results.numbers import three_digits
+from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 Verdict = Literal["good", "weak", "refused"]
 
@@ -13,6 +16,10 @@ MODEL: Final = "model.toml"
 VEHICLE: Final = "vehicle.toml"
 CURVES: Final = "fit.csv"
 PICTURES: Final = ("fit.png", "fit.svg")
+AXIS_ROWS: Final = (
+    *("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s"),
+    *("held-out R2", "verdict"),
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,7 @@ class Noise:
     velocity_m_s: Number
 
 
-class IdentifySummary(Summary):
+class IdentifySummary(ReportedSummary):
     """An identification."""
 
     command = "identify"
@@ -81,3 +88,84 @@ class IdentifySummary(Summary):
     def good(self) -> bool:
         """Whether there is a model of both axes."""
         return bool(self.model)
+
+    @property
+    def verdicts(self) -> dict[str, str]:
+        """The verdict on each axis by name."""
+        return {name: axis.verdict for name, axis in self.axes.items()}
+
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report on this identification; raises ResultsError."""
+        from mambo_sil.model.identify.identify_plots import fit_panel  # noqa: PLC0415 - loaded when drawing
+
+        curves = folder / CURVES
+        there = curves.is_file()
+        content = {
+            "heads": AXIS_ROWS,
+            "axes": [(name, axis, axis_cells(axis)) for name, axis in self.axes.items()],
+            "facts": dict([*motion_rows(self), *noise_rows(self)]),
+            "logs": self.logs,
+            "remarks": self.remarks,
+            "picture": fit_panel(curves, self.split_s, self.verdicts) if there else None,
+        }
+        missing = [] if there else [CURVES]
+        title = f"Identification from {', '.join(log.name for log in self.logs)}"
+        return Section("identify", title, self.good, finding(self), content, missing)
+
+
+def axis_cells(axis: AxisResult) -> list[str]:
+    """Return the values of `AXIS_ROWS` of an axis in words."""
+    fit = axis.fitted
+    r2 = "-" if axis.held_out_r2 != axis.held_out_r2 else f"{axis.held_out_r2:.3f}"
+    if fit is None:
+        return ["-"] * 5 + [r2, axis.verdict]
+    times = [_plus_minus(each, 1e3, 0) for each in (fit.sum_s, fit.lag_s, fit.delay_s)]
+    integral = "-" if fit.integral_1_s is None else _plus_minus(fit.integral_1_s, 1.0, 2)
+    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, r2, axis.verdict]
+
+
+def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
+    """Return name and value of each parameter of the motion."""
+    motion = summary.motion
+    if motion is None:
+        return []
+    trim = ", ".join(_plus_minus(each, 1.0 / DEGREE, 2) for each in motion.trim_rad)
+    return [
+        ("acceleration per tilt", f"{_plus_minus(motion.acceleration_per_tilt, 1.0, 3)} g per radian"),
+        ("drag", f"{_plus_minus(motion.drag_1_s, 1.0, 3)} 1/s"),
+        ("trim of roll, pitch", f"{trim} degrees"),
+        ("motion explained", f"R2 {motion.r2:.3f}; rms left {motion.disturbance_m_s2:.3f} m/s^2"),
+    ]
+
+
+def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
+    """Return name and value of the measured tilts' offset and of each noise."""
+    tilts = ", ".join(f"{axis.tilt_noise_rad / DEGREE:.2f}" for axis in summary.axes.values())
+    offsets = ", ".join(f"{axis.offset_rad / DEGREE:.2f}" for axis in summary.axes.values())
+    rows = [
+        ("roll, pitch at no command", f"{offsets} degrees"),
+        ("white noise of roll, pitch", f"{tilts} degrees"),
+    ]
+    for words, value, unit in (
+        ("white noise of position", summary.noise.position_m, "m"),
+        ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),
+    ):
+        rows += [(words, f"{three_digits(value)} {unit}")] if value == value else []  # noqa: PLR0124 - NaN
+    return rows
+
+
+def finding(summary: IdentifySummary) -> str:
+    """Return the result in one line."""
+    parts = []
+    for name, axis in summary.axes.items():
+        fit = axis.fitted
+        parts.append(
+            f"{name} refused"
+            if fit is None
+            else f"{name} {axis.verdict}: gain {fit.gain.value:.2f}, {1e3 * fit.sum_s.value:.0f} ms"
+        )
+    return "; ".join(parts)
+
+
+def _plus_minus(estimate: Interval, factor: float, decimals: int) -> str:
+    return f"{factor * estimate.value:.{decimals}f} +- {factor * estimate.within:.{decimals}f}"

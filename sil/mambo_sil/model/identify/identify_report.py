@@ -2,23 +2,19 @@
 
 from typing import Final
 
-from mambo_sil.model.identify.identify import Curves
-from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary
+from mambo_sil.model.identify.identify_record import (
+    AXIS_ROWS,
+    IdentifySummary,
+    axis_cells,
+    finding,
+    motion_rows,
+    noise_rows,
+)
 from mambo_sil.model.identify.response import Interval
-from mambo_sil.model.identify.signals import DEGREE
-from mambo_sil.results.numbers import three_digits
 
 ADVICE: Final = (
     "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
     "eight on a Crazyflie; --manoeuvre eight.csv writes its waypoints for another drone"
-)
-AXIS_ROWS: Final = (
-    *("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s"),
-    *("held-out R2", "verdict"),
-)
-CURVE_COLUMNS: Final = (
-    *("time_s", "roll_command_rad", "roll_rad", "roll_model_rad"),
-    *("pitch_command_rad", "pitch_rad", "pitch_model_rad"),
 )
 
 
@@ -41,47 +37,6 @@ def identify_text(summary: IdentifySummary) -> str:
     if any(axis.verdict != "good" for axis in summary.axes.values()):
         lines.append(ADVICE)
     return "\n".join(line.rstrip() for line in lines)
-
-
-def axis_cells(axis: AxisResult) -> list[str]:
-    """Return the values of `AXIS_ROWS` of an axis in words."""
-    fit = axis.fitted
-    r2 = "-" if axis.held_out_r2 != axis.held_out_r2 else f"{axis.held_out_r2:.3f}"
-    if fit is None:
-        return ["-"] * 5 + [r2, axis.verdict]
-    times = [_plus_minus(each, 1e3, 0) for each in (fit.sum_s, fit.lag_s, fit.delay_s)]
-    integral = "-" if fit.integral_1_s is None else _plus_minus(fit.integral_1_s, 1.0, 2)
-    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, r2, axis.verdict]
-
-
-def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
-    """Return name and value of each parameter of the motion."""
-    motion = summary.motion
-    if motion is None:
-        return []
-    trim = ", ".join(_plus_minus(each, 1.0 / DEGREE, 2) for each in motion.trim_rad)
-    return [
-        ("acceleration per tilt", f"{_plus_minus(motion.acceleration_per_tilt, 1.0, 3)} g per radian"),
-        ("drag", f"{_plus_minus(motion.drag_1_s, 1.0, 3)} 1/s"),
-        ("trim of roll, pitch", f"{trim} degrees"),
-        ("motion explained", f"R2 {motion.r2:.3f}; rms left {motion.disturbance_m_s2:.3f} m/s^2"),
-    ]
-
-
-def noise_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
-    """Return name and value of the measured tilts' offset and of each noise."""
-    tilts = ", ".join(f"{axis.tilt_noise_rad / DEGREE:.2f}" for axis in summary.axes.values())
-    offsets = ", ".join(f"{axis.offset_rad / DEGREE:.2f}" for axis in summary.axes.values())
-    rows = [
-        ("roll, pitch at no command", f"{offsets} degrees"),
-        ("white noise of roll, pitch", f"{tilts} degrees"),
-    ]
-    for words, value, unit in (
-        ("white noise of position", summary.noise.position_m, "m"),
-        ("white noise of velocity", summary.noise.velocity_m_s, "m/s"),
-    ):
-        rows += [(words, f"{three_digits(value)} {unit}")] if value == value else []  # noqa: PLR0124 - NaN
-    return rows
 
 
 def model_text(summary: IdentifySummary) -> str:
@@ -129,31 +84,6 @@ def vehicle_text(summary: IdentifySummary) -> str:
     return "\n".join(lines) + "\n"
 
 
-def curves_csv(curves: Curves) -> str:
-    """Return the curves as CSV with the columns `CURVE_COLUMNS`."""
-    columns = [curves.time_s]
-    for axis in range(2):
-        columns += [curves.command_rad[axis], curves.tilt_rad[axis], curves.model_rad[axis]]
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return (
-        "\n".join([",".join(CURVE_COLUMNS), *(",".join(f"{each:.6g}" for each in row) for row in rows)])
-        + "\n"
-    )
-
-
-def finding(summary: IdentifySummary) -> str:
-    """Return the result in one line."""
-    parts = []
-    for name, axis in summary.axes.items():
-        fit = axis.fitted
-        parts.append(
-            f"{name} refused"
-            if fit is None
-            else f"{name} {axis.verdict}: gain {fit.gain.value:.2f}, {1e3 * fit.sum_s.value:.0f} ms"
-        )
-    return "; ".join(parts)
-
-
 def _heading(summary: IdentifySummary) -> list[str]:
     """Return the first comment lines of a file: what it describes, and from which logs."""
     first = (
@@ -178,7 +108,3 @@ def _half_widths(summary: IdentifySummary) -> dict[str, float]:
 def _round(value: float) -> str:
     """Return a value with four digits, as TOML."""
     return repr(float(f"{value:.4g}"))
-
-
-def _plus_minus(estimate: Interval, factor: float, decimals: int) -> str:
-    return f"{factor * estimate.value:.{decimals}f} +- {factor * estimate.within:.{decimals}f}"

@@ -1,5 +1,6 @@
 """Feed the inputs in a flight log through the compiled controller, next to the commands of the log."""
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
-from mambo_sil.errors import LogError
+from mambo_sil.errors import LogError, ResultsError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.model.identify.columns import KNOWN, Column
 from mambo_sil.model.identify.csv_log import read_csv
@@ -40,6 +41,9 @@ SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
 }
 """Known columns of each signal: those of trace.csv, and of the Crazyflie, whose y has the other sign. The
 commands are those of the controller itself."""
+
+AXES: Final = ("roll", "pitch")
+CURVE_COLUMNS: Final = ("time_s", *(f"{axis}_{kind}_rad" for kind in ("logged", "replayed") for axis in AXES))
 
 _SAME_PERIOD: Final = 0.1
 """Share by which the period of a log may differ from the update period, and its rows be the updates."""
@@ -138,3 +142,24 @@ def _interpolated(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) ->
         value = np.unwrap(signal.value) if name == YAW else signal.value
         columns.append(np.interp(time_s, signal.time_s, value))
     return np.stack(columns, axis=1)
+
+
+def write_curves(replay: LogReplay, path: Path) -> None:
+    """Write logged and replayed commands as CSV."""
+    table = np.column_stack([replay.time_s, replay.logged_rad, replay.replayed_rad])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(CURVE_COLUMNS)
+        writer.writerows(table.tolist())
+
+
+def read_curves(path: Path) -> FloatArray:
+    """Return the table (k, 5) of a file of `write_curves`; raises ResultsError."""
+    try:
+        header, *lines = csv.reader(path.read_text("utf-8").splitlines())
+        table = np.array([[float(field) for field in line] for line in lines])
+        if tuple(header) != CURVE_COLUMNS or table.shape[1:] != (len(CURVE_COLUMNS),):
+            raise ValueError("other columns")
+    except (OSError, ValueError) as error:
+        raise ResultsError(f"{path}: is not what replay writes: {error}; run replay again") from error
+    return table

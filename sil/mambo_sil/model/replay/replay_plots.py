@@ -6,7 +6,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.model.replay.replay_report import AXES, read_curves
+from mambo_sil.model.replay.log_replay import AXES, read_curves
 from mambo_sil.results.pictures import inline, save
 from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, THIN, style
 

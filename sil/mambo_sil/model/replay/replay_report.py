@@ -1,20 +1,15 @@
-"""How the replayed commands differ from those of the log: record, text, CSV."""
+"""How the replayed commands differ from those of the log: record, text, section of the report."""
 
-import csv
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.errors import ResultsError
-from mambo_sil.model.replay.log_replay import LogReplay
-from mambo_sil.results.summary import Number, Summary
+from mambo_sil.model.replay.log_replay import AXES, LogReplay
+from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 CURVES: Final = "replay.csv"
 PICTURES: Final = ("replay.png", "replay.svg")
-AXES: Final = ("roll", "pitch")
-CURVE_COLUMNS: Final = ("time_s", *(f"{axis}_{kind}_rad" for kind in ("logged", "replayed") for axis in AXES))
 
 SETTLING_S: Final = 1.0
 """Time from the beginning of a log in which the estimates of the controller approach those of the flight."""
@@ -22,7 +17,7 @@ GOOD_EXPLAINED: Final = 0.9
 """Least share of the logged command that a replay of the controller that flew explains."""
 
 
-class LogReplaySummary(Summary):
+class LogReplaySummary(ReportedSummary):
     """A replay of a log; what is by axis has roll and pitch."""
 
     command = "replay"
@@ -54,6 +49,23 @@ class LogReplaySummary(Summary):
     def good(self) -> bool:
         """Whether the log is one of this controller."""
         return self.same_bits or min(self.explained) >= GOOD_EXPLAINED
+
+    def section(self, folder: Path) -> Section:
+        """Return the section of the report on this replay; raises ResultsError."""
+        from mambo_sil.model.replay.replay_plots import replay_panel  # noqa: PLC0415 - loaded when drawing
+
+        curves = folder / CURVES
+        there = curves.is_file()
+        content = {
+            "facts": {
+                "controller": f"settings {self.settings[:16]} of {self.source}",
+                **dict(rows(self)),
+            },
+            "remarks": self.remarks,
+            "picture": replay_panel(curves) if there else None,
+        }
+        missing = [] if there else [CURVES]
+        return Section("replay", f"Replay of {self.log}", self.good, finding(self), content, missing)
 
 
 def summarise(replay: LogReplay, log: str, source: str, settings: str) -> LogReplaySummary:
@@ -128,24 +140,3 @@ def replay_text(summary: LogReplaySummary) -> str:
     """Format a summary."""
     lines = [f"{name:20}{value}" for name, value in rows(summary)]
     return "\n".join([finding(summary), *lines, *summary.remarks])
-
-
-def write_curves(replay: LogReplay, path: Path) -> None:
-    """Write logged and replayed commands as CSV."""
-    table = np.column_stack([replay.time_s, replay.logged_rad, replay.replayed_rad])
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(CURVE_COLUMNS)
-        writer.writerows(table.tolist())
-
-
-def read_curves(path: Path) -> FloatArray:
-    """Return the table (k, 5) of a file of `write_curves`; raises ResultsError."""
-    try:
-        header, *lines = csv.reader(path.read_text("utf-8").splitlines())
-        table = np.array([[float(field) for field in line] for line in lines])
-        if tuple(header) != CURVE_COLUMNS or table.shape[1:] != (len(CURVE_COLUMNS),):
-            raise ValueError("other columns")
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"{path}: is not what replay writes: {error}; run replay again") from error
-    return table

@@ -1,12 +1,50 @@
 """Render result folders as one HTML page, which depends on nothing but the folders."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
-from mambo_sil.pages.report.result_kinds import read_summary, section
+from pydantic import ValidationError
+
+from mambo_codegen.errors import echo
+from mambo_sil.board.footprint.footprint_report import FootprintSummary
+from mambo_sil.board.footprint.sweep_report import SweepSummary
+from mambo_sil.board.pil.pil_report import BoardFlightSummary
+from mambo_sil.errors import ResultsError
+from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, UnfinishedCampaign
+from mambo_sil.experiment.faults.faults_report import FaultsSummary
+from mambo_sil.experiment.regress.regress_report import RegressSummary
+from mambo_sil.experiment.table2.sensed import SensedSummary
+from mambo_sil.experiment.table2.table2 import Table2Summary
+from mambo_sil.flight.flight_report import FlySummary, ReplaySummary
+from mambo_sil.model.identify.identify_record import IdentifySummary
+from mambo_sil.model.replay.replay_report import LogReplaySummary
+from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.html_page import render_page
-from mambo_sil.results.summary import Summary
+from mambo_sil.results.summary import ReportedSummary, Summary
+from mambo_sil.verify.verify_report import VerifySummary
+
+RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
+    FlySummary,
+    ReplaySummary,
+    BoardFlightSummary,
+    Table2Summary,
+    SensedSummary,
+    FootprintSummary,
+    SweepSummary,
+    FaultsSummary,
+    VerifySummary,
+    RegressSummary,
+    CampaignSummary,
+    IdentifySummary,
+    LogReplaySummary,
+)
+"""The summaries that a result folder may have; its key "command" says which."""
+
+_UNFINISHED: Final = "campaign.json"
+"""The file that a campaign writes first; it writes its summary last."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +76,7 @@ def report_page(folders: Sequence[Path]) -> tuple[str, list[ReportedFolder]]:
     Raises ResultsError and TraceError.
     """
     summaries = [read_summary(folder) for folder in folders]
-    sections = [section(folder, summary) for folder, summary in zip(folders, summaries, strict=True)]
+    sections = [summary.section(folder) for folder, summary in zip(folders, summaries, strict=True)]
     context = {
         "shown": [(str(folder), one) for folder, one in zip(folders, sections, strict=True)],
         "generators": sorted({summary.generator for summary in summaries}),
@@ -49,3 +87,36 @@ def report_page(folders: Sequence[Path]) -> tuple[str, list[ReportedFolder]]:
         for folder, summary, one in zip(folders, summaries, sections, strict=True)
     ]
     return render_page("report.html.j2", context), overview
+
+
+def read_summary(folder: Path) -> ReportedSummary:
+    """Read the summary in a result folder; raises ResultsError."""
+    if (folder / SUMMARY).is_file():
+        return _read(folder / SUMMARY, *RESULTS)
+    if (folder / _UNFINISHED).is_file():
+        return _read(folder / _UNFINISHED, UnfinishedCampaign)
+    what = f"has no {SUMMARY}" if folder.is_dir() else "is not a folder"
+    commands = ", ".join(kind.command for kind in RESULTS)
+    raise ResultsError(f"{echo(str(folder))}: {what}; name a result folder of {commands}")
+
+
+def _read(path: Path, *kinds: type[ReportedSummary]) -> ReportedSummary:
+    """Read the summary at `path` as one of `kinds`; raises ResultsError."""
+    name = echo(str(path))
+    try:
+        document: Any = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise ResultsError(f"{name}: cannot be read as JSON: {error}; run its command again") from error
+    command = document.get("command") if isinstance(document, dict) else None
+    kind = next((kind for kind in kinds if kind.command == command), None)
+    if kind is None:
+        commands = ", ".join(kind.command for kind in kinds)
+        raise ResultsError(f"{name}: command = {echo(str(command))} must be one of {commands}")
+    try:
+        return kind.model_validate({"generator": None} | document)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise ResultsError(
+            f"{name}: {echo(key)} is not what {command} writes: {first['msg']}; run {command} again"
+        ) from error
