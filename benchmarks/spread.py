@@ -23,8 +23,8 @@ RADIUS_M: Final = 0.001
 CASES: Final[dict[str, dict[str, Any]]] = {
     "Table II case": {},
     "yaw 0.8 rad": {"yaw_rad": 0.8},
-    "wind 0.5 m/s^2 along x": {"wind_m_s2": (0.5, 0.0)},
-    "wind 0.5 m/s^2 along y": {"wind_m_s2": (0.0, 0.5)},
+    "push 0.5 m/s^2 along x": {"push_m_s2": (0.5, 0.0)},
+    "push 0.5 m/s^2 along y": {"push_m_s2": (0.0, 0.5)},
     "motor lag 0.03 s": {"motor_lag_s": 0.03},
     "circle, 1 m, 1 rad/s": {"trajectory": "circle", "size_m": 1.0, "rate_rad_s": 1.0},
     "circle, 1 m, 1.5 rad/s": {"trajectory": "circle", "size_m": 1.0, "rate_rad_s": 1.5},

@@ -121,8 +121,8 @@ def sensors(figures: Figures) -> str:
 _CONDITIONS: Final = {
     "table2": "Table II case",
     "yaw": "yaw 0.8 rad",
-    "wind-x": "wind 0.5 m/s^2 along x",
-    "wind-y": "wind 0.5 m/s^2 along y",
+    "push-x": "push 0.5 m/s^2 along x",
+    "push-y": "push 0.5 m/s^2 along y",
     "motor-lag": "motor lag 0.03 s",
     "circle": "circle of 1 m at 1 rad/s",
     "fast-circle": "circle of 1 m at 1.5 rad/s",

@@ -83,7 +83,7 @@ def test_reference_and_compiled_flights_print_the_same() -> None:
 )
 def test_every_curve_flies(trajectory: str) -> None:
     """Each named trajectory, with wind, heading, motor lag and a start from the ground."""
-    options = ["--wind", "0.2,-0.1", "--yaw-rad", "0.5", "--motor-lag-s", "0.02", "--start", "take-off"]
+    options = ["--push", "0.2,-0.1", "--yaw-rad", "0.5", "--motor-lag-s", "0.02", "--start", "take-off"]
     said, _ = run("fly", "--trajectory", trajectory, *options, "--duration-s", "1", *PLAIN)
     assert json.loads(said)["lost"] is False
 
@@ -99,7 +99,7 @@ def test_a_seed_decides_gusts_and_noise(tmp_path: Path) -> None:
     first, _, third = map(json.loads, flights)
     assert first["metrics"] != first["metrics_as_seen"]
     assert first["metrics"] != third["metrics"]
-    assert (first["seed"], first["sensors"], first["wind_m_s2"]) == (7, "mambo", [0, 0])
+    assert (first["seed"], first["sensors"], first["push_m_s2"]) == (7, "mambo", [0, 0])
     header = (tmp_path / "0" / "trace.csv").read_text().splitlines()[0]
     assert header == ",".join((*CSV_COLUMNS, *SEEN_COLUMNS))
 
@@ -116,10 +116,14 @@ def test_waypoints_fly(tmp_path: Path) -> None:
         (["mamba"], "did you mean mambo"),
         (["--trajectory", "triangle"], "--trajectory triangle must be bernoulli"),
         (["--trajectory", "none.CSV"], "none.CSV: cannot be read: No such file or directory\n"),
-        (["--wind", "strong"], "--wind strong must be two numbers, as in 0.5,0, or gusts"),
+        (
+            ["--wind", "0.5,0"],
+            "--wind 0.5,0 must be none or gusts; a steady acceleration is --push X,Y, in m/s^2",
+        ),
+        (["--push", "strong"], "--push strong must be two numbers, as in 0.5,0"),
         (["--seed", "-1"], "--seed = -1 must lie in 0.."),
-        (["--replay", "none.json"], "none.json: cannot be read: No such file or directory"),
-        (["--wind", "nan,0"], "--wind = nan must be a finite number"),
+        (["--repeat", "none.json"], "none.json: cannot be read: No such file or directory"),
+        (["--push", "nan,0"], "--push = nan must be a finite number"),
         (["--yaw-rad", "inf"], "--yaw-rad = inf must be a finite number"),
         (["--motor-lag-s", "nan"], "--motor-lag-s = nan must be a finite number; it must lie in 0..1"),
         (["--size-m", "1e4"], "--size-m = 10000.0 must lie in -1000..1000"),
@@ -168,7 +172,7 @@ def test_a_crash_is_a_failure_that_says_when_and_how(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("pd", PD_NAMES)
-def test_a_replayed_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
+def test_a_repeated_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
     """Exit 1 although the trace is the recorded one; a record that does not crash exits 0."""
     for name, tilt_rad, code in (("upside.json", 1.2, 1), ("level.json", 0.0, 0)):
         scenario = Scenario(duration_s=0.1, start_tilt_rad=(tilt_rad, 0.0))
@@ -176,8 +180,8 @@ def test_a_replayed_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
         flown = fly(flight, pd_controller(pd))
         record = Record(scenario=scenario, controller=pd, settings=ONE_NORM, trace_sha256=flown.digest())
         write_record(record, tmp_path / name)
-        said, _ = run("fly", "--replay", name, "--no-pictures", code=code)
-        assert "replay: the trace equals the recorded one" in said
+        said, _ = run("fly", "--repeat", name, "--no-pictures", code=code)
+        assert "repetition: the trace equals the recorded one" in said
         assert ("CRASHED at 0.00 s: tilted 68.8 degrees" in said) == (code == 1)
 
 
@@ -208,7 +212,7 @@ def test_a_flight_just_longer_than_the_transient_has_no_second_column() -> None:
 
 def test_the_summary_repeats_the_flight(tmp_path: Path) -> None:
     """Everything asked for is in it, what was not flown is null, and stdout has the same text."""
-    options = ["--controller", "pd", "--wind", "90,0", "--duration-s", "40", "--trajectory", "way.csv"]
+    options = ["--controller", "pd", "--push", "90,0", "--duration-s", "40", "--trajectory", "way.csv"]
     (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,9000,0\n")
     said, talk = run("fly", *options, *PLAIN, code=1)
     assert talk.count("\n") == 1
@@ -219,7 +223,7 @@ def test_the_summary_repeats_the_flight(tmp_path: Path) -> None:
     assert len(summary["trajectory_sha256"]) == 64
     keys = "generator command controller source settings update_period_s trajectory size_m rate_rad_s yaw_rad"
     assert set(keys.split()) < set(summary)
-    assert [summary[key] for key in ("wind_m_s2", "motor_lag_s", "start")] == [[90, 0], 0, "hover"]
+    assert [summary[key] for key in ("push_m_s2", "motor_lag_s", "start")] == [[90, 0], 0, "hover"]
 
 
 def test_pictures_heed_no_settings_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

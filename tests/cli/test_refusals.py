@@ -28,7 +28,7 @@ def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
         "fly --trajectory triangle -o a/b",
         "fly --on no-board -o a/b",
         "fly --controller pd --on crazyflie -o a/b",
-        "fly --replay no.json -o a/b",
+        "fly --repeat no.json -o a/b",
         "footprint --board no-board -o a/b",
         "footprint --optimisation=fast --board crazyflie -o a/b",
         "sweep --board no-board -o a/b",

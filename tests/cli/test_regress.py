@@ -62,7 +62,7 @@ def test_a_suite_passes_and_leaves_its_results(passed: Path) -> None:
     assert (out / "regress.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_broken_bound_fails_and_its_flight_replays_bit_for_bit() -> None:
+def test_a_broken_bound_fails_and_its_flight_repeats_bit_for_bit() -> None:
     """Exit 1 names flight, metric, value and bound; the record is that of the flight."""
     break_suite()
     said, _ = run("regress", "mine.toml", "-o", "out", code=1)
@@ -71,12 +71,12 @@ def test_a_broken_bound_fails_and_its_flight_replays_bit_for_bit() -> None:
     assert "iae_m_s = " in line
     assert "(bound 1e-06)" in line
     assert len(list(Path("out/flights").iterdir())) == 4
-    replayed, _ = run(
-        "fly", "--replay", "out/flights/0003-eight.json", "--json", "--no-pictures", "-o", "again"
+    repeated, _ = run(
+        "fly", "--repeat", "out/flights/0003-eight.json", "--json", "--no-pictures", "-o", "again"
     )
-    assert json.loads(replayed)["same_bits_as_recorded"] is True
+    assert json.loads(repeated)["same_bits_as_recorded"] is True
     flown = json.loads(Path("out/summary.json").read_text("utf-8"))["flights"][3]
-    assert json.loads(replayed)["metrics"]["iae_m_s"] == flown["metrics"]["iae_m_s"]
+    assert json.loads(repeated)["metrics"]["iae_m_s"] == flown["metrics"]["iae_m_s"]
     Path("mine.toml").write_text(SUITE, "utf-8")
     run("regress", "mine.toml", "-o", "out")
     assert not list(Path("out/flights").iterdir())

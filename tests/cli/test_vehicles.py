@@ -107,7 +107,7 @@ def test_sensors_of_another_drone_are_refused() -> None:
     )
 
 
-def test_a_campaign_flies_another_drone_and_its_flights_replay() -> None:
+def test_a_campaign_flies_another_drone_and_its_flights_repeat() -> None:
     """With its own sensors, and draws around its own mass; the records do not need its file."""
     Path("campaign.toml").write_text('controllers = ["pd"]\n[flight]\nduration_s = 1.0\n', "utf-8")
     run("campaign", "campaign.toml", "--vehicle", "mine.toml", "--flights", "2", "-o", "out")
@@ -120,7 +120,7 @@ def test_a_campaign_flies_another_drone_and_its_flights_replay() -> None:
     assert 0.1 <= scenario.drag_1_s <= 0.3
     assert scenario.sensors == "mocap"
     Path("mine.toml").unlink()
-    said, _ = run("fly", "--replay", str(path), "--no-pictures", "-o", "again")
+    said, _ = run("fly", "--repeat", str(path), "--no-pictures", "-o", "again")
     assert "the trace equals the recorded one, bit for bit" in said
     _, said = run("campaign", "campaign.toml", "--flights", "2", "-o", "out", code=2)
     assert 'flight.vehicle = "mine" instead of "mambo"' in said

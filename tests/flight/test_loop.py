@@ -115,7 +115,7 @@ def test_controller_receives_the_recorded_state_and_target() -> None:
             given.append(inputs)
             return super().step(*inputs)
 
-    flight = Flight(FIGURE_OF_EIGHT, 3.0, yaw_rad=0.4, vehicle=Vehicle(wind_m_s2=(0.5, 0.3)))
+    flight = Flight(FIGURE_OF_EIGHT, 3.0, yaw_rad=0.4, disturbances=Disturbances(push_m_s2=(0.5, 0.3)))
     trace = fly(flight, Recorder())
     state = np.concatenate([trace.position_m[..., :2], trace.velocity_m_s[..., :2], trace.euler_rad], axis=-1)
     acceleration = FIGURE_OF_EIGHT.acceleration(trace.time_s)[:, None]
@@ -171,7 +171,7 @@ def test_the_heading_turns_from_the_start_of_the_clock() -> None:
 
 def test_an_event_between_updates_happens_at_its_own_tick() -> None:
     """A push at 0.5 s moves the drone 10 ms until the update at 0.51 s, one at 0.505 s half as long; once."""
-    push = Disturbances(push_n_s=(0.0063, 0.0, 0.0), push_time_s=np.array([0.5, 0.505]))
+    push = Disturbances(impulse_n_s=(0.0063, 0.0, 0.0), impulse_time_s=np.array([0.5, 0.505]))
     trace = fly(Flight(Hover(), 0.6, 2, disturbances=push), PdController())
     np.testing.assert_allclose(trace.velocity_m_s[50, :, 0], [0.1, 0.0], atol=1e-12)
     np.testing.assert_allclose(trace.velocity_m_s[51, :, 0], 0.1, atol=2e-4)
@@ -185,10 +185,10 @@ def test_without_seeds_every_flight_has_seed_0() -> None:
     assert plain.digest(0) == plain.digest(1) == seeded.digest(0) != seeded.digest(1)
 
 
-def test_pd_reaches_a_step_and_is_off_target_in_wind() -> None:
-    """It settles at a point 1.4 m away, and in a wind of 0.5 m/s^2 where Kp times the error balances it."""
-    vehicle = Vehicle(wind_m_s2=(0.0, np.array([0.0, 0.5])))
-    flight = Flight(Trajectories((PositionStep(1.0, -1.0), Hover())), 30.0, 2, vehicle=vehicle)
+def test_pd_reaches_a_step_and_is_off_target_under_a_push() -> None:
+    """It settles at a point 1.4 m away, and under a push where Kp times the error balances it."""
+    push = Disturbances(push_m_s2=(0.0, np.array([0.0, 0.5])))
+    flight = Flight(Trajectories((PositionStep(1.0, -1.0), Hover())), 30.0, 2, disturbances=push)
     last = simulate.fly(flight, PdController()).position_m[-1]
     np.testing.assert_allclose(last[0], [1.0, -1.0, -1.1], atol=0.02)
     np.testing.assert_allclose(last[1, 1], 0.5 / 9.81 / 0.24, rtol=0.05)

@@ -1,4 +1,4 @@
-"""Scenarios and records: files, flights in a batch, replay."""
+"""Scenarios and records: files, flights in a batch, repetition."""
 
 import json
 import math
@@ -40,14 +40,14 @@ HARD = Scenario(
     torque_factor_n_m_s2=1.2e-10,
     motor_lag_s=0.02,
     drag_1_s=0.05,
-    wind_m_s2=(0.1, -0.05),
+    push_m_s2=(0.1, -0.05),
     wind_speed_m_s=4.0,
     wind_direction_rad=1.0,
     battery_sag_1_s=0.001,
     payload_kg=0.003,
     payload_time_s=0.7,
-    push_n_s=(0.01, 0.005, -0.002),
-    push_time_s=1.2,
+    impulse_n_s=(0.01, 0.005, -0.002),
+    impulse_time_s=1.2,
     command_delay_ticks=3,
     dropped_share=0.1,
     sensors="mambo-derotated",
@@ -70,6 +70,7 @@ def test_a_record_reads_back_as_it_was_written(tmp_path: Path) -> None:
     [
         ({"mass_kg": -1.0}, "scenario.mass_kg: Input should be greater than 0"),
         ({"mas_kg": 1.0}, "scenario.mas_kg: Extra inputs are not permitted"),
+        ({"wind_m_s2": [0.5, 0.0]}, "scenario.wind_m_s2: is called push_m_s2 since version 0.2"),
         ({"payload_kg": -0.07}, "payload_kg must leave a positive mass"),
         ({"seed": -1}, "scenario.seed: Input should be greater than or equal to 0"),
         (
@@ -181,9 +182,9 @@ def test_every_key_reaches_its_field_of_the_simulation() -> None:
         ("dropped_share", flight.link.dropped_share),
         ("mass_kg", flight.vehicle.airframe.mass_kg),
         ("inertia_kg_m2", flight.vehicle.airframe.inertia_kg_m2),
-        ("wind_m_s2", flight.vehicle.wind_m_s2),
-        ("push_n_s", flight.disturbances.push_n_s),
-        ("push_time_s", flight.disturbances.push_time_s),
+        ("push_m_s2", flight.disturbances.push_m_s2),
+        ("impulse_n_s", flight.disturbances.impulse_n_s),
+        ("impulse_time_s", flight.disturbances.impulse_time_s),
         ("noise_scale", sensors.noise_scale),
         ("gyro_bias_rad_s", sensors.gyro_bias_rad_s),
     ):
@@ -282,14 +283,14 @@ def test_step_sizes_are_the_changes_of_the_plan() -> None:
 def test_a_record_is_flown_again_with_its_inner_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The reference replays a flight of the C bit for bit; a wrong digest or further options fail."""
+    """The reference repeats a flight of the C bit for bit; a wrong digest or further options fail."""
     trace = fly(flight_of([CALM, HARD], 0.01), CompiledController(MAMBO, 2))
     good = Record(scenario=HARD, settings=MAMBO, trace_sha256=trace.digest(1))
     write_record(good, tmp_path / "good.json")
     write_record(good.model_copy(update={"trace_sha256": "0" * 64}), tmp_path / "other.json")
 
     monkeypatch.chdir(tmp_path)
-    said, _ = run("fly", "--replay", "good.json", "--no-pictures", "-o", "good")
+    said, _ = run("fly", "--repeat", "good.json", "--no-pictures", "-o", "good")
     assert "the trace equals the recorded one, bit for bit" in said
     inner = np.load(tmp_path / "good" / "inner-steps.npz")
     k, iterations = len(trace.time_s), MAMBO.optimizer.iterations
@@ -297,6 +298,6 @@ def test_a_record_is_flown_again_with_its_inner_steps(
     assert inner["plan_rad"].shape == inner["step_size_rad"].shape == (k, iterations, 1, 2, 2)
     header = (tmp_path / "good" / "trace.csv").read_text().splitlines()[0]
     assert header.endswith(",".join(SEEN_COLUMNS))
-    run("fly", "--replay", "other.json", "--no-pictures", code=1)
-    _, refused = run("fly", "--replay", "good.json", "--seed", "3", code=2)
-    assert refused == "--replay good.json contains the whole flight: leave out --seed\n"
+    run("fly", "--repeat", "other.json", "--no-pictures", code=1)
+    _, refused = run("fly", "--repeat", "good.json", "--seed", "3", code=2)
+    assert refused == "--repeat good.json contains the whole flight: leave out --seed\n"

@@ -183,8 +183,8 @@ REASONS: Final[Mapping[Key, str]] = {
     **{
         (
             "world.h",
-            "const mask_t any_axis = (flight->push_n_s[0] != <real>) "
-            "| (flight->push_n_s[1] != <real>) | (flight->push_n_s[2] != <real>);",
+            "const mask_t any_axis = (flight->impulse_n_s[0] != <real>) "
+            "| (flight->impulse_n_s[1] != <real>) | (flight->impulse_n_s[2] != <real>);",
             change,
         ): "a push of zero changes nothing but the sign of a zero"
         for change in ("zero -> one", "zero -> one #1", "zero -> one #2")

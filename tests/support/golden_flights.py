@@ -28,7 +28,7 @@ PRESETS: Final = ("mambo", "mambo-1norm")
 SCENARIOS: Final = {
     "figure of eight": Scenario(duration_s=10.0),
     "circle, turned, in wind, with motor lag": Scenario(
-        trajectory="circle", duration_s=10.0, yaw_rad=0.8, wind_m_s2=(0.5, 0.3), motor_lag_s=0.03
+        trajectory="circle", duration_s=10.0, yaw_rad=0.8, push_m_s2=(0.5, 0.3), motor_lag_s=0.03
     ),
     "Lissajous, turning": Scenario(trajectory="lissajous", duration_s=10.0, yaw_rad=-2.0, yaw_rate_rad_s=1.0),
     "step": Scenario(trajectory="step", duration_s=10.0),

@@ -28,7 +28,7 @@ from mambo_sil.experiment.table2.table2 import CASES, Claim, Table2Row, Table2Su
 from mambo_sil.flight import flight_report
 from mambo_sil.flight.controllers.pd import PdController
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.flight_report import FlySummary, ReplaySummary
+from mambo_sil.flight.flight_report import FlySummary, RepeatSummary
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD, PD_TITLES
 from mambo_sil.flight.scenario import Scenario
@@ -79,12 +79,12 @@ def fly_folder(folder: Path, *, lost: bool = False) -> None:
     ).write(folder)
 
 
-def replay_folder(folder: Path) -> None:
+def repeat_folder(folder: Path) -> None:
     """Write a recorded flight flown again, not bit for bit."""
     flown = trace()
     write_npz(flown, folder / "trace.npz")
-    ReplaySummary(
-        replay=HOSTILE,
+    RepeatSummary(
+        repeat=HOSTILE,
         same_bits_as_recorded=False,
         same_bits_as_host=None,
         controller="pd",
@@ -267,7 +267,7 @@ def identify_folder(folder: Path) -> None:
 
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
-    "replay": replay_folder,
+    "repeat": repeat_folder,
     "table2": table2_folder,
     "sensed": sensed_folder,
     "footprint": footprint_folder,

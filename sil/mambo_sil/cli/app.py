@@ -57,7 +57,7 @@ COMMANDS: Final[dict[str, Callable[..., None]]] = {
 EXAMPLES: Final = """\
 mambo-nmpc fly
 mambo-nmpc fly controller.toml --trajectory circle --yaw-rad 0.8 -o circle
-mambo-nmpc fly --controller pd --wind 0.5,0 -o pd-in-wind
+mambo-nmpc fly --controller pd --push 0.5,0 -o pd-pushed
 mambo-nmpc fly --on crazyflie -o on-crazyflie
 mambo-nmpc fly controller.toml --port /dev/ttyACM0 -o on-the-board
 mambo-nmpc fly controller.toml --port /dev/ttyACM0 --real-time --duration-s 20
@@ -65,7 +65,7 @@ mambo-nmpc fly --trajectory waypoints.csv --start take-off --duration-s 30
 mambo-nmpc fly --sensors mambo --wind gusts --seed 7 -o as-on-the-mambo
 mambo-nmpc fly --vehicle crazyflie --sensors mocap -o crazyflie
 mambo-nmpc fly --vehicle my-drone.toml -o my-drone
-mambo-nmpc fly --replay worst.json -o again
+mambo-nmpc fly --repeat worst.json -o again
 mambo-nmpc table2 -o table2
 mambo-nmpc table2 --scalar fixed -o fixed
 mambo-nmpc table2 --sensors -o seen

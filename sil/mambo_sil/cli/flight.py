@@ -34,7 +34,7 @@ from mambo_sil.flight.trajectories import CURVES, Trajectory, Waypoints
 from mambo_sil.results.folders import new_results
 from mambo_sil.results.scratch import scratch_folder
 
-GUSTS = "gusts"
+CALM, GUSTS = "none", "gusts"
 LONGEST_FLIGHT_S = 3600.0
 LARGEST_SEED = 2**63 - 1
 TRACE_FILES = ("trace.csv", "trace.npz")
@@ -72,11 +72,10 @@ def flight_of_options(options: FlyOptions, settings: Settings, drone: VehicleFil
     """Return the flight that the options describe; raises FlightError and TrajectoryError."""
     name, period_s = echo(options.source), settings.horizon.update_period_s
     curve = _trajectory(options)
-    gusty = options.wind == GUSTS
     _within("--yaw-rad", options.yaw_rad, -1000.0, 1000.0)
     motor_lag_s = drone.motor_lag_s if options.motor_lag_s is None else options.motor_lag_s
     _within("--motor-lag-s", motor_lag_s, 0.0, 1.0)
-    wind_m_s2 = (0.0, 0.0) if gusty else _wind(options.wind)
+    disturbances = Disturbances(_wind_speed_m_s(options.wind), push_m_s2=_push_m_s2(options.push))
     try:
         sensors = choose_sensors(options.sensors, drone)
     except FlightError as error:
@@ -89,10 +88,10 @@ def flight_of_options(options: FlyOptions, settings: Settings, drone: VehicleFil
             duration_s=options.duration_s,
             start=options.start,
             yaw_rad=options.yaw_rad,
-            vehicle=replace(Vehicle.of(drone), motor_lag_s=motor_lag_s, wind_m_s2=wind_m_s2),
+            vehicle=replace(Vehicle.of(drone), motor_lag_s=motor_lag_s),
             update_period_s=period_s,
             seeds=(options.seed,),
-            disturbances=Disturbances(wind_speed_m_s=LIGHT_M_S if gusty else 0.0),
+            disturbances=disturbances,
             sensors=sensors,
         )
     except FlightError as error:
@@ -114,7 +113,7 @@ def summary_fields(
         "motor_lag_s": flight.vehicle.motor_lag_s,
         "update_period_s": flight.update_period_s,
         "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
-        "wind_m_s2": flight.vehicle.wind_m_s2,
+        "push_m_s2": flight.disturbances.push_m_s2,
         "wind_speed_m_s": flight.disturbances.wind_speed_m_s,
         **judge(trace, settings, drone),
     }
@@ -215,13 +214,21 @@ def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
             )
 
 
-def _wind(text: str) -> tuple[float, float]:
+def _wind_speed_m_s(wind: str) -> float:
+    if wind not in (CALM, GUSTS):
+        raise FlightError(
+            f"--wind {echo(wind)} must be {CALM} or {GUSTS}; a steady acceleration is --push X,Y, in m/s^2"
+        )
+    return LIGHT_M_S if wind == GUSTS else 0.0
+
+
+def _push_m_s2(text: str) -> tuple[float, float]:
     try:
         x, y = (float(word) for word in text.split(","))
     except ValueError:
-        raise FlightError(f"--wind {echo(text)} must be two numbers, as in 0.5,0, or {GUSTS}") from None
-    _within("--wind", x, -100.0, 100.0)
-    _within("--wind", y, -100.0, 100.0)
+        raise FlightError(f"--push {echo(text)} must be two numbers, as in 0.5,0") from None
+    _within("--push", x, -100.0, 100.0)
+    _within("--push", y, -100.0, 100.0)
     return x, y
 
 

@@ -98,14 +98,14 @@ class FlyOptions:
     size_m: Annotated[float, typer.Option(help="Half-width, radius or step of the curve, in m.")] = 2.0
     rate_rad_s: Annotated[float, typer.Option(help="Angular rate of the curve, in rad/s.")] = 0.5
     yaw_rad: Annotated[float, typer.Option(help="Constant yaw, in rad.")] = 0.0
+    push: Annotated[
+        str,
+        typer.Option(help="Steady acceleration along x (north), y (east), in m/s^2.", metavar="X,Y"),
+    ] = "0,0"
     wind: Annotated[
         str,
-        typer.Option(
-            help="Constant acceleration by wind along x (north), y (east), in m/s^2; or `gusts`: a mean "
-            "wind towards north with light turbulence.",
-            metavar="X,Y|gusts",
-        ),
-    ] = "0,0"
+        typer.Option(help="`gusts`: a mean wind towards north with light turbulence.", metavar="none|gusts"),
+    ] = "none"
     sensors: Annotated[
         SensorsName,
         typer.Option(
@@ -140,7 +140,7 @@ class FlyOptions:
             "inputs, lost replies and periods without a step.",
         ),
     ] = False
-    replay: Annotated[
+    repeat: Annotated[
         Path | None,
         typer.Option(
             help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"

@@ -1,4 +1,4 @@
-"""`fly --replay`: repeat a recorded flight, and record every iteration of the optimizer."""
+"""`fly --repeat`: repeat a recorded flight, and record every iteration of the optimizer."""
 
 from pathlib import Path
 
@@ -11,15 +11,15 @@ from mambo_sil.cli.progress import progress_bar
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.flight_report import ReplaySummary, flight_text, judge
+from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
 from mambo_sil.flight.loop import PositionController
 from mambo_sil.flight.loop import fly as simulate
 from mambo_sil.flight.scenario import Record, flight_of, read_record
 from mambo_sil.results.folders import new_results
 
 INNER_STEPS = "inner-steps.npz"
-ALLOWED = frozenset({"replay", "output", "pictures", "as_json"})
-"""Options allowed with --replay; the record contains all others."""
+ALLOWED = frozenset({"repeat", "output", "pictures", "as_json"})
+"""Options allowed with --repeat; the record contains all others."""
 
 
 def fly_again(options: FlyOptions, file: Path) -> None:
@@ -34,13 +34,13 @@ def fly_again(options: FlyOptions, file: Path) -> None:
         given = context.get_parameter_source(name)
         if given is not None and given.name == "COMMANDLINE":
             option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
-            raise FlightError(f"--replay {echo(str(file))} contains the whole flight: leave out {option}")
+            raise FlightError(f"--repeat {echo(str(file))} contains the whole flight: leave out {option}")
     record = read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
     watched, controller = _controllers(record)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
-    with new_results(options.output, ReplaySummary.command, files) as folder:
-        with progress_bar("replaying") as progress:
+    with new_results(options.output, RepeatSummary.command, files) as folder:
+        with progress_bar("repeating") as progress:
             trace = simulate(flight, controller, progress)
         write_trace(trace, folder)
         if options.pictures:
@@ -48,8 +48,8 @@ def fly_again(options: FlyOptions, file: Path) -> None:
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
-        summary = ReplaySummary(
-            replay=str(file),
+        summary = RepeatSummary(
+            repeat=str(file),
             same_bits_as_recorded=None if recorded is None else trace.digest() == recorded,
             same_bits_as_host=None,
             controller=record.controller,

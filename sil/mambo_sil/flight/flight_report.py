@@ -104,7 +104,7 @@ class FlySummary(FlightSummary):
     size_m: float
     rate_rad_s: float
     yaw_rad: float
-    wind_m_s2: tuple[float, float]
+    push_m_s2: tuple[float, float]
     wind_speed_m_s: float
     sensors: str
     seed: int
@@ -129,19 +129,19 @@ class FlySummary(FlightSummary):
             **_course(self),
             "controller": _controller(self.controller, f"{self.settings[:16]} of {self.source}"),
             "start": f"{self.start}, heading {self.yaw_rad:g} rad",
-            "disturbances": "steady acceleration {:g}, {:g} m/s²".format(*self.wind_m_s2)
+            "disturbances": "push {:g}, {:g} m/s²".format(*self.push_m_s2)
             + f"; wind with gusts {self.wind_speed_m_s:g} m/s; motor lag {self.motor_lag_s:g} s",
         }
         titles = (name, f"Flight: {name}, {self.trajectory}")
         return self._section(folder, titles, parameters | facts, bad)
 
 
-class ReplaySummary(FlightSummary):
+class RepeatSummary(FlightSummary):
     """The results of repeating a recorded flight."""
 
-    command = "fly --replay"
+    command = "fly --repeat"
 
-    replay: str
+    repeat: str
     scenario: Scenario
     same_bits_as_recorded: bool | None
 
@@ -154,13 +154,13 @@ class ReplaySummary(FlightSummary):
         """Return the section of the report on this flight; raises TraceError."""
         name = PD_TITLES.get(self.controller, "NMPC")
         facts = {
-            "record": self.replay,
+            "record": self.repeat,
             **_course(self.scenario),
             "controller": _controller(self.controller, self.settings[:16]),
             "seed": str(self.scenario.seed),
         }
         bad = ["the trace differs from the recorded one"] if self.same_bits_as_recorded is False else []
-        return self._section(folder, (name, f"Replay: {name}, {self.replay}"), facts, bad)
+        return self._section(folder, (name, f"Repetition: {name}, {self.repeat}"), facts, bad)
 
 
 def _controller(name: str, settings: str) -> str:
@@ -245,9 +245,9 @@ def flight_text(summary: FlightSummary) -> str:
     if refused:
         lines.append("refused inputs: " + ", ".join(f"{count} {name}" for name, count in refused.items()))
         lines += [f"  {sentence}" for sentence in summary.refusals]
-    if isinstance(summary, ReplaySummary) and summary.same_bits_as_recorded is not None:
+    if isinstance(summary, RepeatSummary) and summary.same_bits_as_recorded is not None:
         same = "equals" if summary.same_bits_as_recorded else "DIFFERS FROM"
-        lines.append(f"replay: the trace {same} the recorded one, bit for bit")
+        lines.append(f"repetition: the trace {same} the recorded one, bit for bit")
     if isinstance(summary, FlySummary) and summary.board is not None:
         same = "equals" if summary.same_bits_as_host else "DIFFERS FROM"
         lines.append(f"emulated core of {summary.board}: the trace {same} that of this machine, bit for bit")

@@ -28,3 +28,12 @@ PD_FEEDFORWARD: Final = "PD-feedforward"
 PD_NAMES: Final[tuple[PdName, ...]] = get_args(PdName)
 PD_TITLES: Final[dict[str, str]] = {"pd": PD, "pd-feedforward": PD_FEEDFORWARD}
 """What tables and pictures call the PDs, by name."""
+
+RENAMED: Final = {
+    "wind_m_s2": "push_m_s2",
+    "push_n_s": "impulse_n_s",
+    "push_time_s": "impulse_time_s",
+    **{f"wind_{axis}_m_s2": f"push_{axis}_m_s2" for axis in "xy"},
+    **{f"push_{axis}_n_s": f"impulse_{axis}_n_s" for axis in "xyz"},
+}
+"""Keys of version 0.1 and their names now, for messages."""

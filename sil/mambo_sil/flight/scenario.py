@@ -20,6 +20,7 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic_core import ErrorDetails
 
 from mambo_codegen.errors import echo
 from mambo_codegen.plain_file import read_plain_file
@@ -35,7 +36,7 @@ from mambo_sil.drone.vehicles.model import VehicleFile
 from mambo_sil.drone.vehicles.sections import MamboSensors, MocapSensors
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import SENSORS_OF, ControllerName, CurveName, SensorsName, Start
+from mambo_sil.flight.names import RENAMED, SENSORS_OF, ControllerName, CurveName, SensorsName, Start
 from mambo_sil.flight.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 1
@@ -98,8 +99,8 @@ class Scenario(_Record):
     motor_lag_s: float = Field(_AS_THE_VEHICLE, ge=0.0, le=1.0)
     drag_1_s: float = Field(_AS_THE_VEHICLE, ge=0.0)
 
-    wind_m_s2: Two = (0.0, 0.0)
-    """Steady disturbance acceleration along x and y of the world."""
+    push_m_s2: Two = (0.0, 0.0)
+    """Steady acceleration along x and y of the world."""
     wind_speed_m_s: float = Field(0.0, ge=0.0, le=50.0)
     """Mean wind 20 ft above the ground, with gusts; 0 is still air."""
     wind_direction_rad: float = 0.0
@@ -107,8 +108,8 @@ class Scenario(_Record):
     battery_sag_1_s: float = Field(0.0, ge=0.0, le=1.0)
     payload_kg: float = 0.0
     payload_time_s: float = 0.0
-    push_n_s: Three = (0.0, 0.0, 0.0)
-    push_time_s: float = 0.0
+    impulse_n_s: Three = (0.0, 0.0, 0.0)
+    impulse_time_s: float = 0.0
 
     command_delay_ticks: int = Field(0, ge=0, le=200)
     """Delay of the roll and pitch commands in ticks of the vehicle."""
@@ -235,7 +236,14 @@ def read_record(path: Path) -> Record:
         return Record.model_validate_json(content)
     except ValidationError as error:
         faults = [
-            f"{name}: {'.'.join(map(str, fault['loc'])) or 'file'}: {fault['msg']}"
+            f"{name}: {'.'.join(map(str, fault['loc'])) or 'file'}: {_rule(fault)}"
             for fault in error.errors(include_url=False, include_context=False, include_input=False)
         ]
         raise ScenarioError("\n".join(faults)) from None
+
+
+def _rule(fault: ErrorDetails) -> str:
+    """Return the rule that a key of a record breaks; for a key of version 0.1 its new name."""
+    key = fault["loc"][-1] if fault["loc"] else ""
+    renamed = RENAMED.get(str(key)) if fault["type"] == "extra_forbidden" else None
+    return fault["msg"] if renamed is None else f"is called {renamed} since version 0.2"

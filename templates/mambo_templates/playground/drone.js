@@ -48,7 +48,7 @@ class Drone {
     this.module.reset();
     this.sensed = false;
     this.setMembers("flight", { body_start: [target[0], target[1]] });
-    this.setMembers("flight", { push_tick: [-1] }, BigInt64Array);
+    this.setMembers("flight", { impulse_tick: [-1] }, BigInt64Array);
     this.inputs[3].set(draws);
     this.position.set([target[0], target[1], 0]);
     this.angles.fill(0);
@@ -56,8 +56,8 @@ class Drone {
   }
 
   push(impulse, tick) {
-    this.setMembers("flight", { push_n_s: [...impulse, 0] });
-    this.setMembers("flight", { push_tick: [tick] }, BigInt64Array);
+    this.setMembers("flight", { impulse_n_s: [...impulse, 0] });
+    this.setMembers("flight", { impulse_tick: [tick] }, BigInt64Array);
   }
 
   update(...inputs) {

@@ -90,7 +90,7 @@ def test_the_flight_is_the_one_without_a_board(tmp_path: Path) -> None:
     elf = build_firmware(presets.preset("mambo"), "host", tmp_path / "pil")
     near, far = os.openpty()
     with subprocess.Popen([elf], stdin=near, stdout=near) as process:
-        options = ["--duration-s", "1", "--wind", "0.2,0.1", "-o"]
+        options = ["--duration-s", "1", "--push", "0.2,0.1", "-o"]
         said, _ = run("fly", "--port", os.ttyname(far), *options, "board")
         process.kill()
     os.close(near)

@@ -269,7 +269,7 @@ def test_other_bits_are_told_and_fail(
         ),
         (["--port", "x", "--controller", "pd"], "--port x flies the C on a board: leave out --controller"),
         (["--port", "x", "--on", "mega"], "--port x flies the C on a board: leave out --controller and --on"),
-        (["--port", "x", "--replay", "y"], "contains the whole flight: leave out --port"),
+        (["--port", "x", "--repeat", "y"], "contains the whole flight: leave out --port"),
         (
             ["--real-time"],
             "--real-time lets the clock of a board call the step: give its --port, or leave it out",

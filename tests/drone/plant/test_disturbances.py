@@ -175,7 +175,7 @@ def test_payload_is_added_at_its_time() -> None:
 
 def test_push_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
     """The change is along the axes of the world for any heading, at that time and in that flight only."""
-    disturbances = Disturbances(push_n_s=(np.array([0.0063, 0.0]), -0.00063, 0.0), push_time_s=0.5)
+    disturbances = Disturbances(impulse_n_s=(np.array([0.0063, 0.0]), -0.00063, 0.0), impulse_time_s=0.5)
     trace = hover(1.0, 2, yaw_rad=0.8, disturbances=disturbances)
     np.testing.assert_array_equal(trace.velocity_m_s[:50, :, :2], 0.0)
     np.testing.assert_allclose(trace.velocity_m_s[50, :, :2], [[0.1, -0.01], [0.0, -0.01]], atol=1e-12)
@@ -186,7 +186,7 @@ def test_push_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
 def test_a_push_meets_the_mass_of_its_instant(part: tuple[float, float, float], loaded: bool) -> None:
     """A payload counts from its own tick on: due with the push it is carried, one tick later it is not."""
     disturbances = Disturbances(
-        payload_kg=0.007, payload_time_s=0.01 if loaded else 0.015, push_n_s=part, push_time_s=0.01
+        payload_kg=0.007, payload_time_s=0.01 if loaded else 0.015, impulse_n_s=part, impulse_time_s=0.01
     )
     world = World(disturbances, Vehicle(), (0,), 1.1)
     state = at_rest()
@@ -202,7 +202,7 @@ def test_events_happen_at_the_nearest_tick_of_each_flight() -> None:
     """12.4 ms is tick 2, 12.6 ms tick 3; 35 ms is tick 7, although 0.035 / 0.005 is not exactly 7."""
     times_s = np.array([0.0124, 0.0126, 0.035])
     disturbances = Disturbances(
-        payload_kg=0.007, payload_time_s=times_s, push_n_s=(0.0, 0.007, 0.0), push_time_s=times_s
+        payload_kg=0.007, payload_time_s=times_s, impulse_n_s=(0.0, 0.007, 0.0), impulse_time_s=times_s
     )
     world = World(disturbances, Vehicle(), (0, 0, 0), 1.1)
     pushed, loaded = np.zeros((9, 3)), np.zeros((9, 3))
@@ -250,7 +250,7 @@ def test_each_flight_has_the_gusts_of_its_own_wind_at_the_given_height() -> None
     [
         (Disturbances(battery_sag_1_s=np.array([0.0, 2.0])), [1.0, 0.99], 0.0, 0.0),
         (Disturbances(payload_kg=np.array([0.0, 0.005])), 1.0, [0.0, 0.005], 0.0),
-        (Disturbances(push_n_s=(0.0, np.array([0.0, 0.0063]), 0.0)), 1.0, 0.0, [0.0, 0.1]),
+        (Disturbances(impulse_n_s=(0.0, np.array([0.0, 0.0063]), 0.0)), 1.0, 0.0, [0.0, 0.1]),
     ],
     ids=["battery", "payload", "push"],
 )

@@ -80,12 +80,12 @@ def test_a_tilt_accelerates_by_its_share_of_g_against_drag() -> None:
     np.testing.assert_allclose(truth(state).velocity_m_s[:, 0], expected, rtol=1e-8)
 
 
-def test_air_wind_battery_and_payload_act_on_the_body() -> None:
-    """Still and level: drag towards the air, the wind's acceleration, and thrust over the whole mass."""
+def test_air_push_battery_and_payload_act_on_the_body() -> None:
+    """Still and level: drag towards the air, the push's acceleration, and thrust over the whole mass."""
     vehicle = Vehicle.of(FLOWN)
-    windy = Vehicle(vehicle.airframe, 0.0, 0.15, (0.3, -0.2), FLOWN)
-    moment = Moment(thrust_share=0.9, payload_kg=0.01, air_m_s=(2.0, -1.0))
-    state = fly(FLOWN, (0.0, 0.0), 1, vehicle=windy, moment=moment)[-1]
+    vehicle = Vehicle(vehicle.airframe, 0.0, 0.15, FLOWN)
+    moment = Moment(thrust_share=0.9, payload_kg=0.01, air_m_s=(2.0, -1.0), push_m_s2=(0.3, -0.2))
+    state = fly(FLOWN, (0.0, 0.0), 1, vehicle=vehicle, moment=moment)[-1]
     found = truth(state).velocity_m_s[:, 0] / FLOWN.step_s
     expected = [0.15 * 2.0 + 0.3, -0.15 - 0.2, 9.81 * (1.0 - 0.9 * 0.03 / 0.04)]
     np.testing.assert_allclose(found, expected, rtol=1e-3)

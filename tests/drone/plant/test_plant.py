@@ -63,7 +63,7 @@ def paper_derivative(state: FloatArray, wrench: FloatArray, body: RigidBody) -> 
         ]
     )
     inertia = np.diag(np.array(body.inertia_kg_m2))
-    wind = matrix.T @ np.array([*body.wind_m_s2, 0.0])
+    wind = matrix.T @ np.array([*body.push_m_s2, 0.0])
     gravity = GRAVITY_M_S2 * np.array(
         [-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)]
     )
@@ -209,7 +209,7 @@ def test_integrator_step_is_the_third_order_taylor_polynomial() -> None:
 
 def test_free_motion_converges_at_third_order() -> None:
     """Halving the step divides the error against the matrix form by about eight, to 1e-4."""
-    body = replace(Vehicle().rigid_body, wind_m_s2=(0.3, -0.2))
+    body = replace(Vehicle().rigid_body, push_m_s2=(0.3, -0.2))
     exact = tumble_exactly(body, 2.0)
     errors = [np.linalg.norm(tumble(body, 2.0, step_s) - exact) for step_s in (0.02, 0.01, 0.005)]
     assert errors[0] / errors[1] == pytest.approx(8.0, abs=0.1)

@@ -89,7 +89,7 @@ def test_a_push_changes_the_velocity_by_impulse_over_total_mass() -> None:
     """A payload of 7 g makes 70 g; the change is along the axes of the world for a leaning drone."""
     state = moving()
     impulse_n_s = np.array([[0.007], [-0.0014], [0.0021]])
-    pushed = Vehicle().apply_push(state, impulse_n_s, 0.007)
+    pushed = Vehicle().apply_impulse(state, impulse_n_s, 0.007)
     change_m_s = truth(pushed).velocity_m_s - truth(state).velocity_m_s
     np.testing.assert_allclose(change_m_s[:, 0], [0.1, -0.02, 0.03], rtol=1e-12)
     np.testing.assert_array_equal(pushed.body[[0, 1, 2, *range(6, 12)]], state.body[[0, 1, 2, *range(6, 12)]])
@@ -100,7 +100,7 @@ def test_a_push_leaves_its_input_and_the_flights_beside_it_alone() -> None:
     state = moving(2)
     state.body[3:6, 1] = -0.0
     before = state.body.copy()
-    pushed = Vehicle().apply_push(state, np.array([[0.01, 0.0]] * 3), 0.0)
+    pushed = Vehicle().apply_impulse(state, np.array([[0.01, 0.0]] * 3), 0.0)
     assert state.body.tobytes() == before.tobytes()
     assert pushed.body[:, 1].tobytes() == before[:, 1].tobytes()
 

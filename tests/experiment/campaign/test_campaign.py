@@ -126,9 +126,9 @@ def test_draws_are_those_of_earlier_versions() -> None:
     shares = np.random.Generator(np.random.Philox(np.random.SeedSequence(0, spawn_key=(0,)).spawn(2)[0]))
     first, *_, last = shares.random(37)
     assert drawn["mass_kg"] == 0.063 + first * (0.08 - 0.063)
-    assert list(PARAMETERS)[36] == "push_time_s"
-    pushed = draw(0, 0, PARAMETERS | {"push_time_s": parse({"uniform": [0.0, 1.0]}, WIDE)})
-    assert pushed["push_time_s"] == last
+    assert list(PARAMETERS)[36] == "impulse_time_s"
+    pushed = draw(0, 0, PARAMETERS | {"impulse_time_s": parse({"uniform": [0.0, 1.0]}, WIDE)})
+    assert pushed["impulse_time_s"] == last
 
 
 @pytest.mark.parametrize(
@@ -239,7 +239,9 @@ BAD = {
     "sed = 1": "sed is not a key of this file; did you mean seed?",
     "draws = 3": "draws = 3 must be a section; write [draws] and its keys below",
     "[draws]\nmas_kg = 1": "draws.mas_kg is not a parameter; did you mean mass_kg?",
-    "[draws]\nwind = 3": "draws.wind is not a parameter; did you mean wind_x_m_s2, wind_y_m_s2",
+    "[draws]\nwind = 3": "draws.wind is not a parameter; did you mean wind_speed_m_s, wind_direction_rad",
+    "[draws]\nwind_x_m_s2 = 3": "draws.wind_x_m_s2 is called push_x_m_s2 since version 0.2",
+    "[draws]\npush_z_n_s = 3": "draws.push_z_n_s is called impulse_z_n_s since version 0.2",
     "[draws]\nmass_kg = 60": "draws.mass_kg = 60 must lie in 0.01..1",
     "[draws]\nmass_kg = nan": "draws.mass_kg = NaN must lie in 0.01..1",
     "[draws]\nmass_kg = { uniform = [0.08, 0.06] }": "[0.08, 0.06] } must have the lower limit first",
@@ -253,7 +255,7 @@ BAD = {
     '[draws]\nmass_kg = { uniform = [0.06, "x"] }': "must be a number, { uniform = [low, high] }",
     "[draws]\nmass_kg = { choice = [true] }": "must be a number, { uniform = [low, high] }",
     "[draws]\nmass_kg = { choice = 0.07 }": "must be a number, { uniform = [low, high] }",
-    "[draws]\nwind_x_m_s2 = { normal = [0, -1] }": "must have a standard deviation of 0 or more",
+    "[draws]\npush_x_m_s2 = { normal = [0, -1] }": "must have a standard deviation of 0 or more",
     "[draws]\nnoise_scale = { log_uniform = [0, 1] }": "must have limits above 0",
     "[draws]\ncommand_delay_ticks = 1.5": "must be whole numbers",
     "[draws]\ncommand_delay_ticks = { uniform = [0, 2] }": "must be a whole number or { choice",

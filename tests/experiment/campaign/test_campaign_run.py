@@ -92,11 +92,11 @@ def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Pa
 
 
 @pytest.mark.long
-def test_a_worst_flight_replays_bit_for_bit(whole: Path, tmp_path: Path) -> None:
-    """`fly --replay` repeats it with the Python reference, alone, with the same bits as the C in a batch."""
+def test_a_worst_flight_repeats_bit_for_bit(whole: Path, tmp_path: Path) -> None:
+    """`fly --repeat` repeats it with the Python reference, alone, with the same bits as the C in a batch."""
     worst = json.loads((whole / "summary.json").read_text())["worst"]["mambo"][0]
     record, out = str(whole / worst["record"]), str(tmp_path)
-    summary = json.loads(run("fly", "--replay", record, "--json", "--no-pictures", "-o", out)[0])
+    summary = json.loads(run("fly", "--repeat", record, "--json", "--no-pictures", "-o", out)[0])
     assert summary["same_bits_as_recorded"] is True
     assert summary["metrics"]["iae_m_s"] == worst["iae_m_s"]
 

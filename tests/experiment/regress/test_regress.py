@@ -133,7 +133,7 @@ def test_same_bits_want_a_recorded_digest(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", PD_NAMES)
 def test_the_record_of_a_failed_flight_names_the_kind_of_controller(tmp_path: Path, name: str) -> None:
-    """A PD's flight is replayed with it."""
+    """A PD's flight is repeated with it."""
     found, pd = suite(tmp_path), load_entrant(name, Path(), "test")
     rows = [row(4.0), row(1.0), row(1.0)]
     write_records(judge(found, pd, rows, None, tmp_path), found, pd, rows, tmp_path)
@@ -177,13 +177,13 @@ calm                 ise_m2_s                       2       1.75        2.5     
 still                crashed                        0          0          0          -      12.5%      0 of 1
 
 eight/yaw_rad=0: iae_m_s = 2.5 (bound 3; recorded 2, so at most 2.2)
-    mambo-nmpc fly --replay out/flights/0000-eight.json
+    mambo-nmpc fly --repeat out/flights/0000-eight.json
 fall/seed=2: iae_m_s = nan (recorded 1, so at most 1.1)
-    mambo-nmpc fly --replay out/flights/0004-fall.json
+    mambo-nmpc fly --repeat out/flights/0004-fall.json
 calm/seed=1: crashed; ise_m2_s = 2.5 (bound 2)
-    mambo-nmpc fly --replay out/flights/0005-calm.json
+    mambo-nmpc fly --repeat out/flights/0005-calm.json
 calm/seed=2: refused_updates = 5 (bound 4)
-    mambo-nmpc fly --replay out/flights/0006-calm.json
+    mambo-nmpc fly --repeat out/flights/0006-calm.json
 mine with mambo: 4 of 8 flights passed, 4 failed
 compared with the bounds and with here.json"""
 
@@ -365,7 +365,7 @@ def test_each_controller_has_its_baseline(tmp_path: Path) -> None:
 
 
 def test_a_record_is_left_of_each_failed_flight_only(tmp_path: Path) -> None:
-    """With the digest of its trace, for `fly --replay`."""
+    """With the digest of its trace, for `fly --repeat`."""
     found = suite(tmp_path)
     rows = [row(1.0), row(4.0, trace_sha256="cd"), row(1.0)]
     summary = judged(found, rows)
@@ -394,7 +394,7 @@ def test_junit_has_a_case_for_each_flight(tmp_path: Path) -> None:
     text = junit_xml(summary).decode("utf-8")
     assert text.startswith("<?xml version='1.0' encoding='utf-8'?>\n<testsuites tests=\"3\"")
     assert text.endswith("\n</testsuites>\n")
-    assert "replay it: mambo-nmpc fly --replay flights/0001-eight.json, in the result folder" in text
+    assert "repeat it: mambo-nmpc fly --repeat flights/0001-eight.json, in the result folder" in text
     messages = [case.find("failure") for case in found]
     assert [None if one is None else one.get("message") for one in messages] == [
         "iae_m_s = 4 (bound 3)",
@@ -411,7 +411,7 @@ def test_the_text_lists_some_failed_flights_and_counts_the_rest(tmp_path: Path) 
     )
     found = load_suite(str(path))
     text = regress_text(judge(found, mambo(), [row(2.0)] * 30, None, path), "out")
-    assert text.count("fly --replay out/flights/") == MOST_SHOWN
+    assert text.count("fly --repeat out/flights/") == MOST_SHOWN
     assert "and 20 more failed flights, all in junit.xml" in text
     assert "many with mambo: 0 of 30 flights passed, 30 failed" in text
 

@@ -34,18 +34,18 @@ def test_lists_multiply_the_flights_of_a_group(tmp_path: Path) -> None:
         [flights.eight]
         sensors = ["none", "mambo"]
         yaw_rad = [0.0, 0.5]
-        wind_m_s2 = [[0.5, 0.0], [0.0, -0.5]]
+        push_m_s2 = [[0.5, 0.0], [0.0, -0.5]]
         [flights.hover]
         trajectory = "hover"
-        wind_m_s2 = [0.1, 0.2]
+        push_m_s2 = [0.1, 0.2]
         """,
     )
     names = [flight.name for flight in found.flights]
     assert len(names) == len(set(names)) == 9
-    assert names[0] == "eight/yaw_rad=0,wind_m_s2=0.5;0,sensors=none"
+    assert names[0] == "eight/yaw_rad=0,push_m_s2=0.5;0,sensors=none"
     assert names[-1] == "hover"
-    assert found.flights[7].scenario == Scenario(yaw_rad=0.5, wind_m_s2=(0.0, -0.5), sensors="mambo")
-    assert found.flights[8].scenario == Scenario(trajectory="hover", wind_m_s2=(0.1, 0.2))
+    assert found.flights[7].scenario == Scenario(yaw_rad=0.5, push_m_s2=(0.0, -0.5), sensors="mambo")
+    assert found.flights[8].scenario == Scenario(trajectory="hover", push_m_s2=(0.1, 0.2))
 
 
 def test_names_do_not_depend_on_the_order_of_keys(tmp_path: Path) -> None:
@@ -117,6 +117,7 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
     ("line", "message"),
     [
         ("yaw = 1.0", "yaw is not a key of this file; did you mean yaw_rad, yaw_rate_rad_s?"),
+        ("wind_m_s2 = [0.5, 0.0]", "wind_m_s2 is called push_m_s2 since version 0.2"),
         ("size_m = [1, 5000]", "size_m = [1, 5000] must be less than or equal to 1000; 5000 is not"),
         ("size_m = 5000", "size_m = 5000 must be less than or equal to 1000"),
         ("seed = 1.5", "seed = 1.5 must be a valid integer"),
@@ -125,8 +126,8 @@ def test_every_metric_can_be_bounded_and_compared(tmp_path: Path) -> None:
         ("yaw_rad = true", "yaw_rad = true must be a valid number"),
         ("yaw_rad = []", "yaw_rad = [] must have 1 to 1000 values"),
         ("yaw_rad = [1, 1.0]", "yaw_rad = [1, 1.0] must have different values; every value is a flight"),
-        ("wind_m_s2 = [1, 2, 3]", "wind_m_s2 = [1, 2, 3] must be a vector of 2 finite numbers, or a list"),
-        ("wind_m_s2 = [[1, inf], [1, 2]]", "or a list of such vectors; [1, Infinity] is not"),
+        ("push_m_s2 = [1, 2, 3]", "push_m_s2 = [1, 2, 3] must be a vector of 2 finite numbers, or a list"),
+        ("push_m_s2 = [[1, inf], [1, 2]]", "or a list of such vectors; [1, Infinity] is not"),
         ("yaw_rad = { from = 0, to = 1 }", "must be a value, a list of values, or { from = first, to ="),
         ("yaw_rad = { from = 0, to = 1, count = 3, step = 1 }", "must be a value, a list of values, or {"),
         ("yaw_rad = { from = 0, to = 1, count = 3.0 }", "must be a value, a list of values, or { from ="),

@@ -107,7 +107,7 @@ def crazyflie_log(rows: list[dict[str, str]], commands: str) -> Iterator[list[ob
 @pytest.mark.parametrize("commands", ["nmpc", "mine"])
 def test_a_crazyflie_log_is_replayed_without_options(commands: str, tmp_path: Path) -> None:
     """Seven digits, blocks one after the other; an own prefix is named by --columns."""
-    run(*FLOWN, "crazyflie", "--vehicle", "crazyflie", "--wind", "0.3,0.2", "--yaw-rad", "0.4")
+    run(*FLOWN, "crazyflie", "--vehicle", "crazyflie", "--push", "0.3,0.2", "--yaw-rad", "0.4")
     with Path("flight.csv").open("w", newline="") as file:
         csv.writer(file).writerows(crazyflie_log(trace_rows(), commands))
     named = [f"{axis}_command_rad=deg*mine.{axis}" for axis in ("roll", "pitch")]
@@ -138,7 +138,7 @@ def trace_columns() -> dict[str, NDArray[np.float64]]:
 def test_a_ulog_is_replayed(source: str, target: tuple[str, ...]) -> None:
     """Single precision and a quaternion cost the last digits; an acceleration is read if it is given."""
     write_given()
-    run(*FLOWN, source, "--wind", "0.3,0.2")
+    run(*FLOWN, source, "--push", "0.3,0.2")
     Path("flight.ulg").write_bytes(ulog(trace_columns(), quaternion=False, target=target))
     summary = replayed("flight.ulg", source)
     assert (summary["steps"], summary["resampled"]) == (401, False)

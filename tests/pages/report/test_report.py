@@ -24,7 +24,7 @@ from tests.support.tools import board_builder
 VOID = {"meta", "input", "br", "img", "circle", "line", "path", "rect", "use"}
 SEEN = {
     "fly": ("max error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
-    "replay": ("Replay: PD", "✗", "the trace differs from the recorded one", "<dt>state</dt>", "Play"),
+    "repeat": ("Repetition: PD", "✗", "the trace differs from the recorded one", "<dt>state</dt>", "Play"),
     "sensed": ("20 flights, 1 lost", "7.123", "0.77", "drift, m"),
     "table2": (
         "PD-feedforward, flown",
@@ -40,7 +40,7 @@ SEEN = {
     "sweep": ("closest tracking that fits: prediction 10", "All 5 controllers", "IAE, m s", "\N{EN DASH}"),
     "faults": ("state NaN to the end", "crashed", "2376.50", "OK, BAD_STATE"),
     "verify": ("incomplete: 1 of 2 checks passed", "cppcheck is missing", "update_period_s"),
-    "regress": ("1 of 2 flights passed, 1 failed", "the trace differs", "fly --replay", ">1.5<", "0.750"),
+    "regress": ("1 of 2 flights passed, 1 failed", "the trace differs", "fly --repeat", ">1.5<", "0.750"),
     "identify": (
         "roll good: gain 0.83",
         "pitch refused",
@@ -49,7 +49,7 @@ SEEN = {
         "is refused: too calm",
         "<svg role",
     ),
-    "campaign": ("crashed: 0 with pd, 1 with mambo", "3 of 4 flights, 75.0 %", "fly --replay", "IAE, m s"),
+    "campaign": ("crashed: 0 with pd, 1 with mambo", "3 of 4 flights, 75.0 %", "fly --repeat", "IAE, m s"),
 }
 
 
@@ -246,7 +246,7 @@ def test_a_lost_flight_is_shown_as_far_as_it_went() -> None:
         (lambda folder: (folder / SUMMARY).write_text("[]"), "command = None must be one of fly, "),
         (
             lambda folder: (folder / SUMMARY).write_text('{"command": "dance"}'),
-            "command = dance must be one of fly, fly --replay, fly --port, table2, ",
+            "command = dance must be one of fly, fly --repeat, fly --port, table2, ",
         ),
         (
             lambda folder: (folder / SUMMARY).write_text('{"command": "fly", "generator": "x"}'),

@@ -1,4 +1,4 @@
-"""Disturbances of a flight: wind with gusts, battery sag, payload and push."""
+"""Disturbances of a flight: push, wind with gusts, battery sag, payload and impulse."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +22,16 @@ class Disturbances:
     """Mean wind 20 ft above the ground (W20 of `gusts`); 0 is still air."""
     wind_direction_rad: PerFlight = 0.0
     """Heading towards which the air moves: 0 north, pi/2 east."""
+    push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    """Steady acceleration along x and y of the world."""
     battery_sag_1_s: PerFlight = 0.0
     """Share of the fresh battery's thrust lost per second since the start of the flight."""
     payload_kg: PerFlight = 0.0
     """Mass added at the centre of the drone at `payload_time_s`; a negative mass is dropped."""
     payload_time_s: PerFlight = 0.0
-    push_n_s: tuple[PerFlight, PerFlight, PerFlight] = (0.0, 0.0, 0.0)
-    """Impulse in the world frame (NED), applied in one instant at `push_time_s`."""
-    push_time_s: PerFlight = 0.0
+    impulse_n_s: tuple[PerFlight, PerFlight, PerFlight] = (0.0, 0.0, 0.0)
+    """Impulse in the world frame (NED), applied in one instant at `impulse_time_s`."""
+    impulse_time_s: PerFlight = 0.0
 
     @property
     def windy(self) -> bool:
@@ -37,16 +39,15 @@ class Disturbances:
         return bool(np.any(self.wind_speed_m_s))
 
     @cached_property
-    def pushing(self) -> bool:
-        """Whether any flight is pushed."""
-        return any(bool(np.any(component)) for component in self.push_n_s)
+    def struck(self) -> bool:
+        """Whether any flight has an impulse."""
+        return any(bool(np.any(component)) for component in self.impulse_n_s)
 
     @cached_property
     def any(self) -> bool:
         """Whether any disturbance is on in any flight."""
-        return (
-            self.windy or self.pushing or bool(np.any(self.battery_sag_1_s)) or bool(np.any(self.payload_kg))
-        )
+        steady = *self.push_m_s2, self.battery_sag_1_s, self.payload_kg
+        return self.windy or self.struck or any(bool(np.any(one)) for one in steady)
 
 
 class World:
@@ -69,7 +70,7 @@ class World:
             )
 
     def tick(self, state: VehicleState, time_s: float) -> tuple[VehicleState, Moment | None]:
-        """Return the state after any push due at `time_s`, and thrust, payload and wind of this tick.
+        """Return the state after any impulse due at `time_s`, and the other disturbances of this tick.
 
         `time_s` is on the trajectory's clock. Without disturbances the second value is None.
         """
@@ -81,16 +82,17 @@ class World:
         self._ticks += 1
         loaded = np.rint(np.asarray(disturbances.payload_time_s) / step_s) <= now
         payload_kg: FloatArray = np.asarray(disturbances.payload_kg, np.float64) * loaded
-        due = np.rint(np.asarray(disturbances.push_time_s) / step_s) == now
-        if disturbances.pushing and due.any():
+        due = np.rint(np.asarray(disturbances.impulse_time_s) / step_s) == now
+        if disturbances.struck and due.any():
             flights = state.body.shape[1]
             impulse_n_s = np.stack(
-                [np.broadcast_to(component * due, flights) for component in disturbances.push_n_s]
+                [np.broadcast_to(component * due, flights) for component in disturbances.impulse_n_s]
             )
-            state = self._vehicle.apply_push(state, impulse_n_s, payload_kg)
+            state = self._vehicle.apply_impulse(state, impulse_n_s, payload_kg)
         moment = Moment(
             thrust_share=np.maximum(1.0 - disturbances.battery_sag_1_s * flown_s, 0.0),
             payload_kg=payload_kg,
             air_m_s=None if self._gusts is None else self._gusts.next(),
+            push_m_s2=disturbances.push_m_s2,
         )
         return state, moment

@@ -1,7 +1,7 @@
 """A drone of whose code nothing is known: gain, lag and dead time of each angle, as a log shows them.
 
     angle(t) follows gain x command(t - dead time) with a first-order lag, yaw its reference
-    horizontal acceleration = k x that of the thrust at these angles - drag (v - air) + wind
+    horizontal acceleration = k x that of the thrust at these angles - drag (v - air) + push
     vertical acceleration = g - that of the thrust
 
 with k the acceleration per tilt: the angles are those that the drone reports, and its thrust need not point
@@ -52,7 +52,7 @@ class Surroundings:
 
     thrust_acceleration_m_s2: PerFlight
     drag_1_s: PerFlight
-    wind_m_s2: tuple[PerFlight, PerFlight]
+    push_m_s2: tuple[PerFlight, PerFlight]
     air_m_s: tuple[PerFlight, PerFlight]
 
 
@@ -78,22 +78,20 @@ class FirstOrderDrone:
         """Return the state (12, n), with the rows of the rigid body, and the memory one tick later."""
         memory = np.concatenate([command_rad, memory[:-2]])
         nodes, slopes = self._angles(body[EULER], memory, yaw_reference_rad)
-        push_m_s2 = [self._push(angles, around) for angles in (body[EULER], nodes[0], nodes[1])]
+        forced = [self._acceleration(angles, around) for angles in (body[EULER], nodes[0], nodes[1])]
 
-        def derivative(motion: FloatArray, push: FloatArray) -> FloatArray:
+        def derivative(motion: FloatArray, acceleration: FloatArray) -> FloatArray:
             rate = np.empty_like(motion)
             rate[:3] = motion[3:]
             for axis in range(2):
                 drag = around.drag_1_s * (motion[3 + axis] - around.air_m_s[axis])
-                rate[3 + axis] = push[axis] - drag
-            rate[5] = push[2]
+                rate[3 + axis] = acceleration[axis] - drag
+            rate[5] = acceleration[2]
             return rate
 
         sines, cosines = sine_cosine(body[EULER])
         motion = np.concatenate([body[POSITION], to_world(sines, cosines, body[VELOCITY])])
-        motion = bogacki_shampine(
-            derivative, motion, (push_m_s2[0], push_m_s2[1], push_m_s2[2]), self._step_s
-        )
+        motion = bogacki_shampine(derivative, motion, (forced[0], forced[1], forced[2]), self._step_s)
         after = np.empty_like(body)
         after[POSITION] = motion[:3]
         after[EULER] = nodes[2]
@@ -119,15 +117,17 @@ class FirstOrderDrone:
         slopes[2] = (yaw_reference_rad - nodes[2][2]) / self._attitude.yaw_lag_s
         return nodes, slopes
 
-    def _push(self, angles_rad: FloatArray, around: Surroundings) -> FloatArray:
-        """Return the acceleration (3, n) in the world by thrust, wind and gravity."""
+    def _acceleration(self, angles_rad: FloatArray, around: Surroundings) -> FloatArray:
+        """Return the acceleration (3, n) in the world by thrust, push and gravity."""
         thrust = np.zeros_like(angles_rad)
         thrust[2] = -around.thrust_acceleration_m_s2
-        push = to_world(*sine_cosine(angles_rad), thrust)
+        acceleration = to_world(*sine_cosine(angles_rad), thrust)
         for axis in range(2):
-            push[axis] = self._attitude.acceleration_per_tilt_g * push[axis] + around.wind_m_s2[axis]
-        push[2] = push[2] + GRAVITY_M_S2
-        return push
+            acceleration[axis] = (
+                self._attitude.acceleration_per_tilt_g * acceleration[axis] + around.push_m_s2[axis]
+            )
+        acceleration[2] = acceleration[2] + GRAVITY_M_S2
+        return acceleration
 
 
 def _body_rates(angles_rad: FloatArray, slopes_rad_s: FloatArray) -> FloatArray:

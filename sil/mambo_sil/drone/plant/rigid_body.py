@@ -34,16 +34,16 @@ SineCosine = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class RigidBody:
-    """A rigid body under gravity, thrust, linear rotor drag and wind.
+    """A rigid body under gravity, thrust, linear rotor drag, wind and a push.
 
     The drag models blade flapping: it acts in the plane of the rotors and is proportional to the velocity in
-    that plane (Pounds, Mahony and Corke 2010). `wind_m_s2` is a disturbance acceleration in the world frame.
+    that plane (Pounds, Mahony and Corke 2010). `push_m_s2` is a steady acceleration in the world frame.
     """
 
     mass_kg: PerFlight
     inertia_kg_m2: tuple[PerFlight, PerFlight, PerFlight]
     drag_1_s: PerFlight
-    wind_m_s2: tuple[PerFlight, PerFlight]
+    push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
     air_m_s: tuple[PerFlight, PerFlight] | None = None
     """Air velocity along x and y of the world; None is still air."""
 
@@ -61,16 +61,16 @@ class RigidBody:
         p, q, r = state[RATES]
         thrust, roll_torque, pitch_torque, yaw_torque = wrench
         inertia_x, inertia_y, inertia_z = self.inertia_kg_m2
-        wind_x, wind_y = self.wind_m_s2
+        push_x, push_y = self.push_m_s2
 
         rate = np.empty_like(state)
 
         # Equation 2.
         rate[POSITION] = to_world(sines, cosines, state[VELOCITY])
 
-        # Equation 7, gravity plus wind acceleration: R transposed takes the sum to the body frame.
-        heading_x = cos_yaw * wind_x + sin_yaw * wind_y
-        heading_y = cos_yaw * wind_y - sin_yaw * wind_x
+        # Equation 7, gravity plus push: R transposed takes the sum to the body frame.
+        heading_x = cos_yaw * push_x + sin_yaw * push_y
+        heading_y = cos_yaw * push_y - sin_yaw * push_x
         pitched_z = cos_pitch * GRAVITY_M_S2 + sin_pitch * heading_x
         external_x = cos_pitch * heading_x - sin_pitch * GRAVITY_M_S2
         external_y = cos_roll * heading_y + sin_roll * pitched_z

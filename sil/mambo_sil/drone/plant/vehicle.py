@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.arguments import require, require_kind, require_per_flight
+from mambo_sil.arguments import require_kind, require_per_flight
 from mambo_sil.drone.plant.airframe import MAMBO, NOMINAL, Airframe, airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.cascade import CascadeLoop
@@ -36,7 +36,6 @@ STEP_S: Final = NOMINAL.step_s
 
 LARGEST_LAG_S: Final = 1.0
 LARGEST_DRAG_1_S: Final = 100.0
-LARGEST_WIND_M_S2: Final = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +77,15 @@ def truth(state: VehicleState) -> Seen:
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """Battery, payload and wind during one tick; the default is undisturbed."""
+    """Disturbances during one tick; the default is undisturbed."""
 
     thrust_share: PerFlight = 1.0
     """Rotor thrust and torque, relative to a fresh battery."""
     payload_kg: PerFlight = 0.0
     air_m_s: tuple[PerFlight, PerFlight] | None = None
     """Air velocity along x and y of the world; None is still air."""
+    push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
+    """Steady acceleration along x and y of the world."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,24 +95,18 @@ class Vehicle:
     airframe: Airframe = MAMBO
     motor_lag_s: PerFlight = NOMINAL.motor_lag_s
     drag_1_s: PerFlight = NOMINAL.body.drag_1_s
-    wind_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
     drone: VehicleFile = NOMINAL
 
     def __post_init__(self) -> None:
         """Raise ArgumentError for values outside the ranges of a vehicle.toml, and for other types."""
         require_kind("airframe", self.airframe, Airframe, "an Airframe; Vehicle.from_preset makes a Vehicle")
         require_kind("drone", self.drone, VehicleFile, "a VehicleFile")
-        pair = isinstance(self.wind_m_s2, tuple) and len(self.wind_m_s2) == 2
-        require(pair, "wind_m_s2", self.wind_m_s2, "be a tuple of two, along x and y")
         self.require_flights(None)
 
     def require_flights(self, flights: int | None) -> None:
         """Raise ArgumentError unless every array has one value for each flight; None: any number of them."""
         require_per_flight("motor_lag_s", self.motor_lag_s, 0.0, LARGEST_LAG_S, flights)
         require_per_flight("drag_1_s", self.drag_1_s, 0.0, LARGEST_DRAG_1_S, flights)
-        for axis, wind_m_s2 in zip("xy", self.wind_m_s2, strict=True):
-            name = f"wind_m_s2 along {axis}"
-            require_per_flight(name, wind_m_s2, -LARGEST_WIND_M_S2, LARGEST_WIND_M_S2, flights)
 
     @classmethod
     def of(cls, drone: VehicleFile) -> "Vehicle":
@@ -151,8 +146,8 @@ class Vehicle:
 
     @cached_property
     def rigid_body(self) -> RigidBody:
-        """The rigid body of this drone, without payload and in still air."""
-        return RigidBody(self.airframe.mass_kg, self.airframe.inertia_kg_m2, self.drag_1_s, self.wind_m_s2)
+        """The rigid body of this drone, undisturbed."""
+        return RigidBody(self.airframe.mass_kg, self.airframe.inertia_kg_m2, self.drag_1_s)
 
     @cached_property
     def rotor_decay(self) -> FloatArray:
@@ -169,7 +164,9 @@ class Vehicle:
         speed = self.rotors.commanded_speed_rad_s(commands)
         return VehicleState(body, speed, np.zeros((self.loop.rows, flights)))
 
-    def apply_push(self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight) -> VehicleState:
+    def apply_impulse(
+        self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight
+    ) -> VehicleState:
         """Return the state right after an impulse (3, n) in the world frame."""
         body = state.body.copy()
         change_m_s = to_body(body[EULER], impulse_n_s / (self.airframe.mass_kg + payload_kg))
@@ -207,7 +204,7 @@ class Vehicle:
         return Surroundings(
             share * np.maximum(thrust_n, 0.0) / mass_kg,
             self.drag_1_s,
-            self.wind_m_s2,
+            moment.push_m_s2,
             moment.air_m_s or (0.0, 0.0),
         )
 
@@ -222,7 +219,7 @@ class Vehicle:
         if moment is not None:
             wrenches = moment.thrust_share * wrenches
             mass_kg = self.airframe.mass_kg + moment.payload_kg
-            body = replace(body, mass_kg=mass_kg, air_m_s=moment.air_m_s)
+            body = replace(body, mass_kg=mass_kg, push_m_s2=moment.push_m_s2, air_m_s=moment.air_m_s)
         inputs = (wrenches[:, 0], wrenches[:, 1], wrenches[:, 2])
 
         def derivative(stage: FloatArray, wrench: FloatArray) -> FloatArray:

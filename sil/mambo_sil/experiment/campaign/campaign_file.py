@@ -38,7 +38,7 @@ from mambo_sil.experiment.campaign.parameters import (
     draw,
     scenario_values,
 )
-from mambo_sil.flight.names import PD_NAMES, SENSORS_OF, PdName, SensorsName, Start
+from mambo_sil.flight.names import PD_NAMES, RENAMED, SENSORS_OF, PdName, SensorsName, Start
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -336,6 +336,8 @@ def _section(names: Sequence[str], model: type[FileSection]) -> Any:
 
 def _explain_unknown(names: Sequence[str], dotted: str, model: type[FileSection]) -> str:
     """Return a message that a key does not exist, with similar keys that do."""
+    if names[-1] in RENAMED:
+        return f"{dotted} is called {RENAMED[names[-1]]} since version 0.2"
     keys = list(_section(names, model).model_fields)
     near = [key for key in keys if key.startswith(f"{names[-1]}_")]
     near = near or difflib.get_close_matches(names[-1], keys, n=1)

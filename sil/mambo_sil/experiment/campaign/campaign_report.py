@@ -1,4 +1,4 @@
-"""Results of a campaign: summary, text, section of the report, and records for replay."""
+"""Results of a campaign: summary, text, section of the report, and records to repeat flights."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class Drawn(BaseModel, extra="allow", frozen=True):
 
 @dataclass(frozen=True)
 class WorstFlight:
-    """One of the worst flights, with the record that replays it."""
+    """One of the worst flights, with the record that repeats it."""
 
     flight: int
     crashed: bool
@@ -158,7 +158,7 @@ def _record_name(flight: int, name: str) -> str:
 
 
 def write_records(campaign: Campaign, store: FlightStore) -> None:
-    """Write the missing records of all flights for `fly --replay`; raises UnwritableError."""
+    """Write the missing records of all flights for `fly --repeat`; raises UnwritableError."""
     section = campaign.flight
     with convert_os_errors(store.folder):
         (store.folder / RECORDS).mkdir(exist_ok=True)
@@ -207,7 +207,7 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
 
 
 def campaign_text(summary: CampaignSummary, folder: str) -> str:
-    """Return a summary as text: statistics per controller, improvements, commands to replay the worst."""
+    """Return a summary as text: statistics per controller, improvements, commands to repeat the worst."""
     lines: list[str] = []
     width = max(len(name) for name in summary.controllers)
     for name, found in summary.controllers.items():
@@ -227,12 +227,12 @@ def campaign_text(summary: CampaignSummary, folder: str) -> str:
             ratio = f"{digits(one.median):>9}  {interval:20}"
             lines.append(f"  {one.controller:{width}} {one.index:18}{ratio}{_spelled(one.better)}")
         lines.append("")
-    lines.append("worst flights by IAE, and the commands that replay them:")
+    lines.append("worst flights by IAE, and the commands that repeat them:")
     for name, flights in summary.worst.items():
         for flight in flights:
             what = "crashed" if flight.crashed else f"{digits(flight.iae_m_s)} m s"
             lines.append(
-                f"  {name:{width}} {what:>12}  mambo-nmpc fly --replay {echo(folder)}/{flight.record}"
+                f"  {name:{width}} {what:>12}  mambo-nmpc fly --repeat {echo(folder)}/{flight.record}"
             )
     return "\n".join(lines)
 

@@ -17,6 +17,7 @@ from mambo_codegen.reference import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.elementary import arc_cosine, sine_cosine
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -48,7 +49,7 @@ PATIENCE: Final = 5
 """Consecutive rejected steps after which a levelling caller commands zero tilt: 0.05 s at 100 Hz."""
 
 TURN_RATE_RAD_S: Final = 1.0
-HOVER_WIND_M_S2: Final = (0.5, 0.3)
+HOVER_PUSH_M_S2: Final = (0.5, 0.3)
 """Steady disturbance acceleration on the hovering flights: without it even a dead controller would hover."""
 NEVER: Final = 2**31
 """`PATIENCE` of a caller that never levels."""
@@ -157,11 +158,11 @@ def _flight(sorties: Sequence[_Sortie], period_s: float, drone: VehicleFile) -> 
             duration_s=DURATION_S,
             flights=len(sorties),
             yaw_rate_rad_s=TURN_RATE_RAD_S * np.array([sortie.scenario.turning for sortie in sorties]),
-            vehicle=replace(
-                Vehicle.of(drone),
-                wind_m_s2=(HOVER_WIND_M_S2[0] * hovering, HOVER_WIND_M_S2[1] * hovering),
-            ),
+            vehicle=Vehicle.of(drone),
             update_period_s=period_s,
+            disturbances=Disturbances(
+                push_m_s2=(HOVER_PUSH_M_S2[0] * hovering, HOVER_PUSH_M_S2[1] * hovering)
+            ),
         )
     except FlightError as error:
         raise FlightError(f"horizon.{error}") from error

@@ -36,7 +36,7 @@ class FlightResult:
     checks: list[Check]
     same_bits: bool | None
     record: str | None
-    """File for `fly --replay`; only of a failed flight."""
+    """File for `fly --repeat`; only of a failed flight."""
 
     @property
     def failures(self) -> list[str]:

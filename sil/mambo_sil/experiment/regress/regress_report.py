@@ -1,4 +1,4 @@
-"""Results of a suite: summary, text, section of the report, JUnit XML, and records for replay."""
+"""Results of a suite: summary, text, section of the report, JUnit XML, and records to repeat flights."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -93,7 +93,7 @@ def judge(
 def write_records(
     summary: RegressSummary, suite: FlightSuite, entrant: Entrant, rows: Sequence[Row], folder: Path
 ) -> None:
-    """Write a record of each failed flight for `fly --replay` into the folder `RECORDS` in `folder`."""
+    """Write a record of each failed flight for `fly --repeat` into the folder `RECORDS` in `folder`."""
     (folder / RECORDS).mkdir()
     for flight, row, result in zip(suite.flights, rows, summary.flights, strict=True):
         if result.record is not None:
@@ -182,7 +182,7 @@ def regress_text(summary: RegressSummary, folder: str) -> str:
     lines.append("")
     for flight in summary.failed[:MOST_SHOWN]:
         lines.append(f"{flight.name}: {'; '.join(flight.failures)}")
-        lines.append(f"    mambo-nmpc fly --replay {echo(folder)}/{flight.record}")
+        lines.append(f"    mambo-nmpc fly --repeat {echo(folder)}/{flight.record}")
     if len(summary.failed) > MOST_SHOWN:
         lines.append(f"and {len(summary.failed) - MOST_SHOWN} more failed flights, all in {JUNIT}")
     lines.append(f"{echo(summary.suite)} with {summary.controller}: {finding(summary)}")
@@ -201,6 +201,6 @@ def junit_xml(summary: RegressSummary) -> bytes:
         )
         if flight.failures:
             failure = ElementTree.SubElement(case, "failure", {"message": "; ".join(flight.failures)})
-            failure.text = f"replay it: mambo-nmpc fly --replay {flight.record}, in the result folder"
+            failure.text = f"repeat it: mambo-nmpc fly --repeat {flight.record}, in the result folder"
     ElementTree.indent(root)
     return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from mambo_sil.arguments import (
     require_per_flight,
 )
 from mambo_sil.drone.plant.arrays import PerFlight
+from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.flight.api.controller import Controller
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -35,6 +36,8 @@ from mambo_sil.flight.scenario import (
 )
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Trajectory
+
+LARGEST_PUSH_M_S2: Final = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,7 @@ def fly(
     sensors: SensorsName = "none",
     seeds: Sequence[int] = (0,),
     start: Start = "hover",
+    push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0),
 ) -> Flown:
     """Fly the settings of a controller on a vehicle, once for each seed, with new controllers.
 
@@ -72,6 +76,7 @@ def fly(
     sensors:    what controller and inner loops see: the truth ("none"), or the vehicle's sensors by name.
     seeds:      of sensor noise, one for each of n flights.
     start:      hovering at the first point, or on the ground 5 s earlier ("take-off").
+    push_m_s2:  steady acceleration along x and y of the world, each one number or an array (n,).
 
     Raises ArgumentError for a wrong argument, FlightError if they do not fit together.
     """
@@ -85,6 +90,7 @@ def fly(
     given = _as_seeds(seeds)
     require_per_flight("yaw_rad", yaw_rad, -LARGEST_YAW_RAD, LARGEST_YAW_RAD, len(given))
     vehicle.require_flights(len(given))
+    _require_push(push_m_s2, len(given))
     flight = Flight(
         _curve(trajectory, size_m, rate_rad_s),
         duration_s=duration_s,
@@ -94,6 +100,7 @@ def fly(
         vehicle=vehicle,
         update_period_s=controller.update_period_s,
         seeds=given,
+        disturbances=Disturbances(push_m_s2=push_m_s2),
         sensors=choose_sensors(sensors, vehicle.drone),
     )
     trace = simulate.fly(flight, CompiledController(controller.settings, flight.flights))
@@ -110,6 +117,15 @@ def _curve(trajectory: object, size_m: float, rate_rad_s: float) -> Trajectory:
     rule = f"be {', '.join(map(spell, CURVES))} or an object with the methods target and acceleration"
     require(flown, "trajectory", trajectory, rule)
     return cast("Trajectory", trajectory)
+
+
+def _require_push(push_m_s2: object, flights: int) -> None:
+    """Raise ArgumentError unless the push is one number or an array (flights,) along each axis."""
+    pair = push_m_s2 if isinstance(push_m_s2, tuple) else ()
+    require(len(pair) == len("xy"), "push_m_s2", push_m_s2, "be a tuple of two, along x and y")
+    for axis, push in zip("xy", pair, strict=True):
+        name = f"push_m_s2 along {axis}"
+        require_per_flight(name, push, -LARGEST_PUSH_M_S2, LARGEST_PUSH_M_S2, flights)
 
 
 def _as_seeds(seeds: object) -> tuple[int, ...]:

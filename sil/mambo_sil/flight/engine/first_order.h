@@ -41,32 +41,32 @@ static inline void follow(const engine_simulation_t *simulation, int64_t tick, c
     slopes_rad_s[2] = (heading_rad - nodes_rad[2][2]) / simulation->yaw_lag_s;
 }
 
-/* Acceleration in the world by thrust, wind and gravity. */
+/* Acceleration in the world by thrust, push and gravity. */
 static inline void accelerate(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                              real_t thrust_acceleration_m_s2, const rotation_t *r, real_t *push_m_s2)
+                              real_t thrust_acceleration_m_s2, const rotation_t *r, real_t *acceleration_m_s2)
 {
     const real_t thrust[3] = { splat(0.0), splat(0.0), -thrust_acceleration_m_s2 };
     int i;
 
-    to_world(r, thrust, push_m_s2);
+    to_world(r, thrust, acceleration_m_s2);
     for (i = 0; i < 2; i++) {
-        push_m_s2[i] = (simulation->acceleration_per_tilt_g * push_m_s2[i]) + flight->wind_m_s2[i];
+        acceleration_m_s2[i] = (simulation->acceleration_per_tilt_g * acceleration_m_s2[i]) + flight->push_m_s2[i];
     }
-    push_m_s2[2] = push_m_s2[2] + simulation->gravity_m_s2;
+    acceleration_m_s2[2] = acceleration_m_s2[2] + simulation->gravity_m_s2;
 }
 
 /* Time derivative of position and velocity in the world. */
 static inline void motion_derivative(const engine_flight_t *flight, const surroundings_t *around, const real_t *motion,
-                                     const real_t *push_m_s2, real_t *rate)
+                                     const real_t *acceleration_m_s2, real_t *rate)
 {
     int i;
 
     for (i = 0; i < 3; i++) {
         rate[i] = motion[3 + i];
-        rate[3 + i] = push_m_s2[i];
+        rate[3 + i] = acceleration_m_s2[i];
     }
     for (i = 0; i < 2; i++) {
-        rate[3 + i] = push_m_s2[i] - (flight->drag_1_s * (motion[3 + i] - around->air_m_s[i]));
+        rate[3 + i] = acceleration_m_s2[i] - (flight->drag_1_s * (motion[3 + i] - around->air_m_s[i]));
     }
 }
 
@@ -83,7 +83,7 @@ static inline void advance(const engine_simulation_t *simulation, const engine_f
     real_t nodes_rad[3][3];
     real_t slopes_rad_s[3];
     real_t motion[6];
-    real_t push_m_s2[3];
+    real_t acceleration_m_s2[3];
     real_t first[6];
     real_t second[6];
     real_t third[6];
@@ -99,20 +99,20 @@ static inline void advance(const engine_simulation_t *simulation, const engine_f
     }
     to_world(r, body + VELOCITY, motion + 3);
 
-    accelerate(simulation, flight, thrust_acceleration_m_s2, r, push_m_s2);
-    motion_derivative(flight, around, motion, push_m_s2, first);
+    accelerate(simulation, flight, thrust_acceleration_m_s2, r, acceleration_m_s2);
+    motion_derivative(flight, around, motion, acceleration_m_s2, first);
     for (i = 0; i < 6; i++) {
         inner[i] = motion[i] + (half_s * first[i]);
     }
     turned = rotation(nodes_rad[0]);
-    accelerate(simulation, flight, thrust_acceleration_m_s2, &turned, push_m_s2);
-    motion_derivative(flight, around, inner, push_m_s2, second);
+    accelerate(simulation, flight, thrust_acceleration_m_s2, &turned, acceleration_m_s2);
+    motion_derivative(flight, around, inner, acceleration_m_s2, second);
     for (i = 0; i < 6; i++) {
         inner[i] = motion[i] + (three_quarters_s * second[i]);
     }
     turned = rotation(nodes_rad[1]);
-    accelerate(simulation, flight, thrust_acceleration_m_s2, &turned, push_m_s2);
-    motion_derivative(flight, around, inner, push_m_s2, third);
+    accelerate(simulation, flight, thrust_acceleration_m_s2, &turned, acceleration_m_s2);
+    motion_derivative(flight, around, inner, acceleration_m_s2, third);
     for (i = 0; i < 6; i++) {
         motion[i] = motion[i] + (ninth_s * (((2.0 * first[i]) + (3.0 * second[i])) + (4.0 * third[i])));
     }

@@ -175,7 +175,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
         if (simulation->disturbed) {
             const real_t payload_kg = choose(flight->payload_tick <= now, flight->payload_kg, splat(0.0));
 
-            push(flight, now, payload_kg, &r, state);
+            apply_impulse(flight, now, payload_kg, &r, state);
             thrust_share = maximum(1.0 - (flight->battery_sag_1_s * (simulation->step_s * (double)ticks)), splat(0.0));
             around.mass_kg = flight->mass_kg + payload_kg;
             if (simulation->windy) {

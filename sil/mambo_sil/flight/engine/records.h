@@ -12,7 +12,7 @@ typedef struct {
     int64_t ticks_per_update;
     int64_t first_tick;       /* on the trajectory's clock: negative for a take-off */
     int64_t lifting_updates;  /* updates with the constant thrust of a take-off */
-    int64_t disturbed;        /* whether any flight has gusts, payload, push or battery sag */
+    int64_t disturbed;        /* whether any flight has gusts, payload, push, impulse or battery sag */
     int64_t windy;            /* whether any flight has gusts */
     int64_t dropping;         /* whether any flight drops updates */
     int64_t sensed;           /* whether controllers receive estimates */
@@ -116,7 +116,7 @@ typedef struct {
     real_t torque_per_thrust_m;
     real_t rotor_decay[4];    /* at the nodes and at the end of a tick */
     real_t drag_1_s;
-    real_t wind_m_s2[2];
+    real_t push_m_s2[2];
 
     real_t gust_mean_m_s;
     real_t gust_sigma_m_s;
@@ -128,8 +128,8 @@ typedef struct {
     real_t battery_sag_1_s;
     real_t payload_kg;
     whole_t payload_tick;     /* on the trajectory's clock */
-    real_t push_n_s[3];
-    whole_t push_tick;        /* on the trajectory's clock */
+    real_t impulse_n_s[3];
+    whole_t impulse_tick;        /* on the trajectory's clock */
 
     whole_t delay_ticks;
     real_t dropped_share;

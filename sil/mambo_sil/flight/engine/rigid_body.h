@@ -77,10 +77,10 @@ static inline void derivative(const engine_simulation_t *simulation, const engin
     const real_t q = state[10];
     const real_t yaw_axis_rate = state[11];
     const real_t *inertia = flight->inertia_kg_m2;
-    const real_t wind_x = flight->wind_m_s2[0];
-    const real_t wind_y = flight->wind_m_s2[1];
-    real_t heading_x = (r->cos_yaw * wind_x) + (r->sin_yaw * wind_y);
-    real_t heading_y = (r->cos_yaw * wind_y) - (r->sin_yaw * wind_x);
+    const real_t push_x = flight->push_m_s2[0];
+    const real_t push_y = flight->push_m_s2[1];
+    real_t heading_x = (r->cos_yaw * push_x) + (r->sin_yaw * push_y);
+    real_t heading_y = (r->cos_yaw * push_y) - (r->sin_yaw * push_x);
     const real_t pitched_z = (r->cos_pitch * simulation->gravity_m_s2) + (r->sin_pitch * heading_x);
     const real_t external_x = (r->cos_pitch * heading_x) - (r->sin_pitch * simulation->gravity_m_s2);
     const real_t external_y = (r->cos_roll * heading_y) + (r->sin_roll * pitched_z);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * Gusts, battery, payload and push: sil/mambo_sil/drone/plant/{gusts,disturbances}.py; the delay of sil/mambo_sil/drone/plant/link.py.
+ * Gusts, battery, payload and impulse: sil/mambo_sil/drone/plant/{gusts,disturbances}.py; the delay of sil/mambo_sil/drone/plant/link.py.
  */
 #ifndef ENGINE_WORLD_H
 #define ENGINE_WORLD_H
@@ -40,23 +40,23 @@ static inline void blow(const engine_simulation_t *simulation, const engine_flig
 }
 
 /* Change the velocity of the flights with an impulse at this tick. */
-static inline void push(const engine_flight_t *flight, int64_t tick, real_t payload_kg, const rotation_t *r,
+static inline void apply_impulse(const engine_flight_t *flight, int64_t tick, real_t payload_kg, const rotation_t *r,
                         vehicle_state_t *state)
 {
-    const mask_t any_axis = (flight->push_n_s[0] != 0.0) | (flight->push_n_s[1] != 0.0) | (flight->push_n_s[2] != 0.0);
-    const mask_t pushed = (flight->push_tick == tick) & any_axis;
+    const mask_t any_axis = (flight->impulse_n_s[0] != 0.0) | (flight->impulse_n_s[1] != 0.0) | (flight->impulse_n_s[2] != 0.0);
+    const mask_t due = (flight->impulse_tick == tick) & any_axis;
     real_t change_m_s[3];
     int i;
 
-    if (any(pushed)) {
+    if (any(due)) {
         for (i = 0; i < 3; i++) {
-            change_m_s[i] = flight->push_n_s[i] / (flight->mass_kg + payload_kg);
+            change_m_s[i] = flight->impulse_n_s[i] / (flight->mass_kg + payload_kg);
         }
         to_body(r, change_m_s, change_m_s);
         for (i = 0; i < 3; i++) {
             const real_t before_m_s = state->body[VELOCITY + i];
 
-            state->body[VELOCITY + i] = choose(pushed, before_m_s + change_m_s[i], before_m_s);
+            state->body[VELOCITY + i] = choose(due, before_m_s + change_m_s[i], before_m_s);
         }
     }
 }

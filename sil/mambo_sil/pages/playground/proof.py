@@ -26,7 +26,7 @@ RATE_RAD_S: Final = 0.5
 """The eight of Table II."""
 _SEED: Final = 0
 _WIND: Final = Disturbances(
-    wind_speed_m_s=4.0, wind_direction_rad=1.0, push_n_s=(0.02, -0.03, 0.0), push_time_s=1.5
+    wind_speed_m_s=4.0, wind_direction_rad=1.0, impulse_n_s=(0.02, -0.03, 0.0), impulse_time_s=1.5
 )
 
 
@@ -52,7 +52,7 @@ def motion_capture(drone: VehicleFile) -> MotionCapture:
 
 
 def proof_flight(drone: VehicleFile, period_s: float) -> Flight:
-    """Return an eight in gusts, with a push and motion capture; raises FlightError."""
+    """Return an eight in gusts, with an impulse and motion capture; raises FlightError."""
     return Flight(
         Bernoulli(HALF_WIDTH_M, RATE_RAD_S),
         duration_s=DURATION_S,
@@ -82,7 +82,7 @@ def inputs(flight: Flight) -> ProofInputs:
 
 
 def calm(flight: Flight) -> Flight:
-    """Return the same flight without wind, push and noise, from which the page starts."""
+    """Return the same flight without wind, impulse and noise, from which the page starts."""
     assert isinstance(flight.sensors, MotionCapture)
     quiet = replace(flight.sensors, noise_scale=0.0)
     return replace(flight, disturbances=Disturbances(), sensors=quiet)

@@ -18,7 +18,7 @@ from mambo_sil.experiment.faults.faults_report import FaultsSummary
 from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedSummary
 from mambo_sil.experiment.table2.table2 import Table2Summary
-from mambo_sil.flight.flight_report import FlySummary, ReplaySummary
+from mambo_sil.flight.flight_report import FlySummary, RepeatSummary
 from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.replay.replay_report import LogReplaySummary
 from mambo_sil.results.folders import SUMMARY
@@ -28,7 +28,7 @@ from mambo_sil.verify.verify_report import VerifySummary
 
 RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
     FlySummary,
-    ReplaySummary,
+    RepeatSummary,
     BoardFlightSummary,
     Table2Summary,
     SensedSummary,
