@@ -1,16 +1,24 @@
 """Write files whole or not at all: a new file is written next to its destination, then renamed onto it."""
 
 import contextlib
+import errno
 import os
 import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from mambo_codegen.plain_file import find_obstacle
+
 _NEW = ".mambo-nmpc-new"
 
 
 def put(place: Path, content: bytes) -> None:
-    """Write one file whole or not at all; make its folder if it is missing. Raises OSError."""
+    """Write one file whole or not at all; make its folder if it is missing.
+
+    Raises OSError, also for what is neither a plain file nor nothing: a pipe, a link to nothing.
+    """
+    if obstacle := find_obstacle(place):
+        raise OSError(errno.EINVAL, f"it is {obstacle}; name a plain file", str(place))
     with stage({place: content}):
         pass
 

@@ -1,9 +1,30 @@
-"""Read files that a user names: only plain files, because reading a pipe could wait forever."""
+"""Files that a user names: only plain files, because reading a pipe could wait forever.
+
+Writing replaces what is at a path, and a pipe, a socket or a device is no file of ours.
+"""
 
 import errno
 import os
 import stat
 from pathlib import Path
+from typing import Final
+
+_KINDS: Final = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def find_obstacle(path: Path) -> str | None:
+    """Return what is at `path`, such as "a pipe"; None for a plain file, a link to one, and nothing."""
+    try:
+        mode = path.stat().st_mode
+    except OSError:
+        return "a link to nothing" if path.is_symlink() else None
+    return None if stat.S_ISREG(mode) else _KINDS[stat.S_IFMT(mode)]
 
 
 def read_plain_file(path: Path, most_bytes: int) -> bytes:

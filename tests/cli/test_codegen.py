@@ -79,7 +79,7 @@ def test_init_that_fails_leaves_everything_as_it_was(force: list[str]) -> None:
     talk = run("init", "-o", "file/controller.toml", *force, code=2)[1]
     assert talk == "file/controller.toml: cannot be written: Not a directory\n"
     Path("folder").mkdir()
-    assert "is not a file" in run("init", "-o", "folder", *force, code=2)[1]
+    assert "folder: is a folder, not a file" in run("init", "-o", "folder", *force, code=2)[1]
     Path("controller.toml").write_text("mine", encoding="utf-8")
     run_limited("init", "-o", "new/controller.toml", *force)
     run_limited("init", "-o", "controller.toml", "--force")

@@ -185,10 +185,12 @@ def test_bundle_cannot_point_outside_its_folder(tmp_path: Path, path: str) -> No
 
 
 def test_folder_or_link_in_the_way_is_refused_even_with_force(folder: Path) -> None:
-    """A folder where a file belongs, a file or link where a folder belongs: no force removes them."""
-    (folder / "src" / "b.c").mkdir()
-    with pytest.raises(ForeignFilesError, match=r"src/b\.c is in the way"):
-        bundle.write(NEXT, folder, force=True)
+    """A folder or pipe where a file belongs, a file or link where a folder belongs: no force removes them."""
+    for make, remove in ((Path.mkdir, Path.rmdir), (os.mkfifo, Path.unlink)):
+        make(folder / "src" / "b.c")
+        with pytest.raises(ForeignFilesError, match=r"src/b\.c is in the way"):
+            bundle.write(NEXT, folder, force=True)
+        remove(folder / "src" / "b.c")
     for in_the_way in (Path.touch, lambda place: place.symlink_to(folder / "src")):
         in_the_way(folder / "example")
         with pytest.raises(ForeignFilesError, match="example is in the way"):

@@ -1,19 +1,53 @@
 """Files that a user names: a pipe is refused at once, whatever would have read it."""
 
 import os
+import socket
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from mambo_codegen import boards
+from mambo_codegen.atomic import put
 from mambo_codegen.errors import MamboNmpcError
-from mambo_codegen.plain_file import read_plain_file
+from mambo_codegen.plain_file import find_obstacle, read_plain_file
 from mambo_codegen.settings import presets
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.flight.scenario import read_record
 from mambo_sil.flight.trajectories import Waypoints
 from mambo_sil.model.tune import tuning_file
+
+
+@pytest.fixture
+def socket_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the path of a socket, made in the working folder because its name must be short."""
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind("socket")
+    return tmp_path / "socket"
+
+
+def test_what_is_no_plain_file_is_not_replaced(tmp_path: Path, socket_path: Path) -> None:
+    """Pipe, socket, folder and dangling link stay; a file, a link to one and a new file are written."""
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "dangling").symlink_to("nothing")
+    (tmp_path / "endless").symlink_to("endless")
+    os.mkfifo(tmp_path / "pipe")
+    before = {path: path.lstat() for path in tmp_path.iterdir()}
+    obstacles = {"dangling": "a link to nothing", "endless": "a link to nothing", "folder": "a folder"}
+    for name, kind in {**obstacles, "pipe": "a pipe", socket_path.name: "a socket"}.items():
+        assert find_obstacle(tmp_path / name) == kind
+        with pytest.raises(OSError, match=f"it is {kind}; name a plain file"):
+            put(tmp_path / name, b"new")
+    with pytest.raises(OSError, match="it is a folder"):
+        put(Path(), b"new")
+    assert {path: path.lstat() for path in tmp_path.iterdir()} == before
+    (tmp_path / "file").write_bytes(b"old")
+    (tmp_path / "link").symlink_to("file")
+    for name in ("file", "link", "made"):
+        assert find_obstacle(tmp_path / name) is None
+        put(tmp_path / name, b"new")
+        assert (tmp_path / name).read_bytes() == b"new"
 
 
 def test_a_plain_file_is_read_up_to_a_limit(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from typing import Any, Literal
 from mambo_codegen import __version__
 from mambo_codegen.atomic import is_left_over, stage
 from mambo_codegen.errors import ForeignFilesError, LayoutError, UnwritableError, echo
+from mambo_codegen.plain_file import find_obstacle
 
 MANIFEST = "manifest.json"
 GENERATOR = "mambo-nmpc"
@@ -165,8 +166,8 @@ def _apply(contents: Mapping[str, bytes], changes: Changes, target: Path, name: 
 
 
 def _refuse_blocked(contents: Mapping[str, bytes], target: Path, name: str) -> None:
-    """Refuse a folder at the path of a file, and a file or link at the path of a folder, even with force."""
-    blocked = {path for path in contents if (target / path).is_dir() and not (target / path).is_symlink()}
+    """Refuse what is no file at the path of a file, and no folder at that of a folder, even with force."""
+    blocked = {path for path in contents if not (target / path).is_symlink() and find_obstacle(target / path)}
     folders = {folder for path in contents for folder in _folders_of(path)}
     blocked |= {
         str(folder)

@@ -178,14 +178,15 @@ def write_file(text: str, output: Path, *, force: bool) -> bool:
     Raises FileExistsRefusedError unless `force`, UnwritableError.
     """
     from mambo_codegen.atomic import put
+    from mambo_codegen.plain_file import find_obstacle
 
     if str(output) == "-":
         typer.echo(text, nl=False)
         return False
     name = echo(str(output))
     place = Path(os.path.realpath(output))
-    if place.exists() and not place.is_file():
-        raise UnwritableError(f"{name}: is not a file; name one, or print to stdout with -o -")
+    if obstacle := find_obstacle(output):
+        raise UnwritableError(f"{name}: is {obstacle}, not a file; name one, or print to stdout with -o -")
     try:
         if os.path.lexists(output) and not force:
             raise FileExistsRefusedError(

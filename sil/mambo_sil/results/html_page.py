@@ -3,6 +3,7 @@
 import base64
 import contextlib
 import hashlib
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -12,6 +13,7 @@ from markupsafe import Markup
 
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import FileExistsRefusedError, UnwritableError, echo
+from mambo_codegen.plain_file import find_obstacle
 from mambo_sil.results.numbers import digits_or_dash, fixed_or_dash, three_digits_or_dash
 
 _MARK: Final = b'<meta name="generator" content="mambo-nmpc">'
@@ -55,17 +57,20 @@ def new_page(output: Path, what: str) -> Iterator[Callable[[str], int]]:
     """Yield a function that writes a page to `output` and returns its size in bytes.
 
     Raises FileExistsRefusedError, before anything is computed, if there is a file that is no page of ours;
-    `what` says what is expected. Raises UnwritableError if the file system refuses.
+    `what` says what is expected. Raises UnwritableError for a pipe and the like, and if the file system
+    refuses. A link to a file stays a link.
     """
-    name = echo(str(output))
+    name, place = echo(str(output)), Path(os.path.realpath(output))
+    if obstacle := find_obstacle(output):
+        raise UnwritableError(f"{name}: is {obstacle}, not a file; name one with -o")
 
     def write(text: str) -> int:
         page = text.encode("utf-8", "replace")  # a folder's name may be invalid UTF-8
-        put(output, page)
+        put(place, page)
         return len(page)
 
     try:
-        if output.is_file() and _MARK not in output.read_bytes()[:1000]:
+        if place.is_file() and _MARK not in place.read_bytes()[:1000]:
             raise FileExistsRefusedError(
                 f"{name}: exists and is no {what} of mambo-nmpc; name another file with -o"
             )

@@ -1,6 +1,7 @@
 """The command `playground`: what it takes, what it refuses, and that its page stands alone."""
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,10 @@ def test_a_page_is_written_over_and_nothing_else_is() -> None:
     Path("mine.html").write_text("<p>notes", "utf-8")
     assert "mine.html: exists and is no page of mambo-nmpc" in run("pd", "-o", "mine.html", code=2)[1]
     assert Path("mine.html").read_text("utf-8") == "<p>notes"
+    os.mkfifo("pipe")
+    for name, kind in {"pipe": "a pipe", ".": "a folder"}.items():
+        assert f"{name}: is {kind}, not a file; name one with -o" in run("pd", "-o", name, code=2)[1]
+    assert Path("pipe").is_fifo()
 
 
 @pytest.mark.parametrize(

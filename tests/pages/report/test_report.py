@@ -1,7 +1,9 @@
 """The report: a page of whatever was run, and a message for whatever is no result."""
 
 import json
+import os
 import re
+import socket
 from collections.abc import Callable
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -330,9 +332,22 @@ def test_only_a_report_is_overwritten() -> None:
 
 
 def test_an_output_that_cannot_be_written_is_named() -> None:
-    """A folder is there; a folder that is not there is made."""
+    """What is no file stays as it is; a folder that is not there is made; a link stays one."""
     made("verify")
-    assert "verify: cannot be written" in run("verify", "-o", "verify", code=2)
+    os.mkfifo("pipe")
+    with socket.socket(socket.AF_UNIX) as made_socket:
+        made_socket.bind("socket")
+    Path("dangling").symlink_to("nothing")
+    obstacles = {"pipe": "a pipe", "socket": "a socket", "dangling": "a link to nothing"}
+    for name, kind in {**obstacles, "verify": "a folder", ".": "a folder", "/": "a folder"}.items():
+        assert run("verify", "-o", name, code=2) == f"{name}: is {kind}, not a file; name one with -o\n"
+    assert Path("pipe").is_fifo()
+    assert Path("socket").is_socket()
+    assert not Path("nothing").exists()
+    run("verify")
+    Path("link.html").symlink_to("report.html")
+    run("verify", "-o", "link.html")
+    assert Path("link.html").is_symlink()
     run("verify", "-o", "pages/report.html")
     assert Path("pages/report.html").is_file()
 

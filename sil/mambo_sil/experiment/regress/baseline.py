@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 from mambo_codegen import __version__
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import FileExistsRefusedError, InvalidSettingsError, echo, echo_value
+from mambo_codegen.plain_file import find_obstacle
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import DIGEST, INDICES, Row
@@ -109,8 +110,8 @@ def _changes(suite: FlightSuite, found: Baseline) -> str:
 def demand_replaceable(path: Path) -> None:
     """Raise FileExistsRefusedError if `path` exists and does not begin as a baseline, damaged or not."""
     name = echo(str(path))
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise FileExistsRefusedError(f"{name}: is not a plain file; move it away")
+    if obstacle := "a link" if path.is_symlink() else find_obstacle(path):
+        raise FileExistsRefusedError(f"{name}: is {obstacle}, not a plain file; move it away")
     with convert_os_errors(path):
         if path.exists() and _MARK not in path.read_bytes()[:1000]:
             raise FileExistsRefusedError(f"{name}: exists and is no baseline of mambo-nmpc; move it away")
