@@ -21,8 +21,8 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, echo, echo_value
-from mambo_codegen.settings.toml_file import BOARDS, existing_path, parse_document, read_text, shipped
+from mambo_codegen.errors import InvalidSettingsError, echo, echo_value
+from mambo_codegen.settings.toml_file import BOARDS, parse_document, read_text
 
 _PYDANTIC_SUBJECTS: Final = ("Input should", "String should", "Tuple should")
 
@@ -167,7 +167,7 @@ class Board(BaseModel):
 
 def names() -> tuple[str, ...]:
     """Return the names of the boards, sorted."""
-    return tuple(shipped(BOARDS))
+    return BOARDS.names()
 
 
 def load(name_or_path: str) -> Board:
@@ -176,11 +176,9 @@ def load(name_or_path: str) -> Board:
     Raises SourceNotFoundError if there is neither, UnreadableFileError if the file is not TOML, and
     InvalidSettingsError with all broken rules.
     """
-    if ours := shipped(BOARDS).get(name_or_path):
-        return _parse(ours.read_text("utf-8"), f"board {name_or_path}", name_or_path)
-    path = existing_path(name_or_path)
+    path = BOARDS.own_file(name_or_path)
     if path is None:
-        raise _not_found(name_or_path)
+        return _parse(BOARDS.text(name_or_path), f"board {name_or_path}", name_or_path)
     return _parse(read_text(path), echo(name_or_path), path.stem)
 
 
@@ -237,12 +235,3 @@ def _fields(section: Sequence[int | str]) -> dict[str, Any]:
     for part in section:
         model = model.model_fields[part].annotation
     return {key: field for key, field in model.model_fields.items() if key != "name"}
-
-
-def _not_found(name: str) -> SourceNotFoundError:
-    near = difflib.get_close_matches(name, names(), n=1)
-    guess = f" (did you mean {near[0]}?)" if near else ""
-    return SourceNotFoundError(
-        f"{echo(name)} is neither a board nor a file{guess}; boards are {', '.join(names())}, "
-        "and a TOML file of the same shape describes another"
-    )

@@ -13,6 +13,7 @@ import pytest
 
 from mambo_codegen import errors
 from mambo_codegen.settings import controller_toml, presets
+from mambo_codegen.settings.toml_file import PRESETS
 from tests.support.command import run
 
 COMMAND = "from mambo_sil.cli import command, generate; app = command.root(); generate.register(app); app()"
@@ -99,7 +100,7 @@ def test_init_writes_where_a_link_leads() -> None:
 def test_presets_lists_every_preset_with_its_use() -> None:
     """People get a line per preset, machines a JSON object."""
     lines = run("presets")[0].splitlines()
-    described = {name: presets.description(name) for name in presets.names()}
+    described = {name: PRESETS.description(name) for name in presets.names()}
     assert {line.split()[0]: line.split(maxsplit=1)[1] for line in lines} == described
     assert json.loads(run("presets", "--json")[0]) == described
 

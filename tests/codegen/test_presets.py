@@ -8,6 +8,7 @@ import pytest
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.toml_file import PRESETS
 
 
 def departures(settings: Settings) -> dict[str, Any]:
@@ -94,7 +95,7 @@ def test_every_preset_is_described_in_one_line() -> None:
     """The list of presets has a sentence for each."""
     assert presets.names() == ("crazyflie", "mambo", "mambo-1norm", "table1", "table1-printed")
     for name in presets.names():
-        description = presets.description(name)
+        description = PRESETS.description(name)
         assert description.endswith(".")
         assert not description.startswith("#")
 

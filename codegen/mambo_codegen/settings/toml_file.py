@@ -1,27 +1,86 @@
-"""Read TOML files, with messages that name file and line."""
+"""Find and read TOML files, shipped ones and those of the user, with messages that name file and line."""
 
+import difflib
 import re
 import tomllib
+from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from mambo_codegen.errors import UnreadableFileError, echo
+from mambo_codegen.errors import SourceNotFoundError, UnreadableFileError, echo
 from mambo_codegen.plain_file import read_plain_file
 
 LARGEST_FILE_BYTES = 64_000
-BOARDS, PRESETS, VEHICLES = "boards", "presets", "vehicles"
-"""The kinds of TOML files that the package holds."""
 
 _PLACE = re.compile(r"(?P<reason>.*) \(at (?P<place>line (?P<line>\d+), column \d+)\)", re.DOTALL)
 
 
-def shipped(kind: str, package: str = "mambo_codegen") -> dict[str, Traversable]:
-    """Return the TOML files of a kind that a package holds, {name: file}, sorted by name."""
-    folder = resources.files(package) / "data" / kind
-    files = {file.name.removesuffix(".toml"): file for file in folder.iterdir()}
-    return dict(sorted(files.items()))
+@dataclass(frozen=True)
+class ShippedFiles:
+    """The TOML files of a kind that a package holds in data/`kind`, beside which a user has files of his own.
+
+    one, several: what messages call them, such as "a preset" and "presets".
+    advice:       how to come by another one.
+    """
+
+    kind: str
+    one: str
+    several: str
+    advice: str
+    package: str = "mambo_codegen"
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the files, sorted."""
+        return tuple(self._files())
+
+    def text(self, name: str) -> str:
+        """Return the text of the file `name`; raises SourceNotFoundError."""
+        return self.file(name).read_text("utf-8")
+
+    def file(self, name: str) -> Traversable:
+        """Return the file `name`; raises SourceNotFoundError."""
+        files = self._files()
+        if name not in files:
+            raise self._not_found(name, f"not {self.one}")
+        return files[name]
+
+    def description(self, name: str) -> str:
+        """Return the first line of the file `name`, which is a comment; raises SourceNotFoundError."""
+        return self.text(name).splitlines()[0].removeprefix("# ")
+
+    def own_file(self, name_or_path: str) -> Path | None:
+        """Return the path of the user's file; None for the name of a shipped one.
+
+        `mambo` is the shipped one, `./mambo` a file. Raises SourceNotFoundError if there is neither.
+        """
+        if name_or_path in self.names():
+            return None
+        path = existing_path(name_or_path)
+        if path is None:
+            raise self._not_found(name_or_path, f"neither {self.one} nor a file")
+        return path
+
+    def _files(self) -> dict[str, Traversable]:
+        """Return the files by name, sorted."""
+        folder = resources.files(self.package) / "data" / self.kind
+        files = {file.name.removesuffix(".toml"): file for file in folder.iterdir()}
+        return dict(sorted(files.items()))
+
+    def _not_found(self, name: str, what: str) -> SourceNotFoundError:
+        names = self.names()
+        near = difflib.get_close_matches(name, names, n=1)
+        guess = f" (did you mean {near[0]}?)" if near else ""
+        return SourceNotFoundError(
+            f"{echo(name)} is {what}{guess}; {self.several} are {', '.join(names)}, and {self.advice}"
+        )
+
+
+PRESETS: Final = ShippedFiles(
+    "presets", "a preset", "presets", "`mambo-nmpc init` writes a controller.toml to start from"
+)
+BOARDS: Final = ShippedFiles("boards", "a board", "boards", "a TOML file of the same shape describes another")
 
 
 def existing_path(text: str) -> Path | None:

@@ -38,9 +38,9 @@ EXIT_CODES = (
 
 def complete_presets(incomplete: str) -> list[str]:
     """Return the presets that begin with `incomplete`, for the shell; it completes files itself."""
-    from mambo_codegen.settings.toml_file import PRESETS, shipped
+    from mambo_codegen.settings.toml_file import PRESETS
 
-    return [name for name in shipped(PRESETS) if name.startswith(incomplete)]
+    return [name for name in PRESETS.names() if name.startswith(incomplete)]
 
 
 Source = Annotated[

@@ -58,8 +58,9 @@ def init(
 ) -> None:
     """Write a controller.toml that holds and explains every setting."""
     from mambo_codegen.settings import controller_toml, presets
+    from mambo_codegen.settings.toml_file import PRESETS
 
-    text = controller_toml.to_toml(presets.preset(preset), presets.description(preset))
+    text = controller_toml.to_toml(presets.preset(preset), PRESETS.description(preset))
     if write_file(text, output, force=force):
         name = echo(str(output))
         typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)
@@ -67,9 +68,9 @@ def init(
 
 def list_presets(as_json: AsJson = False) -> None:
     """List the presets and their purpose."""
-    from mambo_codegen.settings import presets
+    from mambo_codegen.settings.toml_file import PRESETS
 
-    described = {name: presets.description(name) for name in presets.names()}
+    described = {name: PRESETS.description(name) for name in PRESETS.names()}
     if as_json:
         typer.echo(json.dumps(described, indent=2))
         return

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
 
 import typer
 
-from mambo_codegen.settings.toml_file import BOARDS, VEHICLES, shipped
+from mambo_codegen.settings.toml_file import BOARDS
 from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
+from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.flight.names import CURVE_NAMES, ControllerName, EngineName, SensorsName, Start
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ Workers = Annotated[
     typer.Option(help="Processes on this machine; by default one for each processor.", min=1, max=1024),
 ]
 
-BOARD_NAMES: Final = tuple(shipped(BOARDS))
-VEHICLE_NAMES: Final = tuple(shipped(VEHICLES, "mambo_sil.drone.vehicles"))
+BOARD_NAMES: Final = BOARDS.names()
+VEHICLE_NAMES: Final = VEHICLES.names()
 
 
 def complete_boards(incomplete: str) -> list[str]:

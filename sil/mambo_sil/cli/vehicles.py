@@ -20,7 +20,7 @@ def vehicles(
     as_json: AsJson = False,
 ) -> None:
     """List the drones that can be flown, or print the file of one to start from."""
-    from mambo_sil.drone.vehicles import presets
+    from mambo_sil.drone.vehicles import VEHICLES
     from mambo_sil.drone.vehicles.model import VehicleFile
 
     if name is not None and (schema or as_json):
@@ -29,9 +29,9 @@ def vehicles(
         typer.echo(json.dumps(VehicleFile.json_schema(), indent=2))
         return
     if name is not None:
-        typer.echo(presets.text_of(name), nl=False)
+        typer.echo(VEHICLES.text(name), nl=False)
         return
-    described = {each: presets.description(each) for each in presets.names()}
+    described = {each: VEHICLES.description(each) for each in VEHICLES.names()}
     if as_json:
         typer.echo(json.dumps(described, indent=2))
         return

@@ -7,7 +7,7 @@ import pytest
 
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError
 from mambo_codegen.settings.toml_file import parse_document
-from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles import VEHICLES, presets
 from mambo_sil.drone.vehicles.model import VehicleFile
 
 FLOWN = """\
@@ -41,8 +41,8 @@ def test_a_shipped_drone_reads_and_fits_its_schema(name: str) -> None:
     """Its first line says what it is, and every value but those of kinds and rates has a source."""
     drone = presets.load(name)
     assert drone.name == name
-    assert presets.description(name)
-    document = parse_document(presets.text_of(name), name)
+    assert VEHICLES.description(name)
+    document = parse_document(VEHICLES.text(name), name)
     jsonschema.validate(document, VehicleFile.json_schema())
     assert VehicleFile.model_validate(drone.model_dump()) == drone
 

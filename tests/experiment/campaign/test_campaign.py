@@ -12,7 +12,7 @@ import pytest
 
 from mambo_codegen.errors import MamboNmpcError, UnreadableFileError
 from mambo_sil.drone.plant.airframe import MAMBO
-from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_flights import INDICES
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
@@ -478,11 +478,11 @@ def test_a_file_names_its_drone(tmp_path: Path) -> None:
     named = campaign_file.read(path)
     assert (named.drone.name, named.file.flight.sensors) == ("crazyflie", "mocap")
     assert numbers(named, "mass_kg") == (0.05,)
-    (tmp_path / "my.toml").write_text(presets.text_of("generic"))
+    (tmp_path / "my.toml").write_text(VEHICLES.text("generic"))
     assert campaign_file.read(written(tmp_path, '[flight]\nvehicle = "my.toml"\n')).drone.name == "my"
     assert faults(tmp_path, '[flight]\nvehicle = "my"\n') == [
         "flight.vehicle: my is neither a shipped vehicle nor a file; vehicles are "
-        f"{', '.join(presets.names())}, and `mambo-nmpc vehicles NAME` prints one to start from"
+        f"{', '.join(VEHICLES.names())}, and `mambo-nmpc vehicles NAME` prints one to start from"
     ]
     assert faults(tmp_path, '[flight]\nvehicle = "crazyflie"\nsensors = "mambo"\n') == [
         'flight.sensors = "mambo" must be "none" or "mocap": vehicle crazyflie has sensors.kind = "mocap"'

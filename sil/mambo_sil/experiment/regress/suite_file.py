@@ -3,7 +3,6 @@
 A list of values of a key multiplies the flights of its group. All errors of a file are reported together.
 """
 
-import difflib
 import json
 import math
 import re
@@ -17,8 +16,8 @@ from typing import Annotated, Any, Final
 from pydantic import Field, PlainValidator, ValidationError, create_model
 from pydantic_core import PydanticCustomError
 
-from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, echo, echo_value
-from mambo_codegen.settings.toml_file import existing_path, shipped
+from mambo_codegen.errors import InvalidSettingsError, echo, echo_value
+from mambo_codegen.settings.toml_file import ShippedFiles
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles import presets as vehicles
 from mambo_sil.drone.vehicles.model import VehicleFile
@@ -27,7 +26,13 @@ from mambo_sil.experiment.campaign.campaign_flights import INDICES
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import Scenario
 
-SUITES: Final = "suites"
+SUITES: Final = ShippedFiles(
+    "suites",
+    "a shipped suite",
+    "shipped suites",
+    "docs/how-to/regress.md shows how to write one",
+    "mambo_sil.experiment.regress",
+)
 MOST_FLIGHTS: Final = 2000
 MOST_VALUES: Final = 1000
 DEFAULT_TOLERANCE: Final = 0.05
@@ -194,18 +199,10 @@ def load_suite(named: str, vehicle: str | None = None) -> FlightSuite:
     working directory. Raises SourceNotFoundError if there is neither, UnreadableFileError for a file that is
     not TOML, InvalidSettingsError with all its errors.
     """
-    ours = shipped(SUITES, __package__)
-    if named in ours:
-        with as_file(ours[named]) as path:
-            return _suite(read_as(SuiteFile, path), named, Path(), f"suite {named}", vehicle)
-    found = existing_path(named)
+    found = SUITES.own_file(named)
     if found is None:
-        near = difflib.get_close_matches(named, ours, n=1)
-        guess = f" (did you mean {near[0]}?)" if near else ""
-        raise SourceNotFoundError(
-            f"{echo(named)} is neither a shipped suite nor a file{guess}; shipped suites are "
-            f"{', '.join(ours)}, and docs/how-to/regress.md shows how to write one"
-        )
+        with as_file(SUITES.file(named)) as path:
+            return _suite(read_as(SuiteFile, path), named, Path(), f"suite {named}", vehicle)
     return _suite(read_as(SuiteFile, found), found.stem, found.parent, echo(named), vehicle)
 
 
