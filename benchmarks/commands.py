@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from benchmarks.markdown import table
+from mambo_sil.flight.engine.build import VARIABLE
 from mambo_sil.flight.names import EngineName
 
 WORKERS: Final = 2
@@ -50,11 +51,12 @@ class Used:
     memory_mb: float
 
 
-def run(arguments: Sequence[str]) -> Used:
+def run(arguments: Sequence[str], engine: EngineName = "c") -> Used:
     """Run mambo-nmpc with `arguments` in a new folder."""
     with TemporaryDirectory() as folder, (Path(folder) / "said").open("w") as said:
         line = [sys.executable, "-m", "mambo_nmpc", *arguments, "-o", "out"]
-        process = subprocess.Popen(line, cwd=folder, stdout=said, stderr=said)
+        environment = os.environ | {VARIABLE: engine}
+        process = subprocess.Popen(line, cwd=folder, stdout=said, stderr=said, env=environment)
         _, status, used = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         assert process.returncode == 0, (Path(folder) / "said").read_text("utf-8")
@@ -64,7 +66,7 @@ def run(arguments: Sequence[str]) -> Used:
 def measure(case: Case, engine: EngineName, count: int) -> Used:
     """Return the medians of the runs of a case."""
     counted = () if case.counted is None else (case.counted, str(count))
-    runs = [run((*case.arguments, *counted, "--engine", engine)) for _ in range(case.runs)]
+    runs = [run((*case.arguments, *counted), engine) for _ in range(case.runs)]
     return Used(
         statistics.median(one.processor_s for one in runs), statistics.median(one.memory_mb for one in runs)
     )

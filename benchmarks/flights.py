@@ -5,6 +5,7 @@ for the same 100 s: compiled C at 100 Hz, stock loops and integrator at 200 Hz, 
 sensors. All run in turns.
 """
 
+import os
 import statistics
 import time
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from rotorpy.vehicles.multirotor import Multirotor
 from mambo_codegen.settings import presets
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.build import VARIABLE
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import EngineName
@@ -39,7 +41,8 @@ def ours(flights: int, engine: EngineName, *, sensed: bool) -> Callable[[], None
     )
 
     def run() -> None:
-        fly(flight, CompiledController(settings, flights), engine=engine)
+        os.environ[VARIABLE] = engine
+        fly(flight, CompiledController(settings, flights))
 
     return run
 

@@ -55,10 +55,11 @@ def test_a_flight_leaves_trace_metrics_and_pictures(tmp_path: Path) -> None:
     assert "<svg" in (out / "flight.svg").read_text()
 
 
-def test_without_pictures_the_earlier_ones_go(tmp_path: Path) -> None:
+def test_without_pictures_the_earlier_ones_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What lies in the folder is of one flight; in NumPy its trace is the same."""
     traces = []
-    for options in ([], ["--no-pictures"], ["--no-pictures", "--engine", "numpy"]):
+    for engine, options in (("c", []), ("c", ["--no-pictures"]), ("numpy", ["--no-pictures"])):
+        monkeypatch.setenv("MAMBO_NMPC_ENGINE", engine)
         run("fly", "--duration-s", "1", *options, "-o", "out")
         traces.append((tmp_path / "out" / "trace.csv").read_text())
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"trace.csv", "trace.npz", "summary.json"}

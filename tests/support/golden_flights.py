@@ -7,6 +7,7 @@ python -m tests.support.golden_flights --write       write all of them to the go
 """
 
 import json
+import os
 import sys
 from collections import defaultdict
 from collections.abc import Mapping
@@ -18,8 +19,9 @@ from mambo_sil.drone.vehicles import presets as vehicles
 from mambo_sil.experiment.campaign.campaign_file import default, scenario
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.build import VARIABLE
 from mambo_sil.flight.engine.simulate import fly
-from mambo_sil.flight.names import PD_NAMES, PD_TITLES, EngineName
+from mambo_sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_flights.json")
@@ -27,7 +29,7 @@ PRESETS: Final = ("mambo", "mambo-1norm")
 
 SCENARIOS: Final = {
     "figure of eight": Scenario(duration_s=10.0),
-    "circle, turned, in wind, with motor lag": Scenario(
+    "circle, turned, pushed, with motor lag": Scenario(
         trajectory="circle", duration_s=10.0, yaw_rad=0.8, push_m_s2=(0.5, 0.3), motor_lag_s=0.03
     ),
     "Lissajous, turning": Scenario(trajectory="lissajous", duration_s=10.0, yaw_rad=-2.0, yaw_rate_rad_s=1.0),
@@ -57,7 +59,7 @@ SHORT: Final = {name: flown.model_copy(update={"duration_s": SHORT_S}) for name,
 """The same flights, ended early."""
 
 
-def digests(engine: EngineName, scenarios: Mapping[str, Scenario]) -> dict[str, str]:
+def digests(scenarios: Mapping[str, Scenario]) -> dict[str, str]:
     """Fly every scenario with both PDs and with the presets; return the digests of the traces."""
     chosen = {name: presets.load(name) for name in PRESETS}
     period_s = chosen[PRESETS[0]].horizon.update_period_s
@@ -67,9 +69,9 @@ def digests(engine: EngineName, scenarios: Mapping[str, Scenario]) -> dict[str, 
     found: dict[str, str] = {}
     for names in batches.values():
         flight = flight_of([scenarios[name] for name in names], period_s)
-        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd), engine=engine) for pd in PD_NAMES}
+        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd)) for pd in PD_NAMES}
         traces |= {
-            preset: fly(flight, CompiledController(settings, len(names)), engine=engine)
+            preset: fly(flight, CompiledController(settings, len(names)))
             for preset, settings in chosen.items()
         }
         for index, name in enumerate(names):
@@ -78,9 +80,9 @@ def digests(engine: EngineName, scenarios: Mapping[str, Scenario]) -> dict[str, 
 
 
 if __name__ == "__main__":
+    os.environ[VARIABLE] = "numpy" if sys.argv[1] == "--write" else sys.argv[1]
     if sys.argv[1:] == ["--write"]:
-        both = {"whole": digests("numpy", SCENARIOS), "short": digests("numpy", SHORT)}
+        both = {"whole": digests(SCENARIOS), "short": digests(SHORT)}
         GOLDEN.write_text(json.dumps(both, indent=2) + "\n", "utf-8")
     else:
-        chosen_engine: EngineName = "c" if sys.argv[1] == "c" else "numpy"
-        print(json.dumps(digests(chosen_engine, SHORT if sys.argv[2:] else SCENARIOS), indent=2))
+        print(json.dumps(digests(SHORT if sys.argv[2:] else SCENARIOS), indent=2))

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.options import AsJson, Engine, OtherDrone, Workers, output_option, show
+from mambo_sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
     from mambo_sil.cli.progress import Bar
     from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
-    from mambo_sil.flight.names import EngineName
 
 
 def campaign(
@@ -32,7 +31,6 @@ def campaign(
         str | None,
         typer.Option(help="Address of a running Dask scheduler; its workers fly, not this machine."),
     ] = None,
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
@@ -41,9 +39,7 @@ def campaign(
     from mambo_sil.cli.progress import counting_bar
 
     with counting_bar("starting", "flights", flights) as bar:
-        summary = _run(
-            source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler, engine=engine
-        )
+        summary = _run(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
     from mambo_sil.experiment.campaign.campaign_report import PICTURE, RECORDS, campaign_text
     from mambo_sil.experiment.campaign.store import TABLE
     from mambo_sil.results.folders import SUMMARY
@@ -61,7 +57,6 @@ def _run(
     *,
     workers: int | None,
     scheduler: str | None,
-    engine: "EngineName",
 ) -> "CampaignSummary":
     """Fly the missing flights and write the results; if interrupted print how many are finished."""
     from mambo_sil.experiment.campaign import campaign_file
@@ -77,7 +72,7 @@ def _run(
                 pool = processes(workers or os.cpu_count() or 1) if scheduler is None else cluster(scheduler)
                 with pool as open_pool:
                     bar.stage("flying")
-                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running, engine=engine)
+                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running)
             return finish(chosen, store, bar.stage)
         except KeyboardInterrupt:
             with contextlib.suppress(OSError):

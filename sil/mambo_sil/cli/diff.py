@@ -6,7 +6,7 @@ import typer
 
 from mambo_codegen.errors import echo
 from mambo_sil.cli.command import complete_presets
-from mambo_sil.cli.options import AsJson, Drone, Engine, OptionalResults, show
+from mambo_sil.cli.options import AsJson, Drone, OptionalResults, show
 
 
 def diff(
@@ -25,7 +25,6 @@ def diff(
     *,
     output: OptionalResults = None,
     vehicle: Drone = "mambo",
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Compare two controllers: settings, gains, poles, flights; exit 0 if they are the same, 1 if not."""
@@ -39,7 +38,7 @@ def diff(
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:
-        summary = compare(sides[0], sides[1], vehicles.load(vehicle), output, bar, engine=engine)
+        summary = compare(sides[0], sides[1], vehicles.load(vehicle), output, bar)
     show(summary, diff_text(summary), as_json=as_json)
     if output is not None:
         pictures = () if summary.same else PICTURES

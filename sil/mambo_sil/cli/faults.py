@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.options import AsJson, Drone, Engine, Results, Scalar, Source, load, show
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, load, show
 
 FILES = ("faults.csv", "faults.png", "faults.svg")
 
@@ -16,7 +16,6 @@ def faults(
     output: Results = Path("faults"),
     vehicle: Drone = "mambo",
     scalar: Scalar = None,
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly with faults of sensors, timing, target and operator; exit 1 if the drone crashes."""
@@ -32,9 +31,7 @@ def faults(
     with new_results(output, FaultsSummary.command, FILES) as folder:
         with progress_bar("flying with faults") as bar:
             try:
-                verdicts = fly_faults(
-                    settings, lambda n: CompiledController(settings, n), bar, drone=drone, engine=engine
-                )
+                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), bar, drone=drone)
             except FlightError as error:
                 raise FlightError(f"{echo(source)}: {error}") from error
             bar.stage("drawing pictures")

@@ -56,7 +56,7 @@ def fly_once(options: FlyOptions) -> None:
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
         controller = _on_board(options, settings) if options.on else _controller(options, settings)
         with progress_bar("flying") as progress:
-            trace = simulate(flight, controller, progress, engine=options.engine)
+            trace = simulate(flight, controller, progress)
         same_bits = (
             None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
         )

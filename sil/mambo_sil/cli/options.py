@@ -11,7 +11,7 @@ import typer
 from mambo_codegen.settings.toml_file import BOARDS
 from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
 from mambo_sil.drone.vehicles import VEHICLES
-from mambo_sil.flight.names import CURVE_NAMES, ControllerName, EngineName, SensorsName, Start
+from mambo_sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
@@ -66,13 +66,6 @@ PortName = Annotated[
 Baud = Annotated[int, typer.Option(help="Rate of the serial port.", min=1)]
 BAUD: Final = 500000
 """The rate of the shipped boards."""
-
-Engine = Annotated[
-    EngineName,
-    typer.Option(
-        "--engine", help="Simulate in compiled C, or in NumPy: some hundred times slower, the same bits."
-    ),
-]
 
 Options = TypeVar("Options")
 
@@ -147,7 +140,6 @@ class FlyOptions:
             help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
         ),
     ] = None
-    engine: Engine = "c"
     pictures: Annotated[bool, typer.Option(help="Draw the flight, which takes most of the time.")] = True
     as_json: AsJson = False
 

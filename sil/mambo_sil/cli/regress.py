@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.options import AsJson, Engine, OtherDrone, Results, show
+from mambo_sil.cli.options import AsJson, OtherDrone, Results, show
 
 if TYPE_CHECKING:
     from mambo_sil.experiment.campaign.campaign_file import Entrant
     from mambo_sil.experiment.campaign.campaign_flights import Row
     from mambo_sil.experiment.regress.suite_file import FlightSuite
-    from mambo_sil.flight.names import EngineName
 
 _WORTH_A_WORKER_S = 4000.0
 """Simulated time that the engine flies while a worker process starts, about half a second."""
@@ -30,7 +29,6 @@ def regress(
     update: Annotated[
         bool, typer.Option("--update", help="Record the metrics as the baseline of later runs.", metavar="")
     ] = False,
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly a suite of flights as a regression test; exit 1 if a flight exceeds a bound or its baseline."""
@@ -64,7 +62,7 @@ def regress(
         demand_replaceable(path)
     baseline = None if update else read_baseline(chosen, entrant.name)
     with new_results(output, RegressSummary.command, (*PICTURES, JUNIT, f"{RECORDS}/")) as folder:
-        rows = _fly(chosen, entrant, engine)
+        rows = _fly(chosen, entrant)
         summary = judge(chosen, entrant, rows, baseline, path)
         write_records(summary, chosen, entrant, rows, folder)
         (folder / JUNIT).write_bytes(junit_xml(summary))
@@ -80,18 +78,19 @@ def regress(
         raise typer.Exit(1)
 
 
-def _fly(suite: "FlightSuite", entrant: "Entrant", engine: "EngineName") -> "list[Row]":
+def _fly(suite: "FlightSuite", entrant: "Entrant") -> "list[Row]":
     """Fly the suite on all processors; show the progress."""
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.experiment.regress.suite_flights import fly_suite
+    from mambo_sil.flight.engine.build import chosen_engine
 
     workers = os.cpu_count() or 1
-    if engine == "c":
+    if chosen_engine() == "c":
         flown_s = sum(flight.scenario.duration_s for flight in suite.flights)
         workers = min(workers, 1 + int(flown_s / _WORTH_A_WORKER_S))
     with (
         counting_bar("flying", "flights", len(suite.flights)) as progress,
         processes(workers) as pool,
     ):
-        return fly_suite(suite, entrant, pool, progress, engine=engine)
+        return fly_suite(suite, entrant, pool, progress)

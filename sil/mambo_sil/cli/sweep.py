@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
-from mambo_sil.cli.options import AsJson, Drone, Engine, Results, Scalar, Source, complete_boards, load, show
+from mambo_sil.cli.options import AsJson, Drone, Results, Scalar, Source, complete_boards, load, show
 
 FILES = ("sweep.csv", "sweep.png", "sweep.svg")
 
@@ -30,7 +30,6 @@ def sweep(
     ] = False,
     vehicle: Drone = "mambo",
     output: Results = Path("sweep"),
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Measure footprint and tracking error over a grid of horizons and iterations."""
@@ -66,7 +65,7 @@ def sweep(
         counting_bar("sweeping", "controllers", total) as bar,
     ):
         with processes(os.cpu_count() or 1) as pool:
-            points = measure_grid(settings, chosen, grid, pool.run, bar, drone=drone, engine=engine)
+            points = measure_grid(settings, chosen, grid, pool.run, bar, drone=drone)
         bar.stage("drawing pictures")
         from mambo_sil.board.footprint.footprint_plots import draw_sweep
 

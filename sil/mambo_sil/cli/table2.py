@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.options import AsJson, Engine, Results, Scalar, load, show
+from mambo_sil.cli.options import AsJson, Results, Scalar, load, show
 
 if TYPE_CHECKING:
-    from mambo_sil.flight.names import EngineName
+    pass
 
 PICTURES = ("figure3.png", "figure3.svg")
 SENSED_TABLE = "sensors.md"
@@ -25,7 +25,6 @@ def table2(
         ),
     ] = False,
     scalar: Scalar = None,
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Fly Table II of the paper with both PDs and the presets for the Mambo, and check the paper's claims."""
@@ -43,13 +42,13 @@ def table2(
     from mambo_sil.results.folders import new_results
 
     if sensors:
-        _fly_with_sensors(output, scalar, engine, as_json=as_json)
+        _fly_with_sensors(output, scalar, as_json=as_json)
         return
     settings = {name: load(name, scalar) for name in PRESETS}
     files = {name: f"{name.lower()}.npz" for name in (*PD_TITLES.values(), *settings)}
     with new_results(output, Table2Summary.command, (*files.values(), *PICTURES)) as folder:
         with progress_bar("flying Table II") as progress:
-            traces = fly_table2(settings, progress, engine=engine)
+            traces = fly_table2(settings, progress)
         for name, trace in traces.items():
             write_npz(trace, folder / files[name])
         draw_figure3({name: traces[name] for name in DRAWN}, folder / "figure3")
@@ -59,7 +58,7 @@ def table2(
     typer.echo(f"{echo(str(output))}: {', '.join(PICTURES)} and the traces", err=True)
 
 
-def _fly_with_sensors(output: Path, scalar: str | None, engine: "EngineName", *, as_json: bool) -> None:
+def _fly_with_sensors(output: Path, scalar: str | None, *, as_json: bool) -> None:
     from mambo_sil.cli.progress import progress_bar
     from mambo_sil.experiment.table2.sensed import PRESETS, SensedSummary, fly_sensed, text
     from mambo_sil.results.folders import new_results
@@ -67,7 +66,7 @@ def _fly_with_sensors(output: Path, scalar: str | None, engine: "EngineName", *,
     settings = {name: load(name, scalar) for name in PRESETS}
     with new_results(output, SensedSummary.command, (SENSED_TABLE,)) as folder:
         with progress_bar("flying Table II with sensors") as progress:
-            summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress, engine=engine))
+            summary = SensedSummary(scalar=scalar, rows=fly_sensed(settings, progress))
         table = text(summary.rows)
         (folder / SENSED_TABLE).write_text(table + "\n", "utf-8")
         summary.write(folder)

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mambo_codegen.errors import echo
-from mambo_sil.cli.options import AsJson, Engine, OtherDrone, Workers, output_option, show
+from mambo_sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
     from optuna import Study
 
     from mambo_sil.cli.progress import Bar
-    from mambo_sil.flight.names import EngineName
     from mambo_sil.model.tune.tuning_file import Tuning
     from mambo_sil.model.tune.tuning_report import TuneSummary
 
@@ -35,7 +34,6 @@ def tune(
         str | None,
         typer.Option(help="URL of a database that several machines share, instead of a file in the folder."),
     ] = None,
-    engine: Engine = "c",
     as_json: AsJson = False,
 ) -> None:
     """Search for settings that track well with calm commands; continue an interrupted search."""
@@ -43,7 +41,7 @@ def tune(
 
     with counting_bar("starting", "trials", trials) as bar:
         count = workers or os.cpu_count() or 1
-        summary = _run(source, vehicle, output, trials, bar, workers=count, storage=storage, engine=engine)
+        summary = _run(source, vehicle, output, trials, bar, workers=count, storage=storage)
     from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT, tune_text
     from mambo_sil.results.folders import SUMMARY
 
@@ -61,7 +59,6 @@ def _run(
     *,
     workers: int,
     storage: str | None,
-    engine: "EngineName",
 ) -> "TuneSummary":
     """Run the missing trials and write the results."""
     from mambo_sil.errors import StudyError
@@ -86,7 +83,7 @@ def _run(
             bar(len(finished_trials(study)))
             if len(finished_trials(study)) < trials:
                 owner = owner_of(output, storage)
-                _search(tuning, study, owner, trials, bar, workers=workers, folder=output, engine=engine)
+                _search(tuning, study, owner, trials, bar, workers=workers, folder=output)
             found = finished_trials(study)
         bar.stage("drawing the front")
         return finish(tuning, found, output)
@@ -101,7 +98,6 @@ def _search(
     *,
     workers: int,
     folder: Path,
-    engine: "EngineName",
 ) -> None:
     """Search until `trials` are finished; if interrupted print how many are."""
     from mambo_sil.experiment.campaign.executors import processes
@@ -110,7 +106,7 @@ def _search(
     bar.stage("tuning")
     try:
         with processes(workers) as pool:
-            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running, engine=engine)
+            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
     except KeyboardInterrupt:
         with contextlib.suppress(OSError):
             typer.echo(

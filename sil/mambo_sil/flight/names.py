@@ -22,6 +22,7 @@ EngineName = Literal["c", "numpy"]
 
 STARTS: Final[tuple[Start, ...]] = get_args(Start)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
+ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
 PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"

@@ -121,6 +121,6 @@ def test_an_update_is_refused_when_the_controller_was_called_and_did_not_accept(
     trace.status[[1, 2, 9], 1] = [Status.OK, Status.BAD_STATE, Status.BAD_TARGET]
     trace.command_rad[:] = 0.0
     trace.command_rad[:51, 1, 0] = 0.35
-    found = _evaluate(trace, 0.35, NOMINAL, "c")
+    found = _evaluate(trace, 0.35, NOMINAL)
     assert found["refused_updates"] == [0, 2]
     assert found["saturated_share"] == [0.0, 51 / len(trace.time_s)]

@@ -18,7 +18,6 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
-from mambo_sil.flight.names import EngineName
 from mambo_sil.results.summary import Number
 
 COUNTED_TICKS: Final = 60
@@ -68,14 +67,13 @@ def measure_grid(
     progress: Callable[[int], None],
     *,
     drone: VehicleFile = NOMINAL,
-    engine: EngineName = "c",
 ) -> list[Point]:
     """Return the points of the grid in order; `run` measures them, in any order.
 
     Calls `progress` with the number of measured points. Raises WorkerError if a worker fails.
     """
     documents = settings.model_dump(), board.model_dump(), drone.model_dump()
-    jobs = [((*documents, *point), engine) for point in grid.points()]
+    jobs = [((*documents, *point),) for point in grid.points()]
     found: dict[int, Point] = {}
     progress(0)
     try:
@@ -97,9 +95,7 @@ def budgets(board: Board, update_period_s: float) -> dict[str, float]:
     }
 
 
-def _measure_point(
-    job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int], engine: EngineName
-) -> Point:
+def _measure_point(job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int]) -> Point:
     """Measure one point in a worker process; `job` is plain data, since generic models do not pickle."""
     document, board_document, drone, prediction, control, iterations = job
     board = Board.model_validate(board_document)
@@ -110,7 +106,7 @@ def _measure_point(
     case = next(iter(CASES.values()))
     vehicle = Vehicle.of(VehicleFile.model_validate(drone))
     flight = Flight(case, vehicle=vehicle, update_period_s=chosen.horizon.update_period_s)
-    metrics = measure(fly(flight, CompiledController(chosen), engine=engine))
+    metrics = measure(fly(flight, CompiledController(chosen)))
     return Point(
         prediction=prediction,
         control=control,

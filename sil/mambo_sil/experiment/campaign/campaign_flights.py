@@ -22,7 +22,6 @@ from mambo_sil.flight.engine.evaluation import evaluate
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import Metrics
-from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 
@@ -55,7 +54,6 @@ def fly_batch(
     entrants: Sequence[dict[str, Any]],
     flight: dict[str, Any],
     drawn: Sequence[Draw],
-    engine: EngineName = "c",
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
@@ -67,12 +65,10 @@ def fly_batch(
             f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
         )
     scenarios = [scenario(flight, one) for one in drawn]
-    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios, engine)
+    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios)
 
 
-def fly_scenarios(
-    entrants: Sequence[Entrant], scenarios: Sequence[Scenario], engine: EngineName = "c"
-) -> list[Row]:
+def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) -> list[Row]:
     """Fly flights together with every controller; return one row per flight, in order.
 
     Tells the worker's pool how far it is. Raises BuildError if there is no compiler, FlightError for flights
@@ -83,9 +79,9 @@ def fly_scenarios(
     for number, entrant in enumerate(entrants):
         flight = flight_at(entrant.settings.horizon.update_period_s)
         report = partial(_report_part, number, len(entrants))
-        trace = fly(flight, _controller(entrant, flight), report, engine=engine)
+        trace = fly(flight, _controller(entrant, flight), report)
         limit_rad = Design(entrant.settings).tilt_limit_rad
-        for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle, engine).items():
+        for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value
     report_share(0.0)
@@ -104,9 +100,9 @@ def _controller(entrant: Entrant, flight: Flight) -> PositionController:
         return CompiledController(entrant.settings, flight.flights)
 
 
-def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile, engine: EngineName) -> dict[str, list[Any]]:
+def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> dict[str, list[Any]]:
     """Return the results of n flights of a drone by key, each a list of n."""
-    results = evaluate(trace, limit_rad, drone, engine=engine)
+    results = evaluate(trace, limit_rad, drone)
     found: dict[str, list[Any]] = {
         CRASHED: results.crashed.astype(int).tolist(),
         REFUSED: results.refused.tolist(),

@@ -12,7 +12,6 @@ from mambo_sil.experiment.campaign.campaign_flights import columns, fly_batch
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import FlightStore, open_store
-from mambo_sil.flight.names import EngineName
 
 MOST_IN_A_BATCH: Final = 20
 """Flights in one task: about a second with two controllers, and larger batches are hardly faster."""
@@ -53,7 +52,6 @@ def fly_missing(
     *,
     running: Callable[[float], None] = lambda _: None,
     batch: int = MOST_IN_A_BATCH,
-    engine: EngineName = "c",
 ) -> None:
     """Fly the missing flights and store them.
 
@@ -69,7 +67,7 @@ def fly_missing(
     def tasks() -> Iterator[tuple[Any, ...]]:
         for number, flown in enumerate(batches):
             drawn[number] = [campaign.draw(flight) for flight in flown]
-            yield __version__, entrants, section, drawn[number], engine
+            yield __version__, entrants, section, drawn[number]
 
     progress(len(store.lines))
     for number, rows in pool.run(fly_batch, tasks(), lambda shares: running(shares * size)):

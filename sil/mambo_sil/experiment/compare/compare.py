@@ -11,7 +11,6 @@ from mambo_sil.errors import FlightError
 from mambo_sil.experiment.compare.compared_flights import Answers, answers
 from mambo_sil.experiment.compare.diff_plots import draw_steps
 from mambo_sil.experiment.compare.diff_record import PICTURES, DiffSummary, differences, figures
-from mambo_sil.flight.names import EngineName
 from mambo_sil.results.folders import new_results
 
 Side = tuple[str, Settings]
@@ -24,8 +23,6 @@ def compare(
     drone: VehicleFile,
     folder: Path | None,
     progress: Callable[[float], None],
-    *,
-    engine: EngineName = "c",
 ) -> DiffSummary:
     """Return the comparison of two controllers on a drone; write it and its picture to `folder`.
 
@@ -42,9 +39,9 @@ def compare(
     with contextlib.ExitStack() as stack:
         place = folder and stack.enter_context(new_results(folder, DiffSummary.command, PICTURES))
         if not summary.same:
-            first = _answers(a, drone, engine)
+            first = _answers(a, drone)
             progress(0.5)
-            second = _answers(b, drone, engine)
+            second = _answers(b, drone)
             found = {"figures_a": figures(a[1], first), "figures_b": figures(b[1], second)}
             summary = summary.model_copy(update=found)
             if place is not None:
@@ -54,8 +51,8 @@ def compare(
     return summary
 
 
-def _answers(side: Side, drone: VehicleFile, engine: EngineName) -> Answers:
+def _answers(side: Side, drone: VehicleFile) -> Answers:
     try:
-        return answers(side[1], drone, engine=engine)
+        return answers(side[1], drone)
     except FlightError as error:
         raise FlightError(f"{echo(side[0])}: {error}") from error

@@ -15,7 +15,6 @@ from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import horizontal_error_m, measure
-from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import STEP_TIME_S, Bernoulli, PositionStep, Trajectories
 from mambo_sil.results.summary import Number
@@ -58,7 +57,7 @@ class Answers:
     eight: EightAnswer
 
 
-def answers(settings: Settings, drone: VehicleFile, *, engine: EngineName = "c") -> Answers:
+def answers(settings: Settings, drone: VehicleFile) -> Answers:
     """Fly steps and eight with the compiled controller, without disturbance or sensor noise.
 
     Raises FlightError, and the errors of building the C.
@@ -73,8 +72,8 @@ def answers(settings: Settings, drone: VehicleFile, *, engine: EngineName = "c")
         update_period_s=period_s,
     )
     eight = Flight(Bernoulli(2.0, 0.5), vehicle=vehicle, update_period_s=period_s)
-    steps = fly(step, CompiledController(settings, 2), engine=engine)
-    flown = fly(eight, CompiledController(settings), engine=engine)
+    steps = fly(step, CompiledController(settings, 2))
+    flown = fly(eight, CompiledController(settings))
     metrics = measure(flown)
     return Answers(
         steps,

@@ -32,7 +32,6 @@ from mambo_sil.flight.crashes import crash_tilt_rad
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, saturated_share
-from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Hover, Trajectories, Trajectory
 from mambo_sil.results.summary import Number
@@ -121,7 +120,6 @@ def fly_faults(
     chosen: Sequence[FaultScenario] | None = None,
     *,
     drone: VehicleFile = NOMINAL,
-    engine: EngineName = "c",
 ) -> tuple[Verdict, ...]:
     """Fly every fault, or those `chosen`, on every course with every onset; return verdicts course by course.
 
@@ -139,7 +137,7 @@ def fly_faults(
         Fault(s.begin, s.end, s.scenario.alter, s.scenario.drop_every, s.scenario.late_updates)
         for s in sorties
     ]
-    trace = fly(flight, FaultyController(caller, faults, compiled.instances), progress, engine=engine)
+    trace = fly(flight, FaultyController(caller, faults, compiled.instances), progress)
     healthy = [not sortie.end for sortie in sorties]
     if (trace.status[:, healthy] == Status.BAD_TARGET).any():
         raise FlightError(

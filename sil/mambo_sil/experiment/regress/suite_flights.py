@@ -9,7 +9,6 @@ from mambo_sil.experiment.campaign.campaign_flights import Row, fly_scenarios
 from mambo_sil.experiment.campaign.campaign_run import MOST_IN_A_BATCH
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.regress.suite_file import FlightSuite
-from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.scenario import SHARED_KEYS, flight_of
 
 _LONGEST_BATCH_S = 10_000.0
@@ -31,8 +30,6 @@ def fly_suite(
     entrant: Entrant,
     pool: Pool,
     progress: Callable[[int], None],
-    *,
-    engine: EngineName = "c",
 ) -> list[Row]:
     """Fly all flights of a suite and return their results by metric, in order.
 
@@ -40,7 +37,7 @@ def fly_suite(
     there is no compiler.
     """
     batches = list(_batches(suite, pool.workers))
-    tasks = [([entrant], [suite.flights[number].scenario for number in batch], engine) for batch in batches]
+    tasks = [([entrant], [suite.flights[number].scenario for number in batch]) for batch in batches]
     rows: dict[int, Row] = {}
     progress(0)
     try:

@@ -25,7 +25,7 @@ from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
-from mambo_sil.flight.names import PD_NAMES, PD_TITLES, EngineName
+from mambo_sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import SensedTrace, Trace
 from mambo_sil.results.numbers import digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
@@ -84,7 +84,6 @@ def fly_sensed(
     *,
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
-    engine: EngineName = "c",
 ) -> list[SensedRow]:
     """Fly the case with both PDs and the compiled C of `settings` by name, each with every one of `VIEWS`.
 
@@ -101,7 +100,7 @@ def fly_sensed(
         controller: PositionController = (
             pd_controller(pds[name]) if name in pds else CompiledController(settings[name], n)
         )
-        trace = fly(flight, controller, report_part(progress, index, len(jobs)), engine=engine)
+        trace = fly(flight, controller, report_part(progress, index, len(jobs)))
         rows.append(_judge(name, view, trace))
     return rows
 

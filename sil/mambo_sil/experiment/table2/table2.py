@@ -13,7 +13,7 @@ from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
-from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES, EngineName
+from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import Trace, read_existing
 from mambo_sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
 from mambo_sil.results.numbers import digits, three_digits
@@ -107,9 +107,7 @@ def report_part(progress: Callable[[float], None], part: int, parts: int) -> Cal
     return lambda share: progress((part + share) / parts)
 
 
-def fly_table2(
-    settings: Mapping[str, Settings], progress: Callable[[float], None], *, engine: EngineName = "c"
-) -> dict[str, Trace]:
+def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], None]) -> dict[str, Trace]:
     """Fly every case with both PDs and with the compiled C of `settings` by name, 100 s each.
 
     Calls `progress` with the share done. Returns the traces by controller, with one flight for each case.
@@ -118,7 +116,7 @@ def fly_table2(
     controllers: dict[str, PositionController] = {PD_TITLES[name]: pd_controller(name) for name in PD_NAMES}
     controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
     return {
-        name: fly(flight, controller, report_part(progress, index, len(controllers)), engine=engine)
+        name: fly(flight, controller, report_part(progress, index, len(controllers)))
         for index, (name, controller) in enumerate(controllers.items())
     }
 

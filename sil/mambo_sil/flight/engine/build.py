@@ -1,5 +1,6 @@
 """Build the engine with the host's compiler, once per machine, and load it."""
 
+import os
 from functools import lru_cache
 from importlib import resources
 from typing import Any, Final
@@ -7,8 +8,11 @@ from typing import Any, Final
 import cffi
 import numpy as np
 
+from mambo_codegen.settings.key import spell
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.drone.plant import elementary
+from mambo_sil.errors import FlightError
+from mambo_sil.flight.names import ENGINE_NAMES, EngineName
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 
 SOURCES: Final = ("evaluation.c", "faults.c", "loop.c", "pd.c")
@@ -36,6 +40,7 @@ FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno")
 LANES: Final = {1: (), 2: ("-DLANES=2",), 4: ("-DLANES=4", "-mavx2")}
 """Flags by number of lanes."""
 LIBRARIES: Final = ("-lm",)
+VARIABLE: Final = "MAMBO_NMPC_ENGINE"
 
 ffi: Final = cffi.FFI()
 ffi.cdef("typedef double real_t; typedef int64_t whole_t;")
@@ -60,6 +65,18 @@ def _constants() -> str:
             spelled = ", ".join(float(value).hex() for value in values)
             lines.append(f"static const double {name}[] = {{ {spelled} }};")
     return "\n".join(lines) + "\n"
+
+
+def chosen_engine() -> EngineName:
+    """Return what computes simulations: the environment variable MAMBO_NMPC_ENGINE, by default `c`.
+
+    Raises FlightError for an unknown value.
+    """
+    named = os.environ.get(VARIABLE, "c")
+    for engine in ENGINE_NAMES:
+        if named == engine:
+            return engine
+    raise FlightError(f"{VARIABLE} = {spell(named)} in the environment must be {' or '.join(ENGINE_NAMES)}")
 
 
 @lru_cache

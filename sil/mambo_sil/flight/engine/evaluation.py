@@ -11,22 +11,21 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.model import VehicleFile
 from mambo_sil.flight import evaluation
 from mambo_sil.flight.crashes import least_level
-from mambo_sil.flight.engine.build import ffi, lanes_for, load, pointer
+from mambo_sil.flight.engine.build import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.simulate import trace_record
 from mambo_sil.flight.evaluation import Evaluation
 from mambo_sil.flight.metrics import Metrics
-from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.traces import SensedTrace, Trace
 
 _METRICS: Final = tuple(field.name for field in fields(Metrics))
 
 
-def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile, *, engine: EngineName = "c") -> Evaluation:
+def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
     """Evaluate the flights of `drone` under commands that are limited to `limit_rad`.
 
     Raises CacheError and UnwritableError if the engine cannot be built for want of a folder or space.
     """
-    if engine == "c":
+    if chosen_engine() == "c":
         try:
             toolchain = host_toolchain()
             return evaluate_compiled(

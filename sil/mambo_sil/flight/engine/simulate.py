@@ -12,11 +12,10 @@ from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
-from mambo_sil.flight.engine.build import ffi, lanes_for, load, pointer
+from mambo_sil.flight.engine.build import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.native import is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
 from mambo_sil.flight.loop import Flight, PositionController, allocate_trace
-from mambo_sil.flight.names import EngineName
 from mambo_sil.flight.traces import Trace
 
 DELAY_TICKS_MAX: Final = 200
@@ -29,17 +28,15 @@ def fly(
     flight: Flight,
     controller: PositionController,
     progress: Progress | None = None,
-    *,
-    engine: EngineName = "c",
 ) -> Trace:
     """Simulate the flights and return their trace; call `progress` with the share done.
 
-    Uses the engine unless `engine` is numpy, or the step of the controller is not a C function. On a machine
-    without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
+    Uses the engine unless `chosen_engine` is numpy, or the step of the controller is not a C function. On a
+    machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
     UnwritableError if the engine cannot be built for want of a folder or space.
     """
     delay_ticks = int(np.max(flight.link.delay_ticks))
-    if engine == "c" and is_native(controller) and delay_ticks <= DELAY_TICKS_MAX:
+    if chosen_engine() == "c" and is_native(controller) and delay_ticks <= DELAY_TICKS_MAX:
         try:
             toolchain = host_toolchain()
             compiled = load(toolchain, lanes_for(flight.flights, toolchain))

@@ -25,7 +25,6 @@ from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, Row, fly_batch
 from mambo_sil.experiment.campaign.distributions import Distribution
 from mambo_sil.experiment.campaign.executors import Pool
-from mambo_sil.flight.names import EngineName
 from mambo_sil.model.tune.tuning_file import Tuning
 
 if TYPE_CHECKING:
@@ -123,7 +122,6 @@ def search(
     pool: Pool,
     progress: Callable[[int], None],
     running: Callable[[float], None] = lambda _: None,
-    engine: EngineName = "c",
 ) -> None:
     """Run trials until the study has `trials` finished ones.
 
@@ -141,7 +139,7 @@ def search(
             study.add_trial(propose(tuning, study, owner))
         flown = _find_unfinished(study, owner)
         entrants = [Entrant(_NAME, "nmpc", tuning.settings(values)) for values in flown.values()]
-        tasks = [(__version__, [entrant.document()], flight, drawn, engine) for entrant in entrants]
+        tasks = [(__version__, [entrant.document()], flight, drawn) for entrant in entrants]
         numbers = list(flown)
         for task, rows in pool.run(fly_batch, tasks, running):
             crashed, means = judge(rows, tuning.file.flight.duration_s, tuning.base.limits.tilt_rad)

@@ -1,4 +1,4 @@
-"""The option --engine of every command that flies: with numpy the engine is not even built."""
+"""The variable MAMBO_NMPC_ENGINE in every command that flies: with numpy the engine is not built."""
 
 import os
 import shlex
@@ -77,7 +77,7 @@ SAID = "the simulation runs in NumPy"
 
 @pytest.mark.parametrize("line", COMMANDS)
 def test_numpy_needs_no_engine(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a compiler that refuses the engine, only the option c says that it flies in NumPy."""
+    """With a compiler that refuses the engine, only the engine c says that it flies in NumPy."""
     name = line.split(maxsplit=1)[0]
     if name == "tune":
         require_module("optuna")
@@ -93,8 +93,10 @@ def test_numpy_needs_no_engine(line: str, tmp_path: Path, monkeypatch: pytest.Mo
     compiler.write_text(ODD_COMPILER.format(shlex.quote(require("gcc", "gcc"))), "utf-8")
     compiler.chmod(0o755)
     monkeypatch.setenv("CC", str(compiler))
-    demand_said([*line.split(), "--engine", "c", "-o", "c"], tmp_path)
-    done = command(*line.split(), "--engine", "numpy", "-o", "numpy", folder=tmp_path, script=SCRIPT)
+    monkeypatch.setenv("MAMBO_NMPC_ENGINE", "c")
+    demand_said([*line.split(), "-o", "c"], tmp_path)
+    monkeypatch.setenv("MAMBO_NMPC_ENGINE", "numpy")
+    done = command(*line.split(), "-o", "numpy", folder=tmp_path, script=SCRIPT)
     assert SAID not in done.stderr
     assert (tmp_path / "numpy" / "summary.json").is_file()
 
@@ -113,3 +115,13 @@ def demand_said(arguments: list[str], folder: Path) -> None:
         said = any(SAID in line for line in process.stderr)
         os.killpg(process.pid, signal.SIGKILL)
     assert said
+
+
+@pytest.mark.parametrize("line", ["fly --duration-s 0.5", "campaign campaign.toml --flights 1 --workers 1"])
+def test_an_unknown_engine_is_refused(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The message names both; also in a worker."""
+    (tmp_path / "campaign.toml").write_text(FILES["campaign"], "utf-8")
+    monkeypatch.setenv("MAMBO_NMPC_ENGINE", "fast")
+    done = command(*line.split(), "-o", "out", folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.endswith('MAMBO_NMPC_ENGINE = "fast" in the environment must be c or numpy\n')
