@@ -52,7 +52,7 @@ check: $(SETUP_TEST)
 
 test: tools $(SETUP_TEST)
 	$(STYLE_AND_TYPES)
-	$(BIN)/python -m pytest -n auto $(MARKED)
+	$(BIN)/python -m pytest -n auto --dist worksteal $(MARKED)
 
 # As root on a system with apt, install all packages if a command is missing; elsewhere name them.
 tools:

@@ -1,5 +1,6 @@
 """Fixtures for all tests, and the skip of those that want a compiler where there is none."""
 
+import os
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -9,6 +10,9 @@ from hypothesis import HealthCheck, settings
 from mambo_codegen.errors import BuildError
 from tests.support.tools import require
 
+# Arrays of tests are small: threads of NumPy's linear algebra take processor time from the other workers.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 settings.register_profile(
     "house", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -16,12 +20,13 @@ settings.load_profile("house")
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _own_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep builds out of the user's compile cache, with one cache for all workers, and hide an outer make."""
-    base = tmp_path_factory.getbasetemp()
-    shared = base.parent if base.name.startswith("popen-") else base
+def _own_environment() -> Iterator[None]:
+    """Keep builds out of the user's compile cache, in one for all workers and runs, and hide an outer make.
+
+    What it holds is named by the hash of all that made it; `make clean` removes it.
+    """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(shared / "cache"))
+        patch.setenv("XDG_CACHE_HOME", str(Path(__file__).parents[1] / "build" / "tests-cache"))
         for name in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS"):
             patch.delenv(name, raising=False)
         yield

@@ -1,5 +1,6 @@
 """Libraries of a controller in every build: each compiler and optimisation, from one translation unit."""
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
@@ -13,8 +14,22 @@ BUILDS: Final = (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"),
 _NOT_CALLED: Final = ("src/nmpc_self_test.c", "src/nmpc_float.c")
 
 
-def libraries(settings: Settings) -> dict[str, Any]:
-    """Build the C of a controller in each of `BUILDS`; returns the libraries by compiler and optimisation.
+_WHOLE: Final = 10
+"""So many of the settings of a parity test, the corners among them, run in every build, with all cases."""
+
+
+def share_of(index: int) -> tuple[tuple[tuple[str, str], ...], int]:
+    """Return the builds in which the settings of a number run, and the percentage of the cases.
+
+    After the first `_WHOLE` settings each runs in two builds, which take turns, with a fifth of the cases.
+    """
+    if index < _WHOLE:
+        return BUILDS, 100
+    return (BUILDS[index % len(BUILDS)], BUILDS[(index + 2) % len(BUILDS)]), 20
+
+
+def libraries(settings: Settings, builds: Sequence[tuple[str, str]] = BUILDS) -> dict[str, Any]:
+    """Build the C of a controller in each of `builds`; returns the libraries by compiler and optimisation.
 
     The sources are joined as in an amalgamated bundle, so that each optimisation sees all of them at once.
     Self-test and interface of floats, which no step calls, are left out.
@@ -26,5 +41,5 @@ def libraries(settings: Settings) -> dict[str, Any]:
     source = LibrarySource("nmpc_all", unit, lambda: unit, (*COMPILE_FLAGS, "-Iinclude", "-Isrc"), ffi)
     return {
         f"{compiler} {level}": load_shared_library(source, toolchain(compiler, level))
-        for compiler, level in BUILDS
+        for compiler, level in builds
     }

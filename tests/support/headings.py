@@ -16,6 +16,7 @@ from typing import Final
 
 from mambo_codegen.bundle.flags import PROOF_PREPROCESSING, proofs
 from mambo_codegen.toolchain import Toolchain
+from mambo_sil.board.firmware.doctor import command_version
 from mambo_sil.verify.check import Result, Subject
 from mambo_sil.verify.proof import Property, Report, judge, prove
 from tests.support.tools import require
@@ -61,7 +62,7 @@ def _headings(its: Subject, flags: tuple[str, ...]) -> Report | Result:
     Properties of other functions are left out, since the other proofs have them. A property's place is kept
     as the text of its line.
     """
-    text = "\n".join([*flags, reached(its)])
+    text = "\n".join([str(command_version("frama-c")), *flags, reached(its)])
     file = Path(os.environ["XDG_CACHE_HOME"]) / f"{hashlib.sha256(text.encode()).hexdigest()}.json"
     lines = (its.bundle / _DRIVER).read_text("utf-8").splitlines()
     if not file.is_file():

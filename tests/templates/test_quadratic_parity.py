@@ -15,7 +15,7 @@ from mambo_codegen.reference import ExactReferenceController
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
-from tests.support.builds import libraries
+from tests.support.builds import libraries, share_of
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case
 from tests.support.quadratic_parity import differences, inputs_of_steps, run
@@ -216,12 +216,16 @@ def test_the_inputs_reach_what_is_to_be_compared() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", MANY_SETTINGS)
-def test_a_hundred_thousand_steps_equal_the_reference_in_every_build(index: int, scalar: str) -> None:
-    """In 100,000 steps with each of 50 settings no bit differs, at every optimisation, with gcc and clang."""
+def test_steps_by_the_thousand_equal_the_reference_in_every_build(index: int, scalar: str) -> None:
+    """In 100,000 steps with each of 10 settings no bit differs, at every optimisation, with gcc and clang.
+
+    Nor in 20,000 with each of 40 others, which run in two builds each.
+    """
     settings = quadratic_case(index, scalar)
-    n, steps = 500, 200
+    builds, percentage = share_of(index)
+    n, steps = 5 * percentage, 200
     inputs = inputs_of_steps(settings, n, steps, seed=index)
     expected = run(ExactReferenceController(Design(settings), n), inputs, index)
-    for build, library in libraries(settings).items():
+    for build, library in libraries(settings, builds).items():
         found = run(CompiledController(settings, n, library), inputs, index)
         assert differences(expected, found) == {}, f"{build} for {settings!r}"
