@@ -25,17 +25,22 @@ def identify_binary(
     *,
     as_json: AsJson = False,
 ) -> None:
-    """Tell generator version and settings of the controllers in a firmware image; exit 1 if it has none."""
+    """Show which controllers a firmware image holds; exit 1 if it has none, or lacks one of SOURCE."""
     from mambo_codegen.settings import presets
-    from mambo_sil.board.firmware.identity import held_controllers, identity_text, name_settings
+    from mambo_sil.board.firmware.identity import held_controllers, identity_text, missing, name_settings
 
     held = held_controllers(image)
-    known = {echo(source): presets.load_or_bundle(source) for source in sources or ()}
+    given = {echo(source): presets.load_or_bundle(source) for source in sources or ()}
+    known = dict(given)
     known |= {f"preset {name}": presets.preset(name) for name in presets.names() if name not in known}
     held = name_settings(held, known)
+    lacking = missing(held, given)
     if as_json:
-        typer.echo(json.dumps({"file": str(image), "controllers": [asdict(one) for one in held]}, indent=2))
+        found = {"controllers": [asdict(one) for one in held], "missing": lacking}
+        typer.echo(json.dumps({"file": str(image), **found}, indent=2))
     else:
         typer.echo(identity_text(held, echo(str(image))))
-    if not held:
+    for source in lacking:
+        typer.echo(f"{echo(str(image))}: does not hold the settings of {source}", err=True)
+    if not held or lacking:
         raise typer.Exit(1)

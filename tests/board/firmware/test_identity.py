@@ -81,6 +81,40 @@ def test_presets_and_sources_are_named() -> None:
     assert "of no preset or source named" in run("identify-binary", "image")[0]
 
 
+def test_an_image_without_the_settings_given_fails() -> None:
+    """Whatever else it holds; a preset that nobody named is not missed."""
+    Path("image").write_bytes(version(FIXED.digest))
+    assert run("identify-binary", "image", "mambo")[1] == ""
+    assert run("identify-binary", "image", "mambo", "crazyflie", code=1)[1] == (
+        "image: does not hold the settings of crazyflie\n"
+    )
+    assert json.loads(run("identify-binary", "image", "table1", "--json", code=1)[0])["missing"] == ["table1"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"mambo-nmpc 0.1.0 settings {MAMBO.digest}",
+        f"mambo-nmpc 0.1.0 settings {MAMBO.short_digest[:15]}",
+        f"mambo-nmpc 0.1.0 settings {MAMBO.short_digest} of the manual",
+        f"mambo-nmpc VERSION settings {MAMBO.short_digest}",
+        f"mambo-nmpc 1 settings {MAMBO.short_digest}",
+        f"mambo-nmpc 0.1.0\n{MAMBO.short_digest}x\n",
+    ],
+)
+def test_a_text_that_looks_like_a_version_is_no_controller(text: str) -> None:
+    """Another length of the digest, no version, or a sentence."""
+    Path("image").write_bytes(text.encode() + b"\0code")
+    assert held_controllers(Path("image")) == ()
+    run("identify-binary", "image", code=1)
+
+
+def test_the_greeting_of_a_board_is_found() -> None:
+    """It holds generator and digest in lines of text."""
+    Path("image").write_bytes(f"\x01mambo-nmpc {__version__}\n{MAMBO.short_digest}\nfloat32\n".encode())
+    assert [one.digest for one in held_controllers(Path("image"))] == [MAMBO.short_digest]
+
+
 @pytest.mark.parametrize("calls", [True, False])
 def test_a_linked_controller_is_found_if_its_version_is_called(calls: bool) -> None:
     """Else the linker drops the string, exit 1, and the command says so."""

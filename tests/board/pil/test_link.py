@@ -187,6 +187,25 @@ def test_other_firmware_is_refused_by_name(elf: Path) -> None:
             "#define PIL_PROTOCOL 9U",
             "speaks version 9 of the protocol, and this is version 2; generate it",
         ),
+        (
+            "pil.c",
+            "\\nfloat32\\n",
+            "\\nfixed\\n",
+            "computes in fixed, and this flight in float32",
+        ),
+        *(
+            (
+                "pil.c",
+                f"put(end, self->{member}, 4U)",
+                f"put(end, {number}UL, 4U)",
+                rf"calls {cycles} cycles of {clock_hz} Hz its update period, and that is 0\.01 s",
+            )
+            for member, number, cycles, clock_hz in (
+                ("clock_hz", 0, 10000000, 0),
+                ("period", 0, 0, 1000000000),
+                ("period", 10000002, 10000002, 1000000000),
+            )
+        ),
     ],
 )
 def test_another_version_is_refused_by_name(
@@ -267,6 +286,25 @@ def test_other_bits_are_told_and_fail(
             ["--port", "telegraph://x"],
             "--port telegraph://x must be a device, such as /dev/ttyACM0, or socket",
         ),
+        *(
+            (
+                ["--port", url],
+                f"--port {url} must be a device, such as /dev/ttyACM0, or socket://HOST:PORT, such",
+            )
+            for url in (
+                "",
+                "socket://",
+                "socket://localhost",
+                "socket://:5000",
+                "socket://localhost:0",
+                "socket://localhost:5000/x",
+                "socket://localhost:5000?logging=debug",
+                "loop://",
+                "spy://loop://?file=written",
+            )
+        ),
+        (["--port", "socket://localhost:x"], "must be socket://HOST:PORT: Port could not be cast to integer"),
+        (["--port", "socket://localhost:70000"], "must be socket://HOST:PORT: Port out of range 0-65535"),
         (["--port", "x", "--controller", "pd"], "--port x flies the C on a board: leave out --controller"),
         (["--port", "x", "--on", "mega"], "--port x flies the C on a board: leave out --controller and --on"),
         (["--port", "x", "--repeat", "y"], "contains the whole flight: leave out --port"),

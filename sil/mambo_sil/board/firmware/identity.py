@@ -13,8 +13,13 @@ from mambo_codegen.settings.model import Settings
 
 LARGEST_FILE_BYTES: Final = 256_000_000
 
-_STRING: Final = re.compile(rb"mambo-nmpc ([0-9A-Za-z.+-]{1,40})(?: settings |\n)([0-9a-f]{16})(?![0-9a-f])")
-"""What nmpc_version() returns, and what the firmware of `generate --for pil` answers."""
+_STRING: Final = re.compile(
+    rb"mambo-nmpc ([0-9]+\.[0-9]+[0-9A-Za-z.+-]{0,36})(?: settings |\n)([0-9a-f]{16})(?:[\0\r\n]|\Z)"
+)
+"""What nmpc_version() returns, and what the firmware of `generate --for pil` answers, to the end of the line.
+
+A version has two numbers or more, a digest 16 digits: other texts are of no controller.
+"""
 _HEX_LINE: Final = re.compile(rb":([0-9A-Fa-f]{2}){5,}\s*")
 _DATA, _END, _SEGMENT, _LINEAR = 0, 1, 2, 4
 _UF2_BLOCK_BYTES, _UF2_HEAD_BYTES, _UF2_MOST_BYTES = 512, 32, 476
@@ -67,6 +72,16 @@ def name_settings(
         for name, variant in _variants(source, settings):
             names.setdefault(variant.short_digest, []).append(name)
     return tuple(replace(one, settings=tuple(names.get(one.digest, ()))) for one in held)
+
+
+def missing(held: tuple[HeldController, ...], sources: Mapping[str, Settings]) -> tuple[str, ...]:
+    """Return the sources whose settings no controller in an image has, with any --scalar."""
+    digests = {one.digest for one in held}
+    return tuple(
+        source
+        for source, settings in sources.items()
+        if digests.isdisjoint(variant.short_digest for _, variant in _variants(source, settings))
+    )
 
 
 def _variants(source: str, settings: Settings) -> Iterator[tuple[str, Settings]]:

@@ -64,6 +64,12 @@ class Greeting:
         words = body[cls._NUMBERS.size :].decode("ascii", "replace").split("\n")
         return cls(*cls._NUMBERS.unpack_from(body), *words) if len(words) == 4 else None
 
+    def has_period(self, update_period_s: float) -> bool:
+        """Return whether its clock runs and its period is this one, to the next cycle or the one before."""
+        if self.clock_hz == 0 or self.period_cycles == 0:
+            return False
+        return abs(self.period_cycles - update_period_s * self.clock_hz) <= 1.0
+
 
 @dataclass(frozen=True)
 class StepReply:

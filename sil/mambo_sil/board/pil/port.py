@@ -3,6 +3,7 @@
 import os
 import socket
 from typing import Final, Protocol
+from urllib.parse import urlsplit
 
 from mambo_codegen.errors import echo
 from mambo_sil.errors import BoardError
@@ -43,16 +44,26 @@ def open_port(name: str, baud: int) -> Port:
         raise BoardError(
             "--port needs pyserial, which is missing: pip install 'mambo-nmpc[serial]', or pyserial itself"
         ) from None
-    try:
-        port = serial.serial_for_url(name, baudrate=baud, timeout=READ_S)
-    except ValueError as error:
-        raise BoardError(
-            f"--port {echo(name)} must be a device, such as /dev/ttyACM0, or socket://HOST:PORT: {error}"
-        ) from None
+    _refuse_other_urls(name)
+    port = serial.serial_for_url(name, baudrate=baud, timeout=READ_S)
     if name.startswith("socket://"):
         _send_at_once(port.fileno())
     opened: Port = port
     return opened
+
+
+def _refuse_other_urls(name: str) -> None:
+    """Raise BoardError for a URL but socket://HOST:PORT: others of pyserial's write files, say."""
+    try:
+        url = urlsplit(name)
+        whole = bool(url.hostname and url.port) and name == f"socket://{url.netloc}"
+    except ValueError as error:
+        raise BoardError(f"--port {echo(name)} must be socket://HOST:PORT: {error}") from None
+    if not name or ("://" in name and not whole):
+        raise BoardError(
+            f"--port {echo(name)} must be a device, such as /dev/ttyACM0, or socket://HOST:PORT, such as "
+            "socket://localhost:5000"
+        )
 
 
 def _send_at_once(descriptor: int) -> None:
