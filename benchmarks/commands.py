@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from benchmarks.markdown import table
-from mambo_sil.flight.engine.build import VARIABLE
+from mambo_sil.flight.engine.engine_library import VARIABLE
 from mambo_sil.flight.names import EngineName
 
 WORKERS: Final = 2

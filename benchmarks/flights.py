@@ -17,7 +17,7 @@ from rotorpy.vehicles.multirotor import Multirotor
 from mambo_codegen.settings import presets
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.engine.build import VARIABLE
+from mambo_sil.flight.engine.engine_library import VARIABLE
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import EngineName

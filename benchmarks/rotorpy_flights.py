@@ -27,9 +27,9 @@ from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.presets import read
-from mambo_sil.drone.vehicles.sections import MocapSensors
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
+from mambo_sil.drone.vehicles.vehicle_toml import read
 from mambo_sil.flight.api.controller import Controller
 from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
 from mambo_sil.flight.api.states import DroneState, TargetState

@@ -9,7 +9,7 @@ from benchmarks.evidence.item import Figures
 from benchmarks.markdown import table
 from mambo_sil.experiment.table2.table2 import CASES, INDICES, PRINTED_IMPROVEMENT, PRINTED_NMPC, PRINTED_PD
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
-from mambo_sil.results.numbers import digits, three_digits
+from mambo_sil.results.number_format import digits, three_digits
 from mambo_sil.results.summary import Number
 
 Row = dict[str, str]

@@ -5,11 +5,11 @@ from typing import Final
 
 from docs.pages.tables import code, plain, table
 from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_keys import KEYS, SECTIONS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.keys import KEYS, SECTIONS
 from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.vehicles.model import form
+from mambo_sil.drone.vehicles.vehicle_file import form
 
 UNITS: Final = {"_m_s2": "m/s^2", "_m_s": "m/s", "_1_s": "1/s", "_rad": "rad", "_m": "m", "_s": "s"}
 """The unit that the end of a setting's name stands for; the first end that fits counts."""

@@ -7,8 +7,8 @@ import pytest
 
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.toml_file import parse_document
-from mambo_sil.drone.vehicles.presets import load
-from mambo_sil.drone.vehicles.sections import FirstOrderAttitude
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
+from mambo_sil.drone.vehicles.vehicle_toml import load
 from mambo_sil.model.identify.curves import read_curves
 from tests.support.command import run
 from tests.support.logs import Flown, Truth, crazyflie_columns, fly, write_log

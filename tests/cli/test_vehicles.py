@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 
 from mambo_codegen.settings.toml_file import parse_document
-from mambo_sil.drone.vehicles import presets
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.scenario import read_record
 from tests.support.command import run
 from tests.support.tools import require_module
@@ -51,7 +51,7 @@ def test_the_list_names_every_drone() -> None:
     """With what it is, as text and as JSON."""
     listed = run("vehicles")[0].splitlines()
     described = json.loads(run("vehicles", "--json")[0])
-    assert list(described) == list(presets.names())
+    assert list(described) == list(vehicle_toml.names())
     for line, (name, description) in zip(listed, described.items(), strict=True):
         assert line.split(maxsplit=1) == [name, description]
 
@@ -59,7 +59,7 @@ def test_the_list_names_every_drone() -> None:
 def test_a_shipped_file_is_one_to_start_from() -> None:
     """It is printed as it is, and reads under another name."""
     Path("copy.toml").write_text(run("vehicles", "generic")[0], "utf-8")
-    assert presets.load("copy.toml") == presets.load("generic").model_copy(update={"name": "copy"})
+    assert vehicle_toml.load("copy.toml") == vehicle_toml.load("generic").model_copy(update={"name": "copy"})
 
 
 def test_the_schema_fits_a_file() -> None:
@@ -88,7 +88,7 @@ def test_fly_states_the_whole_drone() -> None:
     """Its summary has every value; the motor lag is the drone's unless one is given."""
     flags = ["--duration-s", "1", "--controller", "pd", "--no-pictures"]
     run("fly", "--vehicle", "mine.toml", "--sensors", "mocap", *flags, "-o", "mine")
-    assert summary("mine")["vehicle"] == presets.load("mine.toml").model_dump()
+    assert summary("mine")["vehicle"] == vehicle_toml.load("mine.toml").model_dump()
     run("fly", "--vehicle", "crazyflie", *flags, "-o", "crazyflie")
     assert summary("crazyflie")["motor_lag_s"] == 0.072
     run("fly", "--vehicle", "crazyflie", "--motor-lag-s", "0.01", *flags, "-o", "quick")
@@ -112,7 +112,7 @@ def test_a_campaign_flies_another_drone_and_its_flights_repeat() -> None:
     Path("campaign.toml").write_text('controllers = ["pd"]\n[flight]\nduration_s = 1.0\n', "utf-8")
     run("campaign", "campaign.toml", "--vehicle", "mine.toml", "--flights", "2", "-o", "out")
     campaign = summary("out")["campaign"]
-    assert campaign["vehicle"] == presets.load("mine.toml").model_dump()
+    assert campaign["vehicle"] == vehicle_toml.load("mine.toml").model_dump()
     assert (campaign["flight"]["vehicle"], campaign["flight"]["sensors"]) == ("mine", "mocap")
     path = Path("out") / "flights" / "000001-pd.json"
     scenario = read_record(path).scenario
@@ -132,7 +132,7 @@ def test_a_study_states_its_drone() -> None:
     text = 'flights = 1\nbase = "mambo-1norm"\n[flight]\nduration_s = 1.0\nvehicle = "mine.toml"\n'
     Path("tune.toml").write_text(text + "[search]\noptimizer.iterations = { choice = [4, 5] }\n", "utf-8")
     run("tune", "tune.toml", "--trials", "1", "--workers", "1", "-o", "out")
-    assert summary("out")["vehicle"] == presets.load("mine.toml").model_dump()
+    assert summary("out")["vehicle"] == vehicle_toml.load("mine.toml").model_dump()
     assert json.loads(Path("out/study.json").read_text("utf-8"))["vehicle"]["name"] == "mine"
 
 

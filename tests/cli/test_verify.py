@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.checks import CHECKS
+from mambo_sil.verify.check_list import CHECKS
 from mambo_sil.verify.verify_report import Verified, closing, verdict
 from tests.support.command import run
 from tests.support.tools import require

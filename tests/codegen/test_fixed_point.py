@@ -20,8 +20,8 @@ from mambo_codegen.reference import ReferenceController, Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.verify.calls import ApiFunction, Tape, answers, calls
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM

@@ -7,8 +7,8 @@ from hypothesis import settings as profile
 from mambo_codegen.design import Design
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.keys import KEYS
 from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from tests.support.strategies import LAGS, QUADRATIC, Values, choices_of, nested, quadratic_settings, toml

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from mambo_codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcError, UnreadableFileError, echo
 from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.keys import KEYS
 from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from tests.support.strategies import (

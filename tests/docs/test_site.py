@@ -28,7 +28,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.long
 def test_it_has_the_pages_that_the_code_writes(site: Path) -> None:
     """Every setting, command and public name is in the reference."""
-    from mambo_codegen.settings.keys import KEYS  # noqa: PLC0415
+    from mambo_codegen.settings.controller_keys import KEYS  # noqa: PLC0415
     from mambo_nmpc import __all__ as names  # noqa: PLC0415 - beside what they are compared with
 
     settings = (site / "reference" / "settings.html").read_text("utf-8")

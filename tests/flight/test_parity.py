@@ -12,8 +12,8 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.experiment.table2.table2 import PRINTED_IMPROVEMENT, PRINTED_PD
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure

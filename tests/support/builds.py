@@ -6,7 +6,7 @@ from typing import Any, Final
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import ffi, glue, with_default_prefix
+from mambo_sil.flight.controllers.controller_library import ffi, glue, with_default_prefix
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 from tests.support.tools import toolchain
 

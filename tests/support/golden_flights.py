@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.settings import presets
-from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.experiment.campaign.campaign_file import default, scenario
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.engine.build import VARIABLE
+from mambo_sil.flight.engine.engine_library import VARIABLE
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_sil.flight.scenario import SHARED_KEYS, Scenario, flight_of
@@ -43,12 +43,16 @@ SCENARIOS: Final = {
         dropped_share=0.1,
     ),
     "take-off": Scenario(duration_s=5.0, start="take-off"),
-    "Crazyflie": Scenario(vehicle=vehicles.load("crazyflie"), duration_s=10.0, yaw_rad=0.8),
+    "Crazyflie": Scenario(vehicle=vehicle_toml.load("crazyflie"), duration_s=10.0, yaw_rad=0.8),
     "Crazyflie, motion capture, gusts": Scenario(
-        vehicle=vehicles.load("crazyflie"), duration_s=10.0, seed=2, sensors="mocap", wind_speed_m_s=3.0
+        vehicle=vehicle_toml.load("crazyflie"), duration_s=10.0, seed=2, sensors="mocap", wind_speed_m_s=3.0
     ),
     "first order, motion capture, gusts": Scenario(
-        vehicle=vehicles.load("crazyflie-flown"), duration_s=10.0, seed=3, sensors="mocap", wind_speed_m_s=3.0
+        vehicle=vehicle_toml.load("crazyflie-flown"),
+        duration_s=10.0,
+        seed=3,
+        sensors="mocap",
+        wind_speed_m_s=3.0,
     ),
     "drawn by the default campaign": scenario(default().flight | {"duration_s": 10.0}, default().draw(0)),
 }

@@ -16,7 +16,7 @@ from typing import Final
 
 from mambo_codegen.bundle.flags import PROOF_PREPROCESSING, proofs
 from mambo_codegen.toolchain import Toolchain
-from mambo_sil.board.firmware.doctor import command_version
+from mambo_sil.board.firmware.tool_report import command_version
 from mambo_sil.verify.check import Result, Subject
 from mambo_sil.verify.proof import Property, Report, judge, prove
 from tests.support.tools import require

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.pil.frames import DELIMITER, Receiver, decode
-from mambo_sil.board.pil.messages import REPLY, Kind, split
-from mambo_sil.board.pil.port import READ_S
+from mambo_sil.board.pil.serial_frames import DELIMITER, Receiver, decode
+from mambo_sil.board.pil.serial_messages import REPLY, Kind, split
+from mambo_sil.board.pil.serial_port import READ_S
 from tests.support.serial_line import build_firmware
 
 PERIOD: Final = 3 * DELIMITER

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.reference import Step
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.inputs import StepInputs, random_steps
+from mambo_sil.verify.step_inputs import StepInputs, random_steps
 
 FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_codegen.design import Design
 from mambo_codegen.reference import ExactStep
 from mambo_codegen.settings.model import Settings
-from mambo_sil.verify.inputs import StepInputs, random_steps
+from mambo_sil.verify.step_inputs import StepInputs, random_steps
 from tests.support.parity import count_differing
 
 FIELDS = ("status", "command_rad", "missed", "saturated", "stored")

@@ -21,7 +21,7 @@ from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn
 from mambo_sil.experiment.campaign.statistics import Distributions, Improvement, Proportion
 from mambo_sil.experiment.faults.fault_flights import End, Verdict
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
-from mambo_sil.experiment.regress.limits import Check, FlightResult
+from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
 from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedRow, SensedSummary
 from mambo_sil.experiment.table2.table2 import CASES, Claim, Table2Row, Table2Summary
@@ -39,7 +39,7 @@ from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, FirstOrder, Interval
 from mambo_sil.verify import verify_report
 from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.checks import CHECKS
+from mambo_sil.verify.check_list import CHECKS
 
 HOSTILE: Final = '<img src=x onerror="alert(1)">&</script>\'.toml'
 """A name of a file that is markup, the end of a script, and quotes."""

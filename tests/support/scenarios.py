@@ -4,8 +4,8 @@ from typing import Any, Final
 
 from hypothesis import strategies as st
 
-from mambo_sil.drone.vehicles import presets
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.names import CURVE_NAMES
 from mambo_sil.flight.scenario import OF_THE_VEHICLE, Scenario
 
@@ -80,8 +80,8 @@ COUPLED: Final = (Scenario(duration_s=4.0, seed=9, sensors="mambo", dropped_shar
 TAKE_OFF: Final = (Scenario(duration_s=1.0, seed=1, sensors="mambo-derotated", start="take-off"),)
 
 
-CRAZYFLIE: Final = presets.load("crazyflie")
-FLOWN: Final = presets.load("crazyflie-flown")
+CRAZYFLIE: Final = vehicle_toml.load("crazyflie")
+FLOWN: Final = vehicle_toml.load("crazyflie-flown")
 
 
 def changed(drone: VehicleFile, **sections: Any) -> VehicleFile:
@@ -128,7 +128,7 @@ FELT: Final = VehicleFile.model_validate(
     LATE.model_dump(exclude_none=True)
     | {
         "attitude": LATE.attitude.model_dump() | {"rate_hz": 200},
-        "sensors": presets.load("mambo").sensors.model_dump(),
+        "sensors": vehicle_toml.load("mambo").sensors.model_dump(),
     }
 )
 """The same with the instruments of the Mambo, which feel the body's rates."""
@@ -203,7 +203,7 @@ def drones() -> st.SearchStrategy[VehicleFile]:
     cascades = st.fixed_dictionaries({"rate_hz": tick, "roll": axis, "pitch": axis, "yaw": axis})
     firsts = st.fixed_dictionaries({"rate_hz": tick, "roll": response, "pitch": response})
     return st.one_of(
-        st.sampled_from([presets.load(name) for name in presets.names()]),
+        st.sampled_from([vehicle_toml.load(name) for name in vehicle_toml.names()]),
         st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors),
         st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors),
     )

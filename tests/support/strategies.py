@@ -10,8 +10,8 @@ from typing import Any
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.keys import KEYS
 from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.reserved import KEYWORDS, STANDARD_NAMES

@@ -11,7 +11,7 @@ import cffi
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.bundle.render import render, with_prefix
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import DECLARATIONS, glue
+from mambo_sil.flight.controllers.controller_library import DECLARATIONS, glue
 from tests.support.bundles import place
 from tests.support.tools import require
 

@@ -18,7 +18,7 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.metrics import measure
@@ -114,7 +114,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
 
 def flight_of(apps: int) -> Flight:
     """Return flights of a circle, at a heading at which every sign counts."""
-    drone = Vehicle.of(vehicles.load("crazyflie"))
+    drone = Vehicle.of(vehicle_toml.load("crazyflie"))
     return Flight(Circle(1.0, 1.2), duration_s=4.0, flights=apps, yaw_rad=0.8, vehicle=drone)
 
 

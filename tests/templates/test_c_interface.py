@@ -15,8 +15,8 @@ from mambo_codegen.numbers.literals import SCALARS
 from mambo_codegen.reference import ReferenceController, Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.extension import build_extension, load_extension
 from tests.support.one_norm import ONE_NORM
 from tests.support.parity import Controller

@@ -6,8 +6,8 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.design import Design
 from mambo_codegen.reference import ReferenceController
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import load_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import load_library
 from tests.support.parity import Run, differences, inputs_of_steps, run
 from tests.support.tools import toolchain
 

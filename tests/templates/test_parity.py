@@ -17,8 +17,8 @@ from mambo_codegen.reference import ReferenceController
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.builds import libraries, share_of
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.extension import build_extension

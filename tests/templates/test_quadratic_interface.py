@@ -12,8 +12,8 @@ from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.reference import Status
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_sil.flight.controllers.build import build_library, ffi
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library, ffi
 from tests.support.bundles import place
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, Array, quadratic_case

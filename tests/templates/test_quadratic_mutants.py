@@ -10,8 +10,8 @@ from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.design import Design
 from mambo_codegen.reference import ExactReferenceController
-from mambo_sil.flight.controllers.build import load_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import load_library
 from tests.support.bundles import place
 from tests.support.mutants import mutants
 from tests.support.quadratic import ONE_MOVE, settings_of

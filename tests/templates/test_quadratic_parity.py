@@ -13,8 +13,8 @@ from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
 from mambo_codegen.reference import ExactReferenceController
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.builds import libraries, share_of
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case

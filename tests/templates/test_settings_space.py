@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mambo_codegen.design import Design
 from mambo_codegen.reference import ReferenceController
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.build import ffi
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import ffi
 from tests.support import command
 from tests.support.cases import SCALARS
 from tests.support.parity import differences, inputs_of_steps, run

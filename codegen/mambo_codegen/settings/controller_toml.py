@@ -39,7 +39,7 @@ def validate(document: Mapping[str, object], source: str) -> Settings:
     try:
         return Settings.model_validate(document)
     except ValidationError as error:
-        from mambo_codegen.settings.keys import SETTINGS  # noqa: PLC0415 - slow to import
+        from mambo_codegen.settings.controller_keys import SETTINGS  # noqa: PLC0415 - slow to import
 
         raise InvalidSettingsError(
             tuple(f"{source}: {fault}" for fault in faults(error, document, SETTINGS))
@@ -62,7 +62,7 @@ def to_toml(settings: Settings, title: str = _TITLE) -> str:
 
     Keys that the controller does not use are left out.
     """
-    from mambo_codegen.settings.keys import KEYS, SECTIONS  # noqa: PLC0415 - slow to import
+    from mambo_codegen.settings.controller_keys import KEYS, SECTIONS  # noqa: PLC0415 - slow to import
 
     parts = [comment(title), comment("A missing key takes the value of preset table1.")]
     for section, values in used_values(settings).items():

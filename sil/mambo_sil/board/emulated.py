@@ -11,12 +11,12 @@ from mambo_codegen.bundle.digest import TICKS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.design import Design
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.emulation.avr import Long
+from mambo_sil.board.emulation.avr_machine import Long
 from mambo_sil.board.emulation.machine import TIME_LIMIT_S, start
 from mambo_sil.board.firmware.firmware_build import Builder
 from mambo_sil.errors import EmulatorError
-from mambo_sil.flight.controllers.build import batch_source, with_default_prefix
 from mambo_sil.flight.controllers.compiled import DIRT, as_arrays, as_step, empty_outcome
+from mambo_sil.flight.controllers.controller_library import batch_source, with_default_prefix
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
 """Functions of the emulated program that Python calls."""

@@ -24,11 +24,11 @@ def design(
 ) -> None:
     """Derive settings from a drone; write a controller.toml that says the reason of each."""
     from mambo_codegen.settings import controller_toml
-    from mambo_sil.drone.vehicles import presets
+    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.model.derive.derived_settings import controller_text
 
     source = echo(vehicle)
-    text = controller_text(presets.load(vehicle), source)
+    text = controller_text(vehicle_toml.load(vehicle), source)
     controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):
         name = echo(str(output))

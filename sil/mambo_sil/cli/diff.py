@@ -30,7 +30,7 @@ def diff(
     """Compare two controllers: settings, gains, poles, flights; exit 0 if they are the same, 1 if not."""
     from mambo_codegen.settings import presets
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.drone.vehicles import presets as vehicles
+    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.compare.compare import compare
     from mambo_sil.experiment.compare.diff_record import PICTURES
     from mambo_sil.experiment.compare.diff_report import diff_text
@@ -38,7 +38,7 @@ def diff(
 
     sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
     with progress_bar("flying") as bar:
-        summary = compare(sides[0], sides[1], vehicles.load(vehicle), output, bar)
+        summary = compare(sides[0], sides[1], vehicle_toml.load(vehicle), output, bar)
     show(summary, diff_text(summary), as_json=as_json)
     if output is not None:
         pictures = () if summary.same else PICTURES

@@ -20,14 +20,14 @@ def faults(
 ) -> None:
     """Fly with faults of sensors, timing, target and operator; exit 1 if the drone crashes."""
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.drone.vehicles import presets
+    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.errors import FlightError
     from mambo_sil.experiment.faults.fault_flights import End, fly_faults
     from mambo_sil.experiment.faults.faults_report import FaultsSummary, table, write_csv
     from mambo_sil.flight.controllers.compiled import CompiledController
     from mambo_sil.results.folders import new_results
 
-    settings, drone = load(source, scalar), presets.load(vehicle)
+    settings, drone = load(source, scalar), vehicle_toml.load(vehicle)
     with new_results(output, FaultsSummary.command, FILES) as folder:
         with progress_bar("flying with faults") as bar:
             try:

@@ -19,8 +19,8 @@ from mambo_sil.cli.progress import progress_bar
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.gusts import LIGHT_M_S
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.drone.vehicles import presets as vehicles
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError, TrajectoryError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
@@ -51,7 +51,7 @@ def fly_once(options: FlyOptions) -> None:
             "--real-time lets the clock of a board call the step: give its --port, or leave it out"
         )
     settings = load(options.source, options.scalar)
-    drone = vehicles.load(options.vehicle)
+    drone = vehicle_toml.load(options.vehicle)
     flight = flight_of_options(options, settings, drone)
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
         controller = _on_board(options, settings) if options.on else _controller(options, settings)

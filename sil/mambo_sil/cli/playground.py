@@ -29,12 +29,12 @@ def playground(
 ) -> None:
     """Write an HTML page, without network, in which the generated C flies a simulated drone in real time."""
     from mambo_sil.cli.progress import progress_bar
-    from mambo_sil.drone.vehicles import presets as vehicles
+    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
     from mambo_sil.pages.playground.playground_page import PlaygroundSummary, playground_page
     from mambo_sil.results.html_page import new_page
 
-    found, drone = page_controllers(sources or DEFAULTS), vehicles.load(vehicle)
+    found, drone = page_controllers(sources or DEFAULTS), vehicle_toml.load(vehicle)
     with new_page(output, "page") as write:
         with progress_bar("compiling") as bar:
             text, flown = playground_page(found, drone, bar)

@@ -15,7 +15,7 @@ from mambo_sil.board.footprint.measure import measure_footprint
 from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.pil_report import BoardFlightSummary, EmulatedCount, board_fields, board_text
-from mambo_sil.board.pil.port import open_port
+from mambo_sil.board.pil.serial_port import open_port
 from mambo_sil.board.pil.timed import TimedController
 from mambo_sil.cli.flight import (
     FLIGHT_FILES,
@@ -27,10 +27,10 @@ from mambo_sil.cli.flight import (
 )
 from mambo_sil.cli.options import FlyOptions, load
 from mambo_sil.cli.progress import progress_bar
-from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import digest_compiled
+from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.flight.loop import fly as simulate
 from mambo_sil.results.folders import new_results
 
@@ -51,7 +51,7 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
     """
     if options.controller != "nmpc" or options.on is not None:
         raise FlightError(f"--port {echo(port)} flies the C on a board: leave out --controller and --on")
-    settings, drone = load(options.source, options.scalar), vehicles.load(options.vehicle)
+    settings, drone = load(options.source, options.scalar), vehicle_toml.load(options.vehicle)
     flight = flight_of_options(options, settings, drone)
     library = build_library(settings, host_toolchain())
     with new_results(options.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:

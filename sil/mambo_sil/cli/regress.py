@@ -39,7 +39,7 @@ def regress(
         read_baseline,
         record_baseline,
     )
-    from mambo_sil.experiment.regress.limits import RECORDS
+    from mambo_sil.experiment.regress.flight_limits import RECORDS
     from mambo_sil.experiment.regress.regress_plots import draw_regress
     from mambo_sil.experiment.regress.regress_report import (
         JUNIT,
@@ -83,7 +83,7 @@ def _fly(suite: "FlightSuite", entrant: "Entrant") -> "list[Row]":
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.experiment.regress.suite_flights import fly_suite
-    from mambo_sil.flight.engine.build import chosen_engine
+    from mambo_sil.flight.engine.engine_library import chosen_engine
 
     workers = os.cpu_count() or 1
     if chosen_engine() == "c":

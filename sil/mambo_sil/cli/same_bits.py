@@ -30,7 +30,7 @@ def same_bits(
 ) -> None:
     """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
     from mambo_codegen.bundle.digest import TICKS, episode_count
-    from mambo_sil.board.footprint.same_bits import (
+    from mambo_sil.board.footprint.build_digests import (
         REFERENCE,
         BuildDigest,
         count_builds,

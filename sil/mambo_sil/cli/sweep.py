@@ -37,7 +37,7 @@ def sweep(
     from mambo_sil.board.footprint.sweep import Grid, budgets, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
     from mambo_sil.cli.progress import counting_bar
-    from mambo_sil.drone.vehicles import presets
+    from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.experiment.campaign.executors import processes
     from mambo_sil.results.folders import new_results
 
@@ -49,7 +49,7 @@ def sweep(
                 "cost there are no horizons and iterations to vary; `mambo-nmpc tune` searches its settings",
             )
         )
-    chosen, drone = boards.load(board), presets.load(vehicle)
+    chosen, drone = boards.load(board), vehicle_toml.load(vehicle)
     grid = Grid(
         _numbers("--prediction", prediction, 50),
         _numbers("--control", control, 50),

@@ -21,7 +21,7 @@ def vehicles(
 ) -> None:
     """List the drones that can be flown, or print the file of one to start from."""
     from mambo_sil.drone.vehicles import VEHICLES
-    from mambo_sil.drone.vehicles.model import VehicleFile
+    from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 
     if name is not None and (schema or as_json):
         raise typer.BadParameter("it prints a TOML file: leave out --schema and --json", param_hint=name)

@@ -7,14 +7,14 @@ import typer
 
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.cli.options import AsJson, Results, Scalar, Source, load, show
-from mambo_sil.verify.checks import CHECKS
+from mambo_sil.verify.check_list import CHECKS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from mambo_codegen.settings.model import Settings
     from mambo_sil.cli.progress import Bar
-    from mambo_sil.verify.checks import Entry
+    from mambo_sil.verify.check_list import Entry
     from mambo_sil.verify.verify_report import Verified
 
 CONTROLLER, REPORTS = "controller/", "checks/"

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import arc_cosine, sine_cosine
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.traces import Trace
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.metrics import Metrics, measure, saturated_share
 from mambo_sil.flight.traces import SensedTrace, Trace

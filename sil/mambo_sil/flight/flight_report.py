@@ -11,7 +11,7 @@ from mambo_codegen.reference import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.crashes import Crash, first_crash
 from mambo_sil.flight.metrics import TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES

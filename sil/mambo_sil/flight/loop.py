@@ -29,7 +29,7 @@ from mambo_sil.drone.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, t
 from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.names import Start
 from mambo_sil.flight.traces import AXES, SensedTrace, Trace

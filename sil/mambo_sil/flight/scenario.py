@@ -32,8 +32,8 @@ from mambo_sil.drone.plant.link import Link
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MotionCapture
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import MamboSensors, MocapSensors
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors, MocapSensors
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.loop import Flight, Offset
 from mambo_sil.flight.names import RENAMED, SENSORS_OF, ControllerName, CurveName, SensorsName, Start

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import FileExistsRefusedError, UnwritableError, echo
 from mambo_codegen.plain_file import find_obstacle
-from mambo_sil.results.numbers import digits_or_dash, fixed_or_dash, three_digits_or_dash
+from mambo_sil.results.number_format import digits_or_dash, fixed_or_dash, three_digits_or_dash
 
 _MARK: Final = b'<meta name="generator" content="mambo-nmpc">'
 """Marks a page of ours, which may be overwritten."""

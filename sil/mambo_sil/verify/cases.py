@@ -27,7 +27,7 @@ from mambo_sil.verify.calls import (
     calls,
     step_quantities,
 )
-from mambo_sil.verify.inputs import StepInputs, random_steps
+from mambo_sil.verify.step_inputs import StepInputs, random_steps
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]

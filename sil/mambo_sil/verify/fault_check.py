@@ -10,8 +10,8 @@ from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.experiment.faults.fault_flights import STRAY_M, End, Verdict, fly_faults
 from mambo_sil.experiment.faults.faults_report import table, write_csv
 from mambo_sil.experiment.faults.scenarios import TO_THE_END, scenarios
-from mambo_sil.flight.controllers.build import build_library, load_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library, load_library
 from mambo_sil.results.folders import finite
 from mambo_sil.verify.check import Result, Subject, failed, incomplete, passed
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.toolchain import refuse_lack_of_space
-from mambo_sil.board.firmware.doctor import command_version
+from mambo_sil.board.firmware.tool_report import command_version
 
 TIME_LIMIT_S: Final = 3600.0
 """Time limit of a tool, in seconds."""

@@ -13,7 +13,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.results.html_page import render_page
 from mambo_sil.results.summary import ReportedSummary, Section
 from mambo_sil.verify.check import CheckOutcome
-from mambo_sil.verify.checks import CHECKS
+from mambo_sil.verify.check_list import CHECKS
 
 PAGE: Final = "verify.html"
 

@@ -16,13 +16,13 @@ from mambo_codegen.design import Design
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest, digest_emulated
-from mambo_sil.board.emulation.avr import AvrMachine, Long
+from mambo_sil.board.emulation.avr_machine import AvrMachine, Long
 from mambo_sil.board.emulation.machine import start
 from mambo_sil.board.firmware.elf import FootprintError, load
 from mambo_sil.board.firmware.firmware_build import Builder
 from mambo_sil.board.firmware.stack import StackReport, bound_stack
 from mambo_sil.errors import EmulationError, EmulatorError
-from mambo_sil.flight.controllers.build import batch_source
+from mambo_sil.flight.controllers.controller_library import batch_source
 from tests.support.cases import settings_case
 from tests.support.linking import link
 from tests.support.one_norm import ONE_NORM

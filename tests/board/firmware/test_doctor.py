@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen import boards
-from mambo_sil.board.firmware import doctor
-from mambo_sil.board.firmware.doctor import LIBFUZZER, Finding, doctor_text, examine
+from mambo_sil.board.firmware import tool_report
+from mambo_sil.board.firmware.tool_report import LIBFUZZER, Finding, doctor_text, examine
 
 ENDLESS = "while :; do :; done"
 
@@ -101,7 +101,7 @@ def test_a_broken_tool_is_here_without_version(
     content: str, bare: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A tool that hangs or cannot run is reported as here, without a version."""
-    monkeypatch.setattr(doctor, "TIME_LIMIT_S", 0.2)
+    monkeypatch.setattr(tool_report, "TIME_LIMIT_S", 0.2)
     put(bare, "cmake", content)
     found = finding_of("cmake")
     assert (found.here, found.version) == (True, "")

@@ -14,7 +14,7 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
-from mambo_sil.board.emulation.unicorn import UnicornMachine
+from mambo_sil.board.emulation.unicorn_machine import UnicornMachine
 from mambo_sil.board.firmware.disassembly import disassemble
 from mambo_sil.board.firmware.elf import Image, load
 from mambo_sil.board.footprint.counts import (
@@ -25,8 +25,8 @@ from mambo_sil.board.footprint.counts import (
     count_instructions,
 )
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.controllers.build import batch_source
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import batch_source
 from mambo_sil.flight.loop import Flight, fly
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import CORES, board_builder

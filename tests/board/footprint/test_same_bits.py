@@ -17,15 +17,15 @@ from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.board.emulated import GUEST, digest_emulated
 from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, builder, clang_builder
-from mambo_sil.board.footprint.same_bits import (
+from mambo_sil.board.footprint.build_digests import (
     BOARD_COMPILERS,
     HOST_COMPILERS,
     REFERENCE,
     count_builds,
     run_everywhere,
 )
-from mambo_sil.flight.controllers.build import batch_source, load_library
 from mambo_sil.flight.controllers.compiled import digest_compiled
+from mambo_sil.flight.controllers.controller_library import batch_source, load_library
 from tests.support.cases import SCALARS, settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder, require, toolchain

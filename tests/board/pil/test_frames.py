@@ -14,7 +14,14 @@ from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
-from mambo_sil.board.pil.frames import LONGEST_PAYLOAD, LONGEST_STUFFED, Receiver, decode, encode, frame_bytes
+from mambo_sil.board.pil.serial_frames import (
+    LONGEST_PAYLOAD,
+    LONGEST_STUFFED,
+    Receiver,
+    decode,
+    encode,
+    frame_bytes,
+)
 from tests.support.bundles import place
 from tests.support.tools import require
 

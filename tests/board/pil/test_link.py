@@ -14,7 +14,7 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.board.pil.board_controller import BoardController
 from mambo_sil.board.pil.connection import Connection, Patience
-from mambo_sil.board.pil.port import open_port
+from mambo_sil.board.pil.serial_port import open_port
 from mambo_sil.errors import BoardError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly as simulate

@@ -11,7 +11,7 @@ import pytest
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.board.pil.connection import Connection
-from mambo_sil.board.pil.port import open_port
+from mambo_sil.board.pil.serial_port import open_port
 from mambo_sil.board.pil.timed import TimedController
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.trajectories import CURVES

@@ -10,8 +10,8 @@ from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.cascade import ANGLE_INTEGRAL, LAST_RATE, RATE_INTEGRAL, CascadeLoop
 from mambo_sil.drone.plant.vehicle import Vehicle, truth
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import CascadeAttitude
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude
 from tests.support.scenarios import CRAZYFLIE, changed
 
 FloatArray = NDArray[np.float64]

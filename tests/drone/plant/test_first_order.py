@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.vehicle import Moment, Seen, Vehicle, VehicleState, truth
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from tests.support.scenarios import FLOWN, LATE, changed
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ from mambo_sil.drone.plant.integrator import NODES, bogacki_shampine
 from mambo_sil.drone.plant.rigid_body import RigidBody
 from mambo_sil.drone.plant.rotors import Rotors, mix
 from mambo_sil.drone.plant.vehicle import STEP_S, Vehicle, VehicleState, truth
-from mambo_sil.drone.vehicles.sections import MamboAttitude
+from mambo_sil.drone.vehicles.vehicle_sections import MamboAttitude
 
 FloatArray = NDArray[np.float64]
 

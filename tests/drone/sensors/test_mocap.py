@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.vehicle import Seen
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
-from mambo_sil.drone.vehicles.sections import MocapSensors
+from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
 FloatArray = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mambo_sil.drone.vehicles import presets
-from mambo_sil.drone.vehicles.model import form
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import form
 from tests.support.command import run
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "reference" / "vehicles.md").read_text("utf-8")
@@ -43,5 +43,5 @@ def test_every_key_is_documented() -> None:
 
 def test_every_shipped_drone_is_documented() -> None:
     """In the first table."""
-    for name in presets.names():
+    for name in vehicle_toml.names():
         assert f"\n| `{name}` | " in DOCUMENT

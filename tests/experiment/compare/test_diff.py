@@ -12,9 +12,9 @@ from mambo_codegen.reference import reference_controller
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import preset
-from mambo_sil.drone.vehicles.presets import preset as vehicle
+from mambo_sil.drone.vehicles.vehicle_toml import preset as vehicle
 from mambo_sil.experiment.compare.compared_flights import answers
-from mambo_sil.experiment.compare.law import axis_laws, observer_gains
+from mambo_sil.experiment.compare.control_terms import axis_laws, observer_gains
 from tests.support.command import run
 
 MAMBO = preset("mambo")

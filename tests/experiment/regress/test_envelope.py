@@ -9,7 +9,7 @@ from typing import Final
 import pytest
 
 from mambo_codegen.settings import presets
-from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.experiment.campaign.campaign_file import load_entrant
 from mambo_sil.experiment.campaign.executors import processes
 from mambo_sil.experiment.regress.regress_report import judge
@@ -51,7 +51,7 @@ def test_the_envelope_of_every_preset_is_known() -> None:
 @pytest.mark.parametrize("controller", KNOWN)
 def test_a_controller_fails_where_it_is_known_to(controller: str) -> None:
     """No flight more and none less; a preset with the name of a vehicle flies that."""
-    vehicle = controller if controller in vehicles.names() else None
+    vehicle = controller if controller in vehicle_toml.names() else None
     suite, entrant = load_suite("envelope", vehicle), load_entrant(controller, Path(), "test")
     with processes(2) as pool:
         rows = fly_suite(suite, entrant, pool, lambda _: None)

@@ -18,7 +18,7 @@ from mambo_sil.experiment.regress.baseline import (
     read_baseline,
     record_baseline,
 )
-from mambo_sil.experiment.regress.limits import RECORDS
+from mambo_sil.experiment.regress.flight_limits import RECORDS
 from mambo_sil.experiment.regress.regress_plots import _rows, _shares, draw_regress
 from mambo_sil.experiment.regress.regress_report import (
     MOST_SHOWN,

@@ -12,8 +12,8 @@ from mambo_codegen.errors import BuildError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 

@@ -15,9 +15,9 @@ from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
 from mambo_sil.board.emulation.machine import CORES as EMULATED_CORES
 from mambo_sil.board.emulation.machine import Machine, start
 from mambo_sil.errors import EmulationError
-from mambo_sil.flight.controllers.build import batch_source
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.verify.inputs import StepInputs
+from mambo_sil.flight.controllers.controller_library import batch_source
+from mambo_sil.verify.step_inputs import StepInputs
 from tests.support.cases import CORNER_HORIZONS, settings_case
 from tests.support.one_norm import ONE_NORM
 from tests.support.parity import Run, differences, inputs_of_steps

@@ -11,7 +11,7 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.inner_steps import InnerSteps, WatchedController
-from mambo_sil.verify.inputs import random_inputs
+from mambo_sil.verify.step_inputs import random_inputs
 from tests.support.cases import SCALARS
 from tests.support.one_norm import ONE_NORM
 

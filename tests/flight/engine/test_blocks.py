@@ -14,9 +14,9 @@ from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.plant.vehicle import Moment, Seen, Vehicle, VehicleState, truth
 from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import NOISES, Sensors
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.faults.injection import Applied, FaultyController
-from mambo_sil.flight.engine.build import LANES, texts
+from mambo_sil.flight.engine.engine_library import LANES, texts
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight
 from mambo_sil.flight.trajectories import Hover
 from tests.support.engines import (

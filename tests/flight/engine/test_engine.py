@@ -19,7 +19,7 @@ from mambo_sil.drone.plant.link import Link
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import PdController, PdFeedForwardController, pd_controller
-from mambo_sil.flight.engine.build import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
+from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
 from mambo_sil.flight.engine.evaluation import evaluate_compiled
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
 from mambo_sil.flight.loop import Flight

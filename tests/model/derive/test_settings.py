@@ -8,8 +8,8 @@ import pytest
 
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.vehicles import presets as vehicles
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
@@ -18,10 +18,10 @@ from mambo_sil.flight.names import SENSORS_OF, CurveName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 from mambo_sil.model.derive.derived_settings import controller_text, derive
-from mambo_sil.model.derive.response import fit_steps
+from mambo_sil.model.derive.step_response import fit_steps
 from tests.support.scenarios import CRAZYFLIE, changed
 
-GENERIC: Final = vehicles.preset("generic")
+GENERIC: Final = vehicle_toml.preset("generic")
 HEADINGS: Final = 8
 SIZES: Final[dict[CurveName, tuple[float, float]]] = {
     "bernoulli": (2.0, 0.5),
@@ -59,13 +59,13 @@ def flown(settings: Settings, drone: VehicleFile, curve: CurveName, *, noisy: bo
     return trace
 
 
-@pytest.mark.parametrize("name", vehicles.names())
+@pytest.mark.parametrize("name", vehicle_toml.names())
 def test_a_shipped_drone_flies_well_with_them(name: str) -> None:
     """Both figures and a step, at every heading, seeing the truth and through its sensors.
 
     The drift of the Mambo's own estimates counts as error: more is allowed with them.
     """
-    drone = vehicles.preset(name)
+    drone = vehicle_toml.preset(name)
     settings = settings_for(drone)
     for noisy, most in ((False, 0.6), (True, 1.8 if name == "mambo" else 0.35)):
         eight = measure(flown(settings, drone, "bernoulli", noisy=noisy))
@@ -80,7 +80,7 @@ def test_a_shipped_drone_flies_well_with_them(name: str) -> None:
 @pytest.mark.parametrize("name", ["crazyflie-flown", "generic"])
 def test_they_are_better_than_those_of_another_drone(name: str) -> None:
     """On a drone without a preset of its own, no preset flies the circle through noise as closely."""
-    drone = vehicles.preset(name)
+    drone = vehicle_toml.preset(name)
     own = measure(flown(settings_for(drone), drone, "circle", noisy=True)).iae_m_s.max()
     for other in ("mambo", "crazyflie"):
         foreign = measure(flown(presets.load(other), drone, "circle", noisy=True)).iae_m_s.min()
@@ -89,7 +89,7 @@ def test_they_are_better_than_those_of_another_drone(name: str) -> None:
 
 def test_the_attitude_model_is_that_of_the_loops() -> None:
     """Of the stock loops, whose equation it solves: integral over angle gain, and next to nothing left."""
-    roll, pitch = fit_steps(vehicles.preset("mambo"))
+    roll, pitch = fit_steps(vehicle_toml.preset("mambo"))
     assert roll.integral_1_s == pytest.approx(1.0, rel=0.1)
     assert roll.lag_s + roll.delay_s == pytest.approx(0.28, abs=0.01)
     assert pitch.lag_s + pitch.delay_s == pytest.approx(0.158, abs=0.01)
@@ -107,7 +107,7 @@ def test_a_loop_without_integrator_gets_none() -> None:
 
 def test_a_first_order_drone_is_copied() -> None:
     """Gain, lag, dead time, acceleration per tilt and drag are those of the file."""
-    drone = vehicles.preset("crazyflie-flown")
+    drone = vehicle_toml.preset("crazyflie-flown")
     model = settings_for(drone).model
     for each in (model.roll_gain, model.pitch_gain):
         assert each == 0.82
@@ -150,12 +150,12 @@ def test_the_observer_follows_the_sensors() -> None:
     observer = settings_for(late).observer
     assert (observer.position_noise, observer.age_s) == (0.005, 0.03)
     assert settings_for(GENERIC).observer.age_s == 0.01
-    assert settings_for(vehicles.preset("mambo")).observer == type(observer)()
+    assert settings_for(vehicle_toml.preset("mambo")).observer == type(observer)()
 
 
 def test_optical_flow_lowers_the_tilt_limit() -> None:
     """To that of the preset for the Mambo, whose thrust would allow more."""
-    assert settings_for(vehicles.preset("mambo")).limits.tilt_rad == 0.35
+    assert settings_for(vehicle_toml.preset("mambo")).limits.tilt_rad == 0.35
 
 
 def test_a_strong_drone_may_use_its_thrust() -> None:

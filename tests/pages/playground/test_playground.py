@@ -10,20 +10,20 @@ import pytest
 from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.presets import preset
-from mambo_sil.drone.vehicles import presets as vehicles
+from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.engine.build import SOURCES
+from mambo_sil.flight.engine.engine_library import SOURCES
 from mambo_sil.flight.engine.records import flight_records
+from mambo_sil.pages.playground.bit_proof import calm, proof_flight
 from mambo_sil.pages.playground.dials import dials, weight_dial
 from mambo_sil.pages.playground.page_controllers import DEFAULTS, page_controllers
-from mambo_sil.pages.playground.proof import calm, proof_flight
 from mambo_sil.pages.playground.wasm_build import module, program
 from tests.support import command
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import only, require, toolchain
 
 SLOW = "[horizon]\nupdate_period_s = 0.02\n"
-MAMBO, CRAZYFLIE = vehicles.preset("mambo"), vehicles.preset("crazyflie")
+MAMBO, CRAZYFLIE = vehicle_toml.preset("mambo"), vehicle_toml.preset("crazyflie")
 
 
 @pytest.fixture(autouse=True)

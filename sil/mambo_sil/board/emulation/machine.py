@@ -7,8 +7,8 @@ or exceeds its time limit raises EmulationError and leaves the machine usable; n
 from pathlib import Path
 from typing import Final
 
-from mambo_sil.board.emulation.avr import AvrMachine
-from mambo_sil.board.emulation.unicorn import MODELS, UnicornMachine
+from mambo_sil.board.emulation.avr_machine import AvrMachine
+from mambo_sil.board.emulation.unicorn_machine import MODELS, UnicornMachine
 
 TIME_LIMIT_S: Final = 1.0
 AVR: Final = "avr"

@@ -21,7 +21,7 @@ from mambo_sil.board.firmware.stack import StackReport, bound_stack
 from mambo_sil.board.footprint.counts import InstructionCounts, count_instructions
 from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.errors import EmulatorError, FlightError
-from mambo_sil.flight.controllers.build import with_default_prefix
+from mambo_sil.flight.controllers.controller_library import with_default_prefix
 from mambo_sil.results.scratch import scratch_folder
 from mambo_sil.results.summary import Number
 

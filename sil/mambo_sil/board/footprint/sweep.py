@@ -11,7 +11,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.board.footprint.measure import measure_footprint
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import WorkerError
 from mambo_sil.experiment.table2.table2 import CASES
 from mambo_sil.flight.controllers.compiled import CompiledController

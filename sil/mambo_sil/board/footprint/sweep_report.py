@@ -8,7 +8,7 @@ from pathlib import Path
 
 from mambo_sil.board.footprint.sweep import Point
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 

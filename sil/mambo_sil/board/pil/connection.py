@@ -20,8 +20,8 @@ from mambo_codegen.bundle.bundle import GENERATOR
 from mambo_codegen.design import Design
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.model import Settings
-from mambo_sil.board.pil.frames import Receiver, encode, frame_bytes
-from mambo_sil.board.pil.messages import (
+from mambo_sil.board.pil.serial_frames import Receiver, encode, frame_bytes
+from mambo_sil.board.pil.serial_messages import (
     DAMAGED,
     HEAD_BYTES,
     OUT_OF_STEP,
@@ -34,7 +34,7 @@ from mambo_sil.board.pil.messages import (
     split,
     step_reply_bytes,
 )
-from mambo_sil.board.pil.port import Port
+from mambo_sil.board.pil.serial_port import Port
 from mambo_sil.errors import BoardError
 
 NO_FLIGHT: Final = "a flight in real time cannot be repeated, so none is written"

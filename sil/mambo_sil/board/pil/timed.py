@@ -22,7 +22,15 @@ from mambo_codegen.design import Design
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.board_controller import BoardStep, as_bytes, command_of, desk_bits
 from mambo_sil.board.pil.connection import NO_FLIGHT, Connection
-from mambo_sil.board.pil.messages import DAMAGED, NAMED_STEPS, OUT_OF_STEP, REPLY, Kind, StepReply, TimedReply
+from mambo_sil.board.pil.serial_messages import (
+    DAMAGED,
+    NAMED_STEPS,
+    OUT_OF_STEP,
+    REPLY,
+    Kind,
+    StepReply,
+    TimedReply,
+)
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.errors import BoardError
 from mambo_sil.flight.controllers.compiled import CompiledController, as_arrays

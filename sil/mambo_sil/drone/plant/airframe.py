@@ -6,8 +6,8 @@ from typing import Final
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import PerFlight
-from mambo_sil.drone.vehicles import presets
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,6 @@ def airframe_of(drone: VehicleFile) -> Airframe:
     )
 
 
-NOMINAL: Final = presets.preset(presets.DEFAULT)
+NOMINAL: Final = vehicle_toml.preset(vehicle_toml.DEFAULT)
 """The drone that flies where none is named."""
 MAMBO: Final = airframe_of(NOMINAL)

@@ -13,8 +13,8 @@ from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.loops import Demand
 from mambo_sil.drone.plant.rotors import distribute
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import CascadeAttitude, CascadeGains
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, CascadeGains
 
 ANGLE_INTEGRAL: Final = slice(0, 3)
 RATE_INTEGRAL: Final = slice(3, 6)

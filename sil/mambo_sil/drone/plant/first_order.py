@@ -18,8 +18,8 @@ from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.elementary import exponential, sine_cosine
 from mambo_sil.drone.plant.integrator import NODES, bogacki_shampine
 from mambo_sil.drone.plant.rigid_body import EULER, POSITION, RATES, VELOCITY, to_body, to_world
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import FirstOrderAttitude, Response
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude, Response
 
 
 @dataclass(frozen=True, eq=False)

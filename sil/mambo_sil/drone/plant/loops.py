@@ -11,8 +11,8 @@ import numpy as np
 from mambo_sil.drone.plant.airframe import Airframe, airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.rotors import mix
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import MamboAttitude
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import MamboAttitude
 
 TAKE_OFF_S: Final = 1.0
 TAKE_OFF_EXCESS: Final = 0.45

@@ -27,9 +27,9 @@ from mambo_sil.drone.plant.rigid_body import (
     to_world,
 )
 from mambo_sil.drone.plant.rotors import Rotors
-from mambo_sil.drone.vehicles import presets
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
 
 STEP_S: Final = NOMINAL.step_s
 """The Mambo's tick: integration step and period of its inner loops; motor commands are held over it."""
@@ -116,8 +116,8 @@ class Vehicle:
     @classmethod
     def from_preset(cls, name: str) -> "Vehicle":
         """Return a shipped drone; raises SourceNotFoundError, ArgumentError for what is no text."""
-        require_kind("name", name, str, f"one of {', '.join(presets.names())}")
-        return cls.of(presets.preset(name))
+        require_kind("name", name, str, f"one of {', '.join(vehicle_toml.names())}")
+        return cls.of(vehicle_toml.preset(name))
 
     @classmethod
     def from_file(cls, path: str | Path) -> "Vehicle":
@@ -126,7 +126,7 @@ class Vehicle:
         Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
         """
         require_kind("path", path, (str, Path), "the path of a vehicle.toml")
-        return cls.of(presets.read(Path(path)))
+        return cls.of(vehicle_toml.read(Path(path)))
 
     @cached_property
     def loop(self) -> MotorLoop | FirstOrderDrone:

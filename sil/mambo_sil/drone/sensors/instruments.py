@@ -18,7 +18,7 @@ from mambo_sil.drone.plant.elementary import exponential, sine_cosine
 from mambo_sil.drone.plant.randomness import Draws, Purpose
 from mambo_sil.drone.plant.rigid_body import to_body
 from mambo_sil.drone.plant.vehicle import STEP_S, Seen
-from mambo_sil.drone.vehicles.sections import MamboSensors
+from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors
 
 Three = tuple[PerFlight, PerFlight, PerFlight]
 

@@ -14,7 +14,7 @@ from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.elementary import exponential
 from mambo_sil.drone.plant.randomness import Draws, Purpose
 from mambo_sil.drone.plant.vehicle import Seen
-from mambo_sil.drone.vehicles.sections import MocapSensors
+from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 
 NOISES: Final = 6
 """Random numbers of a tick: position x, y, z, roll, pitch, yaw."""

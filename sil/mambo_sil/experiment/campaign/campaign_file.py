@@ -26,8 +26,8 @@ from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, echo, ech
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.toml_file import parse_document, read_text
-from mambo_sil.drone.vehicles import presets as vehicles
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.distributions import Distribution, parse
 from mambo_sil.experiment.campaign.parameters import (
@@ -77,7 +77,7 @@ class FlightSection(FileSection):
     rate_rad_s: Annotated[Distribution, _checked("rate_rad_s"), _WRITTEN] = PARAMETERS["rate_rad_s"]
     duration_s: float = Field(100.0, ge=1, le=3600)
     start: Start = "hover"
-    vehicle: str = vehicles.DEFAULT
+    vehicle: str = vehicle_toml.DEFAULT
     """A shipped drone, or its vehicle.toml."""
     sensors: SensorsName | None = None
     """None: the vehicle's own."""
@@ -224,7 +224,7 @@ def load_drone(named: str, folder: Path, place: str) -> VehicleFile:
     """Load a shipped drone or a file in `folder`; raises InvalidSettingsError, which begins with `place`."""
     path = folder / named
     try:
-        return vehicles.load(named if named in vehicles.names() or not path.exists() else str(path))
+        return vehicle_toml.load(named if named in vehicle_toml.names() or not path.exists() else str(path))
     except MamboNmpcError as error:
         raise InvalidSettingsError(tuple(f"{place}: {line}" for line in str(error).splitlines())) from None
 
@@ -271,7 +271,7 @@ def with_defaults(draws: FileSection, drone: VehicleFile) -> FileSection:
 def choose_drone(flight: FlightSection, folder: Path, source: str, vehicle: str | None) -> VehicleFile:
     """Return the drone that `vehicle` names, or else that of the section [flight] of a file in `folder`."""
     if vehicle is not None:
-        return vehicles.load(vehicle)
+        return vehicle_toml.load(vehicle)
     return load_drone(flight.vehicle, folder, f"{source}: flight.vehicle")
 
 

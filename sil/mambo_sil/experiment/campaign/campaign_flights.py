@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from mambo_codegen import __version__
 from mambo_codegen.design import Design
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import WorkerError
 from mambo_sil.experiment.campaign.campaign_file import Entrant, scenario
 from mambo_sil.experiment.campaign.executors import report_share

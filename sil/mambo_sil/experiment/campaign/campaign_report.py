@@ -27,7 +27,7 @@ from mambo_sil.flight.flight_report import named
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.folders import SUMMARY
-from mambo_sil.results.numbers import digits
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 RECORDS: Final = "flights"

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_sil.drone.plant.airframe import NOMINAL, airframe_of
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.distributions import Distribution, Domain, parse
 from mambo_sil.flight.names import CURVE_NAMES
 from mambo_sil.flight.scenario import Scenario

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.compare.compared_flights import Answers, answers
 from mambo_sil.experiment.compare.diff_plots import draw_steps

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly

@@ -6,12 +6,12 @@ from pydantic import BaseModel, ConfigDict
 
 from mambo_codegen.bundle.render import instance_bytes
 from mambo_codegen.design import Design
-from mambo_codegen.settings.keys import KEYS
+from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.methods import used_values
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.compare.compared_flights import Answers, EightAnswer, StepAnswer
-from mambo_sil.experiment.compare.law import AxisLaw, ObserverGains, axis_laws, observer_gains
+from mambo_sil.experiment.compare.control_terms import AxisLaw, ObserverGains, axis_laws, observer_gains
 from mambo_sil.results.summary import Summary
 
 PICTURES: Final = ("step.png", "step.svg")

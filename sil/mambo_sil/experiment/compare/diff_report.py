@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from mambo_codegen.errors import echo
 from mambo_codegen.settings.key import spell
 from mambo_sil.experiment.compare.compared_flights import SETTLED_SHARE, STEP_M
+from mambo_sil.experiment.compare.control_terms import AXES
 from mambo_sil.experiment.compare.diff_record import ControllerFigures, DiffSummary, SettingDifference
-from mambo_sil.experiment.compare.law import AXES
-from mambo_sil.results.numbers import three_digits_or_dash
+from mambo_sil.results.number_format import three_digits_or_dash
 
 _WIDE = 34
 _COLUMN = 14

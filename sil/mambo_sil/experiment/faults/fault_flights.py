@@ -21,7 +21,7 @@ from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.elementary import arc_cosine, sine_cosine
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.faults.fault import Fault, WeightChange
 from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller, ReweightedController

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mambo_sil.drone.plant.arrays import IntArray
 from mambo_sil.experiment.faults.fault import Fault, WeightChange
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.engine.build import ffi, pointer
+from mambo_sil.flight.engine.engine_library import ffi, pointer
 from mambo_sil.flight.engine.native import Native, foreign, native
 
 _NONE: Final = Fault(0, 0)

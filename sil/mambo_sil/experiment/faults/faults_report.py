@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.faults.fault_flights import COURSES, ORDER, End, Verdict, all_statuses
 from mambo_sil.results.summary import ReportedSummary, Section
 

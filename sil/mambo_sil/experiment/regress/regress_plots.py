@@ -8,7 +8,7 @@ from typing import Final
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from mambo_sil.experiment.regress.limits import Check, FlightResult
+from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
 from mambo_sil.results.style import LOOKS, PAGE_INCHES, QUIET, THIN, style
 

@@ -15,10 +15,10 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_file import Entrant
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, SATURATED, Row
 from mambo_sil.experiment.regress.baseline import Baseline
-from mambo_sil.experiment.regress.limits import RECORDS, FlightResult, is_better, judge_flight
+from mambo_sil.experiment.regress.flight_limits import RECORDS, FlightResult, is_better, judge_flight
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import Record, write_record
-from mambo_sil.results.numbers import digits
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import ReportedSummary, Section
 
 JUNIT: Final = "junit.xml"

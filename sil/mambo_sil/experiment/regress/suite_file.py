@@ -19,8 +19,8 @@ from pydantic_core import PydanticCustomError
 from mambo_codegen.errors import InvalidSettingsError, echo, echo_value
 from mambo_codegen.settings.toml_file import ShippedFiles
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.drone.vehicles import presets as vehicles
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import FileSection, load_drone, read_as
 from mambo_sil.experiment.campaign.campaign_flights import INDICES
 from mambo_sil.flight.names import SENSORS_OF
@@ -211,7 +211,7 @@ def _suite(file: SuiteFile, name: str, folder: Path, source: str, vehicle: str |
     flights: list[SuiteFlight] = []
     faults: list[str] = []
     count = 0
-    drone = None if vehicle is None else vehicles.load(vehicle)
+    drone = None if vehicle is None else vehicle_toml.load(vehicle)
     for group, section in file.flights.items():
         if not _GROUP_NAME.fullmatch(group):
             faults.append(f"flights.{echo(group)} must have a name of at most 40 letters, digits, - and _")

@@ -27,7 +27,7 @@ from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import SensedTrace, Trace
-from mambo_sil.results.numbers import digits
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 PRESETS: Final = ("mambo", "table1")

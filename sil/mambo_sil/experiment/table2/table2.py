@@ -16,7 +16,7 @@ from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
 from mambo_sil.flight.traces import Trace, read_existing
 from mambo_sil.flight.trajectories import Bernoulli, Gerono, Trajectories, Trajectory
-from mambo_sil.results.numbers import digits, three_digits
+from mambo_sil.results.number_format import digits, three_digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 INDICES: Final = ("IAE", "ISE", "ITSE", "ITAE")

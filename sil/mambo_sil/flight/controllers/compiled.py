@@ -11,7 +11,7 @@ from mambo_codegen.numbers.representation import COMMAND, OUTCOME, STATE, THRUST
 from mambo_codegen.reference import ExactStep, Step
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
-from mambo_sil.flight.controllers.build import build_library, ffi
+from mambo_sil.flight.controllers.controller_library import build_library, ffi
 
 
 def digest_compiled(library: Any, episodes: int) -> int:

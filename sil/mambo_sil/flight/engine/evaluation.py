@@ -8,10 +8,10 @@ import numpy as np
 from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight import evaluation
 from mambo_sil.flight.crashes import least_level
-from mambo_sil.flight.engine.build import chosen_engine, ffi, lanes_for, load, pointer
+from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.simulate import trace_record
 from mambo_sil.flight.evaluation import Evaluation
 from mambo_sil.flight.metrics import Metrics
@@ -37,7 +37,7 @@ def evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
 
 
 def evaluate_compiled(engine: Any, trace: Trace, limit_rad: float, drone: VehicleFile) -> Evaluation:
-    """Evaluate flights in a library of `build.load`; arguments as of `evaluate`."""
+    """Evaluate flights in a library of `engine_library.load`; arguments as of `evaluate`."""
     updates, flights = trace.status.shape
     by_flight = {
         name: np.ascontiguousarray(array.swapaxes(0, 1)).swapaxes(0, 1)

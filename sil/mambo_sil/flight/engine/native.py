@@ -3,8 +3,8 @@
 from dataclasses import astuple, dataclass
 from typing import Any, Protocol, runtime_checkable
 
-from mambo_sil.flight.controllers.build import ffi as controller_ffi
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.controller_library import ffi as controller_ffi
 from mambo_sil.flight.controllers.pd import (
     ERROR_LIMIT_M,
     POSITION_D_RAD_S_M,
@@ -13,7 +13,7 @@ from mambo_sil.flight.controllers.pd import (
     PdController,
     PdFeedForwardController,
 )
-from mambo_sil.flight.engine.build import ffi
+from mambo_sil.flight.engine.engine_library import ffi
 from mambo_sil.flight.loop import PositionController
 
 EngineController = CompiledController | PdController | PdFeedForwardController

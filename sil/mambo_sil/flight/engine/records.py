@@ -16,9 +16,9 @@ from mambo_sil.drone.plant.rotors import wrench_per_command
 from mambo_sil.drone.plant.vehicle import STEP_S
 from mambo_sil.drone.sensors import estimators, instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
-from mambo_sil.flight.engine.build import record_type
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
+from mambo_sil.flight.engine.engine_library import record_type
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
 
 Record = NDArray[Any]

@@ -12,7 +12,7 @@ from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
-from mambo_sil.flight.engine.build import chosen_engine, ffi, lanes_for, load, pointer
+from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.native import is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
 from mambo_sil.flight.loop import Flight, PositionController, allocate_trace
@@ -50,7 +50,7 @@ def fly(
 def fly_compiled(
     engine: Any, flight: Flight, controller: PositionController, progress: Progress | None = None
 ) -> Trace:
-    """Simulate the flights in a library of `build.load`, a group after the other, with a controller in C."""
+    """Simulate flights in a library of `engine_library.load`, group after group, with a controller in C."""
     lanes = int(engine.engine_lanes())
     times_s, targets = flight.times_s(), flight.given_targets
     simulation = simulation_record(flight, times_s)

@@ -11,9 +11,14 @@ from typing import Final
 from mambo_codegen import __version__
 from mambo_codegen.settings.controller_toml import comment
 from mambo_codegen.settings.key import spell
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import FirstOrderAttitude, MamboSensors, MocapSensors, NoSensors
-from mambo_sil.model.derive.response import fit_steps
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import (
+    FirstOrderAttitude,
+    MamboSensors,
+    MocapSensors,
+    NoSensors,
+)
+from mambo_sil.model.derive.step_response import fit_steps
 
 UPDATE_PERIOD_S: Final = 0.01
 RAMP_S: Final = 0.4

@@ -7,7 +7,7 @@ from typing import Final, Literal
 from mambo_sil.model.identify.motion import Motion
 from mambo_sil.model.identify.response import AxisParameters, FirstOrder, Interval
 from mambo_sil.model.identify.signals import DEGREE
-from mambo_sil.results.numbers import three_digits
+from mambo_sil.results.number_format import three_digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 Verdict = Literal["good", "weak", "refused"]

@@ -10,10 +10,10 @@ from pydantic import Field
 
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.settings import controller_toml
-from mambo_codegen.settings.keys import KEYS
+from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import (
     Draws,
     FileSection,

@@ -7,7 +7,7 @@ from typing import Final
 
 from mambo_codegen.atomic import put
 from mambo_sil.drone.plant.airframe import NOMINAL
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.store import convert_os_errors
 from mambo_sil.model.tune.front import RULE, choose, controller_text, front_csv, pareto_front
 from mambo_sil.model.tune.study import FinishedTrial, study_name

@@ -11,7 +11,7 @@ from mambo_codegen.numbers.representation import WEIGHTS
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.sensors.mocap import MotionCapture
-from mambo_sil.drone.vehicles.sections import FirstOrderAttitude
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.flight.engine.records import flight_records
 from mambo_sil.flight.loop import Flight
 

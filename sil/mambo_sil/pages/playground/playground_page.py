@@ -8,12 +8,12 @@ from typing import Any, Final
 from pydantic import BaseModel, ConfigDict
 
 from mambo_codegen.settings.model import Settings
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.engine.build import ffi, record_type
+from mambo_sil.flight.engine.engine_library import ffi, record_type
 from mambo_sil.flight.engine.native import pd_function
 from mambo_sil.flight.loop import Flight
-from mambo_sil.pages.playground import proof
+from mambo_sil.pages.playground import bit_proof
 from mambo_sil.pages.playground.dials import Dial, dials, weight_dial
 from mambo_sil.pages.playground.page_controllers import PageController, period_s
 from mambo_sil.pages.playground.wasm_build import module
@@ -65,10 +65,10 @@ def playground_page(
 
     Raises FlightError if the drone and the update period do not fit, BuildError and CacheError.
     """
-    flight = proof.proof_flight(drone, period_s(found))
+    flight = bit_proof.proof_flight(drone, period_s(found))
     flown, drones = [], []
     for number, (one, hue) in enumerate(zip(found, _hues(found), strict=True)):
-        wasm, digest = module(one), proof.native_digest(flight, one)
+        wasm, digest = module(one), bit_proof.native_digest(flight, one)
         settings = one.kind.digest if isinstance(one.kind, Settings) else None
         flown.append(
             FlownController(source=one.source, settings=settings, wasm_bytes=len(wasm), trace_sha256=digest)
@@ -83,7 +83,7 @@ def playground_page(
         "flown": list(zip(drones, flown, strict=True)),
         "dials": sliders,
         "vehicle": drone.name,
-        "duration_s": proof.DURATION_S,
+        "duration_s": bit_proof.DURATION_S,
         "generator": PlaygroundSummary.model_fields["generator"].default,
     }
     return render_page("playground.html.j2", context, "playground", STYLES, SCRIPTS), flown
@@ -102,7 +102,7 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
         for number, one in enumerate(found)
         if isinstance(one.kind, Settings) and one.kind.cost.norm == "1-norm"
     ]
-    return [*dials(proof.calm(flight)), *weights]
+    return [*dials(bit_proof.calm(flight)), *weights]
 
 
 def _drone(one: PageController) -> dict[str, Any]:
@@ -115,9 +115,9 @@ def _drone(one: PageController) -> dict[str, Any]:
 
 def _simulation(flight: Flight) -> dict[str, Any]:
     """Return what all drones of the page share; records and arrays in base64."""
-    quiet_simulation, quiet = proof.records(proof.calm(flight))
-    simulation, own = proof.records(flight)
-    read = proof.inputs(flight)
+    quiet_simulation, quiet = bit_proof.records(bit_proof.calm(flight))
+    simulation, own = bit_proof.records(flight)
+    read = bit_proof.inputs(flight)
     return {
         "period_s": flight.update_period_s,
         "ticks": flight.ticks_per_update,
@@ -127,7 +127,7 @@ def _simulation(flight: Flight) -> dict[str, Any]:
         },
         "simulation": _text(quiet_simulation.tobytes()),
         "flight": _text(quiet.tobytes()),
-        "curves": {"eight": (proof.HALF_WIDTH_M, proof.RATE_RAD_S), "circle": _CIRCLE},
+        "curves": {"eight": (bit_proof.HALF_WIDTH_M, bit_proof.RATE_RAD_S), "circle": _CIRCLE},
         "proof": {
             "updates": len(read.targets),
             "simulation": _text(simulation.tobytes()),

@@ -11,9 +11,9 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
-from mambo_sil.flight.controllers.build import glue, with_default_prefix
+from mambo_sil.flight.controllers.controller_library import glue, with_default_prefix
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.engine.build import texts
+from mambo_sil.flight.engine.engine_library import texts
 from mambo_sil.flight.engine.native import pd_function
 from mambo_sil.pages.playground.page_controllers import PageController
 from mambo_sil.results.cache import build_cached

@@ -11,9 +11,9 @@ from mambo_sil.drone.plant.randomness import Purpose, generators
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.sensors import mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
-from mambo_sil.drone.vehicles import presets
-from mambo_sil.drone.vehicles.model import VehicleFile
-from mambo_sil.drone.vehicles.sections import MocapSensors
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.flight.engine.records import Record, flight_records, simulation_record
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
@@ -46,7 +46,7 @@ def motion_capture(drone: VehicleFile) -> MotionCapture:
     """Return the motion capture of a drone; one without has that of the vehicle crazyflie."""
     sensors = drone.sensors
     if not isinstance(sensors, MocapSensors):
-        sensors = presets.preset("crazyflie").sensors
+        sensors = vehicle_toml.preset("crazyflie").sensors
         assert isinstance(sensors, MocapSensors)
     return MotionCapture(sensors)
 

@@ -6,7 +6,7 @@ from typing import Final
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, INDICES, REFUSED, SATURATED, Row
 from mambo_sil.experiment.regress.baseline import Recorded
 from mambo_sil.experiment.regress.suite_file import FlightSuite
-from mambo_sil.results.numbers import digits
+from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number
 
 RECORDS: Final = "flights"

@@ -15,8 +15,8 @@ from mambo_sil.board.emulated import build_guest, digest_emulated
 from mambo_sil.board.firmware.firmware_build import OPTIMISATIONS, Builder, builder, clang_builder
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.errors import EmulatorError
-from mambo_sil.flight.controllers.build import build_library
 from mambo_sil.flight.controllers.compiled import digest_compiled
+from mambo_sil.flight.controllers.controller_library import build_library
 from mambo_sil.results.scratch import scratch_folder
 
 HOST_COMPILERS: Final = ("gcc", "clang")

@@ -7,8 +7,8 @@ import pytest
 
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError
 from mambo_codegen.settings.toml_file import parse_document
-from mambo_sil.drone.vehicles import VEHICLES, presets
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles import VEHICLES, vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 
 FLOWN = """\
 [body]
@@ -26,7 +26,7 @@ pitch = { gain = 0.9, lag_s = 0.06 }
 def refusals(text: str) -> tuple[str, ...]:
     """Return the faults of a vehicle.toml."""
     with pytest.raises(InvalidSettingsError) as caught:
-        presets.parse(text, "drone", "drone.toml")
+        vehicle_toml.parse(text, "drone", "drone.toml")
     return caught.value.faults
 
 
@@ -36,10 +36,10 @@ def changed(old: str, new: str) -> str:
     return FLOWN.replace(old, new)
 
 
-@pytest.mark.parametrize("name", presets.names())
+@pytest.mark.parametrize("name", vehicle_toml.names())
 def test_a_shipped_drone_reads_and_fits_its_schema(name: str) -> None:
     """Its first line says what it is, and every value but those of kinds and rates has a source."""
-    drone = presets.load(name)
+    drone = vehicle_toml.load(name)
     assert drone.name == name
     assert VEHICLES.description(name)
     document = parse_document(VEHICLES.text(name), name)
@@ -51,7 +51,7 @@ def test_a_drone_reads_from_a_file(tmp_path: Path) -> None:
     """It is called as the file; what it leaves out follows from its mass."""
     path = tmp_path / "my-drone.toml"
     path.write_text(FLOWN)
-    drone = presets.load(str(path))
+    drone = vehicle_toml.load(str(path))
     assert drone.name == "my-drone"
     assert drone.step_s == 0.005
     assert (drone.altitude.p_n_m, drone.altitude.d_n_s_m) == (1.0, 0.5)
@@ -63,7 +63,7 @@ def test_a_drone_reads_from_a_file(tmp_path: Path) -> None:
 def test_an_unknown_drone_is_refused_with_the_most_similar_one() -> None:
     """And with all that there are."""
     with pytest.raises(SourceNotFoundError, match=r"mamba is neither .* \(did you mean mambo\?\)"):
-        presets.load("mamba")
+        vehicle_toml.load("mamba")
 
 
 MOCAP = "position_noise_m = 0.0\nvelocity_filter_s = 0.0\nattitude_noise_rad = 0.0\n"

@@ -11,7 +11,7 @@ from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.settings.messages import faults
 from mambo_codegen.settings.toml_file import parse_document, read_text
 from mambo_sil.drone.vehicles import VEHICLES
-from mambo_sil.drone.vehicles.model import VehicleFile, form
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile, form
 
 DEFAULT: Final = "mambo"
 """The drone that flies where none is named."""

@@ -9,7 +9,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.key import Form, Key, key_of, spell
-from mambo_sil.drone.vehicles.sections import (
+from mambo_sil.drone.vehicles.vehicle_sections import (
     AltitudeGains,
     AnyAttitude,
     AnySensors,

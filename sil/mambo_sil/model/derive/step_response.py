@@ -10,7 +10,7 @@ from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.rigid_body import EULER
 from mambo_sil.drone.plant.vehicle import Vehicle, truth
-from mambo_sil.drone.vehicles.model import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.model.identify.axis import WORTH
 from mambo_sil.model.identify.response import FittedResponse, fit_response, residuals, root_mean_square
 from mambo_sil.model.identify.segments import PERIOD_S, SETTLE_S, HeldCommand, Segment
