@@ -30,7 +30,7 @@ from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.drone.vehicles.vehicle_toml import read
-from mambo_sil.flight.api.controller import Controller
+from mambo_sil.flight.api.api_controller import Controller
 from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
 from mambo_sil.flight.api.states import DroneState, TargetState
 from mambo_sil.flight.names import CurveName

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mambo_codegen.errors import MamboNmpcError
     from mambo_sil.drone.plant.vehicle import Vehicle
     from mambo_sil.errors import ArgumentError
-    from mambo_sil.flight.api.controller import Controller
+    from mambo_sil.flight.api.api_controller import Controller
     from mambo_sil.flight.api.flights import Flown, fly
     from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
     from mambo_sil.flight.api.states import DroneState, TargetState
@@ -33,7 +33,7 @@ __all__ = [
 
 _HOMES: Final = {
     "ArgumentError": "mambo_sil.errors",
-    "Controller": "mambo_sil.flight.api.controller",
+    "Controller": "mambo_sil.flight.api.api_controller",
     "DroneState": "mambo_sil.flight.api.states",
     "Flown": "mambo_sil.flight.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",

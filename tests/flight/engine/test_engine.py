@@ -20,7 +20,7 @@ from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import PdController, PdFeedForwardController, pd_controller
 from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
-from mambo_sil.flight.engine.evaluation import evaluate_compiled
+from mambo_sil.flight.engine.evaluate import evaluate_compiled
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD_NAMES, SENSORS_OF

@@ -11,7 +11,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_toml import load as load_drone
 from mambo_sil.flight import evaluation
 from mambo_sil.flight.engine.engine_library import load
-from mambo_sil.flight.engine.evaluation import evaluate, evaluate_compiled
+from mambo_sil.flight.engine.evaluate import evaluate, evaluate_compiled
 from mambo_sil.flight.traces import Trace
 from tests.support.engines import lanes_here
 from tests.support.evaluations import LIMIT_RAD, any_trace, bits, edges, traces

@@ -25,7 +25,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.engine_library import FLAGS as ENGINE_FLAGS
 from mambo_sil.flight.engine.engine_library import HEADERS, LANES, LIBRARIES, SOURCES, ffi, texts
-from mambo_sil.flight.engine.evaluation import evaluate_compiled
+from mambo_sil.flight.engine.evaluate import evaluate_compiled
 from mambo_sil.flight.engine.simulate import fly_compiled
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD_NAMES

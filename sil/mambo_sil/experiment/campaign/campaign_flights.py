@@ -18,7 +18,7 @@ from mambo_sil.experiment.campaign.executors import report_share
 from mambo_sil.experiment.campaign.parameters import Draw
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.engine.evaluation import evaluate
+from mambo_sil.flight.engine.evaluate import evaluate
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import Metrics
