@@ -12,6 +12,7 @@ from benchmarks.evidence.tables import Row, summary, three, title
 from benchmarks.markdown import table
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.campaign.statistics import Table, index_values, read_table
+from mambo_sil.experiment.campaign.store import DATABASE
 
 MOTOR_LAGS_S: Final = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05)
 
@@ -28,7 +29,7 @@ def read_campaign(results: Path) -> Figures:
             for name, one in found["controllers"].items()
         },
         "improvements": [one for one in found["improvements"] if not one["index"].startswith("seen_")],
-        "motor_lags": _by_motor_lag(read_table(folder / "flights.csv"), list(found["controllers"])),
+        "motor_lags": _by_motor_lag(read_table(folder / DATABASE), list(found["controllers"])),
     }
 
 

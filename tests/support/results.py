@@ -1,5 +1,6 @@
 """Result folders of every command, small: written as the records that the commands write."""
 
+import contextlib
 import copy
 import json
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from mambo_sil.board.footprint.sweep_report import SweepSummary
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn, WorstFlight
 from mambo_sil.experiment.campaign.statistics import Distributions, Improvement, Proportion
+from mambo_sil.experiment.campaign.store import FlightStore
 from mambo_sil.experiment.faults.fault_flights import End, Verdict
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
 from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
@@ -188,9 +190,9 @@ def campaign_folder(folder: Path, *, finished: bool = True) -> None:
     identity = {"generator": "mambo-nmpc 0.1.0", "command": "campaign", **document}
     (folder / "campaign.json").write_text(json.dumps(identity), "utf-8")
     columns = [f"{name}_{key}" for name in ("pd", "mambo") for key in ("crashed", "iae_m_s", "trace_sha256")]
-    lines = [",".join(["flight", *columns])]
-    lines += [f"{flight},0,{60 + flight},ab,{int(flight == 3)},{4 + flight},cd" for flight in range(4)]
-    (folder / "flights.csv").write_text("\n".join(lines) + "\n4,0,6", "utf-8")
+    cells = [(0, 60.0 + flight, "ab", int(flight == 3), 4.0 + flight, "cd") for flight in range(4)]
+    with contextlib.closing(FlightStore(folder, columns, "")) as store:
+        store.add({flight: dict(zip(columns, row, strict=True)) for flight, row in enumerate(cells)})
     if not finished:
         return
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mambo_codegen.errors import echo
+from mambo_codegen.errors import UnwritableError, echo
 from mambo_sil.cli.options import AsJson, OtherDrone, Workers, output_option, show
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _run(
 
     chosen = campaign_file.default(vehicle) if source is None else campaign_file.read(source, vehicle)
     with open_campaign(chosen, output) as store:
-        bar(len(store.lines))
+        bar(len(store.finished))
         try:
             if missing_flights(store, flights):
                 pool = processes(workers or os.cpu_count() or 1) if scheduler is None else cluster(scheduler)
@@ -75,9 +75,11 @@ def _run(
                     fly_missing(chosen, store, flights, open_pool, bar, running=bar.running)
             return finish(chosen, store, bar.stage)
         except KeyboardInterrupt:
+            with contextlib.suppress(UnwritableError):
+                store.export()
             with contextlib.suppress(OSError):
                 typer.echo(
-                    f"{echo(str(output))}: stopped with {len(store.lines)} of {flights} flights finished; "
+                    f"{echo(str(output))}: stopped with {len(store.finished)} of {flights} flights finished; "
                     "the same command continues from there",
                     err=True,
                 )

@@ -271,6 +271,8 @@ BAD = {
     "controllers = []": "controllers = [] must name 1 to 10 controllers",
     'controllers = ["mamba"]': "controllers: mamba is neither a preset nor a file (did you mean mambo?)",
     'controllers = ["pd", "pd"]': "controllers: two are called pd",
+    'controllers = ["calm.toml", "Calm.toml"]': "controllers: results of calm and Calm would have the same",
+    'controllers = ["calm_seen.toml", "calm.toml"]': "results of calm_seen and calm would have the same",
     'controllers = ["pd-feedforward.toml"]': "and _, other than pd and pd-feedforward: results are named",
     'controllers = ["odd.toml"]': "controllers: odd.toml: horizon.update_period_s = 0.007 must be a whole",
     'controllers = ["wrong.toml"]': "wrong.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)",
@@ -303,7 +305,8 @@ def test_an_error_names_key_value_and_rule(text: str, tmp_path: Path) -> None:
     """One error in campaign.toml gives one line."""
     (tmp_path / "odd.toml").write_text("[horizon]\nupdate_period_s = 0.007\n")
     (tmp_path / "wrong.toml").write_text("[horizon]\ncontrol = 11\n")
-    (tmp_path / "a b.toml").write_text("")
+    for name in ("a b", "calm", "Calm", "calm_seen"):
+        (tmp_path / f"{name}.toml").write_text("")
     (tmp_path / "pd-feedforward.toml").write_text("")
     (fault,) = faults(tmp_path, text)
     assert BAD[text] in fault

@@ -1,5 +1,6 @@
 """Campaigns give the same bytes for any workers, batches and interruptions; folders are protected."""
 
+import contextlib
 import csv
 import json
 import os
@@ -7,6 +8,7 @@ import resource
 import shlex
 import shutil
 import signal
+import sqlite3
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -20,6 +22,7 @@ from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_flights import fly_batch
 from mambo_sil.experiment.campaign.campaign_run import fly_missing, open_campaign, table_columns
 from mambo_sil.experiment.campaign.executors import Pool, cluster, processes, report_share
+from mambo_sil.experiment.campaign.store import DATABASE
 from mambo_sil.flight.scenario import read_record
 from tests.support.command import command, run
 from tests.support.tools import require_module
@@ -45,8 +48,15 @@ def _whole(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return name and bytes of every file below `folder`."""
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+    """Return name and bytes of every file below `folder`; those of the database depend on the batches."""
+    files = {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+    return files | {DATABASE: b""} if DATABASE in files else files
+
+
+def finished(folder: Path) -> set[int]:
+    """Return the flights in the database in `folder`."""
+    with contextlib.closing(sqlite3.connect(folder / DATABASE)) as database:
+        return {flight for (flight,) in database.execute("SELECT flight FROM flights")}
 
 
 def fly_on_threads(
@@ -61,7 +71,7 @@ def fly_on_threads(
     campaign = campaign_file.read(source)
     with open_campaign(campaign, folder) as store, ThreadPoolExecutor(2) as threads:
         fly_missing(campaign, store, flights, Pool(threads, 2, lambda _: None), progress, batch=batch)
-        store.put_in_order()
+        store.export()
     return (folder / "flights.csv").read_bytes()
 
 
@@ -77,7 +87,8 @@ def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Pa
     """The table has draws and results of each flight, and there is a record per flight and controller."""
     names = set(contents(whole))
     records = {f"flights/{flight:06}-{name}.json" for flight in range(FLIGHTS) for name in ("pd", "mambo")}
-    assert names == {"campaign.json", "flights.csv", "summary.json", "campaign.png", "campaign.svg"} | records
+    files = {"campaign.json", DATABASE, "flights.csv", "summary.json", "campaign.png", "campaign.svg"}
+    assert names == files | records
     rows = list(csv.DictReader((whole / "flights.csv").read_text().splitlines()))
     assert [int(row["flight"]) for row in rows] == list(range(FLIGHTS))
     assert tuple(rows[0])[1:-1] == table_columns(campaign_file.read(source))
@@ -135,37 +146,38 @@ def test_a_stopped_campaign_resumes_to_the_same_bytes(
         message = f"stopped with 3 of {FLIGHTS} flights finished; the same command continues from there\n"
         assert done.stderr.endswith(message)
         assert done.stderr.count("\n") == 1
-    before = (tmp_path / "flights.csv").read_text().splitlines()
-    assert len(before) == 1 + 3
+    assert len(finished(tmp_path)) == 3
+    killed = code == -signal.SIGKILL
+    before = [] if killed else (tmp_path / "flights.csv").read_text().splitlines()
+    assert len(before) == (0 if killed else 1 + 3)
     assert "ratio of pd to the other" in run(*map(str, arguments))[0]
     assert contents(tmp_path) == contents(whole)
     assert set(before) <= set((tmp_path / "flights.csv").read_text().splitlines())
 
 
 def test_a_campaign_resumes_after_a_full_disk(source: Path, whole: Path, tmp_path: Path) -> None:
-    """The disk truncates a line of the table; the next run drops that line and flies the rest."""
+    """The batch that the disk has no room for is not stored; the next run flies it, and the rest."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
 
-    def fill(finished: int) -> None:
-        if finished == 2:
-            size = (tmp_path / "flights.csv").stat().st_size
-            resource.setrlimit(resource.RLIMIT_FSIZE, (size + 100, before[1]))
+    def fill(stored: int) -> None:
+        if stored == 2:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
 
     try:
-        with pytest.raises(UnwritableError, match=r"flights\.csv.*: File too large; the finished flights"):
+        with pytest.raises(UnwritableError, match=r"flights\.sqlite: cannot be .*; the finished flights"):
             fly_on_threads(source, tmp_path, batch=1, progress=fill)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    assert not (tmp_path / "flights.csv").read_bytes().endswith(b"\n")
+    assert len(finished(tmp_path)) == 2
     assert fly_on_threads(source, tmp_path) == (whole / "flights.csv").read_bytes()
 
 
 def test_a_finished_campaign_may_be_extended(source: Path, whole: Path, tmp_path: Path) -> None:
     """It flies the missing flights only and equals one of the full size; fewer flights are refused."""
     fly_on_threads(source, tmp_path, 2)
-    finished: list[int] = []
-    table = fly_on_threads(source, tmp_path, FLIGHTS, batch=1, progress=finished.append)
-    assert finished == [2, 3, 4, 5, 6]
+    counts: list[int] = []
+    table = fly_on_threads(source, tmp_path, FLIGHTS, batch=1, progress=counts.append)
+    assert counts == [2, 3, 4, 5, 6]
     assert table == (whole / "flights.csv").read_bytes()
     with pytest.raises(FlightError, match="already has flight 5; --flights must be 6 or more"):
         fly_on_threads(source, tmp_path, 4)
@@ -236,57 +248,37 @@ def test_another_campaign_is_refused(source: Path, whole: Path, tmp_path: Path) 
     assert fly_on_threads(source, folder) == (whole / "flights.csv").read_bytes()
 
 
-@pytest.mark.parametrize("name", ["thesis.tex", "campaign.json", "flights.csv"])
+@pytest.mark.parametrize("name", ["thesis.tex", "campaign.json", "flights.csv", DATABASE])
 def test_a_folder_with_other_files_is_refused(name: str, source: Path, tmp_path: Path) -> None:
     """A foreign file that has the name of a result does not mark a folder of results."""
     (tmp_path / name).write_text("{}")
     with pytest.raises(ForeignFilesError, match="not from a mambo-nmpc campaign"):
         fly_on_threads(source, tmp_path)
-    assert contents(tmp_path) == {name: b"{}"}
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "{}")]
 
 
-@pytest.mark.parametrize("line", [b"x,1\n", b"0\n", b""])
-def test_an_edited_table_is_refused(line: bytes, source: Path, whole: Path, tmp_path: Path) -> None:
-    """A foreign line, a short line or a repeated line stops the campaign before it flies."""
+def test_an_edited_csv_is_written_anew(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The flights are in the database."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
-    table = folder / "flights.csv"
-    lines = table.read_bytes().splitlines(keepends=True)
-    table.write_bytes(b"".join([*lines[:3], line or lines[1]]))
-    with pytest.raises(ForeignFilesError, match="line 4 is not a line of this campaign"):
-        fly_on_threads(source, folder)
+    (folder / "flights.csv").write_text("edited\n")
+    assert fly_on_threads(source, folder) == (whole / "flights.csv").read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("column", "cell", "rule"),
-    [
-        ("flight", "9" * 5000, "flight: 9999.* must be the number of a flight"),
-        ("flight", "0", "flight: 0 must not be that of an earlier line"),
-        ("mass_kg", "0.07", r"mass_kg: 0\.07 must be 0\.0\d+, the draw of flight 2"),
-        ("seed", "5", r"seed: 5 must be \d+, the draw of flight 2"),
-        ("pd_iae_m_s", "1.0", "line_sha256: .* must be the digest of the line: a result was changed"),
-        ("pd_iae_m_s", "fast", "pd_iae_m_s: fast must be a number"),
-        ("pd_iae_m_s", "", "pd_iae_m_s: an empty cell must be a number"),
-        ("mambo_crashed", "x" * 200_000, r"mambo_crashed: x+\.\.\.x+ must be a number"),
-        ("mambo_trace_sha256", "0" * 64, "line_sha256: .* must be the digest of the line"),
-        ("line_sha256", "", "line_sha256: .* must be the digest of the line"),
-    ],
-)
-def test_an_edited_cell_is_refused(
-    column: str, cell: str, rule: str, *, source: Path, whole: Path, tmp_path: Path
-) -> None:
-    """A number, draw or result that the campaign did not write is named with file, line and column."""
+def test_a_campaign_of_another_version_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
+    """Version 0.1 had no database: the message names the version and what to do, and no file changes."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
-    table = folder / "flights.csv"
-    lines = [line.split(",") for line in table.read_text().splitlines()]
-    lines[3][lines[0].index(column)] = cell
-    table.write_text("".join(",".join(line) + "\n" for line in lines))
-    edited = table.read_bytes()
-    message = rf"flights\.csv: line 4 is not a line of this campaign, the table was edited: {rule}.*; restore"
-    with pytest.raises(ForeignFilesError, match=message):
-        fly_on_threads(source, folder)
-    assert table.read_bytes() == edited
+    (folder / DATABASE).unlink()
+    identity = json.loads((folder / "campaign.json").read_text())
+    (folder / "campaign.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0.old"}))
+    before = contents(folder)
+    said = run("campaign", str(source), "--flights", str(FLIGHTS), "-o", str(folder), code=2)[1]
+    assert said.endswith(
+        "out: holds a campaign of mambo-nmpc 0.1.0.old, which this version does not read; "
+        "go on with that version, or name another folder with -o\n"
+    )
+    assert contents(folder) == before
 
 
 def test_one_run_at_a_time(source: Path, tmp_path: Path) -> None:
@@ -304,7 +296,7 @@ def test_a_dead_worker_is_reported(source: Path, tmp_path: Path) -> None:
         processes(1) as pool,
     ):
         list(pool.run(os._exit, [(1,)]))
-    assert store.lines == {}
+    assert store.finished == set()
 
 
 def test_workers_of_another_version_are_refused() -> None:
@@ -368,7 +360,7 @@ def test_a_dask_cluster_gives_the_results_of_one_process(source: Path, whole: Pa
         with open_campaign(campaign, tmp_path) as store, cluster(local.scheduler_address) as pool:
             assert pool.workers == 2
             fly_missing(campaign, store, FLIGHTS, pool, lambda _: None, batch=2)
-            store.put_in_order()
+            store.export()
         assert (tmp_path / "flights.csv").read_bytes() == (whole / "flights.csv").read_bytes()
 
 

@@ -1,5 +1,6 @@
 """Statistics of a campaign: tables read, intervals of the median, and which indices are compared."""
 
+import contextlib
 import math
 from pathlib import Path
 
@@ -16,49 +17,29 @@ from mambo_sil.experiment.campaign.statistics import (
     quantiles,
     read_table,
 )
+from mambo_sil.experiment.campaign.store import DATABASE, FlightStore
 
-TABLE = "flight,trajectory,mass_kg,pd_trace_sha256\n0,circle,0.07,ab\n1,hover,nan,cd\n"
+COLUMNS = ("trajectory", "mass_kg", "pd_trace_sha256")
 
 
 def test_a_table_is_read_by_column(tmp_path: Path) -> None:
-    """Columns of numbers only; a last line without its end is left out."""
-    path = tmp_path / "flights.csv"
-    path.write_text(TABLE + "2,circle,0.0")
-    found = read_table(path)
+    """Columns of numbers only, in the order of the flights."""
+    with contextlib.closing(FlightStore(tmp_path, COLUMNS, "")) as store:
+        assert read_table(tmp_path / DATABASE) == {}
+        store.add({1: dict(zip(COLUMNS, ("hover", math.nan, "cd"), strict=True))})
+        store.add({0: dict(zip(COLUMNS, ("circle", 0.07, "ab"), strict=True))})
+        found = read_table(tmp_path / DATABASE)
     assert list(found) == ["flight", "mass_kg"]
     assert found["flight"].tolist() == [0.0, 1.0]
     np.testing.assert_array_equal(found["mass_kg"], [0.07, math.nan])
 
 
-@pytest.mark.parametrize("text", ["", "flight", TABLE.partition("\n")[0] + "\n"])
-def test_a_table_without_flights_has_no_columns(tmp_path: Path, text: str) -> None:
-    """Nothing, part of the header, or the header alone."""
-    path = tmp_path / "flights.csv"
-    path.write_text(text)
-    assert read_table(path) == {}
-
-
-@pytest.mark.parametrize(
-    ("line", "fault"),
-    [
-        ("2,circle,0.07\n", "line 4 must have 4 cells, not 3"),
-        ("2,circle,0.07,ab,1\n", "line 4 must have 4 cells, not 5"),
-        ("2,circle,heavy,ab\n", "line 4, mass_kg: heavy must be a number"),
-    ],
-)
-def test_a_table_with_another_line_is_refused(tmp_path: Path, line: str, fault: str) -> None:
-    """File, line, column and rule are named."""
-    path = tmp_path / "flights.csv"
-    path.write_text(TABLE + line)
-    with pytest.raises(ResultsError, match=rf"flights\.csv: is not the table of a campaign: {fault}; run"):
-        read_table(path)
-
-
-def test_what_cannot_be_read_is_no_table(tmp_path: Path) -> None:
-    """A folder, a missing file, and bytes that are no text."""
-    (tmp_path / "bytes").write_bytes(b"\xff\n")
-    for name in (".", "absent", "bytes"):
-        with pytest.raises(ResultsError, match=r"is not the table of a campaign: .*; run campaign again"):
+def test_what_cannot_be_read_is_no_database(tmp_path: Path) -> None:
+    """A folder, a missing file, a file without flights, and text."""
+    (tmp_path / "text").write_text("flight,mass_kg\n" * 100)
+    (tmp_path / "empty").touch()
+    for name in (".", "absent", "empty", "text"):
+        with pytest.raises(ResultsError, match=r"is not the database of a campaign: .*; run campaign again"):
             read_table(tmp_path / name)
 
 

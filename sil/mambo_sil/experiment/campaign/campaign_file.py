@@ -4,6 +4,7 @@ A message names file, key, value, rule and fix; all errors of a file are reporte
 """
 
 import difflib
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -199,10 +200,17 @@ def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None
     file, drone = load_its_drone(file, folder, source, vehicle)
     entrants = tuple(load_entrant(name, folder, f"{source}: controllers") for name in file.controllers)
     names = [entrant.name for entrant in entrants]
-    for name in names:
-        if names.count(name) > 1:
+    for name, other in itertools.combinations(names, 2):
+        if name == other:
             raise InvalidSettingsError(
                 (f"{source}: controllers: two are called {name}; give their files different names",)
+            )
+        if _stem(name) == _stem(other):
+            raise InvalidSettingsError(
+                (
+                    f"{source}: controllers: results of {name} and {other} would have the same names; "
+                    "give one file a name that differs in more than case and _seen",
+                )
             )
     campaign = Campaign(file, entrants, drone)
     for entrant, named in zip(entrants, file.controllers, strict=True):
@@ -210,6 +218,14 @@ def _campaign(file: CampaignFile, folder: Path, source: str, vehicle: str | None
             entrant.settings, campaign.flight, campaign.draw(0), f"{source}: controllers: {echo(named)}"
         )
     return campaign
+
+
+def _stem(name: str) -> str:
+    """Return what must differ in the names of two controllers: columns and records are named after them.
+
+    Columns of a database and files of some systems ignore case; estimated errors have the prefix `seen_`.
+    """
+    return name.casefold().removesuffix("_seen")
 
 
 def demand_flyable(settings: Settings, flight: dict[str, Any], drawn: Draw, place: str) -> None:

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import echo
+from mambo_sil.errors import ResultsError
 from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection, scenario
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST
 from mambo_sil.experiment.campaign.statistics import (
@@ -21,8 +22,7 @@ from mambo_sil.experiment.campaign.statistics import (
     read_table,
     worst_flights,
 )
-from mambo_sil.experiment.campaign.store import TABLE, FlightStore, convert_os_errors
-from mambo_sil.experiment.campaign.table import FLIGHT
+from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
 from mambo_sil.flight.flight_report import named
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, write_record
@@ -80,7 +80,7 @@ class CampaignSummary(ReportedSummary):
     worst: dict[str, list[WorstFlight]]
 
     def section(self, folder: Path) -> Section:
-        """Return the section of the report; raises ResultsError for a table that cannot be read."""
+        """Return the section of the report; raises ResultsError for flights that cannot be read."""
         found = self.controllers
         content = {
             **_content(folder, self.campaign, _flights(folder)),
@@ -103,7 +103,7 @@ class UnfinishedCampaign(Drawn, ReportedSummary):
     command = "campaign"
 
     def section(self, folder: Path) -> Section:
-        """Return the section of the report; raises ResultsError for a table that cannot be read."""
+        """Return the section of the report; raises ResultsError for flights that cannot be read."""
         flights = _flights(folder)
         so_far = len(next(iter(flights.values()), ()))
         finding = f"not finished, {so_far} flights so far; the same command resumes it"
@@ -113,12 +113,19 @@ class UnfinishedCampaign(Drawn, ReportedSummary):
 
 
 def _missing(folder: Path) -> list[str]:
-    return [] if (folder / TABLE).is_file() else [TABLE]
+    return [] if (folder / DATABASE).is_file() else [DATABASE]
 
 
 def _flights(folder: Path) -> Table:
-    """Read the flights in `folder`, none if there is no table; raises ResultsError."""
-    return {} if _missing(folder) else read_table(folder / TABLE)
+    """Read the flights in `folder`, none if there is no database; raises ResultsError."""
+    if not _missing(folder):
+        return read_table(folder / DATABASE)
+    if (folder / TABLE).is_file():
+        raise ResultsError(
+            f"{echo(str(folder))}: has {TABLE} without {DATABASE}, as mambo-nmpc 0.1 wrote it; "
+            "report it with that version, or run campaign again in another folder"
+        )
+    return {}
 
 
 def _content(folder: Path, drawn: Drawn, flights: Table) -> dict[str, Any]:
@@ -165,7 +172,7 @@ def write_records(campaign: Campaign, store: FlightStore) -> None:
         for cells in store.rows():
             flight = int(cells[FLIGHT])
             for entrant in campaign.entrants:
-                digest = cells[f"{entrant.name}_{DIGEST}"]
+                digest = str(cells[f"{entrant.name}_{DIGEST}"])
                 path = store.folder / _record_name(flight, entrant.name)
                 if not _is_written(path, digest):
                     flown = scenario(section, campaign.draw(flight))
@@ -187,15 +194,15 @@ def _is_written(path: Path, digest: str) -> bool:
 
 
 def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None]) -> CampaignSummary:
-    """Sort the table and write records, pictures and, last, the summary; raises UnwritableError.
+    """Write the CSV, records, pictures and, last, the summary; raises UnwritableError.
 
     Calls `stage` with the name of each step before it.
     """
     stage("writing records")
-    store.put_in_order()
+    store.export()
     write_records(campaign, store)
     stage("computing statistics")
-    table = read_table(store.folder / TABLE)
+    table = read_table(store.folder / DATABASE)
     summary = summarise(campaign, table)
     stage("drawing pictures")
     from mambo_sil.experiment.campaign.campaign_plots import draw_campaign  # noqa: PLC0415 - loaded when drawing

@@ -26,21 +26,21 @@ def table_columns(campaign: Campaign) -> tuple[str, ...]:
 
 def open_campaign(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
     """Open and lock the folder of a campaign; raises what `open_store` raises."""
-    return open_store(folder, campaign.document(), table_columns(campaign), campaign.draw)
+    return open_store(folder, campaign.document(), table_columns(campaign))
 
 
 def missing_flights(store: FlightStore, flights: int) -> list[int]:
-    """Return the numbers of the flights that are not in the table.
+    """Return the numbers of the flights that are not in the store.
 
-    Raises FlightError if the table has more than `flights`.
+    Raises FlightError if the store has more than `flights`.
     """
-    last = max(store.lines, default=-1)
+    last = max(store.finished, default=-1)
     if last >= flights:
         raise FlightError(
             f"{store.folder}: already has flight {last}; --flights must be {last + 1} or more, "
             "or name another folder with -o"
         )
-    return [flight for flight in range(flights) if flight not in store.lines]
+    return [flight for flight in range(flights) if flight not in store.finished]
 
 
 def fly_missing(
@@ -69,8 +69,8 @@ def fly_missing(
             drawn[number] = [campaign.draw(flight) for flight in flown]
             yield __version__, entrants, section, drawn[number]
 
-    progress(len(store.lines))
+    progress(len(store.finished))
     for number, rows in pool.run(fly_batch, tasks(), lambda shares: running(shares * size)):
         flown = zip(batches[number], drawn.pop(number), rows, strict=True)
         store.add({flight: draws | row for flight, draws, row in flown})
-        progress(len(store.lines))
+        progress(len(store.finished))

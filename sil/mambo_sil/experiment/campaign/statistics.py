@@ -4,8 +4,9 @@ Every index of a crashed flight is infinite: leaving such flights out would favo
 in difficult ones. Intervals are 95 % confidence intervals.
 """
 
-import itertools
+import contextlib
 import math
+import sqlite3
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ResultsError
 from mambo_sil.experiment.campaign.campaign_flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
-from mambo_sil.experiment.campaign.table import is_number, read_number
+from mambo_sil.experiment.campaign.store import read_rows
 from mambo_sil.results.summary import Number
 
 QUANTILES: Final = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
@@ -37,39 +38,19 @@ Table = Mapping[str, FloatArray]
 
 
 def read_table(path: Path) -> Table:
-    """Return the numeric columns of a table without a truncated last line; raises ResultsError."""
-    name = f"{echo(str(path))}: is not the table of a campaign"
+    """Return the numeric columns of a database of flights, none if it has no flight; raises ResultsError."""
     columns: dict[str, array[float]] = {}
-    titles: list[str] = []
     try:
-        with path.open(encoding="utf-8", newline="\n") as file:
-            for number, line in enumerate(itertools.takewhile(_is_complete, file), start=1):
-                cells = line[:-1].split(",")
-                if number == 1:
-                    titles = cells
-                    continue
-                if len(cells) != len(titles):
-                    fault = f"line {number} must have {len(titles)} cells, not {len(cells)}"
-                    raise ResultsError(f"{name}: {fault}; run campaign again")
-                for title, cell in zip(titles, cells, strict=True):
-                    if is_number(title):
-                        columns.setdefault(title, array("d")).append(
-                            _cell(cell, f"{name}: line {number}", title)
-                        )
-    except (OSError, ValueError) as error:
-        raise ResultsError(f"{name}: {echo(str(error))}; run campaign again") from error
+        with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+            for row in read_rows(database):
+                for title, cell in row.items():
+                    if not isinstance(cell, str):
+                        columns.setdefault(title, array("d")).append(cell)
+    except sqlite3.Error as error:
+        raise ResultsError(
+            f"{echo(str(path))}: is not the database of a campaign: {error}; run campaign again"
+        ) from error
     return {title: np.array(values) for title, values in columns.items()}
-
-
-def _is_complete(line: str) -> bool:
-    return line.endswith("\n")
-
-
-def _cell(cell: str, place: str, title: str) -> float:
-    try:
-        return read_number(cell)
-    except ValueError as error:
-        raise ResultsError(f"{place}, {echo(title)}: {error}; run campaign again") from None
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,15 @@
-"""The folder of a campaign: its identity, and the table of finished flights, which survives a killed run.
+"""The folder of a campaign: its identity, and the database of finished flights, which survives a killed run.
 
-`campaign.json` identifies the campaign and marks the folder. `flights.csv` has one line per finished flight.
-A batch is appended and flushed to the disk as soon as it returns. The next run drops a last line that a kill
-or a full disk truncated. When all flights are finished the lines are sorted by flight.
+`campaign.json` identifies the campaign and marks the folder. `flights.sqlite` has a row for each finished
+flight; the rows of a batch are one transaction. `flights.csv` is exported from it, sorted by flight.
 """
 
 import contextlib
 import hashlib
 import json
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,77 +17,106 @@ from mambo_codegen import __version__
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import ForeignFilesError, UnwritableError, echo
 from mambo_sil.errors import WorkerError
-from mambo_sil.experiment.campaign.parameters import Draw
-from mambo_sil.experiment.campaign.table import FLIGHT, Value, header, line, read_lines
 from mambo_sil.results.folders import GENERATOR, create_folder, lock
 
+DATABASE: Final = "flights.sqlite"
 TABLE: Final = "flights.csv"
+FLIGHT: Final = "flight"
+"""Column with the number of a flight."""
+
+LINE_DIGEST: Final = "line_sha256"
+"""Title of the last column of the CSV: `_DIGITS` digits of a SHA-256 of the campaign and the line."""
+
+_DIGITS: Final = 16
+
+Value = float | str
 
 
 class FlightStore:
-    """The open folder of a campaign; `lines` holds the table's line of each finished flight by number."""
+    """The open folder of a campaign; `finished` holds the numbers of the finished flights."""
 
-    def __init__(self, folder: Path, columns: Sequence[str], key: str, draw: Callable[[int], Draw]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[str], key: str) -> None:
         self.folder = folder
         self._key = key
-        self._columns = columns
-        self._table = folder / TABLE
-        self.lines = self._read(draw)
-        self._file = self._table.open("ab", buffering=0)
+        self._titles = (FLIGHT, *columns)
+        self._path = folder / DATABASE
+        with convert_os_errors(self._path):
+            _refuse_special_file(self._path)
+            self._database = sqlite3.connect(self._path)
+            self.finished = self._open()
 
     def close(self) -> None:
-        """Close the table."""
-        self._file.close()
+        """Close the database."""
+        self._database.close()
 
     def add(self, rows: Mapping[int, Mapping[str, Value]]) -> None:
-        """Append finished flights and flush them to the disk; raises UnwritableError."""
-        lines = {flight: line(flight, self._columns, row, self._key) for flight, row in rows.items()}
-        with convert_os_errors(
-            self._table, "; the finished flights are kept, and the same command continues from there"
+        """Insert finished flights in one transaction; raises UnwritableError."""
+        cells = [(flight, *(row[title] for title in self._titles[1:])) for flight, row in rows.items()]
+        places = ", ".join("?" * len(self._titles))
+        with (
+            convert_os_errors(
+                self._path, "; the finished flights are kept, and the same command continues from there"
+            ),
+            self._database,
         ):
-            left = memoryview("".join(lines.values()).encode())
-            while left:
-                left = left[self._file.write(left) :]
-            os.fsync(self._file.fileno())
-        self.lines |= lines
+            self._database.executemany(f"INSERT INTO flights VALUES ({places})", cells)
+        self.finished |= rows.keys()
 
-    def put_in_order(self) -> None:
-        """Sort the table by flight, atomically."""
-        ordered = [header(self._columns), *(self.lines[flight] for flight in sorted(self.lines))]
+    def export(self) -> None:
+        """Write the CSV, atomically: number, seed, draws, results and digest of the line of each flight."""
+        lines = [",".join((*self._titles, LINE_DIGEST))]
         with convert_os_errors(self.folder):
-            put(self._table, "".join(ordered).encode())
+            for row in self.rows():
+                start = ",".join(map(str, row.values()))
+                digest = hashlib.sha256(f"{self._key},{start}".encode()).hexdigest()[:_DIGITS]
+                lines.append(f"{start},{digest}")
+            put(self.folder / TABLE, ("\n".join(lines) + "\n").encode())
 
-    def rows(self) -> Iterator[dict[str, str]]:
+    def rows(self) -> Iterator[dict[str, Value]]:
         """Yield the cells of each flight by column, in the order of the flights."""
-        for flight in sorted(self.lines):
-            cells = self.lines[flight].rstrip("\n").split(",")[:-1]
-            yield dict(zip((FLIGHT, *self._columns), cells, strict=True))
+        return read_rows(self._database)
 
-    def _read(self, draw: Callable[[int], Draw]) -> dict[int, str]:
-        """Return the lines of an earlier run by flight, after removing a truncated last line.
+    def _open(self) -> set[int]:
+        """Create the table if it is missing, and return the numbers of the flights in it.
 
-        Raises ForeignFilesError for a table that this campaign did not write.
+        Raises ForeignFilesError for a file that is not the database of this campaign.
         """
-        name = echo(str(self._table))
-        with convert_os_errors(self.folder):
-            if self._table.is_symlink() or (self._table.exists() and not self._table.is_file()):
-                raise ForeignFilesError(f"{name}: is not a plain file; move it away", (str(self._table),))
-            content = self._table.read_bytes() if self._table.exists() else b""
-            whole = content[: content.rfind(b"\n") + 1]
-            if not whole:
-                put(self._table, header(self._columns).encode())
-                return {}
-            lines = read_lines(whole.decode("utf-8", "replace"), self._columns, self._key, draw, name)
-            if len(whole) < len(content):
-                os.truncate(self._table, len(whole))
-        return lines
+        columns = ", ".join(f'"{title}"' for title in self._titles[1:])
+        try:
+            self._database.execute(
+                f"CREATE TABLE IF NOT EXISTS flights ({FLIGHT} INTEGER PRIMARY KEY, {columns})"
+            )
+            found = self._database.execute("SELECT * FROM flights LIMIT 0").description
+            if tuple(column[0] for column in found) == self._titles:
+                return {flight for (flight,) in self._database.execute(f"SELECT {FLIGHT} FROM flights")}
+        except sqlite3.OperationalError:
+            raise
+        except sqlite3.DatabaseError:
+            pass
+        name = echo(str(self._path))
+        raise ForeignFilesError(
+            f"{name}: is not the database of this campaign; move it away, or name another folder with -o",
+            (str(self._path),),
+        )
+
+
+def read_rows(database: sqlite3.Connection) -> Iterator[dict[str, Value]]:
+    """Yield the cells of each flight by column, in the order of the flights; SQLite stores NaN as NULL."""
+    found = database.execute(f"SELECT * FROM flights ORDER BY {FLIGHT}")
+    titles = [column[0] for column in found.description]
+    for row in found:
+        yield {title: math.nan if cell is None else cell for title, cell in zip(titles, row, strict=True)}
+
+
+def _refuse_special_file(path: Path) -> None:
+    """Raise ForeignFilesError for a link, a folder and the like."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        raise ForeignFilesError(f"{echo(str(path))}: is not a plain file; move it away", (str(path),))
 
 
 @contextlib.contextmanager
-def open_store(
-    folder: Path, campaign: Mapping[str, Any], columns: Sequence[str], draw: Callable[[int], Draw]
-) -> Iterator[FlightStore]:
-    """Open and lock `folder` for a run of `campaign`, which draws flight n as `draw(n)`.
+def open_store(folder: Path, campaign: Mapping[str, Any], columns: Sequence[str]) -> Iterator[FlightStore]:
+    """Open and lock `folder` for a run of `campaign`.
 
     Raises ForeignFilesError for a folder with other files or another campaign, BusyError if another run has
     locked it, UnwritableError if the file system refuses an access. A folder that is new, in which no flight
@@ -100,11 +129,11 @@ def open_store(
         stack.enter_context(lock(folder))
         new = not any(folder.iterdir())
         claim(folder, "campaign", {"command": "campaign", **campaign})
-        store = stack.enter_context(contextlib.closing(FlightStore(folder, columns, key, draw)))
+        store = stack.enter_context(contextlib.closing(FlightStore(folder, columns, key)))
         try:
             yield store
         except WorkerError:
-            if new and not store.lines:
+            if new and not store.finished:
                 for path in folder.iterdir():
                     path.unlink()
             raise
@@ -112,12 +141,14 @@ def open_store(
 
 @contextlib.contextmanager
 def convert_os_errors(place: Path, advice: str = "") -> Iterator[None]:
-    """Convert an OSError at or below `place` to an UnwritableError."""
+    """Convert an OSError at or below `place`, or an error of the database there, to an UnwritableError."""
     try:
         yield
     except OSError as error:
         name = echo(str(error.filename or place))
         raise UnwritableError(f"{name}: cannot be written: {error.strerror or error}{advice}") from error
+    except sqlite3.Error as error:
+        raise UnwritableError(f"{echo(str(place))}: cannot be written: {error}{advice}") from error
 
 
 def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
@@ -139,6 +170,12 @@ def claim(folder: Path, kind: str, identity: Mapping[str, Any]) -> None:
         with convert_os_errors(folder):
             put(path, (json.dumps(identity, indent=2) + "\n").encode())
         return
+    if held["generator"] != identity["generator"]:
+        raise ForeignFilesError(
+            f"{name}: holds a {kind} of {echo(str(held['generator']))}, which this version does not read; "
+            "go on with that version, or name another folder with -o",
+            (),
+        )
     difference = _difference("", held, json.loads(json.dumps(identity)))
     if difference:
         raise ForeignFilesError(
