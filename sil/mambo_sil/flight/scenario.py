@@ -20,7 +20,6 @@ from pydantic import (
     field_validator,
     model_validator,
 )
-from pydantic_core import ErrorDetails
 
 from mambo_codegen.errors import echo
 from mambo_codegen.plain_file import read_plain_file
@@ -36,10 +35,12 @@ from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors, MocapSensors
 from mambo_sil.errors import FlightError, ScenarioError
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import RENAMED, SENSORS_OF, ControllerName, CurveName, SensorsName, Start
+from mambo_sil.flight.names import SENSORS_OF, ControllerName, CurveName, SensorsName, Start
 from mambo_sil.flight.trajectories import CURVES, Trajectories
 
-FORMAT: Final = 1
+FORMAT: Final = 2
+"""Version 0.1 wrote 1, with other keys."""
+
 LARGEST_FILE_BYTES: Final = 1_000_000
 LARGEST_SEED: Final = 2**63 - 1
 LARGEST_SIZE_M: Final = 1000.0
@@ -209,7 +210,7 @@ def choose_sensors(
 class Record(_Record):
     """A flight that can be repeated: scenario, controller and digest of the trace."""
 
-    format: Literal[1] = FORMAT
+    format: Literal[2] = FORMAT
     scenario: Scenario
     controller: ControllerName = "nmpc"
     settings: Settings
@@ -235,15 +236,10 @@ def read_record(path: Path) -> Record:
     try:
         return Record.model_validate_json(content)
     except ValidationError as error:
-        faults = [
-            f"{name}: {'.'.join(map(str, fault['loc'])) or 'file'}: {_rule(fault)}"
-            for fault in error.errors(include_url=False, include_context=False, include_input=False)
-        ]
-        raise ScenarioError("\n".join(faults)) from None
-
-
-def _rule(fault: ErrorDetails) -> str:
-    """Return the rule that a key of a record breaks; for a key of version 0.1 its new name."""
-    key = fault["loc"][-1] if fault["loc"] else ""
-    renamed = RENAMED.get(str(key)) if fault["type"] == "extra_forbidden" else None
-    return fault["msg"] if renamed is None else f"is called {renamed} since version 0.2"
+        faults = error.errors(include_url=False, include_context=False, include_input=False)
+        if any(fault["loc"] == ("format",) for fault in faults):
+            raise ScenarioError(
+                f"{name}: is a record of another version of mambo-nmpc; repeat it with that version"
+            ) from None
+        lines = [f"{name}: {'.'.join(map(str, fault['loc'])) or 'file'}: {fault['msg']}" for fault in faults]
+        raise ScenarioError("\n".join(lines)) from None

@@ -192,6 +192,18 @@ def test_machines_that_share_a_study_propose_different_trials(source: Path, tmp_
     assert second[0] != second[1] == again
 
 
+def test_a_study_of_another_version_is_refused(source: Path, whole: Path, tmp_path: Path) -> None:
+    """The message names the version and what to do, and no file changes."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    identity = json.loads((folder / "study.json").read_text())
+    (folder / "study.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0.old"}))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(ForeignFilesError, match=r"holds a study of mambo-nmpc 0\.1\.0\.old, .* go on with"):
+        claim(folder, "study", {"command": "tune", **tuning_file.read(source).document()})
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
 def test_folders_of_another_study_or_other_files_are_refused(
     source: Path, whole: Path, tmp_path: Path
 ) -> None:
