@@ -36,7 +36,7 @@ endif
 
 # Tests that need no compiler and take seconds. They run with a PATH on which there is none.
 CHECKED = tests/test_house.py tests/experiment/campaign/test_campaign.py tests/results tests/board/firmware \
-    $(filter-out %/test_generations.py %/test_exact_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
+    $(filter-out %/test_generations.py %/test_quadratic_loop.py %/test_quadratic.py %/test_quadratic_settings.py %/test_targets.py,$(wildcard tests/codegen/test_*.py)) tests/flight/test_metrics.py tests/flight/test_scenario.py tests/flight/test_traces.py \
     tests/flight/test_trajectories.py tests/drone/plant tests/drone/sensors
 
 .PHONY: fly check test tools generated docs evidence bench bench-peers clean

@@ -22,9 +22,9 @@ from benchmarks.ours import Ours
 from benchmarks.peers_setups import PEERS
 from benchmarks.programs import NotHereError, Program, run_tool
 from benchmarks.times_report import FLAGS
-from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.controller import QuadraticController
 from mambo_codegen.methods.quadratic.law import second_derivatives
-from mambo_codegen.reference import ExactReferenceController
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings import presets
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.flight.loop import Flight, fly
@@ -69,7 +69,7 @@ class _Recorder:
     """The controller behind measurement noise; keeps the states that its optimizer is given."""
 
     def __init__(self, random: np.random.Generator) -> None:
-        self._controller = ExactReferenceController(Design(SETTINGS))
+        self._controller = QuadraticController(Quadratic(SETTINGS))
         self._random = random
         self.states: list[Array] = []
         optimizer = self._controller.optimizer
@@ -99,12 +99,12 @@ def write_problem(folder: Path) -> None:
 
     H is divided by its first element, so that DAQP's tolerances, which are absolute, suit it.
     """
-    design, hessian, gradient = Design(SETTINGS), np.zeros((4, 4)), np.zeros((4, 8))
-    limits = design.attitude.command_limit_m_step2
+    method, hessian, gradient = Quadratic(SETTINGS), np.zeros((4, 4)), np.zeros((4, 8))
+    limits = method.attitude.command_limit_m_step2
     for axis, curvature in enumerate(second_derivatives(SETTINGS)):
         moves, scaled = slice(2 * axis, 2 * axis + 2), curvature / curvature[0, 0]
         hessian[moves, moves] = scaled
-        gradient[moves] = -scaled @ design.law.rows[axis] / limits[axis]
+        gradient[moves] = -scaled @ method.law.rows[axis] / limits[axis]
     tables = {
         "hessian[16]": hessian,
         "from_state[32]": gradient,
@@ -153,9 +153,9 @@ def build(program: Program, folder: Path, flags: str, library: Path) -> Any:
 
 def share_limited(states: Array) -> float:
     """Return the share of states (n, 2, 8) in which a free move along an axis would exceed the limit."""
-    design = Design(SETTINGS)
-    moves = np.einsum("amk,nak->nam", design.law.rows, states)
-    beyond = np.abs(moves) > design.attitude.command_limit_m_step2[:, None]
+    method = Quadratic(SETTINGS)
+    moves = np.einsum("amk,nak->nam", method.law.rows, states)
+    beyond = np.abs(moves) > method.attitude.command_limit_m_step2[:, None]
     return float(np.mean(np.any(beyond, axis=2)))
 
 
@@ -194,7 +194,7 @@ def main() -> None:
                         planned[contender, name], ns = one_pass(call, states)
                         times.setdefault((contender, name), []).append(ns)
             median = {key: float(np.median(trim_mean(passes, 0.25, axis=0))) for key, passes in times.items()}
-            limits = Design(SETTINGS).attitude.command_limit_m_step2
+            limits = Quadratic(SETTINGS).attitude.command_limit_m_step2
             limited = {name: share_limited(states) for name, states in sets.items()}
             for contender in list(calls)[1:]:
                 row = {"contender": programs[contender][0].title, "flags": flags}

@@ -7,7 +7,6 @@ from docs.pages.tables import code, plain, table
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_keys import KEYS, SECTIONS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import form
 
@@ -49,10 +48,10 @@ def _row(section: str, key: Key) -> list[str]:
     quadratic, one_norm = presets.preset("mambo"), presets.preset("mambo-1norm")
     name = key.path.removeprefix(f"{section}.")
     meaning = plain(key.description)
-    if not is_used(one_norm, section, name):
+    if not one_norm.uses(section, name):
         meaning = f"Quadratic cost only. {meaning}"
     value = ""
-    if is_used(quadratic, section, name):
+    if quadratic.uses(section, name):
         value = spell(getattr(getattr(quadratic, section), name))
     else:
         meaning = f"1-norm only. {meaning}"

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.exact_times import OURS, SETTINGS, Array, build, one_pass, share_limited, write_problem
-from mambo_codegen.design import Design
-from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
-from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
+from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from tests.support.tools import require
 
-DESIGN = Design(SETTINGS)
+DESIGN = Quadratic(SETTINGS)
 
 
 def tables(folder: Path) -> dict[str, Array]:
@@ -46,6 +46,6 @@ def test_our_contender_has_the_bits_of_the_reference(tmp_path: Path) -> None:
     drawn = states(400)
     assert 0.1 < share_limited(drawn) < 0.9
     moves, _ = one_pass(build(OURS, tmp_path, "-O2", tmp_path / "ours.so"), drawn)
-    products = exact_arithmetic(DESIGN)
-    optimizer = ExactOptimizer(DESIGN, products, AttitudeModel(DESIGN, products).command_limit)
+    products = arithmetic(DESIGN)
+    optimizer = QuadraticOptimizer(DESIGN, products, AttitudeModel(DESIGN, products).command_limit)
     assert np.array_equal(moves, optimizer.minimize(drawn))

@@ -5,9 +5,9 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.horizon import horizon_tables
-from mambo_codegen.reference import ReferenceController, Step
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -24,16 +24,16 @@ def damped() -> Settings:
     return settings
 
 
-def steps(tilts_rad: list[list[float]]) -> list[Step]:
+def steps(tilts_rad: list[list[float]]) -> list[OneNormStep]:
     """Step a fresh controller at rest near its target, with these angles of roll and pitch."""
-    controller = ReferenceController(Design(damped()))
+    controller = OneNormController(OneNorm(damped()))
     return [
         controller.step(np.array([[0.01, 0.0, 0.0, 0.0, *tilt, 0.3]]), np.zeros((1, 4)), [9.81])
         for tilt in tilts_rad
     ]
 
 
-def added(step: Step) -> NDArray[np.float64]:
+def added(step: OneNormStep) -> NDArray[np.float64]:
     """Return what the rates added to the first moves (2,)."""
     return np.asarray(step.command_rad[0] - step.plan_rad[0, 0])
 
@@ -53,7 +53,7 @@ def test_the_command_stays_within_the_tilt_limit() -> None:
 
 def test_a_reset_forgets_the_angles() -> None:
     """The next step has no rate."""
-    controller = ReferenceController(Design(damped()))
+    controller = OneNormController(OneNorm(damped()))
     state = np.array([[0.0, 0.0, 0.0, 0.0, 0.1, 0.1, 0.0]])
     controller.step(state, np.zeros((1, 4)), [9.81])
     controller.reset([[0.0, 0.0]])

@@ -11,12 +11,14 @@ from hypothesis import given
 from numpy.typing import NDArray
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
-from mambo_codegen.design import Design
 from mambo_codegen.errors import InvalidSettingsError
-from mambo_codegen.methods.one_norm.formats import LARGEST, formats, raw
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.formats import formats
 from mambo_codegen.methods.one_norm.horizon import horizon_tables
+from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.numbers.fixed_point import LARGEST, raw
 from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST, WEIGHTS
-from mambo_codegen.reference import ReferenceController, Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import parse, with_option
 from mambo_codegen.settings.model import Settings
@@ -46,7 +48,7 @@ WATCH = ("-O1", "-g", "-fsanitize=undefined", "-fno-sanitize-recover=all")
 
 def extremes(settings: Settings, n: int) -> list[Tape]:
     """Step n controllers through the ends of all ranges, from commands and with weights at theirs."""
-    rng, numbers, ranges = np.random.default_rng(0), Design(settings).numbers, settings.ranges
+    rng, method, ranges = np.random.default_rng(0), OneNorm(settings), settings.ranges
 
     def ends(count: int) -> NDArray[np.float64]:
         return rng.choice([-1.0, 1.0], (n, count))
@@ -55,7 +57,7 @@ def extremes(settings: Settings, n: int) -> list[Tape]:
     bounds = np.array([ranges.position_m] * 2 + [ranges.velocity_m_s] * 2 + [3.25] * 2)
     for step in range(8):
         if step % 3 == 0:
-            weights = rng.choice([0.0, 1.0], (n, 2)) * [numbers.tracking_limit, numbers.effort_limit]
+            weights = rng.choice([0.0, 1.0], (n, 2)) * np.array(method.weight_limits)
             columns.append(calls(settings, ApiFunction.RESET, ends(2) * settings.limits.tilt_rad))
             columns.append(calls(settings, ApiFunction.SET_WEIGHTS, weights))
         state = ends(6) * bounds
@@ -167,7 +169,7 @@ def faults_of(values: Values) -> list[str]:
 
 def test_numbers_are_the_nearest_ties_away_from_zero() -> None:
     """Half a number up is the next one, down the one below; what no format holds is the largest."""
-    numbers = Design(MAMBO).numbers
+    numbers = OneNorm(MAMBO).numbers
     unit = 2.0 ** -asdict(formats(MAMBO, horizon_tables(MAMBO)))["position"]
     given = np.array([0.0, 0.49, 0.5, 1.5, -0.5, -0.51, -1.5, 7.0])[:, None] * unit
     assert numbers.quantize(given, ("position",))[:, 0].tolist() == [0, 0, 1, 2, -1, -1, -2, 7]
@@ -177,7 +179,7 @@ def test_numbers_are_the_nearest_ties_away_from_zero() -> None:
 
 def test_numbers_mean_what_was_given() -> None:
     """To and fro, every number is itself."""
-    numbers = Design(MAMBO).numbers
+    numbers = OneNorm(MAMBO).numbers
     for quantities in (STATE, TARGET, THRUST, COMMAND, WEIGHTS):
         given = np.random.default_rng(0).integers(-LARGEST + 1, LARGEST, (1000, len(quantities)), np.int32)
         assert np.array_equal(numbers.quantize(numbers.to_si(given, *quantities), quantities), given)
@@ -201,14 +203,14 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
         [tmp_path / "convert"], input=rows.tobytes(), capture_output=True, check=True
     ).stdout
 
-    numbers = Design(MAMBO).numbers
+    numbers = OneNorm(MAMBO).numbers
     constants = [(-1.5, "position"), (0.1, "velocity"), (-0.3, "angle"), (3.14159, "yaw"), (9.81, "thrust")]
     constants += [(123.4, "tracking"), (0.7, "effort")]
     expected = [int(numbers.quantize([[value]], (quantity,))[0, 0]) for value, quantity in constants]
     assert np.frombuffer(done[:28], np.int32).tolist() == expected
 
     found = np.frombuffer(done[28:], np.float32).reshape(-1, 4)
-    controller = ReferenceController(Design(MAMBO))
+    controller = OneNormController(OneNorm(MAMBO))
     for row, (status, roll, pitch, cost) in zip(rows, found, strict=True):
         step = controller.step(row[None, :7], row[None, 7:11], row[11:])
         assert status == step.status[0]
@@ -218,7 +220,7 @@ def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) ->
 
 def test_an_error_beyond_the_horizon_s_reach_moves_like_one_within() -> None:
     """Clamping far errors changes the reported cost alone: command, gradient and convergence are the same."""
-    numbers, found = Design(MAMBO).numbers, formats(MAMBO, horizon_tables(MAMBO))
+    numbers, found = OneNorm(MAMBO).numbers, formats(MAMBO, horizon_tables(MAMBO))
     limit_m = float(numbers.to_si(np.array([found.error_limit]), "position")[0])
     assert limit_m < MAMBO.ranges.position_m
     state = np.zeros((2, 7))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.inputs import Status
-from mambo_codegen.reference import ReferenceController
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -23,7 +23,7 @@ def one_norm(scalar: str, thrust: str) -> Settings:
 
 def commands(settings: Settings, thrusts_m_s2: list[float]) -> NDArray[np.float64]:
     """Return the commands (n, 2) of a fresh controller on the way to its target, at these thrusts."""
-    controller = ReferenceController(Design(settings))
+    controller = OneNormController(OneNorm(settings))
     state, target = np.array([[0.01, -0.02, 0.01, 0.02, 0.02, -0.03, 0.4]]), np.zeros((1, 4))
     return np.concatenate([controller.step(state, target, [given]).command_rad for given in thrusts_m_s2])
 
@@ -39,7 +39,7 @@ def test_no_measured_thrust_changes_a_command(scalar: str) -> None:
 
 def test_a_thrust_out_of_range_is_refused_all_the_same() -> None:
     """As with the other norm, which predicts with the thrust of hover too."""
-    controller = ReferenceController(Design(one_norm("float32", "hover")))
+    controller = OneNormController(OneNorm(one_norm("float32", "hover")))
     step = controller.step(np.zeros((1, 7)), np.zeros((1, 4)), [0.0])
     assert step.status.tolist() == [Status.BAD_THRUST]
 

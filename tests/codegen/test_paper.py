@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.paper import Array, Paper
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.tracker import Tracker, unknown_motion
-from mambo_codegen.reference import ReferenceController
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from tests.support.cases import settings_case
@@ -44,10 +44,10 @@ def situation(index: int) -> tuple[Settings, Paper, Situation]:
 def test_errors_cost_and_gradient_are_those_of_the_paper(index: int) -> None:
     """The recurrence gives the errors of a roll-out, with and without lag, exact and printed."""
     settings, paper, case = situation(index)
-    design = Design(settings)
-    predictor = Predictor(design, arithmetic(design))
+    method = OneNorm(settings)
+    predictor = Predictor(method, arithmetic(method))
     weights = np.array([[settings.cost.tracking_weight, settings.cost.effort_weight]])
-    acceleration = case.target[None, 4:] * settings.horizon.prediction_step_s**2 if design.tracker else None
+    acceleration = case.target[None, 4:] * settings.horizon.prediction_step_s**2 if method.tracker else None
     prediction = predictor.prepare(
         case.state[None], case.target[None, :4], np.array([case.thrust]), acceleration
     )
@@ -82,7 +82,7 @@ def test_the_gradient_is_that_of_the_cost(index: int) -> None:
 def test_the_search_is_that_of_the_paper(index: int) -> None:
     """Five consecutive steps: plan, cost, updates and convergence."""
     settings, rng = settings_case(index, "float64"), np.random.default_rng(index)
-    controller, paper = ReferenceController(Design(settings)), Paper(settings)
+    controller, paper = OneNormController(OneNorm(settings)), Paper(settings)
     plan, last = np.zeros((settings.horizon.control, 2)), np.zeros(2)
     acceleration, jerk, velocity = np.zeros(2), np.zeros(2), np.zeros(2)
     for index_of_step in range(5):
@@ -114,10 +114,10 @@ def test_the_search_is_that_of_the_paper(index: int) -> None:
 def test_the_tracker_is_that_of_the_paper(index: int, kind: str) -> None:
     """A target's acceleration and jerk over 200 steps, with jumps and at their limits."""
     settings = with_option(settings_case(index, "float64"), "target.acceleration", kind)
-    design, paper, rng = Design(settings), Paper(settings), np.random.default_rng(index)
-    constants = design.tracker
+    method, paper, rng = OneNorm(settings), Paper(settings), np.random.default_rng(index)
+    constants = method.tracker
     assert constants is not None
-    tracker = Tracker(constants, arithmetic(design))
+    tracker = Tracker(constants, arithmetic(method))
     motion = tracker.update(unknown_motion(np.zeros((1, 2))), np.zeros((1, 2)))
     acceleration, jerk, given = np.zeros(2), np.zeros(2), np.zeros(2)
     step_squared_s2, update_s = settings.horizon.prediction_step_s**2, settings.horizon.update_period_s

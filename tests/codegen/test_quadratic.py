@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.riccati import mp, solve_riccati, sum_costs
 from mambo_codegen.settings.model import Settings
 from tests.support.golden_gains import GOLDEN
@@ -55,7 +55,7 @@ def settings(request: pytest.FixtureRequest) -> Settings:
 def in_si(settings: Settings) -> Array:
     """Return the rows of the law (2, moves, 8) for SI units, i being the integral of u - a."""
     scales = np.array([axis_of(settings, angle).scale for angle in ANGLES])
-    rows = Design(settings).law.rows
+    rows = Quadratic(settings).law.rows
     found: Array = np.divide(rows, scales[:, None], out=np.zeros_like(rows), where=scales[:, None] != 0)
     return found
 
@@ -86,7 +86,7 @@ def test_two_moves_are_the_minimum_of_a_simulated_cost() -> None:
     """Rows and ratios are those of a cost summed over thousands of simulated steps."""
     for values in (TWO_MOVES, CASES["no integrator, 50 Hz, ramp"]):
         settings = settings_of(values)
-        law = Design(settings).law
+        law = Quadratic(settings).law
         for index, angle in enumerate(ANGLES):
             axis = axis_of(settings, angle)
             curvature, slope = two_move_cost(axis, settling_steps(settings))
@@ -118,12 +118,12 @@ def test_observer_has_the_gain_of_the_riccati_equation(settings: Settings) -> No
     spread = solve_discrete_are(transition.T, measured.T, process, noise)
     gain = spread @ measured.T @ np.linalg.inv((measured @ spread @ measured.T) + noise)
     powers = np.array([[period_s ** (row - column) for column in range(2)] for row in range(3)])
-    assert Design(settings).observer.gain == pytest.approx(gain * powers, rel=1e-9)
+    assert Quadratic(settings).observer.gain == pytest.approx(gain * powers, rel=1e-9)
 
 
 def test_attitude_model_is_the_exact_solution_for_a_held_command(settings: Settings) -> None:
     """Rows and share are those of SciPy's matrix exponential, to 9 digits."""
-    attitude = Design(settings).attitude
+    attitude = Quadratic(settings).attitude
     for index, angle in enumerate(ANGLES):
         transition, command = attitude_model(settings, angle)
         share = getattr(settings.model, f"{angle}_integral_1_s")
@@ -139,7 +139,7 @@ def test_attitude_model_is_the_exact_solution_for_a_held_command(settings: Setti
 
 def test_the_limit_bounds_the_model_under_any_commands(settings: Settings) -> None:
     """The worst commands, each with the sign that drives a state furthest, on both axes and turned."""
-    attitude = Design(settings).attitude
+    attitude = Quadratic(settings).attitude
     for index in range(2):
         lagged = [0, 0, 1 - attitude.lagged_share[index], attitude.lagged_share[index]]
         rows = np.array([attitude.tilt_row[index], attitude.integral_row[index], lagged])
@@ -154,7 +154,7 @@ def test_the_limit_bounds_the_model_under_any_commands(settings: Settings) -> No
 def test_the_limit_holds_commands_on_either_side_of_the_trim() -> None:
     """A command at the tilt limit against the trim asks for more acceleration than a move may have."""
     trimmed = settings_of({**ONE_MOVE, "limits.tilt_rad": 0.2, "model.roll_trim_rad": 0.19})
-    attitude = Design(trimmed).attitude
+    attitude = Quadratic(trimmed).attitude
     assert attitude.limit_m_step2 > 2 * attitude.gain_m_step2_rad * (0.2 + 0.19)
     assert attitude.command_limit_m_step2[0] == pytest.approx(attitude.gain_m_step2_rad * 0.01)
 
@@ -164,7 +164,7 @@ def test_the_spectral_radius_is_that_of_the_loop(settings: Settings) -> None:
     for index, angle in enumerate(ANGLES):
         loop = closed_loop(axis_of(settings, angle), in_si(settings)[index, 0])
         radius = np.abs(np.linalg.eigvals(loop)).max()
-        assert Design(settings).law.spectral_radius[index] == pytest.approx(radius, abs=1e-7)
+        assert Quadratic(settings).law.spectral_radius[index] == pytest.approx(radius, abs=1e-7)
         assert radius < 1
 
 
@@ -207,19 +207,20 @@ def test_two_moves_have_the_digits_of_the_flown_controller() -> None:
 
     That one was computed with 1e-10 m^2 of noise more in the position.
     """
-    design = Design(settings_of(TWO_MOVES))
-    assert printed(in_si(design.settings)[0], 6) == [
+    settings = settings_of(TWO_MOVES)
+    method = Quadratic(settings)
+    assert printed(in_si(settings)[0], 6) == [
         *(-6.624725, -2.884852, -0.588049, 0.057918, -0.265591, -0.145323, -0.043196, 0.720681),
         *(-5.687594, -5.795883, -2.509028, 0.561034, -0.597956, -0.795338, -0.101963, -0.809781),
     ]
-    assert design.law.ratios[0] == pytest.approx(0.1802868 / 0.3274581, rel=5e-7)
-    transition, command = attitude_model(design.settings, "roll")
+    assert method.law.ratios[0] == pytest.approx(0.1802868 / 0.3274581, rel=5e-7)
+    transition, command = attitude_model(settings, "roll")
     assert printed(transition, 7) == [
         *(0.9282866, 0.0330256, 0.0581182),
         *(-0.0096372, 0.9998228, -0.0003156),
         *(0.0, 0.0, 0.6534221),
     ]
     assert printed(command, 7) == [0.0135952, 0.0099528, 0.3465779]
-    gain = design.observer.gain / [[1, 100], [0.01, 1], [0.0001, 0.01]]
+    gain = method.observer.gain / [[1, 100], [0.01, 1], [0.0001, 0.01]]
     flown = [[0.2746472, 0.0001975], [4.4443539, 0.0059422], [24.8509282, 0.0395398]]
     assert gain == pytest.approx(np.array(flown), rel=1e-5, abs=5e-8)

@@ -4,19 +4,16 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as profile
 
-from mambo_codegen.design import Design
 from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from tests.support.strategies import LAGS, QUADRATIC, Values, choices_of, nested, quadratic_settings, toml
 
 USED = {
-    norm: [
-        key for key in KEYS.values() if is_used(Settings.model_validate(nested(values)), *key.path.split("."))
-    ]
+    norm: [key for key in KEYS.values() if Settings.model_validate(nested(values)).uses(*key.path.split("."))]
     for norm, values in (("1-norm", LAGS), ("quadratic", QUADRATIC))
 }
 
@@ -145,9 +142,9 @@ def test_a_long_ramp_at_a_short_period_is_admitted() -> None:
         "observer.outage_s": 0.25,
         "model.roll_integral_1_s": 0.005,
     }
-    design = Design(controller_toml.parse(toml({**QUADRATIC, **values}), "slow and quick"))
-    assert design.law.moves == 2
-    assert design.attitude.limit_m_step2 >= 2 * max(design.attitude.command_limit_m_step2)
+    method = Quadratic(controller_toml.parse(toml({**QUADRATIC, **values}), "slow and quick"))
+    assert method.law.moves == 2
+    assert method.attitude.limit_m_step2 >= 2 * max(method.attitude.command_limit_m_step2)
 
 
 @pytest.mark.long
@@ -157,11 +154,11 @@ def test_any_valid_settings_have_finite_constants_and_read_back_equal(settings: 
     """No rule is missing: whatever is admitted has gains, and a file that holds every bit of it."""
     read_back = controller_toml.parse(controller_toml.to_toml(settings), "written")
     assert (read_back, read_back.digest) == (settings, settings.digest)
-    design = Design(settings)
-    for constants in (design.law, design.observer, design.attitude):
+    method = Quadratic(settings)
+    for constants in (method.law, method.observer, method.attitude):
         for name, value in vars(constants).items():
             assert all(abs(number) < 1e12 for number in list_of(value)), name
-    assert max(design.law.spectral_radius) < 1
+    assert max(method.law.spectral_radius) < 1
 
 
 def list_of(value: object) -> list[float]:

@@ -13,7 +13,6 @@ from mambo_codegen.errors import LONGEST_ECHO, InvalidSettingsError, MamboNmpcEr
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from tests.support.strategies import (
     LAGS,
@@ -84,7 +83,7 @@ def test_written_file_explains_every_key_in_use_within_100_columns(values: Value
     for key in KEYS.values():
         section, name = key.path.split(".")
         admits = f"{key.description} {key.kind.capitalize()}: {key.domain}.\n{name} = "
-        assert (admits in unwrapped) == is_used(settings, section, name), key.path
+        assert (admits in unwrapped) == settings.uses(section, name), key.path
 
 
 @pytest.mark.parametrize("key", NUMBERS, ids=lambda key: key.path)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import reference_controller
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.drone.plant.disturbances import Disturbances
@@ -51,10 +50,10 @@ def test_a_command_of_other_bits_is_found() -> None:
     """In the last bit of one update; the comparison above could miss it otherwise."""
     settings, flight = presets.load("mambo"), Flight(CASE, duration_s=0.2)
     trace = fly(flight, CompiledController(settings))
-    demand_reference(flight, trace, reference_controller(Design(settings)))
+    demand_reference(flight, trace, method_of(settings).reference_controller())
     trace.command_rad[17, 0, 1] = np.nextafter(trace.command_rad[17, 0, 1], 1.0)
     with pytest.raises(AssertionError, match="17"):
-        demand_reference(flight, trace, reference_controller(Design(settings)))
+        demand_reference(flight, trace, method_of(settings).reference_controller())
 
 
 @pytest.mark.parametrize("scalar", SCALARS)
@@ -66,7 +65,7 @@ def test_a_flight_with_the_c_is_the_reference_flight(condition: str, preset: str
     flight = CONDITIONS[condition]
     library = build_library(settings, toolchain("gcc"))
     flown = fly(flight, CompiledController(settings, library=library))
-    demand_reference(flight, flown, reference_controller(Design(settings)))
+    demand_reference(flight, flown, method_of(settings).reference_controller())
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
@@ -74,7 +73,7 @@ def test_a_flight_in_numpy_with_the_reference_is_the_flight_with_the_c(condition
     """Nothing of C in one of them: all arrays of both traces are equal bit for bit."""
     settings = presets.load("mambo")
     flight = replace(CONDITIONS[condition], duration_s=2.0)
-    ours = fly(flight, reference_controller(Design(settings)))
+    ours = fly(flight, method_of(settings).reference_controller())
     assert fly(flight, CompiledController(settings)).same_bits(ours)
 
 
@@ -93,10 +92,10 @@ def test_the_hundred_seconds_of_table_2_are_the_reference_flight(preset: str) ->
     )
     assert all(first.same_bits(other) for other in others)
     if preset == "mambo":
-        assert first.same_bits(fly(flight, reference_controller(Design(settings))))
+        assert first.same_bits(fly(flight, method_of(settings).reference_controller()))
     else:
         followed = flight if preset == "mambo-1norm" else replace(flight, duration_s=25.2)
-        demand_reference(followed, first, reference_controller(Design(settings)))
+        demand_reference(followed, first, method_of(settings).reference_controller())
 
 
 def indices(preset: str, scalar: str, flight: Flight) -> np.ndarray:

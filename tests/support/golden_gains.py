@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods.quadratic.method import Quadratic
 from tests.support.quadratic import ONE_MOVE, TWO_MOVES, settings_of
 
 GOLDEN: Final = Path(__file__).with_name("golden_gains.json")
@@ -27,8 +27,8 @@ def constants() -> dict[str, dict[str, Any]]:
     """Return the constants of each controller by their names."""
     found: dict[str, dict[str, Any]] = {}
     for name, values in CONTROLLERS.items():
-        design = Design(settings_of(values))
-        records = (design.law, design.observer, design.attitude)
+        method = Quadratic(settings_of(values))
+        records = (method.law, method.observer, method.attitude)
         joint = {key: value for record in records for key, value in vars(record).items() if key != _MACHINES}
         found[name] = {
             key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in joint.items()

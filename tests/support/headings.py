@@ -14,7 +14,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Final
 
-from mambo_codegen.bundle.flags import PROOF_PREPROCESSING, proofs
+from mambo_codegen.bundle.flags import PROOF_PREPROCESSING
+from mambo_codegen.methods import method_of
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.board.firmware.tool_report import command_version
 from mambo_sil.verify.check import Result, Subject
@@ -28,9 +29,8 @@ _WORD: Final = re.compile(r"[A-Za-z_]\w*")
 
 def check(its: Subject) -> Result:
     """Return the result of all proofs; that of `turn_everywhere` may be of another controller."""
-    settings = its.settings
     reports = []
-    for name, flags in proofs(settings.code.scalar, settings.cost.norm).items():
+    for name, flags in method_of(its.settings).proofs.items():
         report = _headings(its, flags) if name == HEADINGS else prove(its, name)
         if isinstance(report, Result):
             return report

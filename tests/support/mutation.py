@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.bundle.render import SUB_BLOCKS
 from mambo_codegen.errors import BuildError
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.verify import tape_replay
 from mambo_sil.verify.calls import outcome_type
@@ -20,7 +20,7 @@ from tests.support.schemata import ORIGINAL, can_share, refused_numbers, with_mu
 
 FILES: Final = (
     "include/nmpc_config.h",
-    *(f"src/{block}.{end}" for block in SUB_BLOCKS["1-norm"] for end in "hc"),
+    *(f"src/{block}.{end}" for block in OneNorm.sub_blocks for end in "hc"),
     "src/nmpc.c",
     "src/nmpc_float.c",
 )

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any, Final
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
 from tests.support.reasons import Reason, reasons
 
@@ -36,7 +36,7 @@ def _axes_alike(settings: Settings) -> bool:
 
 def _tolerates_one(settings: Settings) -> bool:
     """Whether the tolerance of fixed point is more than one number of the cost."""
-    numbers = Design(settings).numbers
+    numbers = OneNorm(settings).numbers
     return numbers.bits is not None and bool(numbers.constant(settings.optimizer.tolerance, "cost") > 1)
 
 
@@ -44,7 +44,7 @@ def _does_not_show(of: str, change: int) -> Callable[[Settings], bool]:
     """Tell whether a factor of fixed point, a number more or less, rounds to the same steps on all paths."""
 
     def holds(settings: Settings) -> bool:
-        optimizer, products = settings.optimizer, arithmetic(Design(settings))
+        optimizer, products = settings.optimizer, arithmetic(OneNorm(settings))
         if settings.code.scalar != "fixed" or optimizer.iterations > _MOST_WALKED:
             return False
         constant = products.numbers.constant

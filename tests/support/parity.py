@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.reference import Step
+from mambo_codegen.methods.one_norm.controller import OneNormStep
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.step_inputs import StepInputs, random_steps
 
@@ -21,7 +21,7 @@ class Controller(Protocol):
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
         """Replace the weights."""
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> OneNormStep:
         """Compute the next commands."""
 
 
@@ -34,14 +34,14 @@ class Run(NamedTuple):
     """What a controller answered: the statuses of its setters, and the outcome of every step."""
 
     setters: list[NDArray[np.int64]]
-    steps: list[Step]
+    steps: list[OneNormStep]
 
 
 def run(controller: Controller, inputs: list[StepInputs], seed: int) -> Run:
     """Step a fresh controller through `inputs`, reset and reweighted halfway, bad values among the good."""
     rng = np.random.default_rng(seed)
     setters: list[NDArray[np.int64]] = []
-    steps: list[Step] = []
+    steps: list[OneNormStep] = []
     for index, case in enumerate(inputs):
         if index == len(inputs) // 2:
             n = len(case.thrust)

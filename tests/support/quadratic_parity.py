@@ -5,8 +5,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ExactStep
+from mambo_codegen.methods.quadratic.controller import QuadraticStep
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.step_inputs import StepInputs, random_steps
 from tests.support.parity import count_differing
@@ -24,7 +24,7 @@ class ExactController(Protocol):
     def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Replace the last command."""
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> ExactStep:
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> QuadraticStep:
         """Compute the next commands."""
 
 
@@ -32,7 +32,7 @@ class ExactRun(NamedTuple):
     """What a controller answered: the statuses of its setters, and the outcome of every step."""
 
     setters: list[NDArray[np.int64]]
-    steps: list[ExactStep]
+    steps: list[QuadraticStep]
 
 
 def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[StepInputs]:
@@ -44,7 +44,7 @@ def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[S
     """
     rng = np.random.default_rng(seed)
     drawn = random_steps(settings, n, steps, rng)
-    ranges, most = settings.ranges, Design(settings).observer.outage_steps
+    ranges, most = settings.ranges, Quadratic(settings).observer.outage_steps
     period_s = settings.horizon.update_period_s
     flying = np.arange(n) % 5 >= 2
     scale = 10.0 ** rng.uniform(-3, 0.5, (n, 1))
@@ -84,7 +84,7 @@ def run(controller: ExactController, inputs: list[StepInputs], seed: int) -> Exa
     """Step a fresh controller through `inputs`; reset it and set its command on the way, also to bad ones."""
     rng = np.random.default_rng(seed)
     setters: list[NDArray[np.int64]] = []
-    steps: list[ExactStep] = []
+    steps: list[QuadraticStep] = []
     for index, case in enumerate(inputs):
         command = rng.uniform(-1.5, 1.5, (len(case.thrust), 2))
         command[::5, 0] = rng.choice(BAD_COMMANDS, len(command[::5]))

@@ -12,7 +12,6 @@ from pydantic import ValidationError
 
 from mambo_codegen.settings.controller_keys import KEYS
 from mambo_codegen.settings.key import Key, spell
-from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
 from tests.support.cases import SCALARS
@@ -79,7 +78,7 @@ def valid_values(draw: st.DrawFn) -> Values:
     }
     free = {key.path: draw(numbers(key.path)) for key in NUMBERS if key.path not in constrained}
     drawn = constrained | choices | free | {"cost.norm": "1-norm"}
-    return {path: drawn[path] for path in KEYS if is_used(Settings(), *path.split("."))}
+    return {path: drawn[path] for path in KEYS if Settings().uses(*path.split("."))}
 
 
 @st.composite
@@ -120,7 +119,7 @@ def quadratic_values(draw: st.DrawFn) -> Values:
         values[name] = draw(none | numbers(name))
     settings = Settings.model_validate(nested(QUADRATIC))
     for key in KEYS.values():
-        if key.path not in values and is_used(settings, *key.path.split(".")):
+        if key.path not in values and settings.uses(*key.path.split(".")):
             values[key.path] = draw(
                 st.sampled_from(choices_of(key)) if key.low is None else numbers(key.path)
             )
@@ -174,7 +173,7 @@ def quadratic_settings(scalar: str) -> st.SearchStrategy[Settings]:
 
 def base_of(path: str) -> Values:
     """Return the fewest values beside which a controller uses the key at `path`."""
-    return {} if is_used(Settings(), *path.split(".")) else QUADRATIC
+    return {} if Settings().uses(*path.split(".")) else QUADRATIC
 
 
 def choices_of(key: Key) -> list[str]:

@@ -13,8 +13,8 @@ from mambo_codegen import boards
 from mambo_codegen.bundle.digest import self_test_digest
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
 from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -165,7 +165,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     placed(named("drone"), tmp_path, amalgamate=amalgamate)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
-    digest = self_test_digest(Design(presets.load("mambo")), 1000)
+    digest = self_test_digest(method_of(presets.load("mambo")), 1000)
     assert f"digest: 0x{digest:08X} after 100000 steps\n" in printed
     last = [float(word) for word in printed.splitlines()[-1].split()]
     assert abs(last[1] - last[3]) < 0.05
@@ -195,7 +195,7 @@ def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(
     assert len(objects) == len(sources)
     shell(*gcc, "example/main.c", *objects, "-o", "main", folder=tmp_path)
     printed = shell(tmp_path / "main", folder=tmp_path)
-    assert f"digest: 0x{self_test_digest(Design(settings), 1000):08X} after 100000 steps\n" in printed
+    assert f"digest: 0x{self_test_digest(method_of(settings), 1000):08X} after 100000 steps\n" in printed
 
 
 def test_another_digest_than_the_reference_s_fails_the_example(mambo: Path) -> None:

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.numbers.literals import SCALARS
-from mambo_codegen.reference import ReferenceController, Status
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -35,7 +36,7 @@ def built(settings: Settings) -> Any:
 def controller(kind: str, n: int = 1) -> Controller:
     """Make a controller of preset mambo."""
     if kind == "reference":
-        return ReferenceController(Design(MAMBO), n)
+        return OneNormController(OneNorm(MAMBO), n)
     return CompiledController(MAMBO, n, built(MAMBO))
 
 
@@ -171,7 +172,7 @@ HELD_ACCELERATION = np.array([0.0, 0.0, 0.01, -0.004])
 def tracking(kind: str, n: int = 1) -> Controller:
     """Make a controller of preset mambo-1norm."""
     if kind == "reference":
-        return ReferenceController(Design(TRACKED), n)
+        return OneNormController(OneNorm(TRACKED), n)
     return CompiledController(TRACKED, n, built(TRACKED))
 
 
@@ -219,7 +220,7 @@ def test_a_reset_forgets_the_target(kind: str) -> None:
 def test_the_acceleration_is_found_kept_over_a_jump_and_never_beyond_its_limit() -> None:
     """A constant acceleration is estimated to 1 %; a jump keeps it; one of the limit is the limit."""
     lib, ffi = (extension := build_extension(TRACKED)).lib, extension.ffi
-    constants, horizon = Design(TRACKED).tracker, TRACKED.horizon
+    constants, horizon = OneNorm(TRACKED).tracker, TRACKED.horizon
     assert constants is not None
     self, change_m_s, velocity_m_s = ffi.new("nmpc_t *"), 0.02, 0.0
     lib.nmpc_init(self)

@@ -3,8 +3,8 @@
 import pytest
 
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ReferenceController
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import load_library
@@ -63,7 +63,7 @@ FAULTS = {
 @pytest.fixture(scope="module")
 def expected() -> Run:
     """Run the reference once for all faults."""
-    return run(ReferenceController(Design(BACKTRACKING), CASES), INPUTS, seed=0)
+    return run(OneNormController(OneNorm(BACKTRACKING), CASES), INPUTS, seed=0)
 
 
 def found(files: dict[str, str]) -> Run:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.tracker import Tracker, unknown_motion
 from mambo_codegen.numbers.representation import COMMAND, STATE, TARGET, THRUST
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
-from mambo_codegen.reference import ReferenceController
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
@@ -42,8 +42,8 @@ class SubBlocks:
 
     def __init__(self, settings: Settings) -> None:
         extension = build_extension(settings)
-        self.design = Design(settings)
-        self.products = arithmetic(self.design)
+        self.method = OneNorm(settings)
+        self.products = arithmetic(self.method)
         self.numbers = self.products.numbers
         self.scalar = self.numbers.scalar
         self.ffi, self.lib = extension.ffi, extension.lib
@@ -100,8 +100,8 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
     blocks = SubBlocks(settings)
     ffi, lib = blocks.ffi, blocks.lib
     moves_count = 2 * settings.horizon.control
-    predictor = Predictor(blocks.design, blocks.products)
-    limits, quantize, computed = blocks.design.limits, blocks.numbers.quantize, blocks.computed
+    predictor = Predictor(blocks.method, blocks.products)
+    limits, quantize, computed = blocks.method.limits, blocks.numbers.quantize, blocks.computed
     rng = np.random.default_rng(index)
     prediction, controller = ffi.new("nmpc_prediction_t *"), ffi.new("nmpc_t *")
 
@@ -163,7 +163,7 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
 
 def quantize_acceleration(blocks: SubBlocks, rng: np.random.Generator) -> NDArray[Any] | None:
     """Draw a target's acceleration (1, 2) within the tracker's limit; None without a tracker."""
-    tracker = blocks.design.tracker
+    tracker = blocks.method.tracker
     if tracker is None:
         return None
     drawn = rng.uniform(-1, 1, (1, 2)) * tracker.acceleration_limit_m_step2
@@ -177,7 +177,7 @@ def test_tracker_equals_the_reference(index: int, scalar: str, kind: str) -> Non
     """Velocity, acceleration and jerk have the same bits, in ramps, at both limits and over jumps."""
     tracked = with_option(settings_case(index, scalar), "target.acceleration", kind)
     blocks = SubBlocks(with_option(tracked, "horizon.update_period_s", 0.01))
-    controller, constants = blocks.ffi.new("nmpc_t *"), blocks.design.tracker
+    controller, constants = blocks.ffi.new("nmpc_t *"), blocks.method.tracker
     assert constants is not None
     tracker, rng = Tracker(constants, blocks.products), np.random.default_rng(index)
     motion = unknown_motion(blocks.computed(np.zeros((1, 2))))
@@ -211,7 +211,7 @@ def test_steps_equal_the_reference(index: int, scalar: str) -> None:
     settings = settings_case(index, scalar)
     n = 250
     inputs = inputs_of_steps(settings, n, steps=4, seed=index)
-    expected = run(ReferenceController(Design(settings), n), inputs, index)
+    expected = run(OneNormController(OneNorm(settings), n), inputs, index)
     library = build_library(settings, toolchain("gcc"))
     assert differences(expected, run(CompiledController(settings, n, library), inputs, index)) == {}
 
@@ -230,7 +230,7 @@ def test_steps_by_the_thousand_equal_the_reference_in_every_build(index: int, sc
     built = libraries(settings, builds)
     for seed in range(5 * percentage // 100):
         inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
-        expected = run(ReferenceController(Design(settings), chunk), inputs, seed)
+        expected = run(OneNormController(OneNorm(settings), chunk), inputs, seed)
         for build, library in built.items():
             found = run(CompiledController(settings, chunk, library), inputs, seed)
             assert differences(expected, found) == {}, f"{build} for {settings!r}"

@@ -8,8 +8,8 @@ import pytest
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ExactReferenceController
+from mambo_codegen.methods.quadratic.controller import QuadraticController
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import load_library
 from tests.support.bundles import place
@@ -80,7 +80,7 @@ def files() -> dict[str, str]:
 @pytest.fixture(scope="module")
 def expected() -> ExactRun:
     """Run the reference once for all faults."""
-    return run(ExactReferenceController(Design(EVERYTHING), CASES), INPUTS, seed=0)
+    return run(QuadraticController(Quadratic(EVERYTHING), CASES), INPUTS, seed=0)
 
 
 def found(files: dict[str, str]) -> ExactRun:

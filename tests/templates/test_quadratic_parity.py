@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
-from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState
+from mambo_codegen.methods.quadratic.controller import QuadraticController
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
-from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
-from mambo_codegen.reference import ExactReferenceController
+from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library
@@ -33,8 +33,8 @@ class SubBlocks:
     def __init__(self, settings: Settings, seed: int) -> None:
         extension = build_extension(settings)
         self.ffi, self.lib = extension.ffi, extension.lib
-        self.design = Design(settings)
-        self.products = exact_arithmetic(self.design)
+        self.method = Quadratic(settings)
+        self.products = arithmetic(self.method)
         self.numbers = self.products.numbers
         self.scalar = self.numbers.scalar
         self.controller = self.ffi.new("nmpc_t *")
@@ -74,8 +74,8 @@ class SubBlocks:
 def test_observer_equals_the_reference(index: int, scalar: str) -> None:
     """Start, correction, prediction and disturbance have the same bits, up to and beyond every limit."""
     blocks = SubBlocks(quadratic_case(index, scalar), index)
-    lib, observer = blocks.lib, KalmanObserver(blocks.design, blocks.products)
-    constants, ranges = blocks.design.observer, blocks.design.settings.ranges
+    lib, observer = blocks.lib, KalmanObserver(blocks.method, blocks.products)
+    constants, ranges = blocks.method.observer, blocks.method.settings.ranges
     limits = {
         "position_m": ranges.position_m,
         "velocity_m_step": constants.velocity_limit_m_step,
@@ -94,7 +94,7 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
         estimate = Estimate(**{name: blocks.draw(limit) for name, limit in limits.items()})
         position, velocity = blocks.draw(ranges.position_m), blocks.draw(ranges.velocity_m_s)
         state = np.concatenate([position, velocity, blocks.draw(1.0, 3)], axis=1)
-        tilt = blocks.draw(blocks.design.attitude.limit_m_step2)
+        tilt = blocks.draw(blocks.method.attitude.limit_m_step2)
         start = blocks.pointer("nmpc_state_t", state), blocks.reals(tilt)
         arguments = start if constants.age_steps else start[:1]
 
@@ -119,8 +119,8 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
 def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
     """Its step, its turns, measurement, commands and reset have the same bits, up to and beyond its limit."""
     blocks = SubBlocks(quadratic_case(index, scalar), index)
-    lib, self, model = blocks.lib, blocks.controller, AttitudeModel(blocks.design, blocks.products)
-    limit, tilt_rad = blocks.design.attitude.limit_m_step2, blocks.design.settings.limits.tilt_rad
+    lib, self, model = blocks.lib, blocks.controller, AttitudeModel(blocks.method, blocks.products)
+    limit, tilt_rad = blocks.method.attitude.limit_m_step2, blocks.method.settings.limits.tilt_rad
     rng = np.random.default_rng(index)
     members = {"tilt": "tilt", "integral": "integral", "lagged": "lagged", "command": "command"}
     names = {name: f"{member}_m_step2" for name, member in members.items()} | {
@@ -165,9 +165,9 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
 def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
     """The move has the same bits on both axes, with none, one or both of the moves at their limits."""
     blocks = SubBlocks(quadratic_case(index, scalar), index)
-    attitude, law = blocks.design.attitude, blocks.design.law
+    attitude, law = blocks.method.attitude, blocks.method.law
     limits = attitude.command_limit_m_step2.astype(blocks.scalar)
-    optimizer = ExactOptimizer(blocks.design, blocks.products, limits)
+    optimizer = QuadraticOptimizer(blocks.method, blocks.products, limits)
     rng = np.random.default_rng(index)
     n, kinds = 4 * CASES, set()
     move = 10.0 ** rng.uniform(-2, 1.5, (n, 1, 1)) * limits[None, :, None]
@@ -193,7 +193,7 @@ def test_steps_equal_the_reference(index: int, scalar: str) -> None:
     settings = quadratic_case(index, scalar)
     n = 100
     inputs = inputs_of_steps(settings, n, steps=60, seed=index)
-    expected = run(ExactReferenceController(Design(settings), n), inputs, index)
+    expected = run(QuadraticController(Quadratic(settings), n), inputs, index)
     library = build_library(settings, toolchain("gcc"))
     assert differences(expected, run(CompiledController(settings, n, library), inputs, index)) == {}
 
@@ -201,8 +201,8 @@ def test_steps_equal_the_reference(index: int, scalar: str) -> None:
 def test_the_inputs_reach_what_is_to_be_compared() -> None:
     """Every status, outages shorter and longer than admitted, commands at the limit and within."""
     settings = quadratic_case(1, "float64")
-    found = run(ExactReferenceController(Design(settings), 200), inputs_of_steps(settings, 200, 60, 1), 1)
-    most = Design(settings).observer.outage_steps + 1
+    found = run(QuadraticController(Quadratic(settings), 200), inputs_of_steps(settings, 200, 60, 1), 1)
+    most = Quadratic(settings).observer.outage_steps + 1
     missed = np.array([step.missed for step in found.steps])
     statuses = np.array([*found.setters, *(step.status for step in found.steps)])
     assert set(np.unique(statuses)) == {0, 2, 3, 4, 6}
@@ -225,7 +225,7 @@ def test_steps_by_the_thousand_equal_the_reference_in_every_build(index: int, sc
     builds, percentage = share_of(index)
     n, steps = 5 * percentage, 200
     inputs = inputs_of_steps(settings, n, steps, seed=index)
-    expected = run(ExactReferenceController(Design(settings), n), inputs, index)
+    expected = run(QuadraticController(Quadratic(settings), n), inputs, index)
     for build, library in libraries(settings, builds).items():
         found = run(CompiledController(settings, n, library), inputs, index)
         assert differences(expected, found) == {}, f"{build} for {settings!r}"

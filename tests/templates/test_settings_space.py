@@ -8,8 +8,8 @@ import pytest
 from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ReferenceController
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import ffi
@@ -36,7 +36,7 @@ def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> N
     work = drawn.horizon.prediction * drawn.horizon.control * drawn.optimizer.iterations
     n = 100 if work <= USUAL_WORK else 25
     inputs = inputs_of_steps(drawn, n, STEPS, work)
-    expected = run(ReferenceController(Design(drawn), n), inputs, work)
+    expected = run(OneNormController(OneNorm(drawn), n), inputs, work)
     found = run(CompiledController(drawn, n, library), inputs, work)
     assert differences(expected, found) == {}
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mambo_codegen.bundle.flags import proofs
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.check import CheckOutcome
@@ -143,7 +143,7 @@ def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     assert result.outcome is CheckOutcome.PASSED, result.evidence
     promises = 4 if scalar == "fixed" else 8 if its.settings.cost.norm == "quadratic" else 6
     assert result.figures["promises"] == result.figures["promises_proven"] == promises
-    for proof in {*proofs(scalar, its.settings.cost.norm)} - (set() if whole else {headings.HEADINGS}):
+    for proof in {*method_of(its.settings).proofs} - (set() if whole else {headings.HEADINGS}):
         assert "Valid" in {one.status for one in read_properties(its.folder / f"{proof}.csv")}
         assert "ANALYSIS SUMMARY" in (its.folder / f"{proof}.txt").read_text("utf-8")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_codegen.reference import Status
+from mambo_codegen.methods.inputs import Status
 from mambo_sil.verify import bits, dialects, fuzzing, rules, sanitizers
 from mambo_sil.verify.cases import cases
 from mambo_sil.verify.check import CheckOutcome, Result, Subject

@@ -13,13 +13,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import Method, Step
 from mambo_codegen.methods.math import Real, rounded
-from mambo_codegen.methods.one_norm.formats import LARGEST
+from mambo_codegen.numbers.fixed_point import LARGEST
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.numbers.representation import OUTCOME, STATE, InputLimits, Representation
-from mambo_codegen.reference import ExactStep, Step, reference_controller
-from mambo_codegen.settings.model import Settings
+from mambo_codegen.numbers.representation import STATE, InputLimits, Representation
 
 TICKS: Final = 100
 """Steps of an episode."""
@@ -63,9 +61,9 @@ class InputScales:
     acceleration, in m/s^2; 0 without a tracker."""
 
 
-def input_scales(design: Design) -> InputScales:
+def input_scales(method: Method) -> InputScales:
     """Return the factors that give inputs as in a flight, within the ranges of the settings."""
-    settings = design.settings
+    settings = method.settings
     half_m, half_m_s = settings.ranges.position_m / 2, settings.ranges.velocity_m_s / 2
     position_m, velocity_m_s = min(2.0, half_m), min(1.0, half_m_s)
     near = 0.25, 0.025, 0.0025
@@ -73,7 +71,7 @@ def input_scales(design: Design) -> InputScales:
     hover_m_s2 = min(GRAVITY_M_S2, most_m_s2) if fixed else GRAVITY_M_S2
     thrust_m_s2 = min(3.0, most_m_s2 - hover_m_s2) if fixed else 3.0
     unit = 1 if fixed else _UNIT
-    tracker, motion = design.tracker, 0.0
+    tracker, motion = method.tracker, 0.0
     if tracker:
         most = settings.ranges.thrust_acceleration_max_m_s2 if tracker.is_given else half_m_s / 4
         motion = min(tracker.tested_input, most)
@@ -94,36 +92,34 @@ def input_scales(design: Design) -> InputScales:
     )
 
 
-def episode_count(settings: Settings) -> int:
+def episode_count(method: Method) -> int:
     """Return how many episodes the digest covers: fewer for long horizons, which keeps the run time equal."""
-    horizon = settings.horizon
-    if settings.cost.norm == "quadratic":
-        return _MOST_EPISODES
-    work = max(horizon.prediction * horizon.control, _LEAST_WORK) * settings.optimizer.iterations
+    states, iterations = method.work
+    work = max(states, _LEAST_WORK) * iterations
     return max(1, min(_MOST_EPISODES, _MOST_EPISODES * _USUAL_WORK // work))
 
 
 @lru_cache(maxsize=64)  # a bundle renders in 0.1 s instead of 1.5 s
-def self_test_digest(design: Design, count: int) -> int:
+def self_test_digest(method: Method, count: int) -> int:
     """Run the first `count` episodes on the reference controller, and return their digest of 32 bits.
 
     They run side by side, which outweighs NumPy's overhead for each operation.
     """
     digest = np.zeros(1, np.uint32)
-    for word in _episode_digests(design, np.arange(count, dtype=np.uint32)):
+    for word in _episode_digests(method, np.arange(count, dtype=np.uint32)):
         digest = _fold(digest, word)
     return int(digest[0])
 
 
-def episode_inputs(design: Design, episodes: Words) -> Iterator[StepInputs]:
+def episode_inputs(method: Method, episodes: Words) -> Iterator[StepInputs]:
     """Yield the inputs of each of TICKS steps; `episodes` (n,) are the indices of the episodes."""
-    numbers, generator, scales = design.numbers, _Generator(episodes), input_scales(design)
+    numbers, generator, scales = method.numbers, _Generator(episodes), input_scales(method)
     for _ in range(TICKS // TICKS_PER_INPUT):
-        state, target, thrust, change = _next_inputs(design, scales, generator)
+        state, target, thrust, change = _next_inputs(method, scales, generator)
         for _ in range(TICKS_PER_INPUT):
             yield (
                 numbers.to_si(state, *STATE),
-                numbers.to_si(target, *design.target),
+                numbers.to_si(target, *method.target),
                 numbers.to_si(thrust, "thrust"),
             )
             target = target + change
@@ -151,13 +147,13 @@ class _Generator:
         return drawn
 
 
-def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> tuple[Real, Real, Real, Real]:
+def _next_inputs(method: Method, scales: InputScales, generator: _Generator) -> tuple[Real, Real, Real, Real]:
     """Draw states, targets, thrusts and changes of the targets from step to step, in numbers of the C.
 
     Five in 64 have an input out of range, six if an acceleration is given. Velocities change for a tracker
     that measures the acceleration by them.
     """
-    numbers, limits = design.numbers, design.limits
+    numbers, limits = method.numbers, method.limits
     choice = generator.next()
     size = choice & 3
 
@@ -175,10 +171,10 @@ def _next_inputs(design: Design, scales: InputScales, generator: _Generator) -> 
     state += [draw(scales.yaw_rad, "yaw")]
     thrust = numbers.constant(scales.hover_m_s2, "thrust") + draw(scales.thrust_acceleration_m_s2, "thrust")
     thrust = np.minimum(np.maximum(thrust, limits.thrust_least), limits.thrust_most)
-    change = [np.zeros_like(thrust)] * len(design.target)
-    if design.tracker:
-        motion = [draw(scales.target_motion, design.tracker.input_quantity) for _ in range(2)]
-        if design.tracker.is_given:
+    change = [np.zeros_like(thrust)] * len(method.target)
+    if method.tracker:
+        motion = [draw(scales.target_motion, method.tracker.input_quantity) for _ in range(2)]
+        if method.tracker.is_given:
             target += motion
         else:
             change[2:4] = motion
@@ -203,29 +199,26 @@ def _out_of_range(numbers: Representation, limits: InputLimits) -> tuple[Any, An
     return numbers.scalar(np.nan), two * limits.attitude, two * limits.yaw, -two * limits.velocity
 
 
-def _episode_digests(design: Design, episodes: Words) -> Words:
+def _episode_digests(method: Method, episodes: Words) -> Words:
     """Run n episodes, and return the digest of each (n,)."""
-    controller = reference_controller(design, len(episodes))
+    controller = method.reference_controller(len(episodes))
     digests = np.zeros_like(episodes)
-    for inputs in episode_inputs(design, episodes):
-        for word in _words(design, controller.step(*inputs)):
+    for inputs in episode_inputs(method, episodes):
+        for word in _words(method, controller.step(*inputs)):
             digests = _fold(digests, word)
     return digests
 
 
-def _words(design: Design, step: Step | ExactStep) -> Iterator[Words]:
+def _words(method: Method, step: Step) -> Iterator[Words]:
     """Yield the outcome of a step as 32-bit words (n,); a 64-bit number gives its upper word first."""
-    numbers = design.numbers
-    if isinstance(step, ExactStep):
-        counts: tuple[NDArray[Any], ...] = (step.status, step.missed, step.saturated)
-        outcome = [numbers.stored_from_si(step.stored, design.stored)]
-    else:
-        counts = (step.status, step.iterations, step.converged)
-        outcome = [numbers.from_si(getattr(step, name), name) for name in OUTCOME]
-    for count in counts:
-        yield count.astype(np.uint32)
-    for values in outcome:
-        rows = np.ascontiguousarray(values.reshape(len(values), -1))
+    results = {one.name: one for one in method.results}
+    for name in method.digested:
+        values, quantities = getattr(step, name), results[name].quantities
+        if not quantities:
+            yield values.astype(np.uint32)
+            continue
+        numbers = method.numbers.from_si(values, *quantities)
+        rows = np.ascontiguousarray(numbers.reshape(len(numbers), -1))
         yield from rows.astype(rows.dtype.newbyteorder(">")).view(">u4").astype(np.uint32).T
 
 

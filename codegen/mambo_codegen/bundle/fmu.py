@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
@@ -67,10 +67,9 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
             symmetric("target_ax", "m/s2", most_m_s2, "acceleration of the target north"),
             symmetric("target_ay", "m/s2", most_m_s2, "acceleration of the target east"),
         ]
-    if settings.cost.norm == "1-norm":
+    if limits := method_of(settings).weight_limits:
         tracking, effort = settings.cost.tracking_weight, settings.cost.effort_weight
-        numbers = Design(settings).numbers
-        most_tracking, most_effort = numbers.tracking_limit, numbers.effort_limit
+        most_tracking, most_effort = limits
         variables += [
             FmuVariable(
                 "tracking_weight", "parameter", "1/m", 0.0, most_tracking, tracking, "lambda1, eq 12"

@@ -17,34 +17,22 @@ from mambo_codegen.bundle.flags import (
     PROOF_PREPROCESSING,
     RULE_FLAGS,
     WARNING_FLAGS,
-    proofs,
 )
 from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.infix import infix
 from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
-from mambo_codegen.design import Design
-from mambo_codegen.methods.one_norm.formats import SINE_BITS
-from mambo_codegen.methods.quadratic.formats import ExactFormats
+from mambo_codegen.methods import method_of
 from mambo_codegen.numbers import literals
+from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
-from mambo_codegen.numbers.representation import ROW, STATE, THRUST, WEIGHTS, Representation
+from mambo_codegen.numbers.representation import STATE, THRUST, WEIGHTS, Representation
 from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 
 PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
-SUB_BLOCKS: Final = {
-    "1-norm": ("nmpc_math", "nmpc_tracker", "nmpc_predictor", "nmpc_cost", "nmpc_optimizer"),
-    "quadratic": ("nmpc_math", "nmpc_tracker", "nmpc_attitude", "nmpc_observer", "nmpc_optimizer"),
-}
-"""Sources with a header each, by norm; a bundle has nmpc_tracker only if its settings have a tracker."""
-_QUADRATIC: Final = frozenset(
-    {"nmpc_config.h", "nmpc.h", "nmpc.c"}
-    | {f"{block}.{kind}" for block in SUB_BLOCKS["quadratic"][2:] for kind in "hc"}
-)
-"""Files of a bundle whose templates are in quadratic/ if the cost is."""
 PROJECT: Final = {
     "README.md": "README.md",
     "Makefile": "Makefile",
@@ -63,8 +51,6 @@ _REFUSAL: Final = """
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 """
-_BYTES: Final = {"float32": (4, 4), "float64": (8, 8), "fixed": (4, 8)}
-"""Bytes of nmpc_real_t and of nmpc_sum_t."""
 
 
 def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = True) -> dict[str, str]:
@@ -73,28 +59,26 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
     With `amalgamate` the library is one header and one source in the bundle's folder. Without `with_digest`
     the header does not state the self-test digest, which takes a second to compute; flights do not need it.
     """
-    design = Design(settings)
+    method = method_of(settings)
     environment = _environment()
     public: tuple[str, ...] = PUBLIC_HEADERS
-    norm = settings.cost.norm
-    blocks = tuple(block for block in SUB_BLOCKS[norm] if design.tracker or block != "nmpc_tracker")
+    blocks = tuple(block for block in method.sub_blocks if method.tracker or block != "nmpc_tracker")
     code: tuple[str, ...] = (*(f"{block}.c" for block in blocks), "nmpc.c", "nmpc_self_test.c")
-    if design.numbers.formats is not None:
+    if method.numbers.formats is not None:
         public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
 
-    def template(folder: str, name: str) -> jinja2.Template:
-        own = design.is_quadratic and name in _QUADRATIC
-        return environment.get_template(f"{'quadratic' if own else folder}/{name}.j2")
+    def template(name: str) -> jinja2.Template:
+        return environment.select_template([f"{method.folder}/{name}.j2", f"common/{name}.j2"])
 
-    headers = {name: template("include", name) for name in public}
-    privates = {f"{block}.h": template("src", f"{block}.h") for block in blocks}
-    sources = {name: template("src", name) for name in code}
+    headers = {name: template(name) for name in public}
+    privates = {f"{block}.h": template(f"{block}.h") for block in blocks}
+    sources = {name: template(name) for name in code}
     others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
     project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
 
-    context = _context(design, with_digest=with_digest) | {"amalgamated": amalgamate}
+    context = _context(settings, with_digest=with_digest) | {"amalgamated": amalgamate}
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
-    if design.numbers.formats is None:
+    if method.numbers.formats is None:
         text = {name: infix(content) for name, content in text.items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
@@ -126,7 +110,7 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         f"{target.source_folder}{source}": target.opening + bundle[source],
     }
     environment = _environment()
-    context = _context(Design(settings), with_digest=with_digest) | {
+    context = _context(settings, with_digest=with_digest) | {
         "ticks_per_update": ticks,
         "update_period_ns": round(1e9 * settings.horizon.update_period_s),
         "variables": fmu_variables(settings),
@@ -182,13 +166,14 @@ def _number_filter(name: str) -> Callable[..., str]:
     return spell
 
 
-def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
+def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     """Return all values that the templates insert; `with_digest` as in `render`."""
-    settings, numbers = design.settings, design.numbers
+    method = method_of(settings)
+    numbers = method.numbers
     scalar = settings.code.scalar
-    own = _quadratic_context(design) if design.is_quadratic else _one_norm_context(design)
-    return own | {
+    return method.context | {
         "settings": settings,
+        "method_folder": method.folder,
         "spelling": literals.Spelling(scalar, numbers.bits),
         "parameters": [
             (f"{section}.{key}", value)
@@ -207,23 +192,23 @@ def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
         "c_type": literals.C_TYPES[scalar],
         "shell": "nmpc_float_" if numbers.formats else "nmpc_",
         "sum_type": literals.SUM_TYPES[scalar],
-        "scalar_bytes": _BYTES[scalar][0],
-        "instance_bytes": instance_bytes(design),
-        "tracker": design.tracker,
-        "feedback": design.feedback_steps is not None,
-        "feedback_steps": design.feedback_steps,
-        "given": design.tracker is not None and design.tracker.is_given,
-        "trigonometry": design.trigonometry,
+        "scalar_bytes": numbers.bytes[0],
+        "instance_bytes": method.instance_bytes,
+        "tracker": method.tracker,
+        "feedback": method.feedback_steps is not None,
+        "feedback_steps": method.feedback_steps,
+        "given": method.tracker is not None and method.tracker.is_given,
+        "trigonometry": method.trigonometry,
         "sine_error": SINE_ERRORS[scalar],
         "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
         "yaw_limit_rad": YAW_LIMIT_RAD,
-        "vectors": self_test(design),
-        "episodes": episode_count(settings),
+        "vectors": self_test(method),
+        "episodes": episode_count(method),
         "ticks": TICKS,
         "held": TICKS_PER_INPUT,
-        "self_test_steps": TICKS * episode_count(settings),
-        "self_test_digest": self_test_digest(design, episode_count(settings)) if with_digest else None,
-        "spread": input_scales(design),
+        "self_test_steps": TICKS * episode_count(method),
+        "self_test_digest": self_test_digest(method, episode_count(method)) if with_digest else None,
+        "spread": input_scales(method),
         "boards": [
             {
                 "name": board.name,
@@ -239,81 +224,9 @@ def _context(design: Design, *, with_digest: bool) -> dict[str, object]:
         "compile_flags": " ".join(COMPILE_FLAGS),
         "warning_flags": " ".join(WARNING_FLAGS),
         "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
-        "proofs": {
-            name: " ".join((*PROOF_FLAGS, *flags))
-            for name, flags in proofs(scalar, settings.cost.norm).items()
-        },
+        "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in method.proofs.items()},
         "rule_flags": " ".join(RULE_FLAGS),
     }
-
-
-def _one_norm_context(design: Design) -> dict[str, object]:
-    settings, numbers = design.settings, design.numbers
-    return {
-        "quadratic": False,
-        "backtracking": settings.optimizer.variant == "rprop+",
-        "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
-        "tables": design.tables,
-        "hover": settings.model.thrust == "hover",
-        "tracking_limit": numbers.tracking_limit,
-        "effort_limit": numbers.effort_limit,
-    }
-
-
-def _quadratic_context(design: Design) -> dict[str, object]:
-    period_s, model = design.settings.horizon.update_period_s, design.settings.model
-    formats = design.numbers.formats
-    return {
-        "quadratic": True,
-        "attitude": design.attitude,
-        "observer": design.observer,
-        "law": design.law,
-        "stored_numbers": len(design.stored),
-        "stored_quantities": design.stored,
-        "row_quantities": ROW,
-        "stored_limits": _stored_limits(design),
-        "attitude_shares": [period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)],
-        "wide": "(nmpc_sum_t)" if formats else "",
-        "shifts": formats.shifts if isinstance(formats, ExactFormats) else None,
-        "plain_products": _plain_products(design),
-    }
-
-
-def _stored_limits(design: Design) -> list[str]:
-    """Spell the limits of what a controller with a quadratic cost stores, in ascending order."""
-    numbers, tracker = design.numbers, design.tracker
-    limits = [
-        numbers.constant(design.settings.ranges.position_m, "position"),
-        numbers.constant(design.observer.velocity_limit_m_step, "speed"),
-        numbers.constant(design.observer.disturbance_limit_m_step2, "acceleration"),
-        numbers.constant(design.attitude.limit_m_step2, "acceleration"),
-        numbers.constant(design.settings.limits.tilt_rad, "angle"),
-    ]
-    if tracker:
-        limits += [
-            numbers.constant(tracker.acceleration_limit_m_step2, "acceleration"),
-            numbers.constant(tracker.jerk_limit_m_step2_update, "acceleration"),
-        ]
-    return [str(limit) for limit in sorted(limits)]
-
-
-def _plain_products(design: Design) -> list[str]:
-    """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
-    wanted = {
-        "speed_product": True,
-        "tilt_product": True,
-        "command_product": True,
-        "per_step_product": True,
-        "per_step2_product": True,
-        "drag_product": bool(design.observer.drag_1_step),
-        "aged_position": bool(design.observer.age_steps),
-        "aged_velocity": bool(design.observer.age_steps),
-        "feedback_product": design.feedback_steps is not None,
-        "ratio_product": design.law.moves > 1,
-        "target_product": design.tracker is not None,
-        "tracker_product": design.tracker is not None,
-    }
-    return [name for name, is_wanted in wanted.items() if is_wanted]
 
 
 def _settings_id(settings: Settings) -> str:
@@ -339,23 +252,6 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
         for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance")
         if name in bits
     }
-
-
-def instance_bytes(design: Design) -> int:
-    """Return the size of nmpc_t: its numbers, sums and single bytes, with padding."""
-    settings = design.settings
-    number_bytes, sum_bytes = _BYTES[settings.code.scalar]
-    if design.is_quadratic:
-        flags = 3 if design.tracker else 2
-        return (len(design.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
-    moves = 2 * settings.horizon.control
-    weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if design.tables.has_lag else 3), 2
-    tracker, flags = (4 if design.tracker.is_given else 6, 3) if design.tracker else (0, 2)
-    if design.feedback_steps:
-        command, flags = command + 4, flags + 1
-    numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
-    before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
-    return -(-(before_flags + flags) // sum_bytes) * sum_bytes
 
 
 def _join(header: Sequence[str], source: Sequence[str]) -> dict[str, str]:

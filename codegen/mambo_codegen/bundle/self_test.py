@@ -6,17 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import Method
+from mambo_codegen.methods.inputs import Status
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS
-from mambo_codegen.reference import (
-    ExactReferenceController,
-    ExactStep,
-    ReferenceController,
-    Status,
-    Step,
-    reference_controller,
-)
 
 STEPS: Final = 24
 _GOLDEN_RATIO: Final = 0.6180339887498949
@@ -26,8 +19,8 @@ _GOLDEN_RATIO: Final = 0.6180339887498949
 class SelfTestStep:
     """One step: inputs and results.
 
-    Inputs: state (7,), target (4,) or (6,), thrust. Results: status, command (2,) and other numbers: cost and
-    gradient (2,) of the 1-norm; (k,) all stored numbers with a quadratic cost.
+    Inputs: state (7,), target (4,) or (6,), thrust. Results: status, command (2,) and
+    `Method.tested_numbers`.
     """
 
     state: tuple[float, ...]
@@ -38,7 +31,7 @@ class SelfTestStep:
     others: tuple[float, ...]
 
 
-def self_test(design: Design) -> list[SelfTestStep]:
+def self_test(method: Method) -> list[SelfTestStep]:
     """Run the reference controller through STEPS inputs of a typical flight.
 
     The first input has a position error below the smallest normal number, so that a board that flushes such
@@ -46,15 +39,28 @@ def self_test(design: Design) -> list[SelfTestStep]:
     For a tracker that reads it the target's velocity changes little from step to step. The values are a Weyl
     sequence; a library's random numbers may change with its version.
     """
-    settings = design.settings
-    controller = reference_controller(design)
+    settings = method.settings
+    controller = method.reference_controller()
+
+    def step(state: list[float], target: list[float], thrust: float) -> SelfTestStep:
+        made = controller.step([state], [target], [thrust])
+        roll_rad, pitch_rad = made.command_rad[0].tolist()
+        return SelfTestStep(
+            state=tuple(state),
+            target=tuple(target),
+            thrust_acceleration_m_s2=thrust,
+            status=Status(int(made.status[0])),
+            command_rad=(roll_rad, pitch_rad),
+            others=method.tested_numbers(made),
+        )
+
     ranges = settings.ranges
     position_m, speed_m_s = min(2.0, ranges.position_m / 2), min(1.0, ranges.velocity_m_s / 2)
     spread = _weyl_sequence()
     scalar = settings.code.scalar
     tiny = 0.0 if scalar == "fixed" else float(np.finfo(SCALARS[scalar]).smallest_normal) / 100
-    steps = [_step(controller, [tiny] + [0.0] * 6, [0.0] * len(design.target), hover_thrust(settings))]
-    tracker = design.tracker
+    steps = [step([tiny] + [0.0] * 6, [0.0] * len(method.target), hover_thrust(settings))]
+    tracker = method.tracker
     measures = tracker is not None and not tracker.is_given
     velocity_m_s, change_m_s = [0.0, 0.0], speed_m_s
     if tracker and measures:
@@ -78,32 +84,8 @@ def self_test(design: Design) -> list[SelfTestStep]:
                     target[3] = -2 * ranges.velocity_m_s
                 case _:
                     thrust = 0.0
-        steps.append(_step(controller, state, target, thrust))
+        steps.append(step(state, target, thrust))
     return steps
-
-
-def _step(
-    controller: ReferenceController | ExactReferenceController,
-    state: list[float],
-    target: list[float],
-    thrust: float,
-) -> SelfTestStep:
-    step = controller.step([state], [target], [thrust])
-    roll_rad, pitch_rad = step.command_rad[0].tolist()
-    return SelfTestStep(
-        state=tuple(state),
-        target=tuple(target),
-        thrust_acceleration_m_s2=thrust,
-        status=Status(int(step.status[0])),
-        command_rad=(roll_rad, pitch_rad),
-        others=_others(step),
-    )
-
-
-def _others(step: Step | ExactStep) -> tuple[float, ...]:
-    if isinstance(step, ExactStep):
-        return tuple(step.stored[0].tolist())
-    return (float(step.cost[0]), *step.gradient[0, 0].tolist())
 
 
 def _weyl_sequence() -> Iterator[float]:

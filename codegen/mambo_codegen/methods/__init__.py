@@ -1,1 +1,17 @@
-"""The methods of control, and what they share: target tracker, inputs, functions of numbers."""
+"""The methods of control: each folder is one, behind the interface `Method`; `method_of` finds it."""
+
+from typing import Final
+
+from mambo_codegen.methods._interface import LinearLaw, Method, ReferenceController, Step, StepResult
+from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.settings.sections import Sections
+
+__all__ = ["LinearLaw", "Method", "ReferenceController", "Step", "StepResult", "method_of"]
+
+_METHODS: Final[dict[str, type[Method]]] = {"1-norm": OneNorm, "quadratic": Quadratic}
+
+
+def method_of(settings: Sections) -> Method:
+    """Return the method that `cost.norm` names, with `settings`."""
+    return _METHODS[settings.cost.norm](settings)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.numbers.representation import COMMAND, STATE, THRUST
 
@@ -34,9 +34,9 @@ class Status(IntEnum):
 class Inputs:
     """The inputs of n controllers, in the numbers of the C."""
 
-    def __init__(self, design: Design) -> None:
-        self._numbers, self._target = design.numbers, design.target
-        self.limits = design.limits
+    def __init__(self, constants: Constants) -> None:
+        self._numbers, self._target = constants.numbers, constants.target
+        self.limits = constants.limits
 
     def quantize(
         self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.one_norm.formats import SINE_BITS
+from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry
 
 Real = NDArray[Any]

@@ -49,16 +49,12 @@ class TrackerConstants:
         return 1.25 * self.input_limit
 
 
-def tracker_constants(settings: Sections) -> TrackerConstants | None:
-    """Derive the constants of the tracker; None if `settings` have none.
-
-    With a quadratic cost tau is the update period.
-    """
+def tracker_constants(settings: Sections, step_s: float) -> TrackerConstants | None:
+    """Derive the constants of the tracker for the prediction step tau; None if `settings` have none."""
     if settings.target.acceleration == "none":
         return None
     is_given, ranges = settings.target.acceleration == "given", settings.ranges
     update_s, gain = settings.horizon.update_period_s, settings.target.tracker_gain
-    step_s = update_s if settings.cost.norm == "quadratic" else settings.horizon.prediction_step_s
     acceleration_m_s2 = JUMP_MARGIN * GRAVITY_M_S2 * settings.limits.tilt_rad
     if is_given:
         input_limit = min(acceleration_m_s2, ranges.thrust_acceleration_max_m_s2)

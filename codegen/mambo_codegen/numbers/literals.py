@@ -5,7 +5,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.methods.one_norm.formats import LARGEST, raw
+from mambo_codegen.numbers.fixed_point import LARGEST, raw
 
 Scalar = type[np.floating[Any]]
 """The scalar type of a floating point controller, `numpy.float32` or `numpy.float64`."""

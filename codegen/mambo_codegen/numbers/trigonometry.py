@@ -13,8 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen.methods.one_norm.formats import SINE_BITS, WORD_BITS, Formats
-from mambo_codegen.methods.quadratic.formats import ExactFormats
+from mambo_codegen.numbers.fixed_point import SINE_BITS, WORD_BITS
 from mambo_codegen.numbers.literals import SCALARS
 
 SINE_ERRORS: Final = {"float32": 1.2e-7, "float64": 2.3e-16, "fixed": 2e-9}
@@ -56,14 +55,14 @@ class FixedTrigonometry:
     cosine: tuple[int, ...]
 
 
-def fixed_trigonometry(formats: Formats | ExactFormats) -> FixedTrigonometry:
-    """Derive the constants for the format of yaw in `formats`."""
+def fixed_trigonometry(yaw_bits: int) -> FixedTrigonometry:
+    """Derive the constants for a heading with `yaw_bits` fractional bits."""
     return FixedTrigonometry(
         quarter_turns_per_rad=round(2**WORD_BITS / _QUARTER_TURN),
-        quarter_turns_bits=WORD_BITS + formats.yaw,
+        quarter_turns_bits=WORD_BITS + yaw_bits,
         quarter_turn=round(2**_FINE_BITS * _QUARTER_TURN),
         fine_bits=_FINE_BITS,
-        finer_bits=_FINE_BITS - formats.yaw,
+        finer_bits=_FINE_BITS - yaw_bits,
         sine=_fixed_taylor(3),
         cosine=_fixed_taylor(2),
     )

@@ -9,7 +9,6 @@ from pydantic import ValidationError
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.messages import faults
-from mambo_codegen.settings.methods import used_values
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.toml_file import parse_document, read_text
 
@@ -65,7 +64,7 @@ def to_toml(settings: Settings, title: str = _TITLE) -> str:
     from mambo_codegen.settings.controller_keys import KEYS, SECTIONS  # noqa: PLC0415 - slow to import
 
     parts = [comment(title), comment("A missing key takes the value of preset table1.")]
-    for section, values in used_values(settings).items():
+    for section, values in settings.used_values.items():
         parts += ["", comment(SECTIONS[section]), f"[{section}]"]
         for name, value in values.items():
             key = KEYS[f"{section}.{name}"]

@@ -1,5 +1,6 @@
-"""What the sections of the settings share: the base of every section, and the types of their numbers."""
+"""What the sections of the settings share: their base, the types of their numbers, and marks of keys."""
 
+from dataclasses import dataclass
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -46,6 +47,17 @@ Ramp = Annotated[
     AfterValidator(_none_or_ramp),
     AfterValidator(_without_minus_zero),
 ]
+
+
+@dataclass(frozen=True)
+class OnlyFor:
+    """Marks a section or a key that only controllers with this `cost.norm` use."""
+
+    norm: str
+
+
+ONE_NORM: Final = OnlyFor("1-norm")
+QUADRATIC: Final = OnlyFor("quadratic")
 
 
 class SettingsSection(BaseModel):

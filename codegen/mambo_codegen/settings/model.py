@@ -8,13 +8,9 @@ from typing import Any, Self
 from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from mambo_codegen.methods.one_norm.formats import refusals
-from mambo_codegen.methods.one_norm.horizon import lag_refusals
-from mambo_codegen.methods.quadratic.formats import exact_refusals
-from mambo_codegen.methods.quadratic.law import quadratic_refusals
-from mambo_codegen.settings.methods import is_used, used_values
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.refusal import Refusal
-from mambo_codegen.settings.sections import Damping, Sections, Target
+from mambo_codegen.settings.sections import Sections
 
 
 class Settings(Sections):
@@ -22,11 +18,7 @@ class Settings(Sections):
 
     @model_validator(mode="after")
     def _obeys_joint_rules(self) -> Self:
-        refused = list(self._unused())
-        if not refused:
-            refused = quadratic_refusals(self) if self.cost.norm == "quadratic" else lag_refusals(self)
-        if not refused and self.code.scalar == "fixed":
-            refused = exact_refusals(self) if self.cost.norm == "quadratic" else refusals(self)
+        refused = list(self._unused()) or method_of(self).refusals()
         if refused:
             raise ValidationError.from_exception_data(
                 "Settings",
@@ -46,7 +38,7 @@ class Settings(Sections):
         for section, values in self.model_dump().items():
             defaults = type(self).model_fields[section].default
             for name, value in values.items():
-                if not is_used(self, section, name) and value != getattr(defaults, name):
+                if not self.uses(section, name) and value != getattr(defaults, name):
                     yield Refusal(
                         section, name, f'has no effect with cost.norm = "{self.cost.norm}"; leave it out'
                     )
@@ -55,18 +47,17 @@ class Settings(Sections):
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the C depends on, by section.
 
-        Without [target], and with a 1-norm without cost.norm, model.thrust and [damping], if they are the
-        defaults.
+        Without those that a method leaves out if they are the defaults: [target], and with a 1-norm
+        cost.norm, model.thrust and [damping].
         """
-        values = used_values(self)
-        if self.cost.norm == "1-norm":
-            del values["cost"]["norm"]
-            if self.damping == Damping():
-                del values["damping"]
-            if self.model.thrust == "measured":
-                del values["model"]["thrust"]
-        if self.target == Target():
-            del values["target"]
+        values = self.used_values
+        for path in method_of(self).unnamed:
+            section, _, name = path.partition(".")
+            default = type(self).model_fields[section].default
+            if not name and getattr(self, section) == default:
+                del values[section]
+            elif name and getattr(getattr(self, section), name) == getattr(default, name):
+                del values[section][name]
         return values
 
     @property

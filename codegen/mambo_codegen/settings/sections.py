@@ -6,25 +6,25 @@ The descriptions are the comments of controller.toml and part of the JSON schema
 """
 
 import math
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from mambo_codegen.settings import reserved
-from mambo_codegen.settings.fields import Lag, Number, Ramp, SettingsSection
+from mambo_codegen.settings.fields import ONE_NORM, QUADRATIC, Lag, Number, OnlyFor, Ramp, SettingsSection
 
 
 class Horizon(SettingsSection):
     """How far the controller predicts, and how often it runs."""
 
-    prediction: int = Field(
+    prediction: Annotated[int, ONE_NORM] = Field(
         10,
         ge=1,
         le=50,
         description="N_p, the prediction horizon: number of predicted states in the cost (eq 12, Table I).",
     )
-    control: int = Field(
+    control: Annotated[int, ONE_NORM] = Field(
         2,
         ge=1,
         le=50,
@@ -32,7 +32,7 @@ class Horizon(SettingsSection):
         "pitch for each (eq 12, Table I). At most N_p; the last move is held to the end of the prediction "
         "horizon.",
     )
-    prediction_step_s: Number = Field(
+    prediction_step_s: Annotated[Number, ONE_NORM] = Field(
         0.07,
         ge=0.001,
         le=1,
@@ -47,7 +47,7 @@ class Horizon(SettingsSection):
         description="Update period, in seconds: time between two calls of the step function (100 Hz in "
         "the paper).",
     )
-    ramp_s: Ramp = Field(
+    ramp_s: Annotated[Ramp, QUADRATIC] = Field(
         0.0,
         description="Duration of the ramp that leads from the first free move, the command, to the second, "
         "in seconds; 0 for one free move. With a ramp of 0.3 to 0.6 s the controller sees its tilt limit "
@@ -66,18 +66,18 @@ class Horizon(SettingsSection):
 class Model(SettingsSection):
     """The prediction model of the drone."""
 
-    position_update: Literal["exact", "printed"] = Field(
+    position_update: Annotated[Literal["exact", "printed"], ONE_NORM] = Field(
         "exact",
         description='Factor of the acceleration in the position update (eq 9): tau^2/2 for "exact"; tau/2, '
         'as the paper prints it, for "printed", whose units do not match.',
     )
-    yaw_convention: Literal["rotation", "printed"] = Field(
+    yaw_convention: Annotated[Literal["rotation", "printed"], ONE_NORM] = Field(
         "rotation",
         description='Signs of the terms with yaw psi in eq 8: "rotation" takes those of the rotation matrix '
         '(eq 3, NED); "printed" takes those that eq 8 prints, with which the drone is lost at 45 degrees of '
         "yaw.",
     )
-    thrust: Literal["measured", "hover"] = Field(
+    thrust: Annotated[Literal["measured", "hover"], ONE_NORM] = Field(
         "measured",
         description='Thrust over mass u_1/m in eq 8: "measured" takes that of the control step, as the paper '
         'does; "hover" takes 9.81 m/s^2 in every step, for a drone whose thrust is not known or is noisy.',
@@ -94,53 +94,55 @@ class Model(SettingsSection):
         "pitch loop.",
     )
 
-    roll_gain: Number = Field(
+    roll_gain: Annotated[Number, QUADRATIC] = Field(
         1.0, ge=0.2, le=2, description="Measured roll per commanded roll when the attitude loop has settled."
     )
-    pitch_gain: Number = Field(
+    pitch_gain: Annotated[Number, QUADRATIC] = Field(
         1.0,
         ge=0.2,
         le=2,
         description="Measured pitch per commanded pitch when the attitude loop has settled.",
     )
-    roll_delay_s: Lag = Field(
+    roll_delay_s: Annotated[Lag, QUADRATIC] = Field(
         0.0,
         description="Dead time of the roll loop and its lags other than roll_lag_s, in seconds, together: "
         "they count as one first-order lag.",
     )
-    pitch_delay_s: Lag = Field(
+    pitch_delay_s: Annotated[Lag, QUADRATIC] = Field(
         0.0, description="The same for the pitch loop: dead time and the lags other than pitch_lag_s."
     )
-    roll_integral_1_s: Number = Field(
+    roll_integral_1_s: Annotated[Number, QUADRATIC] = Field(
         0.0,
         ge=0,
         le=20,
         description="Integral gain of the roll loop over its angle gain, in 1/s; 0 for a loop without an "
         "integrator.",
     )
-    pitch_integral_1_s: Number = Field(
+    pitch_integral_1_s: Annotated[Number, QUADRATIC] = Field(
         0.0, ge=0, le=20, description="Integral gain of the pitch loop over its angle gain, in 1/s."
     )
-    roll_trim_rad: Number = Field(
+    roll_trim_rad: Annotated[Number, QUADRATIC] = Field(
         0.0,
         ge=-0.2,
         le=0.2,
         description="Measured roll at which the drone does not accelerate, in radians.",
     )
-    pitch_trim_rad: Number = Field(
+    pitch_trim_rad: Annotated[Number, QUADRATIC] = Field(
         0.0,
         ge=-0.2,
         le=0.2,
         description="Measured pitch at which the drone does not accelerate, in radians.",
     )
-    acceleration_per_tilt: Number = Field(
+    acceleration_per_tilt: Annotated[Number, QUADRATIC] = Field(
         1.0,
         ge=0.2,
         le=2,
         description="Horizontal acceleration per radian of measured tilt, in units of 9.81 m/s^2.",
     )
-    drag_1_s: Number = Field(0.0, ge=0, le=5, description="Linear drag: deceleration over velocity, in 1/s.")
-    attitude: Literal["measured", "predicted"] = Field(
+    drag_1_s: Annotated[Number, QUADRATIC] = Field(
+        0.0, ge=0, le=5, description="Linear drag: deceleration over velocity, in 1/s."
+    )
+    attitude: Annotated[Literal["measured", "predicted"], QUADRATIC] = Field(
         "measured",
         description='Attitude at the start of the prediction: "measured", or "predicted" from the past '
         "commands, which closes no quick loop through the attitude and so tolerates slow motors.",
@@ -187,14 +189,14 @@ class Cost(SettingsSection):
         'small cost; "quadratic" sums squares, and its exact minimum is a matter of a few products.',
     )
 
-    tracking_weight: Number = Field(
+    tracking_weight: Annotated[Number, ONE_NORM] = Field(
         2250.0,
         ge=0.001,
         le=1e6,
         description="lambda_1, in 1/m: weight of the 1-norm of the distance between predicted and target "
         "position (eq 12, Table I).",
     )
-    effort_weight: Number = Field(
+    effort_weight: Annotated[Number, ONE_NORM] = Field(
         1.0,
         ge=0,
         le=1e6,
@@ -202,14 +204,14 @@ class Cost(SettingsSection):
         "(eq 12, Table I). A larger weight gives calmer commands and larger tracking errors.",
     )
 
-    response_time_s: Number = Field(
+    response_time_s: Annotated[Number, QUADRATIC] = Field(
         0.215,
         ge=0.02,
         le=2,
         description="Time in which the drone answers an error, in seconds: its cube is the weight of the "
         "command's rate, in s^3. Shorter is closer to the target and less robust.",
     )
-    velocity_weight_s: Number = Field(
+    velocity_weight_s: Annotated[Number, QUADRATIC] = Field(
         0.0,
         ge=0,
         le=2,
@@ -439,14 +441,31 @@ class Sections(SettingsSection):
     cost: Cost = Field(
         Cost(), description="The cost: distance from the target, and changes of the attitude command."
     )
-    observer: Observer = Field(
+    observer: Annotated[Observer, QUADRATIC] = Field(
         Observer(),
         description="The estimate of position, velocity and disturbance: a Kalman filter with fixed gains.",
     )
     damping: Damping = Field(Damping(), description="Feedback of the attitude's rates to the commands.")
-    optimizer: Optimizer = Field(Optimizer(), description="The RPROP search for the moves.")
+    optimizer: Annotated[Optimizer, ONE_NORM] = Field(
+        Optimizer(), description="The RPROP search for the moves."
+    )
     limits: Limits = Field(Limits(), description="The limits of the commands.")
     ranges: Ranges = Field(
         Ranges(), description="The ranges of the inputs; a step refuses an input out of range with a status."
     )
     code: Code = Field(Code(), description="Types and names of the C.")
+
+    def uses(self, section: str, name: str) -> bool:
+        """Return whether a controller with the norm of these settings uses a key."""
+        whole = type(self).model_fields[section]
+        marks = (*whole.metadata, *type(getattr(self, section)).model_fields[name].metadata)
+        return all(mark.norm == self.cost.norm for mark in marks if isinstance(mark, OnlyFor))
+
+    @property
+    def used_values(self) -> dict[str, dict[str, Any]]:
+        """The values of the keys that a controller uses, by section; a section without any is left out."""
+        found = {
+            section: {name: value for name, value in values.items() if self.uses(section, name)}
+            for section, values in self.model_dump().items()
+        }
+        return {section: values for section, values in found.items() if values}

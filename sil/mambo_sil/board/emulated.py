@@ -1,5 +1,6 @@
 """The emulated controller: the C built for a board, run on an emulated core, with the same interface."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -9,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.bundle.digest import TICKS
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulation.avr_machine import Long
 from mambo_sil.board.emulation.machine import TIME_LIMIT_S, start
 from mambo_sil.board.firmware.firmware_build import Builder
 from mambo_sil.errors import EmulatorError
-from mambo_sil.flight.controllers.compiled import DIRT, as_arrays, as_step, empty_outcome
+from mambo_sil.flight.controllers.compiled import DIRT, as_arrays, empty_outcome
 from mambo_sil.flight.controllers.controller_library import batch_source, with_default_prefix
 
 GUEST: Final = ("nmpc_batch_step", "nmpc_batch_init", "nmpc_batch_instance_bytes", "nmpc_self_test_episode")
@@ -26,9 +27,6 @@ _MAX_WORK: Final = 2_000
 
 _SECONDS_PER_WORK: Final = 2e-4
 """Time limit for each of these, ten times what the slowest core takes on a slow machine."""
-
-_EXACT_WORK: Final = 50
-"""What a step with a quadratic cost counts as."""
 
 _MAX_PADDING: Final = 16
 """Upper bound of the bytes that alignment adds to an array."""
@@ -50,18 +48,18 @@ class EmulatedController:
         self, settings: Settings, elf: Path, core: str, n: int = 1, *, counting: bool = False
     ) -> None:
         self.settings = settings
-        self._design = Design(settings)
-        self._numbers = self._design.numbers
+        self._method = method_of(settings)
+        self._numbers = self._method.numbers
         self.scalar = self._numbers.scalar
         self._n = n
-        work = _work(settings)
+        work = math.prod(method_of(settings).work)
         limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * max(work, _MAX_WORK)
         self.machine = start(elf, core, limit_s, counting=counting)
         one = self._empty_outcome(1)
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
         sizes = [
             self._instance_bytes,
-            *(width * np.dtype(self.scalar).itemsize for width in (7, len(self._design.target), 1)),
+            *(width * np.dtype(self.scalar).itemsize for width in (7, len(self._method.target), 1)),
         ]
         sizes += [values.nbytes for values in one.values()]
         overhead = len(sizes) * (self.machine.word_bytes + _MAX_PADDING) + _MAX_PADDING  # pointers, alignment
@@ -86,9 +84,9 @@ class EmulatedController:
 
         `CompiledController.step` explains k.
 
-        Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
+        Returns the `step_type` of the method.
         """
-        inputs = as_arrays(self._design, self._n, state, target, thrust_acceleration_m_s2)
+        inputs = as_arrays(self._method, self._n, state, target, thrust_acceleration_m_s2)
         outcome = self._empty_outcome(self._n)
         for batch in self._batches():
             for address, values in zip(self._inputs, inputs, strict=True):
@@ -97,7 +95,7 @@ class EmulatedController:
             for name, values in outcome.items():
                 content = self.machine.read(self._outputs[name], values[batch].nbytes)
                 values[batch] = np.frombuffer(content, values.dtype).reshape(values[batch].shape)
-        return as_step(self._design, outcome)
+        return self._method.make_step(outcome)
 
     def save(self) -> bytes:
         """Return the instances as they are now."""
@@ -108,7 +106,7 @@ class EmulatedController:
         self._instances[:] = instances
 
     def _empty_outcome(self, n: int) -> dict[str, NDArray[Any]]:
-        return empty_outcome(self._design, n, f"<i{self.machine.word_bytes}")
+        return empty_outcome(self._method, n, f"<i{self.machine.word_bytes}")
 
     def _batches(self) -> Iterator[slice]:
         """Yield the indices of the controllers of each batch."""
@@ -126,16 +124,10 @@ class EmulatedController:
 
 def digest_emulated(settings: Settings, elf: Path, core: str, episodes: int) -> int:
     """Return the self-test digest, computed by a program of `build_guest` on an emulated core."""
-    limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * _work(settings) * TICKS
+    limit_s = TIME_LIMIT_S + _SECONDS_PER_WORK * math.prod(method_of(settings).work) * TICKS
     machine = start(elf, core, limit_s)
     scratch = machine.arena.allocate(machine.call("nmpc_batch_instance_bytes"))
     digest = 0
     for episode in range(episodes):
         digest = machine.call("nmpc_self_test_episode", scratch, episode, Long(digest))
     return digest
-
-
-def _work(settings: Settings) -> int:
-    if settings.cost.norm == "quadratic":
-        return _EXACT_WORK
-    return settings.horizon.prediction * settings.horizon.control * settings.optimizer.iterations

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import typer
 
-from mambo_codegen.design import Design
 from mambo_codegen.errors import echo
+from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import TARGET
-from mambo_codegen.reference import reference_controller
 from mambo_codegen.settings.model import Settings
 from mambo_sil.cli.options import FlyOptions, load, show
 from mambo_sil.cli.progress import progress_bar
@@ -155,7 +154,7 @@ def finish(summary: FlightSummary, text: str, options: FlyOptions, files: tuple[
 def _controller(options: FlyOptions, settings: Settings) -> PositionController:
     match options.controller:
         case "reference":
-            return reference_controller(Design(settings))
+            return method_of(settings).reference_controller()
         case "nmpc":
             return CompiledController(settings)
         case pd:
@@ -192,8 +191,8 @@ def _trajectory(options: FlyOptions) -> Trajectory:
 
 def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
     """Raise FlightError if the controller, in its scalar type, would refuse a target of the flight."""
-    design, ranges = Design(settings), settings.ranges
-    numbers, limits = design.numbers, design.limits
+    method, ranges = method_of(settings), settings.ranges
+    numbers, limits = method.numbers, method.limits
     given = np.abs(flight.targets()[:, :1]).max(axis=0)
     x, y, vx, vy = numbers.quantize(given, TARGET)[0]
     for what, refused, largest, unit, key, limit in (

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from mambo_codegen.design import Design
 from mambo_codegen.errors import echo
-from mambo_codegen.reference import reference_controller
+from mambo_codegen.methods import method_of
 from mambo_sil.cli.flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_sil.cli.options import FlyOptions
 from mambo_sil.cli.progress import progress_bar
@@ -67,8 +66,8 @@ def _controllers(record: Record) -> tuple[WatchedController | None, PositionCont
     match record.controller:
         case "pd" | "pd-feedforward":
             return None, pd_controller(record.controller)
-        case _ if record.settings.cost.norm == "quadratic":
-            return None, reference_controller(Design(record.settings))
+        case _ if not method_of(record.settings).iterates:
+            return None, method_of(record.settings).reference_controller()
         case _:
             watched = WatchedController(record.settings)
             return watched, watched

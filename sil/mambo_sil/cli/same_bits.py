@@ -30,6 +30,7 @@ def same_bits(
 ) -> None:
     """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
     from mambo_codegen.bundle.digest import TICKS, episode_count
+    from mambo_codegen.methods import method_of
     from mambo_sil.board.footprint.build_digests import (
         REFERENCE,
         BuildDigest,
@@ -41,7 +42,7 @@ def same_bits(
 
     settings = load(source, scalar)
     chosen = [one for name in board.split(",") for one in load_boards(name)]
-    count = episode_count(settings) if steps is None else steps // TICKS
+    count = episode_count(method_of(settings)) if steps is None else steps // TICKS
     found: list[BuildDigest] = []
     with contextlib.ExitStack() as stack:
         progress = stack.enter_context(progress_bar("comparing builds"))

@@ -34,6 +34,7 @@ def sweep(
 ) -> None:
     """Measure footprint and tracking error over a grid of horizons and iterations."""
     from mambo_codegen import boards
+    from mambo_codegen.methods import method_of
     from mambo_sil.board.footprint.sweep import Grid, budgets, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
     from mambo_sil.cli.progress import counting_bar
@@ -42,7 +43,7 @@ def sweep(
     from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
-    if settings.cost.norm == "quadratic":
+    if not method_of(settings).iterates:
         raise InvalidSettingsError(
             (
                 f'{echo(source)}: cost.norm = "quadratic" must be "1-norm" for a sweep: with a quadratic '

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
-from mambo_codegen.numbers.representation import ACCELERATION, COMMAND, STATE, TARGET, THRUST, WEIGHTS
-from mambo_codegen.reference import Status, choose, reference_controller
+from mambo_codegen.methods import Method, method_of
+from mambo_codegen.methods.inputs import Status, choose
+from mambo_codegen.numbers.representation import ACCELERATION, COMMAND, STATE, TARGET, THRUST
 from mambo_codegen.settings.model import Settings
 
 Tape = NDArray[Any]
@@ -52,52 +52,39 @@ _POINTERS: Final = {
 }
 
 
-def step_quantities(design: Design) -> tuple[str, ...]:
+def step_quantities(method: Method) -> tuple[str, ...]:
     """Return the quantities of a step's numbers: state, target, thrust, and the acceleration if given."""
-    return (*STATE, *TARGET, *THRUST, *(ACCELERATION if len(design.target) > len(TARGET) else ()))
+    return (*STATE, *TARGET, *THRUST, *(ACCELERATION if len(method.target) > len(TARGET) else ()))
 
 
-def _quantities(design: Design) -> dict[ApiFunction, tuple[str, ...]]:
+def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
     """Return the quantities of the numbers that each function reads."""
     return {
-        ApiFunction.STEP: step_quantities(design),
+        ApiFunction.STEP: step_quantities(method),
         ApiFunction.RESET: COMMAND,
-        ApiFunction.SET_WEIGHTS: COMMAND if design.is_quadratic else WEIGHTS,
+        ApiFunction.SET_WEIGHTS: method.setter_quantities,
         ApiFunction.INIT: COMMAND,
     }
 
 
 def call_type(settings: Settings) -> np.dtype[Any]:
     """Return the layout of a call: function in bits 0 and 1 of the byte, null pointers in bits 2 to 5."""
-    design = Design(settings)
-    return np.dtype([("call", np.uint8), ("values", design.numbers.scalar, len(step_quantities(design)))])
+    method = method_of(settings)
+    return np.dtype([("call", np.uint8), ("values", method.numbers.scalar, len(step_quantities(method)))])
 
 
 def outcome_type(settings: Settings) -> np.dtype[Any]:
-    """Return the layout of an outcome, as `replay.c` writes it."""
-    design, numbers = Design(settings), Design(settings).numbers
-    command = ("command_rad", numbers.scalar, 2)
-    if design.is_quadratic:
-        return np.dtype(
-            [
-                ("status", np.int32),
-                ("missed", np.int32),
-                ("saturated", np.int32),
-                command,
-                ("stored", numbers.scalar, len(design.stored)),
-            ]
-        )
-    moves = 2 * settings.horizon.control
+    """Return the layout of an outcome, as `replay.c` writes it: status, counts and flags, numbers."""
+    method = method_of(settings)
+    quantity = {one.name: one.quantities for one in method.results}
+    left = method.reference_controller().outcome
     return np.dtype(
-        [
-            ("status", np.int32),
-            ("iterations", np.int32),
-            ("converged", np.int32),
-            ("saturated", np.int32),
-            command,
-            ("cost", numbers.wide),
-            ("gradient", numbers.wide, moves),
-            ("plan_rad", numbers.scalar, moves),
+        [("status", np.int32)]
+        + [
+            (name, method.numbers.type_of(quantity[name][0]), values[0].size)
+            if quantity.get(name)
+            else (name, np.int32)
+            for name, values in left.items()
         ]
     )
 
@@ -106,9 +93,9 @@ def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls
     """Return a call of `function` for each row of values (n, k); `nulls` is the mask of null pointers."""
     made = np.zeros(len(values), call_type(settings))
     made["call"] = function | (nulls << 2)
-    design = Design(settings)
-    quantities = _quantities(design)[function][: values.shape[1]]
-    made["values"][:, : values.shape[1]] = design.numbers.quantize(values, quantities)
+    method = method_of(settings)
+    quantities = _quantities(method)[function][: values.shape[1]]
+    made["values"][:, : values.shape[1]] = method.numbers.quantize(values, quantities)
     return made
 
 
@@ -138,9 +125,9 @@ class _Runs:
 
     def __init__(self, settings: Settings, n: int) -> None:
         self._settings = settings
-        self._design = Design(settings)
-        self._quantities = _quantities(self._design)
-        self._controller: Any = reference_controller(self._design, n)
+        self._method = method_of(settings)
+        self._quantities = _quantities(self._method)
+        self._controller: Any = self._method.reference_controller(n)
         self._fresh = self._controller.memory
 
     def make(self, now: Tape) -> Outcomes:
@@ -153,7 +140,7 @@ class _Runs:
         def call(wanted: ApiFunction, made: Callable[[NDArray[Any]], NDArray[np.int64]]) -> NDArray[np.int64]:
             before, quantities = controller.memory, self._quantities[wanted]
             values = now["values"][:, : len(quantities)]
-            status = made(self._design.numbers.to_si(values, *quantities))
+            status = made(self._method.numbers.to_si(values, *quantities))
             controller.memory = choose((function == wanted) & ~null, controller.memory, before)
             return status
 
@@ -162,7 +149,7 @@ class _Runs:
             status: NDArray[np.int64] = controller.step(values[:, 0:7], target, values[:, 11]).status
             return status
 
-        set_other = controller.set_command if self._design.is_quadratic else controller.set_weights
+        set_other = getattr(controller, self._method.setter)
         outcome = np.zeros(len(now), outcome_type(self._settings))
         with np.errstate(all="ignore"):
             resets = call(ApiFunction.RESET, controller.reset)
@@ -172,20 +159,12 @@ class _Runs:
 
         status = np.choose(function, [steps, resets, others, np.zeros_like(steps)])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
-        memory = controller.memory
+        for name, values in controller.outcome.items():
+            outcome[name] = values.reshape(outcome[name].shape)
         writes = (function == ApiFunction.STEP) & ((nulls & NULL_COMMAND) == 0)
         level = ((nulls & NULL_SELF) != 0)[:, None]
-        sent_rad = memory.command_rad if self._design.is_quadratic else memory.sent_rad
-        outcome["command_rad"] = np.where(writes[:, None], np.where(level, 0, sent_rad), UNWRITTEN_RAD)
-        if self._design.is_quadratic:
-            outcome["missed"], outcome["saturated"] = memory.missed, memory.saturated
-            outcome["stored"] = controller.stored
-            return outcome
-        outcome["saturated"] = np.any(np.abs(sent_rad) >= self._design.limits.tilt, axis=1)
-        for name in ("iterations", "converged", "cost"):
-            outcome[name] = getattr(memory, name)
-        for name in ("gradient", "plan_rad"):
-            outcome[name] = getattr(memory, name).reshape(len(now), -1)
+        sent_rad = np.where(level, 0, outcome["command_rad"])
+        outcome["command_rad"] = np.where(writes[:, None], sent_rad, UNWRITTEN_RAD)
         return outcome
 
     def _initialise(self, chosen: NDArray[np.bool_]) -> None:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
 from mambo_codegen.numbers.literals import SCALARS, Scalar
 from mambo_codegen.numbers.representation import COMMAND, WEIGHTS
@@ -38,15 +38,15 @@ RANDOM_TAPES: Final = 1000
 @lru_cache(maxsize=2)
 def cases(settings: Settings) -> tuple[tuple[Tape, ...], tuple[Outcomes, ...]]:
     """Return the tapes of all cases, and the outcomes of the reference for each."""
-    rng, is_quadratic = np.random.default_rng(0), Design(settings).is_quadratic
+    rng, method = np.random.default_rng(0), method_of(settings)
     tapes = (
         *random_tapes(settings, RANDOM_TAPES),
         *_limits(settings, rng),
         *_nulls(settings, rng),
         *_quadrants(settings, rng),
-        *([] if is_quadratic else _convergence(settings)),
-        *([] if is_quadratic else _zero_errors(settings)),
-        *(_outages(settings, rng) if is_quadratic else []),
+        *(_convergence(settings) if method.iterates else []),
+        *(_zero_errors(settings) if method.iterates else []),
+        *(_outages(settings, rng, method.outage_steps) if method.outage_steps is not None else []),
         *_largest_inputs(settings, rng),
         *_target_motion(settings),
     )
@@ -74,14 +74,13 @@ def random_tapes(settings: Settings, n: int) -> list[Tape]:
     weights = 10.0 ** rng.uniform(-3, 6, (n, 2))
     weights[3::7] = rng.choice([0.0, WEIGHT_LIMIT], weights[3::7].shape)
     weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1 * WEIGHT_LIMIT], len(weights[::7]))
-    quadratic = Design(settings).is_quadratic
     columns = [
         *(calls(settings, ApiFunction.STEP, rows) for rows in steps[:3]),
         calls(settings, ApiFunction.RESET, command),
         *(calls(settings, ApiFunction.STEP, rows) for rows in steps[3:5]),
-        calls(settings, ApiFunction.SET_COMMAND, command[::-1])
-        if quadratic
-        else calls(settings, ApiFunction.SET_WEIGHTS, weights),
+        calls(settings, ApiFunction.SET_WEIGHTS, weights)
+        if method_of(settings).weight_limits
+        else calls(settings, ApiFunction.SET_COMMAND, command[::-1]),
         *(calls(settings, ApiFunction.STEP, rows) for rows in steps[5:]),
     ]
     return list(np.stack(columns, axis=1))
@@ -104,25 +103,22 @@ def _limits(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
     bounds = [(-limit, limit) for limit in symmetric]
     most_m_s2 = ranges.thrust_acceleration_max_m_s2
     bounds.append((ranges.thrust_acceleration_min_m_s2, most_m_s2))
-    quantities = step_quantities(Design(settings))
+    quantities = step_quantities(method_of(settings))
     bounds += [(-most_m_s2, most_m_s2)] * (len(quantities) - len(bounds))
     for index, (quantity, ends) in enumerate(zip(quantities, bounds, strict=True)):
         for value in _around(settings, quantity, *ends):
             good = _good_steps(settings, rng, 4)
             good[1, index] = value
             yield calls(settings, ApiFunction.STEP, good)
-    numbers = Design(settings).numbers
+    weight_limits = method_of(settings).weight_limits
     pairs: list[tuple[ApiFunction, Sequence[str], Sequence[float], Sequence[float]]] = [
-        (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), (numbers.tracking_limit, numbers.effort_limit))
+        (function, COMMAND, (-limit,) * 2, (limit,) * 2)
+        for function in (ApiFunction.SET_COMMAND, ApiFunction.RESET)
+        for limit in (ATTITUDE_LIMIT_RAD, tilt)
+        if function == ApiFunction.RESET or not weight_limits
     ]
-    if Design(settings).is_quadratic:
-        pairs = [
-            (ApiFunction.SET_COMMAND, COMMAND, (-limit,) * 2, (limit,) * 2)
-            for limit in (ATTITUDE_LIMIT_RAD, tilt)
-        ]
-    pairs += [
-        (ApiFunction.RESET, COMMAND, (-limit,) * 2, (limit,) * 2) for limit in (ATTITUDE_LIMIT_RAD, tilt)
-    ]
+    if weight_limits:
+        pairs.insert(0, (ApiFunction.SET_WEIGHTS, WEIGHTS, (0.0, 0.0), weight_limits))
     for function, names, lows, highs in pairs:
         for index in range(2):
             for value in _around(settings, names[index], lows[index], highs[index]):
@@ -172,7 +168,8 @@ def _convergence(settings: Settings) -> list[Tape]:
     neighbours are the cases. In fixed point one unit of that weight changes the cost by many units, so
     bisection also finds the effort weight, whose unit is finer than that of the cost.
     """
-    n, scalar, numbers = 16, _floating(settings), Design(settings).numbers
+    n, scalar, numbers = 16, _floating(settings), method_of(settings).numbers
+    most_tracking, most_effort = method_of(settings).weight_limits
     near_m = 1e-7 if numbers.bits is None else math.ldexp(1, -numbers.bits["position"])
     steps = np.zeros((n, 12))
     steps[:, 0:2] = near_m * np.linspace(1, 2, n)[:, None]
@@ -193,13 +190,13 @@ def _convergence(settings: Settings) -> list[Tape]:
         return resting, moving
 
     without = np.zeros(n)
-    resting, moving = between(lambda weights: tapes(weights, without), numbers.tracking_limit)
+    resting, moving = between(lambda weights: tapes(weights, without), most_tracking)
     found = []
     for _ in range(8):
         found += tapes(moving, without)
         moving = np.nextafter(moving, scalar(0))
     if numbers.bits is not None:
-        for effort in between(lambda weights: tapes(resting, weights), numbers.effort_limit):
+        for effort in between(lambda weights: tapes(resting, weights), most_effort):
             found += tapes(resting, effort)
     return found
 
@@ -216,12 +213,12 @@ def _zero_errors(settings: Settings) -> Iterator[Tape]:
             yield calls(settings, ApiFunction.STEP, steps)
 
 
-def _outages(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
-    """Refuse states for as long as the estimate lasts, and a step less or more; then come good steps again.
+def _outages(settings: Settings, rng: np.random.Generator, limit: int) -> Iterator[Tape]:
+    """Refuse states for the `limit` steps that the estimate lasts, and a step less or more.
 
+    Then come good steps again.
     The targets are good in one tape and refused in another, so that both kinds of step are repeated.
     """
-    limit = Design(settings).observer.outage_steps
     for refused in (1, max(1, limit - 1), limit, limit + 1, limit + 3):
         for target in (0.0, np.nan):
             steps = _good_steps(settings, rng, refused + 6)
@@ -236,10 +233,10 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
 
     Then start one unit below the tilt limit with a target that wants more tilt: the smallest change of tilt.
     """
-    numbers = Design(settings).numbers
+    numbers = method_of(settings).numbers
     if numbers.bits is None:
         return
-    limits = Design(settings).limits
+    limits = method_of(settings).limits
     most = np.array(
         [
             *[limits.position] * 2,
@@ -251,7 +248,7 @@ def _largest_inputs(settings: Settings, rng: np.random.Generator) -> Iterator[Ta
             limits.thrust_most,
         ]
     )
-    quantities = step_quantities(Design(settings))
+    quantities = step_quantities(method_of(settings))
     most = np.append(most, [limits.thrust_most] * (len(quantities) - len(most)))
     steps = numbers.to_si(most * rng.choice([-1, 1], (512, len(most))), *quantities)
     steps[:, 11] = np.abs(steps[:, 11])
@@ -276,7 +273,7 @@ def _target_motion(settings: Settings) -> Iterator[Tape]:
     If the acceleration is given, set it to its limit and the numbers next to that. Then accelerate the target
     to and fro along both axes, so that acceleration and jerk reach their limits, with a reset on the way.
     """
-    tracker, ranges = Design(settings).tracker, settings.ranges
+    tracker, ranges = method_of(settings).tracker, settings.ranges
     if tracker is None:
         return
 
@@ -318,7 +315,7 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
     target = state[:, :4] + 0.1 * rng.uniform(-1, 1, (n, 4)) * scale[:4]
     low, high = ranges.thrust_acceleration_min_m_s2, ranges.thrust_acceleration_max_m_s2
     steps = np.concatenate([state, target, np.clip(rng.uniform(8, 12, (n, 1)), low, high)], axis=1)
-    tracker = Design(settings).tracker
+    tracker = method_of(settings).tracker
     if tracker and tracker.is_given:
         steps = np.concatenate([steps, rng.uniform(-0.5, 0.5, (n, 2)) * tracker.input_limit], axis=1)
     return steps
@@ -326,7 +323,7 @@ def _good_steps(settings: Settings, rng: np.random.Generator, n: int) -> Array:
 
 def _around(settings: Settings, quantity: str, low: float, high: float) -> Array:
     """Return both limits of a range, their neighbours, NaN, infinities, zeros and the smallest numbers."""
-    scalar, numbers = _floating(settings), Design(settings).numbers
+    scalar, numbers = _floating(settings), method_of(settings).numbers
     ends = np.array([low, high], scalar)
     beyond = np.array([-np.inf, np.inf], scalar)
     neighbours = [np.nextafter(ends, beyond), np.nextafter(ends, -beyond)]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.experiment.faults.fault_flights import STRAY_M, End, Verdict, fly_faults
@@ -46,7 +46,7 @@ def judge(verdicts: Sequence[Verdict], settings: Settings) -> Result:
 
     It is INCOMPLETE if the drone strays without any fault, because then no recovery can be judged.
     """
-    limit = Design(settings).tilt_limit_rad
+    limit = method_of(settings).tilt_limit_rad
     ending = {scenario.name for scenario in scenarios(settings) if scenario.duration_s != TO_THE_END}
     strays = any(not verdict.band_m <= STRAY_M for verdict in verdicts)
     wrong = []

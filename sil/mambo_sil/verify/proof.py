@@ -3,13 +3,14 @@
 import csv
 import shlex
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
-from mambo_codegen.bundle.flags import PROOF_FLAGS, PROOF_PREPROCESSING, proofs
+from mambo_codegen.bundle.flags import PROOF_FLAGS, PROOF_PREPROCESSING
 from mambo_codegen.bundle.render import with_prefix
+from mambo_codegen.methods import method_of
 from mambo_sil.verify.check import Result, Subject, failed, incomplete, passed
 from mambo_sil.verify.tools import TIME_LIMIT_S, missing, number, run
 
@@ -142,8 +143,8 @@ def _is_promise(one: Property) -> bool:
     return one.kind == _PROMISE or one.kind.startswith("precondition of ")
 
 
-def _proofs(subject: Subject) -> dict[str, tuple[str, ...]]:
-    return proofs(subject.settings.code.scalar, subject.settings.cost.norm)
+def _proofs(subject: Subject) -> Mapping[str, tuple[str, ...]]:
+    return method_of(subject.settings).proofs
 
 
 def _driver(subject: Subject) -> Path:

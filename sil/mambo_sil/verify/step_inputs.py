@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def random_inputs(settings: Settings, n: int, rng: np.random.Generator) -> StepI
 
     for row in np.flatnonzero(rng.random(n) < 0.1):
         _make_special(settings, state[row], target[row], thrust[row : row + 1], rng)
-    tracker = Design(settings).tracker
+    tracker = method_of(settings).tracker
     if tracker and tracker.is_given:
         target = np.concatenate([target, _accelerations(tracker.input_limit, high, n, rng)], axis=1)
     return StepInputs(state, target, thrust)
@@ -68,7 +68,7 @@ def random_steps(settings: Settings, n: int, steps: int, rng: np.random.Generato
     in five of these changes is a jump.
     """
     drawn = [random_inputs(settings, n, rng) for _ in range(steps)]
-    tracker = Design(settings).tracker
+    tracker = method_of(settings).tracker
     if tracker is None or tracker.is_given:
         return drawn
     limit_m_s, change_m_s = settings.ranges.velocity_m_s, tracker.tested_input

@@ -12,7 +12,7 @@ import pytest
 from mambo_codegen import boards
 from mambo_codegen.bundle.digest import self_test_digest
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest, digest_emulated
@@ -78,7 +78,7 @@ def test_self_test_steps_have_their_digest_on_eight_bits(
     """The digest of two episodes equals that of the reference."""
     settings = with_option(presets.load(preset), "code.scalar", scalar)
     elf = build_guest(settings, mega, tmp_path)
-    assert digest_emulated(settings, elf, "avr", 2) == self_test_digest(Design(settings), 2)
+    assert digest_emulated(settings, elf, "avr", 2) == self_test_digest(method_of(settings), 2)
 
 
 def test_memory_holds_what_is_written(mega: Builder, tmp_path: Path) -> None:

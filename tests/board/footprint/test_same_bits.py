@@ -9,9 +9,11 @@ import pytest
 from mambo_codegen import boards
 from mambo_codegen.bundle.digest import TICKS, episode_count, episode_inputs, self_test_digest
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
 from mambo_codegen.errors import BuildError
-from mambo_codegen.reference import ReferenceController, Status
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import host_toolchain
@@ -68,7 +70,7 @@ def test_every_build_has_the_digest_of_the_reference(names: tuple[str, ...], sca
         *((*build, flag) for build in builds for flag in OPTIMISATIONS),
     ]
     assert len(found) == count_builds(chosen)
-    assert {one.digest for one in found} == {f"0x{self_test_digest(Design(settings), 3):08X}"}
+    assert {one.digest for one in found} == {f"0x{self_test_digest(OneNorm(settings), 3):08X}"}
 
 
 @pytest.mark.parametrize(("fault", "compiler"), list(zip(FAULTS, BOARD_COMPILERS, strict=True)))
@@ -85,7 +87,7 @@ def test_a_wrong_bundle_has_another_digest(fault: str, compiler: str, tmp_path: 
         build = BOARD_COMPILERS[compiler](boards.load("crazyflie"), "-O2")
         elf = build.guest(bundle, batch_source(), GUEST, tmp_path)
         digests.append(digest_emulated(MAMBO, elf, "cortex-m4", 2))
-    assert digests[0] == self_test_digest(Design(MAMBO), 2) != digests[1]
+    assert digests[0] == self_test_digest(OneNorm(MAMBO), 2) != digests[1]
 
 
 def test_other_settings_and_other_steps_have_other_digests() -> None:
@@ -96,8 +98,8 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
         with_option(MAMBO, "optimizer.variant", "irprop-"),
         with_option(MAMBO, "code.scalar", "float64"),
     ]
-    digests = [self_test_digest(Design(settings), 3) for settings in (MAMBO, *changed)]
-    assert len({*digests, self_test_digest(Design(MAMBO), 4)}) == len(digests) + 1
+    digests = [self_test_digest(OneNorm(settings), 3) for settings in (MAMBO, *changed)]
+    assert len({*digests, self_test_digest(OneNorm(MAMBO), 4)}) == len(digests) + 1
 
 
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
@@ -106,14 +108,14 @@ def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:
     """The digests are equal for extreme horizons and narrow ranges too."""
     settings = settings_case(index, scalar)
     library = load_library(render(settings, with_digest=False), toolchain("gcc"))
-    assert digest_compiled(library, 5) == self_test_digest(Design(settings), 5)
+    assert digest_compiled(library, 5) == self_test_digest(OneNorm(settings), 5)
 
 
 def test_self_test_steps_end_in_every_way() -> None:
     """About one step in thirteen is refused, for each reason; some converge, some reach the tilt limit."""
     episode = np.arange(50, dtype=np.uint32)
-    reference = ReferenceController(Design(MAMBO), len(episode))
-    steps = [reference.step(*inputs) for inputs in episode_inputs(Design(MAMBO), episode)]
+    reference = OneNormController(OneNorm(MAMBO), len(episode))
+    steps = [reference.step(*inputs) for inputs in episode_inputs(OneNorm(MAMBO), episode)]
     assert len(steps) == TICKS
     status = np.array([step.status for step in steps])
     assert set(status.flat) == {Status.OK, Status.BAD_STATE, Status.BAD_TARGET, Status.BAD_THRUST}
@@ -126,7 +128,7 @@ def test_self_test_steps_end_in_every_way() -> None:
 
 def test_self_test_inputs_are_uniform_and_never_repeat() -> None:
     """Inputs are uniformly distributed and uncorrelated, and differ between episodes."""
-    inputs = list(episode_inputs(Design(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
+    inputs = list(episode_inputs(OneNorm(MAMBO), np.arange(400, dtype=np.uint32)))[::4]
     yaw = np.concatenate([state[:, 6] for state, _, _ in inputs])
     yaw = yaw[np.abs(yaw) <= 100]
     shares = np.histogram(yaw, bins=10, range=(-100, 100))[0] / len(yaw)
@@ -140,7 +142,7 @@ def test_a_missing_compiler_is_a_reason(tmp_path: Path, monkeypatch: pytest.Monk
     """A build that cannot run has a reason instead of a digest; the reference always runs."""
     monkeypatch.setenv("PATH", str(tmp_path))
     found = list(run_everywhere(MAMBO, [boards.load("crazyflie"), boards.load("mega")], 1))
-    assert found[0].digest == f"0x{self_test_digest(Design(MAMBO), 1):08X}"
+    assert found[0].digest == f"0x{self_test_digest(OneNorm(MAMBO), 1):08X}"
     reasons = {(one.where, one.compiler, one.reason) for one in found[1:]}
     assert all(one.digest is None for one in found[1:])
     assert ("host", "clang", "clang is missing") in reasons
@@ -172,4 +174,4 @@ def test_a_bundle_has_the_digest_in_its_header(preset: str, scalar: str) -> None
     stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
     assert stated
     library = load_library(files, toolchain(host_toolchain().command[0]))
-    assert digest_compiled(library, episode_count(settings)) == int(stated[1], 16)
+    assert digest_compiled(library, episode_count(method_of(settings))) == int(stated[1], 16)

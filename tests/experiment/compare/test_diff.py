@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import reference_controller
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.presets import preset
@@ -86,15 +86,15 @@ def test_gains_are_those_of_the_controller(settings: Settings) -> None:
     for axis, sign in ((0, -1.0), (1, 1.0)):
         state = np.zeros((1, 7))
         state[0, 1 - axis] = error_m
-        controller = reference_controller(Design(settings), 1)
-        command = controller.step(state, np.zeros((1, len(Design(settings).target))), np.array([9.81]))
+        controller = method_of(settings).reference_controller(1)
+        command = controller.step(state, np.zeros((1, len(method_of(settings).target))), np.array([9.81]))
         gain = laws[axis].position_gain_rad_m
         assert command.command_rad[0, axis] == pytest.approx(sign * gain * error_m, rel=1e-6)
 
 
 def test_poles_are_those_that_damp_the_loop() -> None:
     """The slowest is the spectral radius; all are damped, and the dominant one is among them."""
-    laws, radius = axis_laws(MAMBO), Design(MAMBO).law.spectral_radius
+    laws, radius = axis_laws(MAMBO), Quadratic(MAMBO).law.spectral_radius
     assert laws is not None
     for law, largest in zip(laws, radius, strict=True):
         decays = [frequency * damping for frequency, damping in law.poles]

@@ -8,8 +8,8 @@ import pytest
 
 from mambo_codegen import boards
 from mambo_codegen.bundle.render import render
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ReferenceController
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
 from mambo_sil.board.emulation.machine import CORES as EMULATED_CORES
@@ -96,7 +96,7 @@ def reference_run(index: int, scalar: str) -> tuple[list[StepInputs], Run]:
     settings = settings_case(index, scalar)
     inputs = inputs_of_steps(settings, N, 4, seed=index)
     inputs[2].state[::7, index % 7] = np.nan
-    reference = ReferenceController(Design(settings), N)
+    reference = OneNormController(OneNorm(settings), N)
     return inputs, Run([], [reference.step(case.state, case.target, case.thrust) for case in inputs])
 
 

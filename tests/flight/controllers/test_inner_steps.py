@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import Memory, ReferenceController, Status, Step
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormMemory, OneNormStep
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
@@ -27,9 +28,9 @@ def inputs(settings: Settings) -> tuple[Any, Any, Any]:
 
 
 def step_watched(
-    settings: Settings, memory: Memory, state: Any, target: Any, thrust: Any
-) -> tuple[Step, InnerSteps]:
-    """Step N reference controllers once from `memory`; returns the step and its iterations."""
+    settings: Settings, memory: OneNormMemory, state: Any, target: Any, thrust: Any
+) -> tuple[OneNormStep, InnerSteps]:
+    """OneNormStep N reference controllers once from `memory`; returns the step and its iterations."""
     watched = WatchedController(settings, N)
     watched.controller.memory = memory
     step = watched.step(state, target, thrust)
@@ -39,7 +40,7 @@ def step_watched(
 @pytest.mark.parametrize("settings", [*SETTINGS.values(), presets.load("table1")], ids=[*SETTINGS, "table1"])
 def test_watching_changes_no_bit(settings: Settings) -> None:
     """The watched step is the step, and the last iteration it saw is the one that the step reports."""
-    plain = ReferenceController(Design(settings), N)
+    plain = OneNormController(OneNorm(settings), N)
     for _ in range(2):
         memory = plain.memory
         expected = plain.step(*inputs(settings))
@@ -56,7 +57,7 @@ def test_watching_changes_no_bit(settings: Settings) -> None:
 def test_moves_follow_decisions_and_step_sizes(scalar: str) -> None:
     """A decision that repeats the one before moves against the slope by the step size, up to the limit."""
     settings = SETTINGS[scalar]
-    _, inner = step_watched(settings, ReferenceController(Design(settings), N).memory, *inputs(settings))
+    _, inner = step_watched(settings, OneNormController(OneNorm(settings), N).memory, *inputs(settings))
     decisions, sizes = inner.decisions(settings).astype(np.int64), inner.step_sizes_rad(settings)
     moved_rad = np.diff(inner.plan_rad.astype(np.float64), axis=0)
     assert np.array_equal(np.sign(moved_rad[0]), -decisions[0])  # from level, far from the limit
@@ -73,7 +74,7 @@ def test_moves_follow_decisions_and_step_sizes(scalar: str) -> None:
 def test_after_convergence_all_decisions_are_zero(scalar: str) -> None:
     """With a huge tolerance every cost after the first has converged."""
     settings = with_option(SETTINGS[scalar], "optimizer.tolerance", 1e6)
-    step, inner = step_watched(settings, ReferenceController(Design(settings), N).memory, *inputs(settings))
+    step, inner = step_watched(settings, OneNormController(OneNorm(settings), N).memory, *inputs(settings))
     decisions = inner.decisions(settings)[:, (step.status == Status.OK) & (inner.cost[0] < 1e5)]
     assert decisions[0].any()
     assert not decisions[1:].any()

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ReferenceController
+from mambo_codegen.methods.one_norm.controller import OneNormController
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.drone.plant.airframe import NOMINAL
@@ -164,7 +164,7 @@ def test_the_engine_compiles_without_a_warning(compiler: str, lanes: int, tmp_pa
 def test_what_is_no_c_flies_in_numpy() -> None:
     """A controller in Python, and a delay longer than the engine holds."""
     flight = Flight(Bernoulli(2.0, 0.5), duration_s=0.2)
-    reference = fly(flight, ReferenceController(Design(MAMBO)))
+    reference = fly(flight, OneNormController(OneNorm(MAMBO)))
     assert reference.same_bits(fly(flight, CompiledController(MAMBO)))
     late = Flight(Bernoulli(2.0, 0.5), duration_s=0.2, link=Link(delay_ticks=201))
     assert fly(late, PdController()).same_bits(loop.fly(late, PdController()))

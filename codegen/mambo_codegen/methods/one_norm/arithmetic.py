@@ -11,14 +11,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
-from mambo_codegen.methods.one_norm.formats import SINE_BITS, Formats
+from mambo_codegen.methods.one_norm.constants import OneNormConstants
+from mambo_codegen.methods.one_norm.formats import OneNormFormats
+from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry
 
 
-class Arithmetic(Protocol):
+class OneNormArithmetic(Protocol):
     """The products of a control step and the representation of their numbers."""
 
     numbers: Representation
@@ -78,14 +79,14 @@ class Arithmetic(Protocol):
         """Return steps * change of an angle, rad."""
 
 
-class FloatArithmetic:
+class OneNormFloatArithmetic:
     """Products in float32 or float64."""
 
-    def __init__(self, design: Design) -> None:
-        self.numbers = design.numbers
-        self._trigonometry: Trigonometry = design.trigonometry
-        self._step_s = self.numbers.scalar(design.settings.horizon.prediction_step_s)
-        self._step_squared_s2 = self.numbers.scalar(design.tables.step_squared_s2)
+    def __init__(self, constants: OneNormConstants) -> None:
+        self.numbers = constants.numbers
+        self._trigonometry: Trigonometry = constants.trigonometry
+        self._step_s = self.numbers.scalar(constants.settings.horizon.prediction_step_s)
+        self._step_squared_s2 = self.numbers.scalar(constants.tables.step_squared_s2)
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return sine_cosine(yaw_rad, self._trigonometry)
@@ -140,16 +141,16 @@ class FloatArithmetic:
         return steps * change_rad
 
 
-class FixedArithmetic:
+class OneNormFixedArithmetic:
     """Products in fixed point."""
 
-    def __init__(self, design: Design, formats: Formats) -> None:
-        self.numbers = design.numbers
+    def __init__(self, constants: OneNormConstants, formats: OneNormFormats) -> None:
+        self.numbers = constants.numbers
         self._formats = formats
-        self._trigonometry: FixedTrigonometry = design.trigonometry
-        self._step_s = self.numbers.constant(design.settings.horizon.prediction_step_s, "step")
-        self._step_squared_s2 = self.numbers.constant(design.tables.step_squared_s2, "step_squared")
-        is_given = design.tracker is not None and design.tracker.is_given
+        self._trigonometry: FixedTrigonometry = constants.trigonometry
+        self._step_s = self.numbers.constant(constants.settings.horizon.prediction_step_s, "step")
+        self._step_squared_s2 = self.numbers.constant(constants.tables.step_squared_s2, "step_squared")
+        is_given = constants.tracker is not None and constants.tracker.is_given
         self._target_bits = formats.thrust if is_given else formats.velocity
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
@@ -214,7 +215,11 @@ class FixedArithmetic:
         return rounded(steps * change_rad, self._formats.feedback)
 
 
-def arithmetic(design: Design) -> Arithmetic:
+def arithmetic(constants: OneNormConstants) -> OneNormArithmetic:
     """Return the products of a controller."""
-    formats = design.numbers.formats
-    return FixedArithmetic(design, formats) if isinstance(formats, Formats) else FloatArithmetic(design)
+    formats = constants.numbers.formats
+    return (
+        OneNormFixedArithmetic(constants, formats)
+        if isinstance(formats, OneNormFormats)
+        else OneNormFloatArithmetic(constants)
+    )

@@ -1,15 +1,16 @@
 """Controller: checks the inputs of a step, predicts, optimizes the plan and applies its first move."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.inputs import Inputs, Status, choose
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.optimizer import Minimize, Rprop, Search
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
@@ -18,7 +19,7 @@ from mambo_codegen.numbers.representation import WEIGHTS
 
 
 @dataclass(frozen=True)
-class Memory:
+class OneNormMemory:
     """State of n controllers between two steps.
 
     command_rad, the first moves of the last plan, is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost
@@ -41,7 +42,7 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class Step:
+class OneNormStep:
     """The result of one step of n controllers; after bad input all but the status is of the last good step.
 
     status:      (n,) a `Status` each.
@@ -64,28 +65,28 @@ class Step:
     converged: NDArray[np.bool_]
 
 
-class ReferenceController:
+class OneNormController:
     """n controllers in NumPy that compute the bits of the generated C.
 
     `minimize` may be wrapped to record the iterations of the optimizer.
     """
 
-    def __init__(self, design: Design, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
-        settings, products = design.settings, arithmetic(design)
+    def __init__(self, constants: OneNormConstants, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
+        settings, products = constants.settings, arithmetic(constants)
         self.settings = settings
-        self._numbers, self._inputs = design.numbers, Inputs(design)
+        self._numbers, self._inputs = constants.numbers, Inputs(constants)
         self._products = products
-        self._feedback = design.feedback_steps and np.array(
-            [design.numbers.constant(steps, "feedback") for steps in design.feedback_steps]
+        self._feedback = constants.feedback_steps and np.array(
+            [constants.numbers.constant(steps, "feedback") for steps in constants.feedback_steps]
         )
-        self._predictor = Predictor(design, products)
-        self._tracker = Tracker(design.tracker, products) if design.tracker else None
+        self._predictor = Predictor(constants, products)
+        self._tracker = Tracker(constants.tracker, products) if constants.tracker else None
         self._rprop = Rprop(settings, products)
         self._minimize = minimize
         self.scalar = self._numbers.scalar
         control, computed = settings.horizon.control, self._numbers.computed
         weights = [settings.cost.tracking_weight, settings.cost.effort_weight]
-        self.memory = Memory(
+        self.memory = OneNormMemory(
             command_rad=np.zeros((n, 2), computed),
             plan_rad=np.zeros((n, control, 2), computed),
             weights=np.tile(self._inputs.numbers([weights], WEIGHTS), (n, 1)),
@@ -128,7 +129,7 @@ class ReferenceController:
         self.memory = replace(self.memory, weights=np.where(good[:, None], given, self.memory.weights))
         return np.where(good, Status.OK, Status.BAD_WEIGHT)
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> OneNormStep:
         """Compute the next commands.
 
         state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
@@ -160,7 +161,7 @@ class ReferenceController:
         )
         new = self.memory = choose(good, new, self.memory)
         to_si = self._numbers.to_si
-        return Step(
+        return OneNormStep(
             status=status,
             command_rad=to_si(new.sent_rad, "angle"),
             cost=to_si(new.cost, "cost"),
@@ -169,6 +170,20 @@ class ReferenceController:
             iterations=new.iterations,
             converged=new.converged,
         )
+
+    @property
+    def outcome(self) -> dict[str, NDArray[Any]]:
+        """What the last call left, in the numbers of the C."""
+        memory = self.memory
+        return {
+            "iterations": memory.iterations,
+            "converged": memory.converged,
+            "saturated": np.any(np.abs(memory.sent_rad) >= self._inputs.limits.tilt, axis=1),
+            "command_rad": memory.sent_rad,
+            "cost": memory.cost,
+            "gradient": memory.gradient,
+            "plan_rad": memory.plan_rad,
+        }
 
     def _command(self, moves_rad: Real, tilt_rad: Real) -> Real:
         """Return the commands (n, 2): the first moves, and what the rates of the attitude add."""

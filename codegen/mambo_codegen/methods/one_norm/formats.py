@@ -15,38 +15,24 @@ integers; cost and gradient use at most 53 bits, so that a double holds them exa
 
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass
 from typing import Final
 
 import numpy as np
 
 from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
-from mambo_codegen.methods.quadratic.attitude_constants import feedback_steps
+from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.tracker_constants import TrackerConstants, tracker_constants
+from mambo_codegen.numbers.fixed_point import MARGIN, PRODUCT_BITS, fractional_bits, integer_bits, raw
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, WEIGHT_LIMIT, YAW_LIMIT_RAD
 from mambo_codegen.settings.refusal import Refusal
 from mambo_codegen.settings.sections import Sections
-
-WORD_BITS: Final = 31
-"""Bits of a number without its sign."""
-
-LARGEST: Final = 2**WORD_BITS - 1
-"""Saturation value of an input: outside every input range, so the step refuses it."""
-
-SINE_BITS: Final = 30
-"""Format of sine and cosine, which are at most 1."""
 
 UPPER_BITS: Final = 32
 """Right shift of products with shares and eta; one factor is shifted left first to keep the format."""
 
 SUM_BITS: Final = 53
 """Most bits of cost and gradient without the sign: those of a double, so that logs and tests are exact."""
-
-_PRODUCT_BITS: Final = 62
-"""Most bits of a product without its sign: one less than the type has, because rounding adds half a unit."""
-
-_MARGIN: Final = 1.01
-"""Every bound is enlarged by 1 %, a thousand times more than all roundings over a horizon add."""
 
 _WEIGHT_HEADROOM: Final = 4.0
 """At run time weights may be up to this factor larger than in the settings. An effort weight of 0 counts as
@@ -60,7 +46,7 @@ _SMALLEST_WEIGHT: Final = 512
 
 
 @dataclass(frozen=True)
-class Formats:
+class OneNormFormats:
     """Fractional bits by quantity, and the limits that are not in the settings, as numbers.
 
     position:           input positions and their difference, m.
@@ -109,6 +95,11 @@ class Formats:
     tracking_limit: int
     effort_limit: int
 
+    @property
+    def bits(self) -> dict[str, int]:
+        """Fractional bits by quantity; the limits, which are numbers, are among them and never read."""
+        return asdict(self)
+
 
 @dataclass(frozen=True)
 class _Bounds:
@@ -129,11 +120,14 @@ class _Bounds:
     response: float
 
 
-def formats(settings: Sections, tables: HorizonTables) -> Formats:
+def formats(settings: Sections, tables: HorizonTables) -> OneNormFormats:
     """Choose the formats of `settings`; `refusals` says whether they are fine enough."""
     ranges, optimizer, tilt = settings.ranges, settings.optimizer, settings.limits.tilt_rad
     step_s, gain = settings.horizon.prediction_step_s, _largest_gain(settings, tables)
-    bounds, tracker = _bounds(settings, tables), tracker_constants(settings)
+    bounds, tracker = (
+        _bounds(settings, tables),
+        tracker_constants(settings, settings.horizon.prediction_step_s),
+    )
 
     feedback = feedback_steps(settings)
     factor = fractional_bits(optimizer.increase)
@@ -150,7 +144,7 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         *(size for angle in tables.angles for size in map(abs, astuple(angle))),
     )
     acceleration = fractional_bits(bounds.acceleration, math.ldexp(bounds.shared, UPPER_BITS - share))
-    error_limit = min(2 * ranges.position_m, bounds.error) * _MARGIN
+    error_limit = min(2 * ranges.position_m, bounds.error) * MARGIN
     error = min(
         fractional_bits(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1
     )
@@ -162,24 +156,22 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
     variation = 4 * settings.horizon.control * tilt
     cost = settings.cost
     effort_limit = _WEIGHT_HEADROOM * (cost.effort_weight or min(1.0, cost.tracking_weight))
-    effort = min(
-        fractional_bits(effort_limit), _PRODUCT_BITS - _integer_bits(variation, effort_limit) - angle
-    )
+    effort = min(fractional_bits(effort_limit), PRODUCT_BITS - integer_bits(variation, effort_limit) - angle)
     tracking_limit = _WEIGHT_HEADROOM * cost.tracking_weight
     tracking = min(
         fractional_bits(tracking_limit),
         SUM_BITS
         - 1
-        - max(_integer_bits(tracking_limit, distance), _integer_bits(effort_limit, variation))
+        - max(integer_bits(tracking_limit, distance), integer_bits(effort_limit, variation))
         - error,
         SUM_BITS
         - 1
-        - max(_integer_bits(tracking_limit, gradient_bound), _integer_bits(effort_limit, 2))
+        - max(integer_bits(tracking_limit, gradient_bound), integer_bits(effort_limit, 2))
         - distance_gradient,
         effort + angle - error - 1,
     )
     effort = min(effort, tracking + distance_gradient)
-    return Formats(
+    return OneNormFormats(
         position=position,
         velocity=fractional_bits(2 * ranges.velocity_m_s),
         thrust=fractional_bits(ranges.thrust_acceleration_max_m_s2),
@@ -204,15 +196,6 @@ def formats(settings: Sections, tables: HorizonTables) -> Formats:
         tracking_limit=raw(min(tracking_limit, WEIGHT_LIMIT), tracking),
         effort_limit=raw(min(effort_limit, WEIGHT_LIMIT), effort),
     )
-
-
-def raw(value: float, bits: int) -> int:
-    """Return the integer of format `bits` nearest to `value`, ties away from zero, at most 2^62.
-
-    Only a tolerance can exceed 2^62; no cost does.
-    """
-    size: int = min(math.floor(math.ldexp(abs(value), bits) + 0.5), 2**_PRODUCT_BITS)
-    return -size if value < 0 else size
 
 
 def refusals(settings: Sections) -> list[Refusal]:
@@ -246,11 +229,11 @@ def refusals(settings: Sections) -> list[Refusal]:
     return refused
 
 
-def _resolves_errors(found: Formats) -> bool:
+def _resolves_errors(found: OneNormFormats) -> bool:
     return found.error >= _COARSEST_ERROR_BITS
 
 
-def _resolves_weight(settings: Sections, found: Formats, name: str) -> bool:
+def _resolves_weight(settings: Sections, found: OneNormFormats, name: str) -> bool:
     weight: float = getattr(settings.cost, name)
     bits = found.tracking if name == "tracking_weight" else found.effort
     return weight == 0 or math.ldexp(weight, bits) >= _SMALLEST_WEIGHT
@@ -335,7 +318,7 @@ def _bounds(settings: Sections, tables: HorizonTables) -> _Bounds:
     tilt_rad, steps = settings.limits.tilt_rad, settings.horizon.prediction
     measured_rad = ATTITUDE_LIMIT_RAD if tables.has_lag else 0.0
     gain = _largest_gain(settings, tables)
-    target = _tracker_bound(tracker_constants(settings))
+    target = _tracker_bound(tracker_constants(settings, settings.horizon.prediction_step_s))
     acceleration = shared = 2 * gain * measured_rad + target
     displacement = (
         2 * settings.ranges.velocity_m_s * settings.horizon.prediction_step_s
@@ -376,18 +359,3 @@ def _tracker_bound(tracker: TrackerConstants | None) -> float:
     if tracker is None:
         return 0.0
     return 2 * tracker.acceleration_limit_m_step2 + tracker.jerk_limit_m_step2_update
-
-
-def fractional_bits(*sizes: float) -> int:
-    """Return the most fractional bits with which values of these sizes fit in a word."""
-    return WORD_BITS - _integer_bits(max(sizes), 1.0)
-
-
-def feedback_bits(feedback: tuple[float, float] | None) -> int:
-    """Return the fractional bits of rate feedback in steps: at most those of a sine, a resolution of 1e-9."""
-    return min(fractional_bits(*feedback), SINE_BITS) if feedback else 0
-
-
-def _integer_bits(a: float, b: float) -> int:
-    """Return the integer bits that the product of two bounds needs."""
-    return math.frexp(a * b * _MARGIN)[1]

@@ -17,8 +17,6 @@ from decimal import Decimal, localcontext
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.settings.fields import SHORTEST_LAG_S
-from mambo_codegen.settings.refusal import Refusal
 from mambo_codegen.settings.sections import Horizon, Sections
 
 
@@ -92,23 +90,6 @@ def shortened_lags_s(settings: Sections) -> tuple[float, float]:
         model.roll_lag_s and model.roll_lag_s - damping.roll_rate_feedback_s,
         model.pitch_lag_s and model.pitch_lag_s - damping.pitch_rate_feedback_s,
     )
-
-
-def lag_refusals(settings: Sections) -> list[Refusal]:
-    """Return which attitude lags are too short: for a quadratic cost, and for the feedback of the rates."""
-    refused = []
-    is_quadratic = settings.cost.norm == "quadratic"
-    for angle in ("roll", "pitch"):
-        lag_s = getattr(settings.model, f"{angle}_lag_s")
-        feedback_s = getattr(settings.damping, f"{angle}_rate_feedback_s")
-        shortest_s = round(feedback_s + SHORTEST_LAG_S, 9)
-        if lag_s < shortest_s and (is_quadratic or (lag_s and feedback_s)):
-            reasons = ['cost.norm = "quadratic"'] if is_quadratic else []
-            reasons += [f"damping.{angle}_rate_feedback_s = {feedback_s:g}"] if feedback_s else []
-            least = f"at least {shortest_s:g}" if is_quadratic else f"0 or at least {shortest_s:g}"
-            rule = f"must be {least} with {' and '.join(reasons)}"
-            refused.append(Refusal("model", f"{angle}_lag_s", rule))
-    return refused
 
 
 def _angle(period_s: float, lag_s: float, share: float) -> AngleConstants:

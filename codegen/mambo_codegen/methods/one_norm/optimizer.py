@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.math import Real, sign
-from mambo_codegen.methods.one_norm.arithmetic import Arithmetic
-from mambo_codegen.settings.model import Settings
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
+from mambo_codegen.settings.sections import Sections
 
 Evaluate = Callable[[Real], tuple[Real, Real]]
 """Moves (n, control, 2) -> cost (n,) and gradient (n, control, 2)."""
@@ -35,7 +35,7 @@ class Search:
 class Rprop:
     """The search of one controller; its constants are numbers of that controller."""
 
-    def __init__(self, settings: Settings, arithmetic: Arithmetic) -> None:
+    def __init__(self, settings: Sections, arithmetic: OneNormArithmetic) -> None:
         optimizer, constant = settings.optimizer, arithmetic.numbers.constant
         self._arithmetic = arithmetic
         self._backtracking = optimizer.variant == "rprop+"

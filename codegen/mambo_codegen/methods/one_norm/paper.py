@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.one_norm.horizon import shortened_lags_s
-from mambo_codegen.settings.model import Settings
+from mambo_codegen.settings.sections import Sections
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Paper:
     command.
     """
 
-    settings: Settings
+    settings: Sections
 
     def eq_8(self, psi: float, u_1_m: float) -> Array:
         """Return the matrix (2, 2) that gives the acceleration along x, y from phi, theta."""

@@ -4,9 +4,9 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real
-from mambo_codegen.methods.one_norm.arithmetic import Arithmetic
+from mambo_codegen.methods.one_norm.arithmetic import OneNormArithmetic
+from mambo_codegen.methods.one_norm.constants import OneNormConstants
 
 
 @dataclass(frozen=True)
@@ -30,8 +30,8 @@ class Prediction:
 class Predictor:
     """The constants of the prediction, in the scalar type of the controller."""
 
-    def __init__(self, design: Design, arithmetic: Arithmetic) -> None:
-        settings, tables = design.settings, design.tables
+    def __init__(self, constants: OneNormConstants, arithmetic: OneNormArithmetic) -> None:
+        settings, tables = constants.settings, constants.tables
         self._steps = settings.horizon.prediction
         self._moves = settings.horizon.control
         self._printed_yaw = settings.model.yaw_convention == "printed"

@@ -8,15 +8,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
-from mambo_codegen.methods.one_norm.formats import SINE_BITS
-from mambo_codegen.methods.quadratic.formats import ExactFormats
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.formats import QuadraticFormats
+from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry
 
 
-class ExactArithmetic(Protocol):
+class QuadraticArithmetic(Protocol):
     """The products of a control step and the representation of their numbers."""
 
     numbers: Representation
@@ -91,13 +91,13 @@ class ExactArithmetic(Protocol):
         """Return ratio * move."""
 
 
-class FloatExactArithmetic:
+class QuadraticFloatArithmetic:
     """Products in float32 or float64."""
 
-    def __init__(self, design: Design) -> None:
-        self.numbers = design.numbers
-        self._trigonometry: Trigonometry = design.trigonometry
-        self._update_period_s = self.numbers.scalar(design.settings.horizon.update_period_s)
+    def __init__(self, constants: QuadraticConstants) -> None:
+        self.numbers = constants.numbers
+        self._trigonometry: Trigonometry = constants.trigonometry
+        self._update_period_s = self.numbers.scalar(constants.settings.horizon.update_period_s)
         self._half = self.numbers.scalar(0.5)
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
@@ -141,14 +141,14 @@ class FloatExactArithmetic:
     position_correction = velocity_correction = disturbance_correction = _correction
 
 
-class FixedExactArithmetic:
+class QuadraticFixedArithmetic:
     """Products in fixed point."""
 
-    def __init__(self, design: Design, formats: ExactFormats) -> None:
-        self.numbers = design.numbers
+    def __init__(self, constants: QuadraticConstants, formats: QuadraticFormats) -> None:
+        self.numbers = constants.numbers
         self._shifts = formats.shifts
-        self._trigonometry: FixedTrigonometry = design.trigonometry
-        self._update_period_s = self.numbers.constant(design.settings.horizon.update_period_s, "step")
+        self._trigonometry: FixedTrigonometry = constants.trigonometry
+        self._update_period_s = self.numbers.constant(constants.settings.horizon.update_period_s, "step")
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return fixed_sine_cosine(yaw_rad, self._trigonometry)
@@ -223,9 +223,9 @@ class FixedExactArithmetic:
         return rounded(product, self._shifts[name])
 
 
-def exact_arithmetic(design: Design) -> ExactArithmetic:
+def arithmetic(constants: QuadraticConstants) -> QuadraticArithmetic:
     """Return the products of a controller with a quadratic cost."""
-    formats = design.numbers.formats
-    if isinstance(formats, ExactFormats):
-        return FixedExactArithmetic(design, formats)
-    return FloatExactArithmetic(design)
+    formats = constants.numbers.formats
+    if isinstance(formats, QuadraticFormats):
+        return QuadraticFixedArithmetic(constants, formats)
+    return QuadraticFloatArithmetic(constants)

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, clamp
-from mambo_codegen.methods.quadratic.arithmetic import ExactArithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class AttitudeState:
     cosine: Real
 
 
-def rotate(products: ExactArithmetic, vector: Real, sine: Real, cosine: Real) -> Real:
+def rotate(products: QuadraticArithmetic, vector: Real, sine: Real, cosine: Real) -> Real:
     """Turn vectors (n, 2) by the angles of which sine and cosine (n,) are given."""
     product, one, other = products.sine_product, vector[:, 0], vector[:, 1]
     return np.stack(
@@ -37,8 +37,8 @@ def rotate(products: ExactArithmetic, vector: Real, sine: Real, cosine: Real) ->
 class AttitudeModel:
     """The constants of the attitude model, in the scalar type of the controller."""
 
-    def __init__(self, design: Design, arithmetic: ExactArithmetic) -> None:
-        constant, attitude = arithmetic.numbers.constant, design.attitude
+    def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic) -> None:
+        constant, attitude = arithmetic.numbers.constant, constants.attitude
         self._products = arithmetic
         self._one = constant(1.0, "sine")
 

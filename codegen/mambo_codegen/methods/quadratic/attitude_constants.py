@@ -97,14 +97,6 @@ def attitude_loops(model: Model, damping: Damping) -> tuple[AttitudeLoop, Attitu
     )
 
 
-def feedback_steps(settings: Sections) -> tuple[float, float] | None:
-    """Return commands of roll and pitch per change of the angle in a period; None without feedback."""
-    damping, period_s = settings.damping, settings.horizon.update_period_s
-    if damping.roll_rate_feedback_s == damping.pitch_rate_feedback_s == 0:
-        return None
-    return damping.roll_rate_feedback_s / period_s, damping.pitch_rate_feedback_s / period_s
-
-
 def attitude_constants(settings: Sections) -> AttitudeConstants:
     """Derive the constants of the attitude model."""
     model, period_s = settings.model, mp.mpf(settings.horizon.update_period_s)

@@ -1,23 +1,24 @@
 """Controller with a quadratic cost: estimates the state, models the attitude loops, minimises the cost."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.inputs import Inputs, Status, choose
 from mambo_codegen.methods.math import Real, clamp
-from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
+from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
-from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
+from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.representation import COMMAND
 
 
 @dataclass(frozen=True)
-class ExactMemory:
+class QuadraticMemory:
     """State of n controllers between two steps.
 
     tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state, saturated
@@ -34,14 +35,14 @@ class ExactMemory:
 
 
 @dataclass(frozen=True)
-class ExactStep:
+class QuadraticStep:
     """The result of one step of n controllers.
 
     status:      (n,) a `Status` each.
     command_rad: (n, 2) roll and pitch commands, in rad.
     missed:      (n,) control steps since the last good state.
     saturated:   (n,) whether the last command lies at the tilt limit.
-    stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `Design.stored`.
+    stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `QuadraticConstants.stored`.
     """
 
     status: NDArray[np.int64]
@@ -51,21 +52,21 @@ class ExactStep:
     stored: Real
 
 
-class ExactReferenceController:
+class QuadraticController:
     """n controllers with a quadratic cost in NumPy that compute the bits of the generated C."""
 
-    def __init__(self, design: Design, n: int = 1) -> None:
-        self.settings, self._design = design.settings, design
-        self._numbers, self._products = design.numbers, exact_arithmetic(design)
-        self._inputs = Inputs(design)
-        self._observer = KalmanObserver(design, self._products)
-        self._model = AttitudeModel(design, self._products)
-        self.optimizer = ExactOptimizer(design, self._products, self._model.command_limit)
-        self._tracker = Tracker(design.tracker, self._products) if design.tracker else None
-        self._feedback = design.feedback_steps and np.array(
-            [self._numbers.constant(steps, "feedback") for steps in design.feedback_steps]
+    def __init__(self, constants: QuadraticConstants, n: int = 1) -> None:
+        self.settings, self._design = constants.settings, constants
+        self._numbers, self._products = constants.numbers, arithmetic(constants)
+        self._inputs = Inputs(constants)
+        self._observer = KalmanObserver(constants, self._products)
+        self._model = AttitudeModel(constants, self._products)
+        self.optimizer = QuadraticOptimizer(constants, self._products, self._model.command_limit)
+        self._tracker = Tracker(constants.tracker, self._products) if constants.tracker else None
+        self._feedback = constants.feedback_steps and np.array(
+            [self._numbers.constant(steps, "feedback") for steps in constants.feedback_steps]
         )
-        self._no_estimate = design.observer.outage_steps + 1
+        self._no_estimate = constants.observer.outage_steps + 1
         self.scalar = self._numbers.scalar
         self.memory = self._restarted(np.zeros((n, 2), self._numbers.computed))
 
@@ -90,8 +91,8 @@ class ExactReferenceController:
         self.memory = choose(good, new, memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> ExactStep:
-        """Compute the next commands; the inputs are those of `ReferenceController.step`."""
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> QuadraticStep:
+        """Compute the next commands; the inputs are those of `OneNormController.step`."""
         states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
         has_state, has_target, has_thrust = self._inputs.check(states, targets, thrusts)
         zero = self._numbers.computed(0)
@@ -99,7 +100,7 @@ class ExactReferenceController:
         targets = np.where(has_target[:, None], targets, zero)
         self._advance(states, has_state, targets, has_target & has_thrust)
         memory = self.memory
-        return ExactStep(
+        return QuadraticStep(
             status=self._inputs.status(has_state, has_target, has_thrust),
             command_rad=self._numbers.to_si(memory.command_rad, *COMMAND),
             missed=memory.missed,
@@ -107,9 +108,9 @@ class ExactReferenceController:
             stored=self._numbers.to_si(self.stored, *self._design.stored),
         )
 
-    def _restarted(self, command_rad: Real) -> ExactMemory:
+    def _restarted(self, command_rad: Real) -> QuadraticMemory:
         n, zeros = len(command_rad), np.zeros_like(command_rad)
-        return ExactMemory(
+        return QuadraticMemory(
             estimate=Estimate(zeros, zeros, zeros),
             attitude=self._model.steady(command_rad),
             target=unknown_motion(zeros),
@@ -154,7 +155,7 @@ class ExactReferenceController:
         )
         limit = model.command_limit
         at_limit = np.any((moves >= limit) | (moves <= -limit), axis=1)
-        self.memory = ExactMemory(
+        self.memory = QuadraticMemory(
             estimate=self._observer.predict(estimate, world),
             attitude=choose(commands, moved, attitude),
             target=motion,
@@ -198,6 +199,17 @@ class ExactReferenceController:
     def _to_heading(self, attitude: AttitudeState, world: Real) -> Real:
         """Return vectors (n, 2) along right and forward from those along x and y."""
         return rotate(self._products, world[:, ::-1], attitude.sine, attitude.cosine)
+
+    @property
+    def outcome(self) -> dict[str, NDArray[Any]]:
+        """What the last call left, in the numbers of the C."""
+        memory = self.memory
+        return {
+            "missed": memory.missed,
+            "saturated": memory.saturated,
+            "command_rad": memory.command_rad,
+            "stored": self.stored,
+        }
 
     @property
     def stored(self) -> Real:

@@ -1,6 +1,6 @@
 """The fixed point formats of a controller with a quadratic cost.
 
-As for the 1-norm (`codegen.fixed_point`) each quantity has as many fractional bits as its bound allows, and
+As for the 1-norm each quantity has as many fractional bits as its bound allows, and
 no bound is sampled: each is the sum of the absolute values of all terms, with sine and cosine at most 1 each,
 so that a proof by intervals finds the same bound in the C.
 
@@ -16,11 +16,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.methods.one_norm.formats import SINE_BITS, feedback_bits, fractional_bits
-from mambo_codegen.methods.quadratic.attitude_constants import attitude_constants, feedback_steps
-from mambo_codegen.methods.quadratic.law import STATES, quadratic_constants
+from mambo_codegen.methods.quadratic.attitude_constants import attitude_constants
+from mambo_codegen.methods.quadratic.law import STATES, law_constants
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
+from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.tracker_constants import tracker_constants
+from mambo_codegen.numbers.fixed_point import SINE_BITS, fractional_bits
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.refusal import Refusal
 from mambo_codegen.settings.sections import Sections
@@ -39,7 +40,7 @@ _COARSEST_COMMAND_RAD: Final = 1e-4
 
 
 @dataclass(frozen=True)
-class ExactFormats:
+class QuadraticFormats:
     """Fractional bits by quantity, and the right shifts of products and sums by the names of the templates.
 
     position:     input and estimated positions, m.       velocity: input velocities, m/s.
@@ -50,11 +51,6 @@ class ExactFormats:
 
     bits: Mapping[str, int]
     shifts: Mapping[str, int]
-
-    @property
-    def yaw(self) -> int:
-        """Fractional bits of a heading."""
-        return self.bits["yaw"]
 
 
 @dataclass(frozen=True)
@@ -69,8 +65,8 @@ class _Bounds:
     angle: float
 
 
-def exact_formats(settings: Sections) -> ExactFormats:
-    """Choose the formats of `settings`; `exact_refusals` says whether they are fine enough."""
+def formats(settings: Sections) -> QuadraticFormats:
+    """Choose the formats of `settings`; `refusals` says whether they are fine enough."""
     return _formats(
         settings.horizon,
         settings.model,
@@ -84,11 +80,12 @@ def exact_formats(settings: Sections) -> ExactFormats:
 
 
 @lru_cache(maxsize=64)
-def _formats(*sections: Any) -> ExactFormats:
+def _formats(*sections: Any) -> QuadraticFormats:
     names = ("horizon", "model", "target", "cost", "observer", "damping", "limits", "ranges")
     settings = Sections.model_construct(**dict(zip(names, sections, strict=True)))
     attitude, observer = attitude_constants(settings), observer_constants(settings)
-    law, tracker = quadratic_constants(settings), tracker_constants(settings)
+    law = law_constants(settings)
+    tracker = tracker_constants(settings, settings.horizon.update_period_s)
     bounds, period_s = _bounds(settings), settings.horizon.update_period_s
     ranges = settings.ranges
 
@@ -138,21 +135,21 @@ def _formats(*sections: Any) -> ExactFormats:
             bits[f"{name}_by_{by}"] = shift + bits[kind] - source
     for name, source in zip(STATES, _inputs(bits), strict=True):
         bits[f"row_{name}"] = shifts["row"] + bits["move"] - source
-    return ExactFormats(bits, shifts | _product_shifts(bits, tracker.input_quantity if tracker else ""))
+    return QuadraticFormats(bits, shifts | _product_shifts(bits, tracker.input_quantity if tracker else ""))
 
 
-def exact_refusals(settings: Sections) -> list[Refusal]:
+def refusals(settings: Sections) -> list[Refusal]:
     """Return which values of `settings` fixed point cannot represent."""
-    formats = exact_formats(settings)
-    command_rad = math.ldexp(np.max(attitude_constants(settings).command_rad_step2_m), -formats.bits["move"])
-    unused = {name for name in ("feedback", "ratio") if not formats.bits[name]}
+    found = formats(settings)
+    command_rad = math.ldexp(np.max(attitude_constants(settings).command_rad_step2_m), -found.bits["move"])
+    unused = {name for name in ("feedback", "ratio") if not found.bits[name]}
     least = min(
         shift
-        for name, shift in formats.shifts.items()
+        for name, shift in found.shifts.items()
         if name != "move" and name.removesuffix("_product") not in unused
     )
     if (
-        formats.bits["position"] >= _COARSEST_POSITION_BITS
+        found.bits["position"] >= _COARSEST_POSITION_BITS
         and command_rad <= _COARSEST_COMMAND_RAD
         and least >= 1
     ):
@@ -171,7 +168,8 @@ def _inputs(bits: Mapping[str, int]) -> list[int]:
 
 def _bounds(settings: Sections) -> _Bounds:
     attitude, observer = attitude_constants(settings), observer_constants(settings)
-    law, tracker = quadratic_constants(settings), tracker_constants(settings)
+    law = law_constants(settings)
+    tracker = tracker_constants(settings, settings.horizon.update_period_s)
     reach_m, speed = settings.ranges.position_m, observer.velocity_limit_m_step
     tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
     tilted = max(tilted, attitude.limit_m_step2)

@@ -22,9 +22,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.one_norm.horizon import lag_refusals
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeLoop, attitude_loops
 from mambo_codegen.methods.quadratic.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
+from mambo_codegen.methods.rate_feedback import lag_refusals
 from mambo_codegen.settings.refusal import Refusal
 from mambo_codegen.settings.sections import Cost, Sections
 
@@ -40,7 +40,7 @@ _DISTURBANCE_POLE_1_S: Final = "0.001"
 
 
 @dataclass(frozen=True)
-class QuadraticConstants:
+class LawConstants:
     """Constants of the law, float64, for lengths in m and times in steps of an update period.
 
     moves:          1, or 2 with a ramp.
@@ -57,10 +57,10 @@ class QuadraticConstants:
     spectral_radius: NDArray[np.float64]
 
 
-def quadratic_constants(settings: Sections) -> QuadraticConstants:
+def law_constants(settings: Sections) -> LawConstants:
     """Derive the constants of the law."""
     laws = _laws(settings)
-    return QuadraticConstants(
+    return LawConstants(
         moves=laws[0].rows.shape[0],
         rows=np.array([law.rows for law in laws]),
         ratios=np.array([law.ratio for law in laws]),
@@ -177,9 +177,9 @@ def _scale(loop: AttitudeLoop, period_s: Any) -> list[Any]:
     return [period_s**2, period_s, one, 1 / period_s, one, integral, one, one]
 
 
-def quadratic_refusals(settings: Sections) -> list[Refusal]:
+def refusals(settings: Sections) -> list[Refusal]:
     """Return why a controller with a quadratic cost cannot have `settings`."""
-    refused = lag_refusals(settings)
+    refused = lag_refusals(settings, needs_lag=True)
     horizon, model = settings.horizon, settings.model
     for angle in ("roll", "pitch"):
         trim_rad, gain = getattr(model, f"{angle}_trim_rad"), getattr(model, f"{angle}_gain")
@@ -194,7 +194,7 @@ def quadratic_refusals(settings: Sections) -> list[Refusal]:
     if refused:
         return refused
     try:
-        radius = float(np.max(quadratic_constants(settings).spectral_radius))
+        radius = float(np.max(law_constants(settings).spectral_radius))
     except ValueError:
         radius = math.inf
     if not radius < 1:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, clamp
-from mambo_codegen.methods.quadratic.arithmetic import ExactArithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Estimate:
 class KalmanObserver:
     """The constants of the observer, in the scalar type of the controller."""
 
-    def __init__(self, design: Design, arithmetic: ExactArithmetic) -> None:
-        constant, observer = arithmetic.numbers.constant, design.observer
+    def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic) -> None:
+        constant, observer = arithmetic.numbers.constant, constants.observer
         self._products = arithmetic
         self._gain = [
             [constant(observer.gain[row][column], name) for column, name in enumerate(names)]
@@ -34,7 +34,7 @@ class KalmanObserver:
                 )
             )
         ]
-        self._position_limit = constant(design.settings.ranges.position_m, "position")
+        self._position_limit = constant(constants.settings.ranges.position_m, "position")
         self._velocity_limit = constant(observer.velocity_limit_m_step, "speed")
         self._disturbance_limit = constant(observer.disturbance_limit_m_step2, "acceleration")
         self._drag = constant(observer.drag_1_step, "drag") if observer.drag_1_step else None

@@ -1,20 +1,34 @@
-"""Optimizer of the quadratic cost: its exact minimum in a box, along both axes of the heading."""
+"""Optimizer of the quadratic cost: its minimum in a box, along both axes of the heading."""
+
+from typing import Final
 
 import numpy as np
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, clamp
-from mambo_codegen.methods.quadratic.arithmetic import ExactArithmetic
+from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.law import STATES
+
+ROW: Final = tuple(f"row_{state}" for state in STATES)
+"""The quantity of each gain of a row."""
 
 
-class ExactOptimizer:
+class QuadraticOptimizer:
     """The constants of the minimum, in the scalar type of the controller."""
 
-    def __init__(self, design: Design, arithmetic: ExactArithmetic, limit: Real) -> None:
-        numbers, law = arithmetic.numbers, design.law
+    def __init__(self, constants: QuadraticConstants, arithmetic: QuadraticArithmetic, limit: Real) -> None:
+        numbers, law = arithmetic.numbers, constants.law
         self._products = arithmetic
         self._limit = limit
-        self._rows = numbers.row_constants(law.rows)
+        self._rows = np.array(
+            [
+                [
+                    [numbers.constant(value, name) for value, name in zip(row, ROW, strict=True)]
+                    for row in axis
+                ]
+                for axis in law.rows
+            ]
+        )
         self._ratios = np.array([numbers.constant(ratio, "ratio") for ratio in law.ratios])
 
     def minimize(self, state: Real) -> Real:

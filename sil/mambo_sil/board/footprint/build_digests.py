@@ -7,8 +7,8 @@ from typing import Final
 
 from mambo_codegen.boards import Board
 from mambo_codegen.bundle.digest import self_test_digest
-from mambo_codegen.design import Design
 from mambo_codegen.errors import BuildError, echo
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.board.emulated import build_guest, digest_emulated
@@ -37,7 +37,7 @@ class BuildDigest:
 
 def run_everywhere(settings: Settings, boards: Sequence[Board], episodes: int) -> Iterator[BuildDigest]:
     """Yield the digest of the reference, then of every build for this machine and for `boards`."""
-    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(Design(settings), episodes)))
+    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(method_of(settings), episodes)))
     for name in HOST_COMPILERS:
         for optimisation in OPTIMISATIONS:
             yield _on_host(settings, name, optimisation, episodes)
@@ -51,7 +51,7 @@ def run_on_board(
     settings: Settings, board: Connection, episodes: int, progress: Callable[[float], None]
 ) -> Iterator[BuildDigest]:
     """Yield the digest of the reference, then that of a real board; call `progress` with the share done."""
-    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(Design(settings), episodes)))
+    yield BuildDigest(REFERENCE, "NumPy", "", _format(self_test_digest(method_of(settings), episodes)))
     digest = board.digest(episodes, progress)
     yield BuildDigest("board", echo(board.greeting.board), "", _format(digest))
 

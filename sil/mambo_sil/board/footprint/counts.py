@@ -10,7 +10,7 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field
 
-from mambo_codegen.reference import Step
+from mambo_codegen.methods.one_norm.controller import OneNormStep
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import EmulatedController
 from mambo_sil.board.firmware.elf import load
@@ -77,11 +77,13 @@ class CountingController:
         self._name_of = lru_cache(None)(image.name_of)
         self.steps: list[CountedStep] = []
 
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Step:
+    def step(
+        self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray
+    ) -> OneNormStep:
         """Step once with state (1, 7), target (1, 4) and thrust_acceleration_m_s2 (1,)."""
         before = self._emulated.save()
         self._emulated.machine.take_counts()
-        outcome: Step = self._emulated.step(state, target, thrust_acceleration_m_s2)
+        outcome: OneNormStep = self._emulated.step(state, target, thrust_acceleration_m_s2)
         by_function: Counter[str] = Counter()
         for address, instructions in self._emulated.machine.take_counts().items():
             name = self._name_of(address).partition("+")[0]

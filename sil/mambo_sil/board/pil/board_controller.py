@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import Method, Step, method_of
 from mambo_codegen.numbers.representation import COMMAND
-from mambo_codegen.reference import ExactStep, Step
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.serial_messages import StepReply
@@ -31,7 +30,7 @@ class BoardController:
     """
 
     def __init__(self, settings: Settings, board: Connection) -> None:
-        self._board, self._desk, self._design = board, CompiledController(settings), Design(settings)
+        self._board, self._desk, self._method = board, CompiledController(settings), method_of(settings)
         self.replies: list[StepReply] = []
         self.different: list[int] = []
 
@@ -41,35 +40,33 @@ class BoardController:
         `CompiledController.step` explains k.
         Raises BoardError if the board is lost.
         """
-        inputs = as_arrays(self._design, 1, state, target, thrust_acceleration_m_s2)
+        inputs = as_arrays(self._method, 1, state, target, thrust_acceleration_m_s2)
         reply = self._board.step(b"".join(as_bytes(values) for values in inputs))
         desk = self._desk.step(state, target, thrust_acceleration_m_s2)
-        if reply.bits != desk_bits(self._design, desk):
+        if reply.bits != desk_bits(self._method, desk):
             self.different.append(len(self.replies))
         self.replies.append(reply)
-        return BoardStep(command_of(self._design, reply), np.array([reply.status]))
+        return BoardStep(command_of(self._method, reply), np.array([reply.status]))
 
 
-def command_of(design: Design, reply: StepReply) -> NDArray[np.floating]:
+def command_of(method: Method, reply: StepReply) -> NDArray[np.floating]:
     """Return roll and pitch (1, 2) of a reply, in rad."""
-    numbers = design.numbers
+    numbers = method.numbers
     command = np.frombuffer(reply.command, np.dtype(numbers.scalar).newbyteorder("<"))
     return numbers.to_si(command.astype(numbers.scalar)[np.newaxis], *COMMAND)
 
 
-def desk_bits(design: Design, step: Step | ExactStep) -> tuple[int, bytes, int]:
+def desk_bits(method: Method, step: Step) -> tuple[int, bytes, int]:
     """Return the `StepReply.bits` of a board that has the bits of `step`."""
-    numbers = design.numbers
-    if isinstance(step, ExactStep):
-        flags = bytes([int(step.missed[0]), int(step.saturated[0])])
-        outcome = as_bytes(numbers.stored_from_si(step.stored, design.stored))
-    else:
-        flags = bytes([int(step.iterations[0]), int(step.converged[0])])
-        outcome = b"".join(
-            as_bytes(numbers.from_si(getattr(step, name), name)) for name in ("cost", "gradient", "plan_rad")
-        )
-    command = as_bytes(numbers.from_si(step.command_rad, "command_rad"))
-    return int(step.status[0]), command, zlib.crc32(outcome + flags)
+    counts, outcome = b"", b""
+    for one in method.results:
+        values = getattr(step, one.name)
+        if not one.quantities:
+            counts += bytes([int(values[0])])
+        elif one.name != "command_rad":
+            outcome += as_bytes(method.numbers.from_si(values, *one.quantities))
+    command = as_bytes(method.numbers.from_si(step.command_rad, *COMMAND))
+    return counts[0], command, zlib.crc32(outcome + counts[1:])
 
 
 def as_bytes(values: NDArray[np.generic]) -> bytes:

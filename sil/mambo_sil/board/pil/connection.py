@@ -17,8 +17,8 @@ import numpy as np
 
 from mambo_codegen import __version__
 from mambo_codegen.bundle.bundle import GENERATOR
-from mambo_codegen.design import Design
 from mambo_codegen.errors import echo
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.serial_frames import Receiver, encode, frame_bytes
 from mambo_sil.board.pil.serial_messages import (
@@ -77,7 +77,7 @@ class Connection:
         patience: Patience | None = None,
     ) -> None:
         self.name, self._open, self._settings, self._say = echo(name), open_port, settings, say
-        self._number_bytes = np.dtype(Design(settings).numbers.scalar).itemsize
+        self._number_bytes = np.dtype(method_of(settings).numbers.scalar).itemsize
         self.patience = patience or Patience()
         self.faults = Counter[str]()
         self.round_trips_s: list[float] = []

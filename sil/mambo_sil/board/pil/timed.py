@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.pil.board_controller import BoardStep, as_bytes, command_of, desk_bits
 from mambo_sil.board.pil.connection import NO_FLIGHT, Connection
@@ -64,8 +64,8 @@ class TimedController:
     """
 
     def __init__(self, settings: Settings, board: Connection) -> None:
-        self._board, self._desk, self._design = board, CompiledController(settings), Design(settings)
-        self._number_bytes = np.dtype(self._design.numbers.scalar).itemsize
+        self._board, self._desk, self._method = board, CompiledController(settings), method_of(settings)
+        self._number_bytes = np.dtype(self._method.numbers.scalar).itemsize
         self._update = 0
         self._heard = deque[tuple[int, int, bytes]]()
         self._sent: list[_Inputs] = []
@@ -105,13 +105,13 @@ class TimedController:
         if newest.period > update:
             return self._held
         result = newest.reply.step
-        command_rad = command_of(self._design, result)
+        command_rad = command_of(self._method, result)
         self._held = BoardStep(command_rad, np.array([NOT_CALLED]))
         return BoardStep(command_rad, np.array([result.status]))
 
     def _send(self, kind: Kind, inputs: _Inputs) -> None:
         """Send the next inputs."""
-        arrays = as_arrays(self._design, 1, *inputs)
+        arrays = as_arrays(self._method, 1, *inputs)
         self._last_request = (kind, len(self._sent), b"".join(as_bytes(values) for values in arrays))
         self._board.tell(*self._last_request)
         self._sent.append(inputs)
@@ -179,7 +179,7 @@ class TimedController:
         """Make the board's steps with the inputs of these numbers, and compare the one that is known."""
         for number in used:
             desk = self._desk.step(*self._sent[number])
-        if arrived.reply.step.bits != desk_bits(self._design, desk):
+        if arrived.reply.step.bits != desk_bits(self._method, desk):
             self.different.append(arrived.number)
 
     def _lost(self, reason: str) -> BoardError:

@@ -10,7 +10,7 @@ from functools import cache, partial
 from typing import Any, Final
 
 from mambo_codegen import __version__
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import WorkerError
 from mambo_sil.experiment.campaign.campaign_file import Entrant, scenario
@@ -80,7 +80,7 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
         flight = flight_at(entrant.settings.horizon.update_period_s)
         report = partial(_report_part, number, len(entrants))
         trace = fly(flight, _controller(entrant, flight), report)
-        limit_rad = Design(entrant.settings).tilt_limit_rad
+        limit_rad = method_of(entrant.settings).tilt_limit_rad
         for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle).items():
             for row, value in zip(rows, values, strict=True):
                 row[f"{entrant.name}_{key}"] = value

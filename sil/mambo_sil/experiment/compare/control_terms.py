@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
-from mambo_codegen.design import Design
-from mambo_codegen.methods.quadratic.law import MOVED, closed_loops
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 
@@ -52,52 +51,43 @@ class ObserverGains(BaseModel):
 
 
 def axis_laws(settings: Settings) -> tuple[AxisLaw, AxisLaw] | None:
-    """Return the laws of roll and pitch; None for a 1-norm, whose commands are not linear in the state."""
-    if settings.cost.norm != "quadratic":
+    """Return the laws of roll and pitch; None for commands that are not linear in the state."""
+    law, period_s = method_of(settings).linear_law, settings.horizon.update_period_s
+    if law is None:
         return None
-    loops = closed_loops(settings)
-    return _axis_law(settings, loops[0], 0), _axis_law(settings, loops[1], 1)
+    return _axis_law(law.gain[0], law.loops[0], period_s), _axis_law(law.gain[1], law.loops[1], period_s)
 
 
 def observer_gains(settings: Settings) -> ObserverGains | None:
-    """Return the gains of the observer; None for a 1-norm, which has none."""
-    if settings.cost.norm != "quadratic":
+    """Return the gains of the observer; None without one."""
+    law = method_of(settings).linear_law
+    if law is None:
         return None
-    period_s = settings.horizon.update_period_s
-    gain = Design(settings).observer.gain / period_s ** np.subtract.outer(np.arange(3), np.arange(2))
-    position, velocity, disturbance = ((float(row[0]), float(row[1])) for row in gain)
+    position, velocity, disturbance = ((float(row[0]), float(row[1])) for row in law.observer_gain)
     return ObserverGains(position=position, velocity_1_s=velocity, disturbance_1_s2=disturbance)
 
 
-def _axis_law(settings: Settings, loop: FloatArray, axis: int) -> AxisLaw:
-    design, period_s = Design(settings), settings.horizon.update_period_s
-    gain = -design.law.rows[axis, 0] * design.attitude.command_rad_step2_m[axis]
-    poles, shares = _poles(settings, loop, axis)
+def _axis_law(gain: FloatArray, loop: FloatArray, period_s: float) -> AxisLaw:
+    poles, shares = _poles(loop)
     log = np.log(poles)
     frequency_rad_s, damping = np.abs(log) / period_s, -log.real / np.abs(log)
     dominant = int(np.argmax(np.where(shares >= LEAST_SHARE, np.abs(poles), 0.0)))
     slowest = sorted(zip(frequency_rad_s.tolist(), damping.tolist(), strict=True))
+    position, velocity, disturbance = gain.tolist()
     return AxisLaw(
-        position_gain_rad_m=float(gain[0]),
-        velocity_gain_rad_s_m=float(gain[1] * period_s),
-        disturbance_gain_rad_s2_m=float(gain[2] * period_s**2),
+        position_gain_rad_m=position,
+        velocity_gain_rad_s_m=velocity,
+        disturbance_gain_rad_s2_m=disturbance,
         dominant_rad_s=float(frequency_rad_s[dominant]),
         dominant_damping=float(damping[dominant]),
         poles=slowest,
     )
 
 
-def _poles(settings: Settings, loop: FloatArray, axis: int) -> tuple[NDArray[np.complex128], FloatArray]:
+def _poles(loop: FloatArray) -> tuple[NDArray[np.complex128], FloatArray]:
     """Return the poles of the states that act on the position, and their shares of an initial error."""
-    name, model = AXES[axis], settings.model
-    unread = set()
-    if getattr(model, f"{name}_integral_1_s") == 0:
-        unread.add("i")
-    if getattr(model, f"{name}_delay_s") == 0:
-        unread.add("c")
-    kept = [k for k, state in enumerate(MOVED) if state not in unread]
-    poles, vectors = np.linalg.eig(loop[np.ix_(kept, kept)])
-    first = np.zeros(len(kept))
+    poles, vectors = np.linalg.eig(loop)
+    first = np.zeros(len(loop))
     first[0] = 1.0
     shares = np.abs(vectors[0] * np.linalg.solve(vectors, first))
     alive = np.abs(poles) > _DEAD

@@ -4,10 +4,8 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
 
-from mambo_codegen.bundle.render import instance_bytes
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.controller_keys import KEYS
-from mambo_codegen.settings.methods import used_values
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.compare.compared_flights import Answers, EightAnswer, StepAnswer
@@ -73,7 +71,7 @@ def differences(a: Settings, b: Settings) -> list[SettingDifference]:
 def figures(settings: Settings, flown: Answers) -> ControllerFigures:
     """Return the figures of one controller."""
     return ControllerFigures(
-        instance_bytes=instance_bytes(Design(settings)),
+        instance_bytes=method_of(settings).instance_bytes,
         law=axis_laws(settings),
         observer=observer_gains(settings),
         step=flown.step,
@@ -84,6 +82,6 @@ def figures(settings: Settings, flown: Answers) -> ControllerFigures:
 def _values(settings: Settings) -> dict[str, Any]:
     return {
         f"{section}.{name}": value
-        for section, values in used_values(settings).items()
+        for section, values in settings.used_values.items()
         for name, value in values.items()
     }

@@ -12,8 +12,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import Status
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -144,7 +144,7 @@ def fly_faults(
             f"ranges.position_m = {settings.ranges.position_m:g}, ranges.velocity_m_s = "
             f"{settings.ranges.velocity_m_s:g}: must include the figure of eight of Table II, 2 m and 1 m/s"
         )
-    limits_rad = Design(settings).tilt_limit_rad, crash_tilt_rad(drone)
+    limits_rad = method_of(settings).tilt_limit_rad, crash_tilt_rad(drone)
     return _judge_faults(trace, sorties, reweighted.answers, *limits_rad)
 
 

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from mambo_codegen.reference import Status
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.inputs import Status
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import (
@@ -97,7 +98,7 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
-        *(() if settings.cost.norm == "quadratic" else _wrong_weights(settings)),
+        *(_wrong_weights(settings) if method_of(settings).weight_limits else ()),
     )
 
 

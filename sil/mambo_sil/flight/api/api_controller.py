@@ -6,8 +6,8 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mambo_codegen.methods import Step, method_of
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
-from mambo_codegen.reference import ExactStep, Step
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
@@ -57,7 +57,7 @@ class Controller:
         state: DroneState,
         target: TargetState,
         thrust_acceleration_m_s2: ArrayLike = GRAVITY_M_S2,
-    ) -> Step | ExactStep:
+    ) -> Step:
         """Return the next commands of n drones; call it once in every update period.
 
         state, target: of n drones.
@@ -65,7 +65,8 @@ class Controller:
 
         The result has `command_rad` (n, 2), roll and pitch, never beyond the tilt limit, and `status` (n,):
         0, or why an input was refused, such as NaN or a position out of range
-        (`codegen.reference.Status`). A quadratic cost adds `saturated`, a 1-norm `cost` and `plan_rad`.
+        (`mambo_codegen.methods.inputs.Status`).
+        A quadratic cost adds `saturated`, a 1-norm `cost` and `plan_rad`.
         Raises ArgumentError for records of another number of drones, for other shapes, and for targets
         without acceleration where the settings have `target.acceleration = "given"`.
         """
@@ -84,7 +85,7 @@ class Controller:
                 )
             aims.append(target.acceleration_m_s2)
         thrusts = of_shape("thrust_acceleration_m_s2", thrust_acceleration_m_s2, (), (self.n,))
-        outcome: Step | ExactStep = self._compiled.step(
+        outcome: Step = self._compiled.step(
             np.concatenate([state.position_m, state.velocity_m_s, state.attitude_rad], axis=1),
             np.concatenate(aims, axis=1),
             np.broadcast_to(thrusts, (self.n,)),
@@ -103,8 +104,8 @@ class Controller:
 
         Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no such function.
         """
-        norm = self.settings.cost.norm
-        if norm != "quadratic":
+        if method_of(self.settings).setter != "set_command":
+            norm = self.settings.cost.norm
             raise ArgumentError(
                 f'set_command needs cost.norm = "quadratic"; that of the controller is {spell(norm)}'
             )

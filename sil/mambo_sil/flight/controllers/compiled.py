@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from mambo_codegen.design import Design
-from mambo_codegen.numbers.representation import COMMAND, OUTCOME, STATE, THRUST, WEIGHTS, Representation
-from mambo_codegen.reference import ExactStep, Step
+from mambo_codegen.methods import Method, method_of
+from mambo_codegen.numbers.representation import COMMAND, STATE, THRUST, WEIGHTS, Representation
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.flight.controllers.controller_library import build_library, ffi
@@ -24,18 +23,18 @@ def digest_compiled(library: Any, episodes: int) -> int:
 
 
 def as_arrays(
-    design: Design, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
+    method: Method, n: int, state: ArrayLike, target: ArrayLike, thrust: ArrayLike
 ) -> list[NDArray[Any]]:
     """Return state (n, 7), target (n, 4) or (n, 6), thrust (n,) as the C reads them.
 
     Columns of a target that the controller has no use for are left out. Raises ValueError for other shapes.
     """
-    columns = len(design.target)
+    columns = len(method.target)
     return [
-        as_array(design.numbers, values, quantities, shape)
+        as_array(method.numbers, values, quantities, shape)
         for values, quantities, shape in (
             (state, STATE, (n, 7)),
-            (np.asarray(target)[:, :columns], design.target, (n, columns)),
+            (np.asarray(target)[:, :columns], method.target, (n, columns)),
             (thrust, THRUST, (n,)),
         )
     ]
@@ -51,44 +50,14 @@ def as_array(
     return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
 
 
-def empty_outcome(design: Design, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
+def empty_outcome(method: Method, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
     """Return the arrays that a step of n controllers fills, in the order of nmpc_outcome_t."""
-    numbers, moves = design.numbers, design.settings.horizon.control
-    if design.is_quadratic:
-        return {
-            "status": np.empty(n, integer),
-            "command_rad": np.empty((n, 2), numbers.scalar),
-            "missed": np.empty(n, integer),
-            "saturated": np.empty(n, integer),
-            "stored": np.empty((n, len(design.stored)), numbers.scalar),
-        }
     return {
-        "status": np.empty(n, integer),
-        "command_rad": np.empty((n, 2), numbers.scalar),
-        "cost": np.empty(n, numbers.wide),
-        "gradient": np.empty((n, moves, 2), numbers.wide),
-        "plan_rad": np.empty((n, moves, 2), numbers.scalar),
-        "iterations": np.empty(n, integer),
-        "converged": np.empty(n, integer),
-    }
-
-
-def as_step(design: Design, outcome: dict[str, NDArray[Any]]) -> Step | ExactStep:
-    """Return the arrays that a step filled in SI units and with the types of the reference."""
-    to_si = design.numbers.to_si
-    if design.is_quadratic:
-        return ExactStep(
-            status=outcome["status"].astype(np.int64),
-            command_rad=to_si(outcome["command_rad"], *COMMAND),
-            missed=outcome["missed"].astype(np.int64),
-            saturated=outcome["saturated"].astype(np.bool_),
-            stored=to_si(outcome["stored"], *design.stored),
+        one.name: np.empty(
+            (n, *one.shape), method.numbers.type_of(one.quantities[0]) if one.quantities else integer
         )
-    types = {"status": np.int64, "iterations": np.int64, "converged": np.bool_}
-    return Step(
-        **{name: outcome[name].astype(kind) for name, kind in types.items()},
-        **{name: to_si(outcome[name], quantity) for name, quantity in OUTCOME.items()},
-    )
+        for one in method.results
+    }
 
 
 DIRT = b"\xa5"
@@ -100,8 +69,8 @@ class CompiledController:
 
     def __init__(self, settings: Settings, n: int = 1, library: Any = None) -> None:
         self.settings = settings
-        self._design = Design(settings)
-        self._numbers = self._design.numbers
+        self._method = method_of(settings)
+        self._numbers = self._method.numbers
         self.scalar = self._numbers.scalar
         self.n = n
         self._library = library or build_library(settings, host_toolchain())
@@ -146,13 +115,13 @@ class CompiledController:
         The target's columns are x, y, vx, vy, ax, ay; only a controller that is given the acceleration of its
         target reads the last two, and needs them.
 
-        Returns a `Step` of a 1-norm, an `ExactStep` of a quadratic cost.
+        Returns a step of the class `Method.step_type`.
         """
-        inputs = as_arrays(self._design, self.n, state, target, thrust_acceleration_m_s2)
-        outcome = empty_outcome(self._design, self.n, np.intc)
+        inputs = as_arrays(self._method, self.n, state, target, thrust_acceleration_m_s2)
+        outcome = empty_outcome(self._method, self.n, np.intc)
         addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
         self._library.nmpc_batch_step(self._controllers, self.n, *map(_address, inputs), addresses)
-        return as_step(self._design, outcome)
+        return self._method.make_step(outcome)
 
     def _native_set(
         self, name: str, values: ArrayLike, quantities: Sequence[str]

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.design import Design
 from mambo_codegen.methods.math import Real, sign
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
+from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
+from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.optimizer import Evaluate, Rprop, Search
-from mambo_codegen.reference import ReferenceController, Step
 from mambo_codegen.settings.model import Settings
 
 
@@ -31,7 +31,7 @@ class InnerSteps:
 
     def decisions(self, settings: Settings) -> NDArray[np.int8]:
         """Return the gradient signs (i, n, control, 2) that RPROP uses: all 0 after convergence."""
-        numbers = Design(settings).numbers
+        numbers = OneNorm(settings).numbers
         tolerance = numbers.to_si(numbers.constant(settings.optimizer.tolerance, "cost"), "cost")
         at_rest = np.zeros(self.cost.shape, np.bool_)
         at_rest[1:] = np.logical_or.accumulate(np.abs(np.diff(self.cost, axis=0)) < tolerance)
@@ -39,8 +39,8 @@ class InnerSteps:
 
     def step_sizes_rad(self, settings: Settings) -> Real:
         """Return RPROP's step sizes (i, n, control, 2) after the update of each iteration."""
-        design = Design(settings)
-        rprop = Rprop(settings, arithmetic(design))
+        method = OneNorm(settings)
+        rprop = Rprop(settings, arithmetic(method))
         size = np.full(self.plan_rad[0].shape, rprop.initial_step)
         before = np.zeros_like(size)
         sizes = []
@@ -49,7 +49,7 @@ class InnerSteps:
             size = rprop.next_step(size, agreement)
             before = np.where(agreement < 0, np.zeros_like(slope), slope)
             sizes.append(size)
-        return design.numbers.to_si(np.stack(sizes), "angle")
+        return method.numbers.to_si(np.stack(sizes), "angle")
 
 
 class WatchedController:
@@ -57,14 +57,14 @@ class WatchedController:
 
     def __init__(self, settings: Settings, n: int = 1) -> None:
         self.settings = settings
-        design = Design(settings)
-        self.controller = ReferenceController(design, n, self._watch)
-        self._numbers = design.numbers
+        method = OneNorm(settings)
+        self.controller = OneNormController(method, n, self._watch)
+        self._numbers = method.numbers
         self.steps: list[InnerSteps] = []
         self._evaluated: list[list[Real]] = []
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
-        """Compute the next commands like `ReferenceController.step`, and append to `steps`."""
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> OneNormStep:
+        """Compute the next commands like `OneNormController.step`, and append to `steps`."""
         self._evaluated = []
         step = self.controller.step(state, target, thrust_acceleration_m_s2)
         self.steps.append(InnerSteps(*(np.stack(values) for values in zip(*self._evaluated, strict=True))))

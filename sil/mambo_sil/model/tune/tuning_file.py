@@ -11,7 +11,6 @@ from pydantic import Field
 from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_codegen.settings import controller_toml
 from mambo_codegen.settings.controller_keys import KEYS
-from mambo_codegen.settings.methods import is_used
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import (
@@ -188,9 +187,7 @@ def _range(path: str, value: Any, base: Settings) -> Distribution:
     """Return the range of one key; raises ValueError, "must ..."."""
     key = KEYS.get(path)
     free = [
-        one
-        for one in KEYS
-        if KEYS[one].low is not None and one not in _FIXED and is_used(base, *one.split("."))
+        one for one in KEYS if KEYS[one].low is not None and one not in _FIXED and base.uses(*one.split("."))
     ]
     if key is None or key.low is None or key.high is None or path not in free:
         raise ValueError(f"must name a number of a controller.toml that may be tuned: {', '.join(free)}")

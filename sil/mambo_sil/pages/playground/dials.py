@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.design import Design
+from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.representation import WEIGHTS
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.disturbances import Disturbances
@@ -72,13 +72,14 @@ def dials(flight: Flight) -> list[Dial]:
 
 
 def weight_dial(settings: Settings, title: str, drone: int) -> Dial:
-    """Return the slider of the effort weight of a 1-norm, with weights in the numbers of its C."""
-    numbers, cost = Design(settings).numbers, settings.cost
+    """Return the slider of the effort weight, with weights in the numbers of its C."""
+    method, cost = method_of(settings), settings.cost
+    _, most = method.weight_limits
     base = cost.effort_weight or 1.0
-    values = [factor * base for factor in _FACTORS if factor * base <= numbers.effort_limit]
+    values = [factor * base for factor in _FACTORS if factor * base <= most]
     if cost.effort_weight not in values:
         values = sorted([*values, cost.effort_weight])
-    weights = numbers.quantize(np.array([[cost.tracking_weight, value] for value in values]), WEIGHTS)
+    weights = method.numbers.quantize(np.array([[cost.tracking_weight, value] for value in values]), WEIGHTS)
     return Dial(
         f"effort{drone + 1}",
         f"Effort weight of {title}",

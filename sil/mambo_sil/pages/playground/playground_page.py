@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ConfigDict
 
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.controllers.pd import pd_controller
@@ -100,7 +101,7 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
     weights = [
         weight_dial(one.kind, one.title, number)
         for number, one in enumerate(found)
-        if isinstance(one.kind, Settings) and one.kind.cost.norm == "1-norm"
+        if isinstance(one.kind, Settings) and method_of(one.kind).weight_limits
     ]
     return [*dials(bit_proof.calm(flight)), *weights]
 

@@ -9,6 +9,7 @@ from typing import Final
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.flight.controllers.controller_library import glue, with_default_prefix
@@ -76,7 +77,7 @@ def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
         return files, ENGINE_CALLS, pd_function(pd_controller(controller))[0]
     bundle = render(with_default_prefix(controller), with_digest=False)
     files |= {path: text for path, text in bundle.items() if path.startswith(("include/", "src/"))} | glue()
-    weights = () if controller.cost.norm == "quadratic" else ("nmpc_host_set_weights",)
+    weights = ("nmpc_host_set_weights",) if method_of(controller).weight_limits else ()
     return files, (*ENGINE_CALLS, *CONTROLLER_CALLS, *weights), "nmpc_host_step"
 
 

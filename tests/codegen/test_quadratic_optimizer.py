@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from mambo_codegen.design import Design
-from mambo_codegen.methods.quadratic.arithmetic import exact_arithmetic
-from mambo_codegen.methods.quadratic.optimizer import ExactOptimizer
+from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.method import Quadratic
+from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.settings.model import Settings
 from tests.support.quadratic import (
     ANGLES,
@@ -68,12 +68,12 @@ def enumerated_minimum(curvature: Array, free: Array, limit: float) -> Array:
 
 def compare_with_a_simulated_program(settings: Settings, n: int, seed: int) -> None:
     """Minimise from n states, within, at and far beyond the limits, and compare with all active sets."""
-    design = Design(settings)
-    limits = design.attitude.command_limit_m_step2
-    optimizer = ExactOptimizer(design, exact_arithmetic(design), limits)
+    method = Quadratic(settings)
+    limits = method.attitude.command_limit_m_step2
+    optimizer = QuadraticOptimizer(method, arithmetic(method), limits)
     rng = np.random.default_rng(seed)
     sizes = 10.0 ** rng.uniform(-2, 1.5, (n, 1, 1)) * limits[None, :, None]
-    largest = np.abs(design.law.rows).max(axis=1)
+    largest = np.abs(method.law.rows).max(axis=1)
     states = sizes * rng.normal(0, 1, (n, 2, 8)) / np.where(largest > 0, largest, 1)
     states *= rng.choice([0.0, 1.0, 1.0], states.shape)
     found = optimizer.minimize(states)
@@ -106,10 +106,10 @@ def test_a_hundred_thousand_minima_are_those_of_every_active_set(index: int) -> 
 def test_one_move_is_the_clamped_law() -> None:
     """With one free move the command is the Riccati gain's, cut off at the limit."""
     settings = settings_of(TWO_MOVES | {"horizon.ramp_s": 0.0, "code.scalar": "float64"})
-    design = Design(settings)
-    limits = design.attitude.command_limit_m_step2
-    optimizer = ExactOptimizer(design, exact_arithmetic(design), limits)
+    method = Quadratic(settings)
+    limits = method.attitude.command_limit_m_step2
+    optimizer = QuadraticOptimizer(method, arithmetic(method), limits)
     states = np.random.default_rng(0).normal(0, 1, (5000, 2, 8)) * [0.3, 0.01, 1e-3, 1e-5, *[1e-3] * 4]
-    free = np.einsum("nak,ak->na", states, design.law.rows[:, 0])
+    free = np.einsum("nak,ak->na", states, method.law.rows[:, 0])
     assert 0.1 < np.mean(np.abs(free) > limits) < 0.9
     assert optimizer.minimize(states) == pytest.approx(np.clip(free, -limits, limits), rel=1e-12, abs=1e-16)

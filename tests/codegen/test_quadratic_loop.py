@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mambo_codegen.design import Design
-from mambo_codegen.reference import ExactReferenceController, ExactStep, Status
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings.model import Settings
 from tests.support.quadratic import ANGLES, ONE_MOVE, TWO_MOVES, Array, axis_of, case_values, settings_of
 
@@ -61,11 +62,11 @@ class LinearDrone:
 
 
 def fly(
-    controller: ExactReferenceController,
+    controller: QuadraticController,
     drone: LinearDrone,
     steps: int,
     distort: Callable[[int, Array], Array] = lambda _, state: state,
-) -> list[ExactStep]:
+) -> list[QuadraticStep]:
     """Fly to the origin; `distort` changes what the controller is told."""
     outcomes = []
     for step in range(steps):
@@ -83,9 +84,9 @@ def test_the_loop_converges_with_any_settings_that_are_admitted(index: int) -> N
     without = {"model.drag_1_s": 0.0, "observer.age_s": 0.0}
     feedback = {f"damping.{angle}_rate_feedback_s": 0.0 for angle in ANGLES}
     settings = settings_of(case_values(20 + index) | without | feedback | {"code.scalar": "float64"})
-    drone, controller = LinearDrone(settings, yaw_rad=0.7 * index), ExactReferenceController(Design(settings))
+    drone, controller = LinearDrone(settings, yaw_rad=0.7 * index), QuadraticController(Quadratic(settings))
     drone.put((1e-4, -2e-4))
-    radius = float(np.max(Design(settings).law.spectral_radius))
+    radius = float(np.max(Quadratic(settings).law.spectral_radius))
     fly(controller, drone, 1000)
     early = np.abs(drone.states[:, :2]).max()
     assert radius < 1
@@ -100,7 +101,7 @@ def test_the_loop_converges_with_any_settings_that_are_admitted(index: int) -> N
 def test_the_observer_finds_a_constant_disturbance(yaw_rad: float) -> None:
     """Wind along x and y: the estimate is the wind, and the drone stands at the target."""
     settings, wind = settings_of(EXACT), (0.6, -0.35)
-    drone, controller = LinearDrone(settings, yaw_rad, wind), ExactReferenceController(Design(settings))
+    drone, controller = LinearDrone(settings, yaw_rad, wind), QuadraticController(Quadratic(settings))
     drone.put((0.5, 0.3))
     last = fly(controller, drone, 2000)[-1]
     assert last.stored[0, 4:6] / settings.horizon.update_period_s**2 == pytest.approx(wind, rel=1e-3)
@@ -113,7 +114,7 @@ def test_a_trim_takes_no_disturbance_to_learn() -> None:
     settings = settings_of(
         EXACT | {"model.roll_trim_rad": 0.02, "model.pitch_trim_rad": -0.03, "model.roll_gain": 0.8}
     )
-    drone, controller = LinearDrone(settings), ExactReferenceController(Design(settings))
+    drone, controller = LinearDrone(settings), QuadraticController(Quadratic(settings))
     controller.reset([[0.02 / 0.8, -0.03]])
     last = fly(controller, drone, 500)[-1]
     assert last.command_rad[0] == pytest.approx([0.02 / 0.8, -0.03], abs=1e-9)
@@ -134,7 +135,7 @@ def test_a_bad_state_leaves_no_trace_of_its_value() -> None:
     settings = settings_of(EXACT | {"damping.roll_rate_feedback_s": 0.05, "target.acceleration": "tracked"})
     stored = set()
     for bad in BAD_STATES:
-        drone, controller = LinearDrone(settings, 0.4), ExactReferenceController(Design(settings))
+        drone, controller = LinearDrone(settings, 0.4), QuadraticController(Quadratic(settings))
         drone.put((0.4, -0.2))
         outcomes = fly(controller, drone, 40, told_in_between(bad))
         assert [int(outcome.status[0]) for outcome in outcomes[19:24]] == [
@@ -150,7 +151,7 @@ def test_a_bad_state_leaves_no_trace_of_its_value() -> None:
 def test_in_a_short_outage_the_controller_flies_on() -> None:
     """Commands change, and the estimate follows the drone that it does not see."""
     settings = settings_of(EXACT)
-    drone, controller = LinearDrone(settings, 0.3), ExactReferenceController(Design(settings))
+    drone, controller = LinearDrone(settings, 0.3), QuadraticController(Quadratic(settings))
     drone.put((0.5, -0.3))
     outcomes = fly(controller, drone, 80, lambda step, state: state * np.nan if 30 <= step < 70 else state)
     commands = np.array([outcome.command_rad[0] for outcome in outcomes])
@@ -164,7 +165,7 @@ def test_in_a_short_outage_the_controller_flies_on() -> None:
 def test_after_a_long_outage_the_estimate_starts_anew() -> None:
     """The command holds when the outage is over its time; position and velocity are then those measured."""
     settings = settings_of(EXACT | {"observer.outage_s": 0.1, "target.acceleration": "tracked"})
-    controller, period_s = ExactReferenceController(Design(settings)), settings.horizon.update_period_s
+    controller, period_s = QuadraticController(Quadratic(settings)), settings.horizon.update_period_s
     drone = LinearDrone(settings)
     drone.put((0.5, -0.3))
     outcomes = fly(controller, drone, 60, lambda step, state: state * np.nan if step >= 30 else state)
@@ -181,7 +182,7 @@ def test_after_a_long_outage_the_estimate_starts_anew() -> None:
 def test_a_command_of_others_moves_the_model() -> None:
     """What was sent in place of the own command is where the model and the next command begin."""
     settings = settings_of(EXACT)
-    used, undisturbed = (ExactReferenceController(Design(settings)) for _ in range(2))
+    used, undisturbed = (QuadraticController(Quadratic(settings)) for _ in range(2))
     for controller in (used, undisturbed):
         controller.step([[0.0] * 7], [[0.0] * 4], [HOVER])
     assert used.set_command([[0.2, 0.1]])[0] == Status.OK
@@ -197,7 +198,7 @@ def test_a_tracked_target_is_followed_closer() -> None:
     errors = {}
     for kind in ("none", "tracked"):
         settings = settings_of(ONE_MOVE | {"target.acceleration": kind, "code.scalar": "float64"})
-        drone, controller = LinearDrone(settings), ExactReferenceController(Design(settings))
+        drone, controller = LinearDrone(settings), QuadraticController(Quadratic(settings))
         largest = 0.0
         for step in range(3000):
             angle = 0.01 * step

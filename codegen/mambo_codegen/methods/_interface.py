@@ -1,0 +1,160 @@
+"""What a method gives: the one interface between a controller's method and everything else."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.math import Real
+from mambo_codegen.methods.proofs import FIXED_PROOFS
+from mambo_codegen.settings.refusal import Refusal
+
+
+class Step(Protocol):
+    """The result of one step of n controllers: status (n,), command_rad (n, 2), and those of the method."""
+
+    @property
+    def status(self) -> NDArray[np.int64]:
+        """A `Status` each."""
+
+    @property
+    def command_rad(self) -> Real:
+        """Roll and pitch commands, in rad."""
+
+
+class ReferenceController(Protocol):
+    """n controllers in NumPy that compute the bits of the generated C.
+
+    Every operation has the order and the brackets of the C templates, in the scalar type of the settings.
+    `@`, `numpy.dot` and `numpy.sum` are not used in methods, because they may reorder additions.
+    """
+
+    memory: Any
+
+    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
+        """Compute the next commands."""
+
+    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Forget the past, and hold `command_rad` (n, 2)."""
+
+    @property
+    def outcome(self) -> Mapping[str, NDArray[Any]]:
+        """What the last call left, in the numbers of the C."""
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """A result of a step in C, in the order of nmpc_outcome_t.
+
+    quantities: of the numbers along the last axis, one for all of them; none for a count.
+    shape:      for one controller.
+    count_type: type of a count in the reference.
+    """
+
+    name: str
+    quantities: tuple[str, ...] = ()
+    shape: tuple[int, ...] = ()
+    count_type: type = np.int64
+
+
+@dataclass(frozen=True)
+class LinearLaw:
+    """A law that is linear in the state as long as no limit acts, and its observer, in SI units.
+
+    gain:          (2, 3) command of roll and pitch per position error, velocity error and acceleration of the
+                   disturbance less the target's.
+    loops:         of roll and pitch, the transition of the states that act on the position, which is the
+                   first of them, in a control step.
+    observer_gain: (3, 2) corrections of position, velocity and disturbance by the innovations of position and
+                   velocity.
+    """
+
+    gain: NDArray[np.float64]
+    loops: tuple[NDArray[np.float64], NDArray[np.float64]]
+    observer_gain: NDArray[np.float64]
+
+
+class Method(Constants):
+    """A method with its settings: the constants and all that other parts of the project ask a method for.
+
+    folder:      the folder of its templates.
+    step_type:   the class of its steps.
+    sub_blocks:  the sources with a header each, in the order of a control step.
+    setter:      the C function, less its prefix, that sets what only this method has, with the quantities of
+                 the numbers that it reads.
+    digested:    the results of a step that the self-test digest covers, in its order.
+    iterates:    whether it searches the moves by iterations over a horizon.
+    unnamed:     sections and keys that the settings' digest leaves out at their defaults: what came later.
+    """
+
+    folder: ClassVar[str]
+    step_type: ClassVar[type]
+    sub_blocks: ClassVar[tuple[str, ...]]
+    setter: ClassVar[str]
+    setter_quantities: ClassVar[tuple[str, ...]]
+    digested: ClassVar[tuple[str, ...]]
+    iterates: ClassVar[bool]
+    unnamed: ClassVar[tuple[str, ...]]
+    float_proofs: ClassVar[Mapping[str, tuple[str, ...]]]
+
+    @abstractmethod
+    def refusals(self) -> list[Refusal]:
+        """Return why a controller cannot have the settings."""
+
+    @abstractmethod
+    def reference_controller(self, n: int = 1) -> ReferenceController:
+        """Return n controllers in NumPy that compute the bits of the C."""
+
+    @property
+    @abstractmethod
+    def results(self) -> tuple[StepResult, ...]:
+        """The results of a step."""
+
+    def make_step(self, results: Mapping[str, NDArray[Any]]) -> Any:
+        """Return the step that has `results`, in SI units and with the types of the reference."""
+        return self.step_type(
+            **{
+                one.name: self.numbers.to_si(results[one.name], *one.quantities)
+                if one.quantities
+                else results[one.name].astype(one.count_type)
+                for one in self.results
+            }
+        )
+
+    @abstractmethod
+    def tested_numbers(self, step: Any) -> tuple[float, ...]:
+        """Return the numbers of a step that the self-test compares beside status and command."""
+
+    @property
+    @abstractmethod
+    def work(self) -> tuple[int, int]:
+        """What a control step costs: predicted states per iteration, and iterations."""
+
+    @property
+    @abstractmethod
+    def instance_bytes(self) -> int:
+        """The size of nmpc_t: its numbers, sums and single bytes, with padding."""
+
+    @property
+    @abstractmethod
+    def context(self) -> dict[str, object]:
+        """What only this method's templates insert."""
+
+    @property
+    def outage_steps(self) -> int | None:
+        """Control steps without a good state over which the method flies on by an estimate; None without."""
+        return None
+
+    @property
+    def proofs(self) -> Mapping[str, tuple[str, ...]]:
+        """Options of Frama-C for each proof of the scalar type, by entry function."""
+        return self.float_proofs if self.numbers.formats is None else FIXED_PROOFS
+
+    @property
+    def linear_law(self) -> LinearLaw | None:
+        """The law in control terms; None for a method whose commands are not linear in the state."""
+        return None

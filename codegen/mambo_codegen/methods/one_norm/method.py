@@ -1,0 +1,105 @@
+"""The 1-norm of the paper, minimised by RPROP, behind the interface of all methods."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from mambo_codegen.methods._interface import Method, StepResult
+from mambo_codegen.methods.one_norm.constants import OneNormConstants
+from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
+from mambo_codegen.methods.one_norm.formats import refusals
+from mambo_codegen.methods.proofs import FLOAT_PROOFS
+from mambo_codegen.methods.rate_feedback import lag_refusals
+from mambo_codegen.numbers.representation import WEIGHTS
+from mambo_codegen.settings.refusal import Refusal
+
+
+class OneNorm(OneNormConstants, Method):
+    """A controller with the 1-norm."""
+
+    folder: ClassVar[str] = "one_norm"
+    step_type: ClassVar[type] = OneNormStep
+    sub_blocks: ClassVar[tuple[str, ...]] = (
+        "nmpc_math",
+        "nmpc_tracker",
+        "nmpc_predictor",
+        "nmpc_cost",
+        "nmpc_optimizer",
+    )
+    setter: ClassVar[str] = "set_weights"
+    setter_quantities: ClassVar[tuple[str, ...]] = WEIGHTS
+    digested: ClassVar[tuple[str, ...]] = (
+        "status",
+        "iterations",
+        "converged",
+        "command_rad",
+        "cost",
+        "gradient",
+        "plan_rad",
+    )
+    iterates: ClassVar[bool] = True
+    unnamed: ClassVar[tuple[str, ...]] = ("cost.norm", "model.thrust", "damping", "target")
+    float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = FLOAT_PROOFS
+
+    def refusals(self) -> list[Refusal]:
+        """Return why a controller with the 1-norm cannot have the settings."""
+        settings = self.settings
+        refused = lag_refusals(settings, needs_lag=False)
+        return refused or (refusals(settings) if settings.code.scalar == "fixed" else [])
+
+    def reference_controller(self, n: int = 1) -> OneNormController:
+        """Return n controllers in NumPy that compute the bits of the C."""
+        return OneNormController(self, n)
+
+    @property
+    def results(self) -> tuple[StepResult, ...]:
+        """The results of a step."""
+        moves = self.settings.horizon.control
+        return (
+            StepResult("status"),
+            StepResult("command_rad", ("angle",), (2,)),
+            StepResult("cost", ("cost",)),
+            StepResult("gradient", ("gradient",), (moves, 2)),
+            StepResult("plan_rad", ("angle",), (moves, 2)),
+            StepResult("iterations"),
+            StepResult("converged", count_type=np.bool_),
+        )
+
+    def tested_numbers(self, step: OneNormStep) -> tuple[float, ...]:
+        """Return cost and gradient by the first move (2,)."""
+        return (float(step.cost[0]), *step.gradient[0, 0].tolist())
+
+    @property
+    def work(self) -> tuple[int, int]:
+        """Predicted states times moves in each iteration, and iterations."""
+        horizon = self.settings.horizon
+        return horizon.prediction * horizon.control, self.settings.optimizer.iterations
+
+    @property
+    def instance_bytes(self) -> int:
+        """The size of nmpc_t: its numbers, sums and single bytes, with padding."""
+        number_bytes, sum_bytes = self.numbers.bytes
+        moves = 2 * self.settings.horizon.control
+        weights, gains, tilt, rollouts, command = 2, 4, 2, 2 * (5 if self.tables.has_lag else 3), 2
+        tracker, flags = (4 if self.tracker.is_given else 6, 3) if self.tracker else (0, 2)
+        if self.feedback_steps:
+            command, flags = command + 4, flags + 1
+        numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
+        before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
+        return -(-(before_flags + flags) // sum_bytes) * sum_bytes
+
+    @property
+    def context(self) -> dict[str, object]:
+        """What only the templates of the 1-norm insert."""
+        settings = self.settings
+        tracking_limit, effort_limit = self.weight_limits
+        return {
+            "quadratic": False,
+            "backtracking": settings.optimizer.variant == "rprop+",
+            "yaw_sign": "" if settings.model.yaw_convention == "printed" else "-",
+            "tables": self.tables,
+            "hover": settings.model.thrust == "hover",
+            "tracking_limit": tracking_limit,
+            "effort_limit": effort_limit,
+        }

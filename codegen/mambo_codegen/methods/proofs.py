@@ -1,0 +1,49 @@
+"""Options of Frama-C for the proofs that controllers of every method have, by entry function."""
+
+from typing import Final
+
+FLOAT_PROOFS: Final = {
+    # Every operation that can result in NaN is an alarm.
+    "take_numbers": (
+        "-warn-special-float nan",
+        "-main take_numbers",
+        "-eva",
+        "-eva-precision 2",
+        "-eva-split-return auto",  # analyse accepted and refused inputs apart
+    ),
+    # NaN is a legal value. Precision 0, without relations between variables: from a stored comparison
+    # Frama-C 25 derives x >= y from !(x < y), which is false for NaN.
+    "refuse_nan": (
+        "-warn-special-float none",
+        "-main refuse_nan",
+        "-eva",
+        "-eva-precision 0",
+    ),
+}
+"""In floating point."""
+
+_WHOLE_NUMBERS: Final = (
+    "-warn-signed-overflow",
+    "-warn-signed-downcast",
+    "-no-warn-right-shift-negative",  # nmpc_math.h asserts that it is arithmetic
+)
+TURN_EVERYWHERE: Final = (
+    "-main turn_everywhere",
+    "-eva",
+    "-eva-precision 0",
+    "-eva-min-loop-unroll 1400",  # more than the quarter turns of all headings
+)
+"""Bounds of sine and cosine over all headings."""
+
+FIXED_PROOFS: Final = {
+    "take_numbers": (
+        *_WHOLE_NUMBERS,
+        "-main take_numbers",
+        "-eva",
+        "-eva-precision 2",
+        "-eva-split-return auto",
+        "-eva-use-spec nmpc_sine_cosine",
+    ),
+    "turn_everywhere": (*_WHOLE_NUMBERS, *TURN_EVERYWHERE),
+}
+"""In fixed point, where no NaN exists and signed overflow is an alarm."""

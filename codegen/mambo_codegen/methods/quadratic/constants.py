@@ -1,0 +1,48 @@
+"""The constants of a controller with a quadratic cost."""
+
+from functools import cached_property
+
+from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants, attitude_constants
+from mambo_codegen.methods.quadratic.formats import QuadraticFormats, formats
+from mambo_codegen.methods.quadratic.law import LawConstants, law_constants
+from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
+
+
+class QuadraticConstants(Constants):
+    """What follows from settings with `cost.norm = "quadratic"`."""
+
+    @property
+    def step_s(self) -> float:
+        """The step of the prediction, tau: the update period."""
+        return self.settings.horizon.update_period_s
+
+    @cached_property
+    def attitude(self) -> AttitudeConstants:
+        """The constants of the attitude model, in float64."""
+        return attitude_constants(self.settings)
+
+    @cached_property
+    def observer(self) -> ObserverConstants:
+        """The constants of the observer, in float64."""
+        return observer_constants(self.settings)
+
+    @cached_property
+    def law(self) -> LawConstants:
+        """The constants of the cost's minimum, in float64."""
+        return law_constants(self.settings)
+
+    def choose_formats(self) -> QuadraticFormats:
+        """Choose the formats of fixed point."""
+        return formats(self.settings)
+
+    @property
+    def stored(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_t, in their order."""
+        observer = [*["position"] * 2, *["speed"] * 2, *["acceleration"] * 2]
+        attitude = [*["acceleration"] * 8, *["sine"] * 2]
+        tracker = ["acceleration"] * 4 if self.tracker else []
+        if self.tracker and not self.tracker.is_given:
+            tracker = ["velocity"] * 2 + tracker
+        tilt = ["angle"] * 2 if self.feedback_steps else []
+        return (*observer, *attitude, *tracker, *tilt, "angle", "angle")

@@ -1,0 +1,170 @@
+"""The quadratic cost, minimised in closed form, behind the interface of all methods."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.methods._interface import LinearLaw, Method, StepResult
+from mambo_codegen.methods.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
+from mambo_codegen.methods.quadratic import formats, law
+from mambo_codegen.methods.quadratic.constants import QuadraticConstants
+from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.optimizer import ROW
+from mambo_codegen.numbers.representation import COMMAND
+from mambo_codegen.settings.refusal import Refusal
+
+_WORK: tuple[int, int] = (50, 1)
+"""What a step counts as, in predicted states of the 1-norm."""
+
+
+class Quadratic(QuadraticConstants, Method):
+    """A controller with a quadratic cost."""
+
+    folder: ClassVar[str] = "quadratic"
+    step_type: ClassVar[type] = QuadraticStep
+    sub_blocks: ClassVar[tuple[str, ...]] = (
+        "nmpc_math",
+        "nmpc_tracker",
+        "nmpc_attitude",
+        "nmpc_observer",
+        "nmpc_optimizer",
+    )
+    setter: ClassVar[str] = "set_command"
+    setter_quantities: ClassVar[tuple[str, ...]] = COMMAND
+    digested: ClassVar[tuple[str, ...]] = ("status", "missed", "saturated", "stored")
+    iterates: ClassVar[bool] = False
+    unnamed: ClassVar[tuple[str, ...]] = ("target",)
+    float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec nmpc_sine_cosine"),
+        "refuse_nan": (
+            *FLOAT_PROOFS["refuse_nan"],
+            # What they require is that they are called without NaN.
+            "-eva-use-spec nmpc_sine_cosine,nmpc_attitude_measure,nmpc_optimizer_minimize",
+        ),
+        "turn_everywhere": ("-warn-special-float nan", *TURN_EVERYWHERE),
+    }
+
+    def refusals(self) -> list[Refusal]:
+        """Return why a controller with a quadratic cost cannot have the settings."""
+        settings = self.settings
+        refused = law.refusals(settings)
+        return refused or (formats.refusals(settings) if settings.code.scalar == "fixed" else [])
+
+    def reference_controller(self, n: int = 1) -> QuadraticController:
+        """Return n controllers in NumPy that compute the bits of the C."""
+        return QuadraticController(self, n)
+
+    @property
+    def results(self) -> tuple[StepResult, ...]:
+        """The results of a step."""
+        return (
+            StepResult("status"),
+            StepResult("command_rad", ("angle",), (2,)),
+            StepResult("missed"),
+            StepResult("saturated", count_type=np.bool_),
+            StepResult("stored", self.stored, (len(self.stored),)),
+        )
+
+    def tested_numbers(self, step: QuadraticStep) -> tuple[float, ...]:
+        """Return all stored numbers."""
+        return tuple(step.stored[0].tolist())
+
+    @property
+    def work(self) -> tuple[int, int]:
+        """What the products of a step count as, and one iteration."""
+        return _WORK
+
+    @property
+    def instance_bytes(self) -> int:
+        """The size of nmpc_t: its numbers and single bytes, with padding."""
+        number_bytes, _ = self.numbers.bytes
+        flags = 3 if self.tracker else 2
+        return (len(self.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
+
+    @property
+    def outage_steps(self) -> int:
+        """Control steps without a good state over which the observer predicts."""
+        return self.observer.outage_steps
+
+    @property
+    def linear_law(self) -> LinearLaw:
+        """The law in control terms."""
+        period_s, model = self.settings.horizon.update_period_s, self.settings.model
+        scale = np.array([1.0, period_s, period_s**2])
+        loops = law.closed_loops(self.settings)
+        return LinearLaw(
+            gain=-self.law.rows[:, 0, :3] * self.attitude.command_rad_step2_m[:, None] * scale,
+            loops=(
+                _without_unread(loops[0], model.roll_integral_1_s, model.roll_delay_s),
+                _without_unread(loops[1], model.pitch_integral_1_s, model.pitch_delay_s),
+            ),
+            observer_gain=self.observer.gain / period_s ** np.subtract.outer(np.arange(3), np.arange(2)),
+        )
+
+    @property
+    def context(self) -> dict[str, object]:
+        """What only the templates of a quadratic cost insert."""
+        period_s, model = self.settings.horizon.update_period_s, self.settings.model
+        found = self.numbers.formats
+        return {
+            "quadratic": True,
+            "attitude": self.attitude,
+            "observer": self.observer,
+            "law": self.law,
+            "stored_numbers": len(self.stored),
+            "stored_quantities": self.stored,
+            "row_quantities": ROW,
+            "stored_limits": _stored_limits(self),
+            "attitude_shares": [
+                period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)
+            ],
+            "wide": "(nmpc_sum_t)" if found else "",
+            "shifts": found.shifts if isinstance(found, formats.QuadraticFormats) else None,
+            "plain_products": _plain_products(self),
+        }
+
+
+def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: float) -> NDArray[np.float64]:
+    """Return the transition of `law.MOVED` less integral part and delay where the model has none."""
+    unread = {name for name, value in (("i", integral_1_s), ("c", delay_s)) if value == 0}
+    kept = [k for k, state in enumerate(law.MOVED) if state not in unread]
+    return loop[np.ix_(kept, kept)]
+
+
+def _stored_limits(constants: QuadraticConstants) -> list[str]:
+    """Spell the limits of what a controller with a quadratic cost stores, in ascending order."""
+    numbers, tracker = constants.numbers, constants.tracker
+    limits = [
+        numbers.constant(constants.settings.ranges.position_m, "position"),
+        numbers.constant(constants.observer.velocity_limit_m_step, "speed"),
+        numbers.constant(constants.observer.disturbance_limit_m_step2, "acceleration"),
+        numbers.constant(constants.attitude.limit_m_step2, "acceleration"),
+        numbers.constant(constants.settings.limits.tilt_rad, "angle"),
+    ]
+    if tracker:
+        limits += [
+            numbers.constant(tracker.acceleration_limit_m_step2, "acceleration"),
+            numbers.constant(tracker.jerk_limit_m_step2_update, "acceleration"),
+        ]
+    return [str(limit) for limit in sorted(limits)]
+
+
+def _plain_products(constants: QuadraticConstants) -> list[str]:
+    """Return the products of two numbers that a controller with a quadratic cost has in fixed point."""
+    wanted = {
+        "speed_product": True,
+        "tilt_product": True,
+        "command_product": True,
+        "per_step_product": True,
+        "per_step2_product": True,
+        "drag_product": bool(constants.observer.drag_1_step),
+        "aged_position": bool(constants.observer.age_steps),
+        "aged_velocity": bool(constants.observer.age_steps),
+        "feedback_product": constants.feedback_steps is not None,
+        "ratio_product": constants.law.moves > 1,
+        "target_product": constants.tracker is not None,
+        "tracker_product": constants.tracker is not None,
+    }
+    return [name for name, is_wanted in wanted.items() if is_wanted]
