@@ -18,8 +18,12 @@ CONTROLLERS: Final = ("pd", "pd-feedforward", "mambo", "mambo-1norm", "table1")
 
 
 def title(name: str) -> str:
-    """Return how tables name a controller: presets as code, the PDs in words."""
-    names = {"pd": "PD", "pd-feedforward": "PD with feed-forward"}
+    """Return how tables name a controller: presets as code, laws without a model in words."""
+    names = {
+        "pd": "PD",
+        "pd-feedforward": "PD with feed-forward",
+        "pid-feedforward": "PID with feed-forward",
+    }
     names |= {PD_TITLES[pd]: names[pd] for pd in PD_NAMES}
     return names.get(name, f"`{name}`")
 

@@ -178,7 +178,7 @@ def test_a_repeated_crash_is_a_failure(tmp_path: Path, pd: PdName) -> None:
     for name, tilt_rad, code in (("upside.json", 1.2, 1), ("level.json", 0.0, 0)):
         scenario = Scenario(duration_s=0.1, start_tilt_rad=(tilt_rad, 0.0))
         flight = flight_of([scenario], 0.01)
-        flown = fly(flight, pd_controller(pd))
+        flown = fly(flight, pd_controller(pd, flight))
         record = Record(scenario=scenario, controller=pd, settings=ONE_NORM, trace_sha256=flown.digest())
         write_record(record, tmp_path / name)
         said, _ = run("fly", "--repeat", name, "--no-pictures", code=code)

@@ -64,7 +64,7 @@ SHORT: Final = {name: flown.model_copy(update={"duration_s": SHORT_S}) for name,
 
 
 def digests(scenarios: Mapping[str, Scenario]) -> dict[str, str]:
-    """Fly every scenario with both PDs and with the presets; return the digests of the traces."""
+    """Fly every scenario with each law without a model and each preset; return the digests of the traces."""
     chosen = {name: presets.load(name) for name in PRESETS}
     period_s = chosen[PRESETS[0]].horizon.update_period_s
     batches = defaultdict(list)
@@ -73,7 +73,7 @@ def digests(scenarios: Mapping[str, Scenario]) -> dict[str, str]:
     found: dict[str, str] = {}
     for names in batches.values():
         flight = flight_of([scenarios[name] for name in names], period_s)
-        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd)) for pd in PD_NAMES}
+        traces = {PD_TITLES[pd]: fly(flight, pd_controller(pd, flight)) for pd in PD_NAMES}
         traces |= {
             preset: fly(flight, CompiledController(settings, len(names)))
             for preset, settings in chosen.items()

@@ -32,7 +32,7 @@ from mambo_sil.flight.controllers.pd import PdController
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.flight_report import FlySummary, RepeatSummary
 from mambo_sil.flight.loop import Flight
-from mambo_sil.flight.names import PD, PD_TITLES
+from mambo_sil.flight.names import PD, PD_NAMES, PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace, write_npz
 from mambo_sil.model.identify.curves import Curves, curves_csv
@@ -103,11 +103,10 @@ def sensed_folder(folder: Path) -> None:
 
 
 def table2_folder(folder: Path) -> None:
-    """Write Table II with both PDs, a preset and made-up rows."""
+    """Write Table II with the laws without a model, a preset and made-up rows."""
     flown = trace()
-    write_npz(flown, folder / "pd.npz")
-    write_npz(flown, folder / "pd-feedforward.npz")
-    write_npz(flown, folder / "mambo.npz")
+    for name in (*PD_NAMES, "mambo"):
+        write_npz(flown, folder / f"{name}.npz")
     rows = [
         Table2Row(
             case, name, (7.123, 0.5, 40.0, 1234.5), None if name == PD else (2.5, 3.0, 4.0, 5.0), 0.0174

@@ -53,11 +53,13 @@ def fly_once(options: FlyOptions) -> None:
     drone = vehicle_toml.load(options.vehicle)
     flight = flight_of_options(options, settings, drone)
     with new_results(options.output, FlySummary.command, FLIGHT_FILES) as folder:
-        controller = _on_board(options, settings) if options.on else _controller(options, settings)
+        controller = _on_board(options, settings) if options.on else _controller(options, settings, flight)
         with progress_bar("flying") as progress:
             trace = simulate(flight, controller, progress)
         same_bits = (
-            None if options.on is None else trace.same_bits(simulate(flight, _controller(options, settings)))
+            None
+            if options.on is None
+            else trace.same_bits(simulate(flight, _controller(options, settings, flight)))
         )
         write_flight(trace, options, folder)
         summary = FlySummary(
@@ -151,14 +153,14 @@ def finish(summary: FlightSummary, text: str, options: FlyOptions, files: tuple[
         raise typer.Exit(1)
 
 
-def _controller(options: FlyOptions, settings: Settings) -> PositionController:
+def _controller(options: FlyOptions, settings: Settings, flight: Flight) -> PositionController:
     match options.controller:
         case "reference":
             return method_of(settings).reference_controller()
         case "nmpc":
             return CompiledController(settings)
         case pd:
-            return pd_controller(pd)
+            return pd_controller(pd, flight)
 
 
 def _on_board(options: FlyOptions, settings: Settings) -> PositionController:

@@ -82,7 +82,7 @@ class FlyOptions:
         ControllerName,
         typer.Option(
             help="The generated C (nmpc), the paper's PD, a PD with feed-forward of the target's velocity "
-            "and acceleration, or the reference in Python."
+            "and acceleration, a PID with more of it and a low-pass, or the reference in Python."
         ),
     ] = "nmpc"
     trajectory: Annotated[

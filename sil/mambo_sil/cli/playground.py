@@ -14,8 +14,8 @@ def playground(
     sources: Annotated[
         list[str] | None,
         typer.Argument(
-            help="At most four controllers: a preset, a controller.toml, the folder of a bundle, pd or "
-            "pd-feedforward; by default mambo, mambo-1norm and both PDs.",
+            help="At most four controllers: a preset, a controller.toml, the folder of a bundle, pd, "
+            "pd-feedforward or pid-feedforward; by default mambo, mambo-1norm and both PDs.",
             metavar="[SOURCE]...",
             autocompletion=complete_presets,
         ),

@@ -22,7 +22,10 @@ def regress(
     suite: Annotated[str, typer.Argument(help="A shipped suite or a TOML file.")] = "envelope",
     *,
     controller: Annotated[
-        str, typer.Option(help="A preset, a controller.toml, pd, or pd-feedforward.", metavar="SOURCE")
+        str,
+        typer.Option(
+            help="A preset, a controller.toml, pd, pd-feedforward, or pid-feedforward.", metavar="SOURCE"
+        ),
     ] = "mambo",
     vehicle: OtherDrone = None,
     output: Results = Path("regress"),

@@ -11,7 +11,7 @@ from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
-from mambo_sil.flight.loop import PositionController
+from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.loop import fly as simulate
 from mambo_sil.flight.scenario import Record, flight_of, read_record
 from mambo_sil.results.folders import new_results
@@ -36,7 +36,7 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             raise FlightError(f"--repeat {echo(str(file))} contains the whole flight: leave out {option}")
     record = read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
-    watched, controller = _controllers(record)
+    watched, controller = _controllers(record, flight)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(options.output, RepeatSummary.command, files) as folder:
         with progress_bar("repeating") as progress:
@@ -61,11 +61,11 @@ def fly_again(options: FlyOptions, file: Path) -> None:
     finish(summary, flight_text(summary), options, written if watched is None else (*written, INNER_STEPS))
 
 
-def _controllers(record: Record) -> tuple[WatchedController | None, PositionController]:
+def _controllers(record: Record, flight: Flight) -> tuple[WatchedController | None, PositionController]:
     """Return the one that records its iterations, None if it has none, and the one that flies."""
     match record.controller:
-        case "pd" | "pd-feedforward":
-            return None, pd_controller(record.controller)
+        case "pd" | "pd-feedforward" | "pid-feedforward":
+            return None, pd_controller(record.controller, flight)
         case _ if not method_of(record.settings).iterates:
             return None, method_of(record.settings).reference_controller()
         case _:

@@ -8,14 +8,14 @@ from typing import Any, Final
 import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.flight.names import PD, PD_FEEDFORWARD
+from mambo_sil.flight.names import PD, PD_FEEDFORWARD, PID_FEEDFORWARD
 from mambo_sil.flight.traces import Trace
 
 LONGEST_S: Final = 200.0
 """Part of a long flight that is shown."""
 
-_HUES: Final = {PD: 1, PD_FEEDFORWARD: 2}
-"""Colour of a PD by its title; all others have 0."""
+_HUES: Final = {PD: 1, PD_FEEDFORWARD: 2, PID_FEEDFORWARD: 3}
+"""Colour of a law without a model by its title; all others have 0."""
 
 _STEP_S: Final = 0.1
 _LEAST_SPAN_CM: Final = 100.0

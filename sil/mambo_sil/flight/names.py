@@ -13,10 +13,11 @@ SENSORS_OF: Final[dict[str, tuple[SensorsName, ...]]] = {
     "mocap": ("none", "mocap"),
 }
 """Names of the sensors a drone can fly with, by the kind in its file; the last is a campaign's default."""
-PdName = Literal["pd", "pd-feedforward"]
-"""The stock PD of the paper, or the PD with feed-forward of the target's velocity and acceleration."""
+PdName = Literal["pd", "pd-feedforward", "pid-feedforward"]
+"""The laws without a model: the stock PD of the paper, the PD with feed-forward of the target's velocity and
+acceleration, and the PID with feed-forward, low-pass and feedback of the tilt."""
 ControllerName = Literal["nmpc", PdName, "reference"]
-"""The generated C, one of the PDs, or the reference in Python."""
+"""The generated C, one of the laws without a model, or the reference in Python."""
 EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""
 
@@ -26,9 +27,14 @@ ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
 PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"
+PID_FEEDFORWARD: Final = "PID-feedforward"
 PD_NAMES: Final[tuple[PdName, ...]] = get_args(PdName)
-PD_TITLES: Final[dict[str, str]] = {"pd": PD, "pd-feedforward": PD_FEEDFORWARD}
-"""What tables and pictures call the PDs, by name."""
+PD_TITLES: Final[dict[str, str]] = {
+    "pd": PD,
+    "pd-feedforward": PD_FEEDFORWARD,
+    "pid-feedforward": PID_FEEDFORWARD,
+}
+"""What tables and pictures call the laws without a model, by name."""
 
 RENAMED: Final = {
     "wind_m_s2": "push_m_s2",

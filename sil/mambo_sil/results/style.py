@@ -19,6 +19,7 @@ GREEN: Final = "#009E73"
 VERMILION: Final = "#D55E00"
 PURPLE: Final = "#CC79A7"
 SKY: Final = "#56B4E9"
+BROWN: Final = "#8C510A"
 
 TARGET, FLOWN, COMMAND = "#c4c4c4", BLUE, ORANGE
 """Colours of what all pictures of flights show."""
@@ -101,11 +102,12 @@ LOOKS: Final = (
 PD_LOOKS: Final = {
     "pd": Look(ORANGE, (0.0, (1.0, 1.0)), "s"),
     "pd-feedforward": Look(GREEN, (0.0, (4.0, 1.5)), "X"),
+    "pid-feedforward": Look(BROWN, (0.0, (5.0, 1.0, 2.0, 1.0)), "<"),
 }
 
 
 def looks(names: Sequence[str]) -> dict[str, Look]:
-    """Return the look of each controller; those of the PDs are theirs alone."""
+    """Return the look of each controller; those of the laws without a model are theirs alone."""
     others = [name for name in names if name not in PD_LOOKS]
     return {
         name: PD_LOOKS[name] if name in PD_LOOKS else LOOKS[others.index(name) % len(LOOKS)] for name in names

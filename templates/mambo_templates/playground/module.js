@@ -13,13 +13,15 @@ class Module {
     this.end = calls.__heap_base.value;
     this.step = calls.playground_controller();
     this.generated = entry.constants === null;
-    this.self = this.generated ? this.space(calls.nmpc_batch_instance_bytes()) : this.put(bytesOf(entry.constants));
+    this.record = this.generated ? null : bytesOf(entry.constants);
+    this.self = this.generated ? this.space(calls.nmpc_batch_instance_bytes()) : this.put(this.record);
     this.reset();
   }
 
-  /* Puts the controller at its start; a PD remembers nothing. */
+  /* Puts the controller at its start. */
   reset() {
     if (this.generated) this.calls.nmpc_batch_init(this.self, 1);
+    else this.at(this.self, this.record.length, Uint8Array).set(this.record);
   }
 
   /* Returns the address of `size` bytes that are 0. */

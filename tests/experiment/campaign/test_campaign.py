@@ -273,7 +273,7 @@ BAD = {
     'controllers = ["pd", "pd"]': "controllers: two are called pd",
     'controllers = ["calm.toml", "Calm.toml"]': "controllers: results of calm and Calm would have the same",
     'controllers = ["calm_seen.toml", "calm.toml"]': "results of calm_seen and calm would have the same",
-    'controllers = ["pd-feedforward.toml"]': "and _, other than pd and pd-feedforward: results are named",
+    'controllers = ["pd-feedforward.toml"]': "other than pd, pd-feedforward, pid-feedforward: results are",
     'controllers = ["odd.toml"]': "controllers: odd.toml: horizon.update_period_s = 0.007 must be a whole",
     'controllers = ["wrong.toml"]': "wrong.toml: horizon.control = 11 must lie in 1..10 (horizon.prediction)",
     'controllers = ["a b.toml"]': "controllers: a b.toml must have a name of at most 40 letters",

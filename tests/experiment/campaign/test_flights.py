@@ -96,7 +96,7 @@ def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -
     document = Entrant(pd, pd, Settings()).document()
     for row, one in zip(fly_batch(__version__, [document], flight, drawn), drawn, strict=True):
         single = flight_of([scenario(flight, one)], 0.01)
-        alone = fly(single, pd_controller(pd))
+        alone = fly(single, pd_controller(pd, single))
         assert (alone.status == NOT_CALLED).any()
         assert row == {f"{pd}_crashed": 0, f"{pd}_refused_updates": 0} | expected_row(alone, pd)
         titles = {*columns([pd], sensed=sensors != "none"), f"{pd}_saturated_share"}

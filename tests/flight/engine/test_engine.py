@@ -18,7 +18,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import Link
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.pd import PdController, PdFeedForwardController, pd_controller
+from mambo_sil.flight.controllers.pd import AnyPd, PdController, pd_controller
 from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOURCES, lanes_for, load, texts
 from mambo_sil.flight.engine.evaluate import evaluate_compiled
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
@@ -46,11 +46,11 @@ BUILDS = [
 DEFAULT_BUILDS = (Toolchain(("gcc",)), Toolchain(("clang",), "-O0"))
 
 
-def controller(kind: str, flight: Flight) -> CompiledController | PdController | PdFeedForwardController:
+def controller(kind: str, flight: Flight) -> CompiledController | AnyPd:
     """Make controllers for a flight: a PD, or preset mambo in a scalar type."""
     for name in PD_NAMES:
         if kind == name:
-            return pd_controller(name)
+            return pd_controller(name, flight)
     return CompiledController(with_option(MAMBO, "code.scalar", kind, "test"), flight.flights)
 
 
@@ -93,7 +93,7 @@ def digests(engine: Any) -> list[str]:
     for batch in BATCHES.values():
         flight = flight_of(batch, PERIOD_S)
         for name in PD_NAMES:
-            trace = fly_compiled(engine, flight, pd_controller(name))
+            trace = fly_compiled(engine, flight, pd_controller(name, flight))
             found += [trace.digest(index) for index in range(len(batch))]
     return found
 

@@ -76,7 +76,7 @@ def digests(path: Path) -> Iterator[str]:
     traces = (
         fly_compiled(engine, flight, controller)
         for flight, controller in (
-            *((flight, pd_controller(name)) for name in PD_NAMES for flight in flights),
+            *((flight, pd_controller(name, flight)) for name in PD_NAMES for flight in flights),
             *((flight, CompiledController(settings, flight.flights)) for flight in flights[:2]),
         )
     )

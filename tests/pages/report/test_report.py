@@ -202,8 +202,9 @@ def test_missing_traces_are_named_and_the_rest_is_shown() -> None:
     assert "therefore not shown: pd.npz, mambo.npz" in page
     assert page.count("Play</button>") == 1
     Path("table2/pd-feedforward.npz").unlink()
+    Path("table2/pid-feedforward.npz").unlink()
     page = page_of("table2")
-    assert "therefore not shown: pd.npz, pd-feedforward.npz, mambo.npz" in page
+    assert "therefore not shown: pd.npz, pd-feedforward.npz, pid-feedforward.npz, mambo.npz" in page
     assert "Play" not in page
     assert "7.123" in page
 
@@ -212,9 +213,10 @@ def test_a_table2_of_one_pd_lacks_nothing() -> None:
     """Results of an earlier version, which flew the paper's PD alone."""
     path = Path(made("table2")) / SUMMARY
     summary = json.loads(path.read_text())
-    summary["rows"] = [row for row in summary["rows"] if row["controller"] != "PD-feedforward"]
+    summary["rows"] = [row for row in summary["rows"] if "feedforward" not in row["controller"]]
     path.write_text(json.dumps(summary))
-    (path.parent / "pd-feedforward.npz").unlink()
+    for name in ("pd-feedforward", "pid-feedforward"):
+        (path.parent / f"{name}.npz").unlink()
     page = page_of("table2")
     assert "not shown" not in page
     assert "feedforward" not in page

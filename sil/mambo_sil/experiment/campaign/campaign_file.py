@@ -301,7 +301,7 @@ def load_settings(named: str, folder: Path, place: str) -> Settings:
 
 
 def load_entrant(named: str, folder: Path, place: str) -> Entrant:
-    """Return the controller called `named`: a PD, a preset or a file in `folder`.
+    """Return the controller called `named`: a law without a model, a preset or a file in `folder`.
 
     Raises InvalidSettingsError, whose lines begin with `place`.
     """
@@ -314,7 +314,7 @@ def load_entrant(named: str, folder: Path, place: str) -> Entrant:
         raise InvalidSettingsError(
             (
                 f"{place}: {echo(named)} must have a name of at most 40 letters, digits, - and "
-                f"_, other than {' and '.join(PD_NAMES)}: results are named after it",
+                f"_, other than {', '.join(PD_NAMES)}: results are named after it",
             )
         )
     return Entrant(name, "nmpc", settings)

@@ -95,7 +95,7 @@ def _report_part(number: int, parts: int, share: float) -> None:
 
 def _controller(entrant: Entrant, flight: Flight) -> PositionController:
     if entrant.kind != "nmpc":
-        return pd_controller(entrant.kind)
+        return pd_controller(entrant.kind, flight)
     with _BUILDING:
         return CompiledController(entrant.settings, flight.flights)
 

@@ -85,7 +85,7 @@ def fly_sensed(
     duration_s: float = DURATION_S,
     flights: int = FLIGHTS,
 ) -> list[SensedRow]:
-    """Fly the case with both PDs and the compiled C of `settings` by name, each with every one of `VIEWS`.
+    """Fly the case with each law without a model and the C of `settings` by name, each with all `VIEWS`.
 
     Calls `progress` with the share done; rows without noise have one flight.
     """
@@ -98,7 +98,7 @@ def fly_sensed(
         n = flights if sensors is not None and sensors.noise_scale else 1
         flight = Flight(case, duration_s=duration_s, flights=n, seeds=tuple(range(n)), sensors=sensors)
         controller: PositionController = (
-            pd_controller(pds[name]) if name in pds else CompiledController(settings[name], n)
+            pd_controller(pds[name], flight) if name in pds else CompiledController(settings[name], n)
         )
         trace = fly(flight, controller, report_part(progress, index, len(jobs)))
         rows.append(_judge(name, view, trace))

@@ -1,4 +1,4 @@
-"""Table II of the paper, reproduced: both PDs and every preset, printed and measured indices, claims."""
+"""Table II of the paper, reproduced: every law without a model and every preset, printed and measured."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -108,12 +108,14 @@ def report_part(progress: Callable[[float], None], part: int, parts: int) -> Cal
 
 
 def fly_table2(settings: Mapping[str, Settings], progress: Callable[[float], None]) -> dict[str, Trace]:
-    """Fly every case with both PDs and with the compiled C of `settings` by name, 100 s each.
+    """Fly every case with the laws without a model and with the compiled C of `settings` by name, 100 s each.
 
     Calls `progress` with the share done. Returns the traces by controller, with one flight for each case.
     """
     flight = Flight(Trajectories(tuple(CASES.values())), duration_s=DURATION_S, flights=len(CASES))
-    controllers: dict[str, PositionController] = {PD_TITLES[name]: pd_controller(name) for name in PD_NAMES}
+    controllers: dict[str, PositionController] = {
+        PD_TITLES[name]: pd_controller(name, flight) for name in PD_NAMES
+    }
     controllers |= {name: CompiledController(one, len(CASES)) for name, one in settings.items()}
     return {
         name: fly(flight, controller, report_part(progress, index, len(controllers)))

@@ -1,23 +1,37 @@
 """Controllers as the engine calls them: C functions, and C wrappers around them."""
 
-from dataclasses import astuple, dataclass
-from typing import Any, Protocol, runtime_checkable
+import math
+from dataclasses import asdict, astuple, dataclass
+from typing import Any, Final, Protocol, runtime_checkable
 
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import ffi as controller_ffi
 from mambo_sil.flight.controllers.pd import (
     ERROR_LIMIT_M,
+    INTEGRAL_LIMIT_RAD,
+    INTEGRATED_ERROR_M,
+    JERK_LIMIT_M_S3,
     POSITION_D_RAD_S_M,
     POSITION_P_RAD_M,
     TILT_LIMIT_RAD,
+    AnyPd,
     PdController,
     PdFeedForwardController,
+    PidFeedForwardController,
 )
 from mambo_sil.flight.engine.engine_library import ffi
 from mambo_sil.flight.loop import PositionController
+from mambo_sil.flight.names import PdName
 
-EngineController = CompiledController | PdController | PdFeedForwardController
+EngineController = CompiledController | AnyPd
 """Controllers whose step is a C function."""
+PD_STEPS: Final[dict[PdName, str]] = {
+    "pd": "engine_pd_step",
+    "pd-feedforward": "engine_pd_feedforward_step",
+    "pid-feedforward": "engine_pid_feedforward_step",
+}
+"""The engine's functions of the laws without a model, by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +80,9 @@ def native(engine: Any, controller: PositionController) -> Native:
         case PdController() | PdFeedForwardController():
             name, constants = pd_function(controller)
             return Native(getattr(engine, name), constants, 0)
+        case PidFeedForwardController():
+            name, records = pd_function(controller)
+            return Native(getattr(engine, name), records, ffi.sizeof("engine_pid_feedforward_t"))
         case CompiledController():
             step, instances, stride = controller.native
             return Native(foreign("engine_controller_t", step), foreign("char *", instances), stride)
@@ -77,10 +94,31 @@ def foreign(kind: str, address: Any) -> Any:
     return ffi.cast(kind, int(controller_ffi.cast("intptr_t", address)))
 
 
-def pd_function(controller: PdController | PdFeedForwardController) -> tuple[str, Any]:
-    """Return the name of the engine's function that is the step of a PD, and its record of constants."""
-    if isinstance(controller, PdController):
-        constants = POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M
-        return "engine_pd_step", ffi.new("engine_pd_t *", constants)
-    gains = (*astuple(controller.gains), TILT_LIMIT_RAD)
-    return "engine_pd_feedforward_step", ffi.new("engine_pd_feedforward_t *", gains)
+def pd_function(controller: AnyPd) -> tuple[str, Any]:
+    """Return the name of the engine's function that is the step of a law without a model, and its records."""
+    match controller:
+        case PdController():
+            constants = POSITION_P_RAD_M, POSITION_D_RAD_S_M, ERROR_LIMIT_M
+            return PD_STEPS["pd"], ffi.new("engine_pd_t[]", [constants])
+        case PdFeedForwardController():
+            gains = (*astuple(controller.gains), TILT_LIMIT_RAD)
+            return PD_STEPS["pd-feedforward"], ffi.new("engine_pd_feedforward_t[]", [gains])
+        case PidFeedForwardController():
+            records = ffi.new("engine_pid_feedforward_t[]", [_pid_record(controller)] * controller.n)
+            return PD_STEPS["pid-feedforward"], records
+
+
+def _pid_record(controller: PidFeedForwardController) -> dict[str, Any]:
+    """Return the members of a record of the PID at its start; those that are missing are 0."""
+    gains = asdict(controller.gains)
+    del gains["low_pass_s"]
+    return gains | {
+        "low_pass_share": controller.low_pass_share,
+        "update_period_s": controller.update_period_s,
+        "gravity_m_s2": GRAVITY_M_S2,
+        "integral_limit_rad": INTEGRAL_LIMIT_RAD,
+        "integrated_error_m": INTEGRATED_ERROR_M,
+        "jerk_limit_m_s3": JERK_LIMIT_M_S3,
+        "tilt_limit_rad": TILT_LIMIT_RAD,
+        "acceleration_m_s2": (math.nan, math.nan),
+    }

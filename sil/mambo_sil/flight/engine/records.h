@@ -222,6 +222,30 @@ typedef struct {
 int64_t engine_pd_feedforward_step(void *self, const double *state, const double *target,
                                    double thrust_acceleration_m_s2, double *command_rad);
 
+/* The PID with feed-forward: PidFeedForwardController. */
+typedef struct {
+    double position_rad_m;
+    double velocity_rad_s_m;
+    double acceleration_rad_s2_m;
+    double jerk_rad_s3_m;
+    double integral_rad_m_s;
+    double tilt_feedback;
+    double low_pass_share;
+    double update_period_s;
+    double gravity_m_s2;
+    double integral_limit_rad;
+    double integrated_error_m;
+    double jerk_limit_m_s3;
+    double tilt_limit_rad;
+
+    double acceleration_m_s2[2]; /* of the target at the last update; initially NaN */
+    double integral_rad[2];
+    double tilt_rad[2];          /* behind the low-pass */
+} engine_pid_feedforward_t;
+
+int64_t engine_pid_feedforward_step(void *self, const double *state, const double *target,
+                                    double thrust_acceleration_m_s2, double *command_rad);
+
 /* A controller with a fault: sil/mambo_sil/experiment/faults/fault.py. Initially update is 0 and computed_rad is 0. */
 typedef struct {
     engine_controller_t controller;

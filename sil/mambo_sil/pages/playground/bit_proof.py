@@ -90,4 +90,4 @@ def calm(flight: Flight) -> Flight:
 
 def native_digest(flight: Flight, one: PageController) -> str:
     """Return the SHA-256 of the trace on this machine; raises BuildError, CacheError."""
-    return fly(flight, one.controller()).digest()
+    return fly(flight, one.controller(flight)).digest()

@@ -1,4 +1,4 @@
-"""The controllers that fly on a page: PDs, and generated C."""
+"""The controllers that fly on a page: laws without a model, and generated C."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,8 @@ from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.pd import PdController, PdFeedForwardController, pd_controller
+from mambo_sil.flight.controllers.pd import AnyPd, pd_controller
+from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.names import PD_NAMES, PD_TITLES, PdName
 
 DEFAULTS: Final = ("mambo", "mambo-1norm", "pd-feedforward", "pd")
@@ -20,7 +21,7 @@ MOST: Final = 4
 
 @dataclass(frozen=True)
 class PageController:
-    """One controller: a PD by its name, or the settings of generated C."""
+    """One controller: a law without a model by its name, or the settings of generated C."""
 
     source: str
     kind: PdName | Settings
@@ -30,13 +31,15 @@ class PageController:
         """The name on the page: of a file or folder without the folders above it."""
         return PD_TITLES.get(self.source, echo(Path(self.source).resolve().name))
 
-    def controller(self) -> CompiledController | PdController | PdFeedForwardController:
-        """Return the controller for this machine; raises BuildError, CacheError."""
-        return CompiledController(self.kind) if isinstance(self.kind, Settings) else pd_controller(self.kind)
+    def controller(self, flight: Flight) -> CompiledController | AnyPd:
+        """Return the controller of a single flight for this machine; raises BuildError, CacheError."""
+        if isinstance(self.kind, Settings):
+            return CompiledController(self.kind)
+        return pd_controller(self.kind, flight)
 
 
 def page_controllers(sources: Sequence[str]) -> tuple[PageController, ...]:
-    """Return the controllers of `sources`: pd, pd-feedforward, presets, settings files, folders of bundles.
+    """Return the controllers of `sources`: laws without a model, presets, settings files, folders of bundles.
 
     Raises FlightError for too many, one twice or different update periods, and what `presets.load` raises.
     """

@@ -27,7 +27,7 @@ SCRIPTS: Final = (
     *("field.js", "plots.js", "controls.js", "playground.js"),
 )
 """The files of the page's script, in their order."""
-_PD_HUES: Final = {"pd": 1, "pd-feedforward": 2}
+_PD_HUES: Final = {"pd": 1, "pd-feedforward": 2, "pid-feedforward": 3}
 """Colours of the PDs on all pages."""
 _DASHES: Final = ((), (7, 3), (2, 3), (9, 3, 2, 3))
 """Lengths of dashes and gaps of each controller's line, in pixels, for whoever cannot tell colours."""
@@ -75,7 +75,7 @@ def playground_page(
             FlownController(source=one.source, settings=settings, wasm_bytes=len(wasm), trace_sha256=digest)
         )
         drones.append(
-            _drone(one) | {"hue": hue, "dash": _DASHES[number], "wasm": _text(wasm), "digest": digest}
+            _drone(one, flight) | {"hue": hue, "dash": _DASHES[number], "wasm": _text(wasm), "digest": digest}
         )
         progress((number + 1) / len(found))
     sliders = _sliders(flight, found)
@@ -106,11 +106,11 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
     return [*dials(bit_proof.calm(flight)), *weights]
 
 
-def _drone(one: PageController) -> dict[str, Any]:
-    """Return title, type of the C's numbers, and in base64 the constants of a PD."""
+def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
+    """Return title, type of the C's numbers, and in base64 the record of a law without a model."""
     if isinstance(one.kind, Settings):
         return {"title": one.title, "scalar": one.kind.code.scalar, "constants": None}
-    constants = pd_function(pd_controller(one.kind))[1]
+    constants = pd_function(pd_controller(one.kind, flight))[1]
     return {"title": one.title, "scalar": "float64", "constants": _text(bytes(ffi.buffer(constants)))}
 
 

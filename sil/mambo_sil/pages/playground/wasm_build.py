@@ -13,9 +13,8 @@ from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.flight.controllers.controller_library import glue, with_default_prefix
-from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.engine_library import texts
-from mambo_sil.flight.engine.native import pd_function
+from mambo_sil.flight.engine.native import PD_STEPS
 from mambo_sil.pages.playground.page_controllers import PageController
 from mambo_sil.results.cache import build_cached
 
@@ -74,7 +73,7 @@ def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
     }
     controller = one.kind
     if not isinstance(controller, Settings):
-        return files, ENGINE_CALLS, pd_function(pd_controller(controller))[0]
+        return files, ENGINE_CALLS, PD_STEPS[controller]
     bundle = render(with_default_prefix(controller), with_digest=False)
     files |= {path: text for path, text in bundle.items() if path.startswith(("include/", "src/"))} | glue()
     weights = ("nmpc_host_set_weights",) if method_of(controller).weight_limits else ()
