@@ -6,6 +6,7 @@ flight; the rows of a batch are one transaction. `flights.csv` is exported from 
 
 import contextlib
 import hashlib
+import io
 import json
 import math
 import sqlite3
@@ -64,13 +65,14 @@ class FlightStore:
 
     def export(self) -> None:
         """Write the CSV, atomically: number, seed, draws, results and digest of the line of each flight."""
-        lines = [",".join((*self._titles, LINE_DIGEST))]
+        content = io.BytesIO()  # one copy of a table that has tens of MB
+        content.write(",".join((*self._titles, LINE_DIGEST)).encode() + b"\n")
         with convert_os_errors(self.folder):
             for row in self.rows():
                 start = ",".join(map(str, row.values()))
                 digest = hashlib.sha256(f"{self._key},{start}".encode()).hexdigest()[:_DIGITS]
-                lines.append(f"{start},{digest}")
-            put(self.folder / TABLE, ("\n".join(lines) + "\n").encode())
+                content.write(f"{start},{digest}\n".encode())
+            put(self.folder / TABLE, content.getvalue())
 
     def rows(self) -> Iterator[dict[str, Value]]:
         """Yield the cells of each flight by column, in the order of the flights."""
