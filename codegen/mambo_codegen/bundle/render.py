@@ -19,7 +19,7 @@ from mambo_codegen.bundle.flags import (
     WARNING_FLAGS,
 )
 from mambo_codegen.bundle.fmu import fmu_variables
-from mambo_codegen.bundle.infix import infix
+from mambo_codegen.bundle.products import products, term
 from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.methods import method_of
@@ -78,8 +78,6 @@ def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = 
 
     context = _context(settings, with_digest=with_digest) | {"amalgamated": amalgamate}
     text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
-    if method.numbers.formats is None:
-        text = {name: infix(content) for name, content in text.items()}
     if amalgamate:
         layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
         library = _join([text[name] for name in public], [text[name] for name in (*privates, *code)])
@@ -152,6 +150,7 @@ def _environment() -> jinja2.Environment:
         autoescape=False,
     )
     environment.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
+    environment.filters["term"] = term
     return environment
 
 
@@ -171,62 +170,66 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     method = method_of(settings)
     numbers = method.numbers
     scalar = settings.code.scalar
-    return method.context | {
-        "settings": settings,
-        "method_folder": method.folder,
-        "spelling": literals.Spelling(scalar, numbers.bits),
-        "parameters": [
-            (f"{section}.{key}", value)
-            for section, values in settings.in_use.items()
-            for key, value in values.items()
-            if key != "prefix"  # every public name shows it
-        ],
-        "version": __version__,
-        "digest": settings.short_digest,
-        "settings_id": _settings_id(settings),
-        "fixed": numbers.formats is not None,
-        "formats": numbers.formats,
-        "sine_bits": SINE_BITS,
-        "scales": _powers(numbers, 1),
-        "units": _powers(numbers, -1),
-        "c_type": literals.C_TYPES[scalar],
-        "shell": "nmpc_float_" if numbers.formats else "nmpc_",
-        "sum_type": literals.SUM_TYPES[scalar],
-        "scalar_bytes": numbers.bytes[0],
-        "instance_bytes": method.instance_bytes,
-        "tracker": method.tracker,
-        "feedback": method.feedback_steps is not None,
-        "feedback_steps": method.feedback_steps,
-        "given": method.tracker is not None and method.tracker.is_given,
-        "trigonometry": method.trigonometry,
-        "sine_error": SINE_ERRORS[scalar],
-        "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
-        "yaw_limit_rad": YAW_LIMIT_RAD,
-        "vectors": self_test(method),
-        "episodes": episode_count(method),
-        "ticks": TICKS,
-        "held": TICKS_PER_INPUT,
-        "self_test_steps": TICKS * episode_count(method),
-        "self_test_digest": self_test_digest(method, episode_count(method)) if with_digest else None,
-        "spread": input_scales(method),
-        "boards": [
-            {
-                "name": board.name,
-                "compiler": board.compiler.common,
-                "flags": " ".join(board.compiler.flags),
-            }
-            for board in map(boards.load, boards.names())
-        ],
-        "hover_thrust_m_s2": hover_thrust(settings),
-        "example_position_m": min(1.0, settings.ranges.position_m / 2),
-        "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
-        "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
-        "compile_flags": " ".join(COMPILE_FLAGS),
-        "warning_flags": " ".join(WARNING_FLAGS),
-        "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
-        "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in method.proofs.items()},
-        "rule_flags": " ".join(RULE_FLAGS),
-    }
+    return (
+        products(fixed=numbers.formats is not None)
+        | method.context
+        | {
+            "settings": settings,
+            "method_folder": method.folder,
+            "spelling": literals.Spelling(scalar, numbers.bits),
+            "parameters": [
+                (f"{section}.{key}", value)
+                for section, values in settings.in_use.items()
+                for key, value in values.items()
+                if key != "prefix"  # every public name shows it
+            ],
+            "version": __version__,
+            "digest": settings.short_digest,
+            "settings_id": _settings_id(settings),
+            "fixed": numbers.formats is not None,
+            "formats": numbers.formats,
+            "sine_bits": SINE_BITS,
+            "scales": _powers(numbers, 1),
+            "units": _powers(numbers, -1),
+            "c_type": literals.C_TYPES[scalar],
+            "shell": "nmpc_float_" if numbers.formats else "nmpc_",
+            "sum_type": literals.SUM_TYPES[scalar],
+            "scalar_bytes": numbers.bytes[0],
+            "instance_bytes": method.instance_bytes,
+            "tracker": method.tracker,
+            "feedback": method.feedback_steps is not None,
+            "feedback_steps": method.feedback_steps,
+            "given": method.tracker is not None and method.tracker.is_given,
+            "trigonometry": method.trigonometry,
+            "sine_error": SINE_ERRORS[scalar],
+            "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
+            "yaw_limit_rad": YAW_LIMIT_RAD,
+            "vectors": self_test(method),
+            "episodes": episode_count(method),
+            "ticks": TICKS,
+            "held": TICKS_PER_INPUT,
+            "self_test_steps": TICKS * episode_count(method),
+            "self_test_digest": self_test_digest(method, episode_count(method)) if with_digest else None,
+            "spread": input_scales(method),
+            "boards": [
+                {
+                    "name": board.name,
+                    "compiler": board.compiler.common,
+                    "flags": " ".join(board.compiler.flags),
+                }
+                for board in map(boards.load, boards.names())
+            ],
+            "hover_thrust_m_s2": hover_thrust(settings),
+            "example_position_m": min(1.0, settings.ranges.position_m / 2),
+            "example_speed_m_s": min(0.2, settings.ranges.velocity_m_s / 2),
+            "steps_per_line": max(1, round(0.5 / settings.horizon.update_period_s)),
+            "compile_flags": " ".join(COMPILE_FLAGS),
+            "warning_flags": " ".join(WARNING_FLAGS),
+            "proof_preprocessing": " ".join(PROOF_PREPROCESSING),
+            "proofs": {name: " ".join((*PROOF_FLAGS, *flags)) for name, flags in method.proofs.items()},
+            "rule_flags": " ".join(RULE_FLAGS),
+        }
+    )
 
 
 def _settings_id(settings: Settings) -> str:
