@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.math import Real
 from mambo_codegen.methods.proofs import FIXED_PROOFS
-from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.key import Refusal
 
 
 class Step(Protocol):

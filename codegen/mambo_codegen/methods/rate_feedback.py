@@ -2,7 +2,7 @@
 
 from mambo_codegen.numbers.fixed_point import SINE_BITS, fractional_bits
 from mambo_codegen.settings.fields import SHORTEST_LAG_S
-from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
 
 

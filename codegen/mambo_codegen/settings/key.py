@@ -22,6 +22,15 @@ class Key:
     high: float | None = None
 
 
+@dataclass(frozen=True)
+class Refusal:
+    """Why a joint rule refuses settings: the key to change, and the rule that it breaks."""
+
+    section: str
+    name: str
+    rule: str
+
+
 def spell(value: object) -> str:
     """Spell a setting's value as TOML: a number as its shortest decimal, text in quotes."""
     if isinstance(value, float):

@@ -9,7 +9,7 @@ from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_codegen.methods import method_of
-from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
 
 

@@ -12,7 +12,7 @@ from mambo_codegen.methods.one_norm.formats import refusals
 from mambo_codegen.methods.proofs import FLOAT_PROOFS
 from mambo_codegen.methods.rate_feedback import lag_refusals
 from mambo_codegen.numbers.representation import WEIGHTS
-from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.key import Refusal
 
 
 class OneNorm(OneNormConstants, Method):

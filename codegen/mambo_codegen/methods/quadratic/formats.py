@@ -22,8 +22,8 @@ from mambo_codegen.methods.quadratic.observer_constants import observer_constant
 from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.tracker_constants import tracker_constants
 from mambo_codegen.numbers.fixed_point import SINE_BITS, fractional_bits
+from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
-from mambo_codegen.settings.refusal import Refusal
 from mambo_codegen.settings.sections import Sections
 
 _TURN: Final = 2.01

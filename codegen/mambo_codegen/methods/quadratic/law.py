@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeLoop, attitude_loops
 from mambo_codegen.methods.quadratic.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
 from mambo_codegen.methods.rate_feedback import lag_refusals
-from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Cost, Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")

@@ -13,7 +13,7 @@ from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.numbers.representation import COMMAND
-from mambo_codegen.settings.refusal import Refusal
+from mambo_codegen.settings.key import Refusal
 
 _WORK: tuple[int, int] = (50, 1)
 """What a step counts as, in predicted states of the 1-norm."""
