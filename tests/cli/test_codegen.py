@@ -16,13 +16,14 @@ from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.toml_file import PRESETS
 from tests.support.command import run
 
-COMMAND = "from mambo_sil.cli import command, generate; app = command.root(); generate.register(app); app()"
+COMMAND = "from mambo_sil.cli.app import main; main()"
 INTERRUPTED = """
-from mambo_sil.cli import command, generate
+from mambo_sil.cli import command
 app = command.root()
-generate.register(app)
 @app.command()
 def stop(): raise KeyboardInterrupt
+@app.command()
+def other(): pass
 app()
 """
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mambo_sil.cli.command import load
-from mambo_sil.cli.faults import FILES
+from mambo_sil.cli.fly.commands import FAULTS_FILES
 from tests.support.command import run
 
 
@@ -15,7 +15,7 @@ def test_faults_leave_table_picture_and_json(tmp_path: Path) -> None:
     """CSV, PNG, SVG and the summary, which stdout repeats; with the scalar type that was asked for."""
     said, _ = run("faults", "table1", "--scalar", "fixed", "--json", "-o", "out")
     out = tmp_path / "out"
-    assert {path.name for path in out.iterdir()} == {*FILES, "summary.json"}
+    assert {path.name for path in out.iterdir()} == {*FAULTS_FILES, "summary.json"}
     assert (out / "faults.png").read_bytes().startswith(b"\x89PNG")
     assert said == (out / "summary.json").read_text("utf-8")
     summary = json.loads(said, parse_constant=pytest.fail)

@@ -151,6 +151,26 @@ def test_bad_input_gets_a_message_and_exit_2(arguments: list[str], message: str,
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_the_summary_says_what_flew(tmp_path: Path) -> None:
+    """A PD has no settings, a hover no size; the time is a whole number of periods, which is also said."""
+    (tmp_path / "way.csv").write_text("time_s,x_m,y_m\n0,0,0\n1,0.2,0.1\n")
+    line = ["--controller", "pd", "--trajectory", "hover", "--duration-s", "0.015"]
+    said, talk = run("fly", *line, *PLAIN)
+    flown = json.loads(said)
+    assert "--duration-s = 0.015: flown 0.02 s, a whole number of update periods of 0.01 s" in talk
+    found = [flown[key] for key in ("settings", "source", "size_m", "rate_rad_s", "duration_s")]
+    assert found == [None, None, None, None, 0.02]
+    said, talk = run("fly", "--trajectory", "step", "--duration-s", "0.57", *PLAIN)
+    flown = json.loads(said)
+    assert [flown[key] for key in ("source", "size_m", "rate_rad_s", "duration_s")] == [
+        "mambo",
+        2,
+        None,
+        0.57,
+    ]
+    assert "--duration-s" not in talk
+
+
 def test_a_refusing_controller_is_an_explained_failure(tmp_path: Path) -> None:
     """More than half of the inputs refused: exit 1, with the range that was exceeded."""
     (tmp_path / "deaf.toml").write_text("[ranges]\nthrust_acceleration_min_m_s2 = 20.0\n")

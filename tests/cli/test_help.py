@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from mambo_sil.cli.app import COMMANDS
+from mambo_sil.cli.app import PANELS
 from tests.support.command import run
 
 HEAVY = {"capstone", "cffi", "elftools", "jinja2", "matplotlib", "numpy", "optuna", "scipy", "unicorn"}
@@ -32,7 +32,8 @@ def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
 
 
 def test_every_command_has_its_line() -> None:
-    """The first sentence of what it does."""
+    """The first sentence of what it does, in the panel of what it is for."""
     said, _ = run("--help")
-    for name in ("init", "presets", "schema", "generate", *COMMANDS):
+    assert all(f"─ {panel} ─" in said for panel in PANELS)
+    for name in (name for commands in PANELS.values() for name in commands):
         assert f"│ {name} " in said

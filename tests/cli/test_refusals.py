@@ -1,6 +1,7 @@
 """Refused commands: an explained exit 2, and no folder or file left behind."""
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +18,70 @@ def test_an_empty_output_is_refused(command: str, tmp_path: Path) -> None:
     """It would be the current folder."""
     said, talk = run(command, "-o", "", code=2)
     assert (said, "must not be empty" in talk) == ("", True)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "generate '' --for crazyflie -o a/b",
+        "generate -o a/b --for ''",
+        "init ''",
+        "design ''",
+        "fly '' -o a/b",
+        "fly --vehicle= -o a/b",
+        "fly --on '' -o a/b",
+        "fly --trajectory '' -o a/b",
+        "fly --repeat '' -o a/b",
+        "footprint --board '' -o a/b",
+        "same-bits --boards ''",
+        "campaign '' -o a/b",
+        "regress '' -o a/b",
+        "identify log.csv '' -o a/b",
+        "identify --manoeuvre ''",
+        "identify-binary ''",
+        "replay '' -o a/b",
+        "diff mambo ''",
+        "report ''",
+        "playground mambo '' -o a.html",
+        "vehicles ''",
+    ],
+)
+def test_an_empty_name_is_refused(line: str, tmp_path: Path) -> None:
+    """It is the unset variable of a script; neither the default nor the current folder takes its place."""
+    said, talk = run(*shlex.split(line), code=2)
+    assert (said, "must not be empty" in talk) == ("", True), talk
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("fly table1 --controller pd", "table1: --controller pd has no settings; leave it out"),
+        (
+            "fly --controller pd-feedforward --scalar fixed",
+            "--scalar fixed: --controller pd-feed",
+        ),
+        ("fly --baud 9600", "it needs --port"),
+        ("footprint --baud 9600", "it needs --port"),
+        ("same-bits --baud 9600", "it needs --port"),
+        ("fly --trajectory hover --size-m 3", "--size-m = 3: --trajectory hover has none; leave it out"),
+        ("fly --trajectory a.csv --size-m 3", "--size-m = 3: --trajectory a.csv has none; leave it out"),
+        (
+            "fly --trajectory step --rate-rad-s 3",
+            "--rate-rad-s = 3: --trajectory step has none; leave",
+        ),
+        ("fly --trajectory hover --rate-rad-s 3", "has none; leave it out, or fly bernoulli, gerono, liss"),
+        (
+            "fly --vehicle crazyflie-flown --motor-lag-s 0.1",
+            "--motor-lag-s = 0.1: vehicle crazyflie-flown is simulated without motors",
+        ),
+    ],
+)
+def test_an_option_without_effect_is_refused(line: str, message: str, tmp_path: Path) -> None:
+    """The message names it and says what to do."""
+    said, talk = run(*line.split(), code=2)
+    assert (said, message in talk) == ("", True), talk
     assert not list(tmp_path.iterdir())
 
 

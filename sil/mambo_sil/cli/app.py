@@ -1,60 +1,46 @@
 """The command line `mambo-nmpc` with all its commands."""
 
 import os
-import signal
 from collections.abc import Callable
-from typing import Final, Never
+from typing import Final
 
 import typer
 
-from mambo_codegen.errors import Terminated
-from mambo_sil.cli import generate as generating
-from mambo_sil.cli.campaign import campaign
-from mambo_sil.cli.command import examples, root
-from mambo_sil.cli.design import design
-from mambo_sil.cli.diff import diff
-from mambo_sil.cli.doctor import doctor
-from mambo_sil.cli.faults import faults
-from mambo_sil.cli.fly import fly
-from mambo_sil.cli.footprint import footprint
-from mambo_sil.cli.identify import identify
-from mambo_sil.cli.identify_binary import identify_binary
-from mambo_sil.cli.options import FlyOptions, command_of
-from mambo_sil.cli.playground import playground
-from mambo_sil.cli.regress import regress
-from mambo_sil.cli.replay_log import replay
-from mambo_sil.cli.report import report
-from mambo_sil.cli.same_bits import same_bits
-from mambo_sil.cli.sweep import sweep
-from mambo_sil.cli.table2 import table2
-from mambo_sil.cli.tune import tune
-from mambo_sil.cli.vehicles import vehicles
-from mambo_sil.cli.verify import EXIT_CODES, verify
+from mambo_sil.cli.board import footprint, same_bits, sweep
+from mambo_sil.cli.command import Command, examples, root
+from mambo_sil.cli.evidence import VERIFY_EXIT_CODES, regress, report, table2, verify
+from mambo_sil.cli.fly.commands import campaign, faults, fly, replay
+from mambo_sil.cli.generate import generate, identify_binary
+from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles
+from mambo_sil.cli.start import doctor, init, playground
 
-COMMANDS: Final[dict[str, Callable[..., None]]] = {
-    "fly": command_of(FlyOptions, fly),
-    "table2": table2,
-    "footprint": footprint,
-    "same-bits": same_bits,
-    "sweep": sweep,
-    "doctor": doctor,
-    "vehicles": vehicles,
-    "design": design,
-    "faults": faults,
-    "verify": verify,
-    "regress": regress,
-    "campaign": campaign,
-    "tune": tune,
-    "identify": identify,
-    "replay": replay,
-    "diff": diff,
-    "identify-binary": identify_binary,
-    "playground": playground,
-    "report": report,
+PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
+    "Start": {"init": init, "doctor": doctor, "playground": playground},
+    "Settings": {
+        "presets": list_presets,
+        "schema": schema,
+        "vehicles": vehicles,
+        "identify": identify,
+        "design": design,
+        "tune": tune,
+        "diff": diff,
+    },
+    "Generate": {"generate": generate, "identify-binary": identify_binary},
+    "Fly": {"fly": fly, "campaign": campaign, "faults": faults, "replay": replay},
+    "Board": {"footprint": footprint, "sweep": sweep, "same-bits": same_bits},
+    "Evidence": {"verify": verify, "regress": regress, "table2": table2, "report": report},
 }
-"""Commands by name, in the order of the help."""
+"""Commands by name, in the panels and the order of the help."""
 
 EXAMPLES: Final = """\
+mambo-nmpc init
+mambo-nmpc init table1 -o paper.toml
+mambo-nmpc init -o - | less
+mambo-nmpc schema > controller.schema.json
+mambo-nmpc generate -o controller
+mambo-nmpc generate controller.toml -o controller --prefix roll_pitch
+mambo-nmpc generate controller.toml -o controller --check
+mambo-nmpc generate --for crazyflie -o app
 mambo-nmpc fly
 mambo-nmpc fly controller.toml --trajectory circle --yaw-rad 0.8 -o circle
 mambo-nmpc fly --controller pd --push 0.5,0 -o pd-pushed
@@ -121,21 +107,16 @@ mambo-nmpc report table2 footprint faults verification -o controller.html
 def app() -> typer.Typer:
     """Return the root command with all its sub-commands."""
     joined = root()
-    generating.register(joined)
-    for name, command in COMMANDS.items():
-        lines = [line for line in EXAMPLES.splitlines() if line.split()[1] == name]
-        more = [EXIT_CODES] if name == "verify" else []
-        joined.command(name, epilog=examples(*lines, *more) if lines else None)(command)
+    for panel, commands in PANELS.items():
+        for name, command in commands.items():
+            lines = [line for line in EXAMPLES.splitlines() if line.split()[1] == name]
+            more = [VERIFY_EXIT_CODES] if name == "verify" else []
+            epilog = examples(*lines, *more) if lines else None
+            joined.command(name, cls=Command, epilog=epilog, rich_help_panel=panel)(command)
     return joined
-
-
-def _terminate(*_: object) -> Never:
-    """End the command on SIGTERM, with all that it does on Ctrl-C."""
-    raise Terminated
 
 
 def main() -> None:
     """Run the command line."""
-    signal.signal(signal.SIGTERM, _terminate)
     os.environ["MPLBACKEND"] = "agg"  # plots go to files; matplotlib fails on a backend it does not know
     app()()

@@ -6,13 +6,14 @@ Results go to stdout, messages to stderr. This module imports nothing slow, beca
 import errno
 import io
 import os
+import signal
 import sys
 import traceback
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Never
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from mambo_codegen import __version__
 from mambo_codegen.errors import (
@@ -82,6 +83,7 @@ class RootGroup(TyperGroup):
 
     def invoke(self, ctx: typer.Context) -> object:  # type: ignore[override] # typer hides the base of Context
         """Run a command; with `--debug` print the traceback of an error first."""
+        signal.signal(signal.SIGTERM, _terminate)
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()
@@ -90,6 +92,25 @@ class RootGroup(TyperGroup):
                 traceback.print_exception(error)
             raise typer.Exit(_exit_code(error)) from error
         return result
+
+
+class Command(TyperCommand):
+    """A command, which refuses the empty value of a script's unset variable."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override] # as above
+        """Parse a command line; raises BadParameter for an empty argument or value of an option."""
+        given, _, parameters = self.make_parser(ctx).parse_args(list(args))
+        for parameter in parameters:
+            value = given.get(parameter.name or "")
+            if "" in (value if isinstance(value, list | tuple) else (value,)):
+                named: Any = parameter  # typer hides the class of parameters
+                raise typer.BadParameter("must not be empty; the current folder is .", ctx, named)
+        return super().parse_args(ctx, args)
+
+
+def _terminate(*_: object) -> Never:
+    """End the command on SIGTERM, with all that it does on Ctrl-C."""
+    raise Terminated
 
 
 def _exit_code(error: BaseException) -> int:
@@ -128,7 +149,7 @@ def _silence_broken_stdout() -> bool:
 
 
 def root() -> typer.Typer:
-    """Return the root command without sub-commands, which `codegen.cli` and `sil.cli` add."""
+    """Return the root command without sub-commands."""
     return typer.Typer(
         name="mambo-nmpc",
         cls=RootGroup,
@@ -158,14 +179,7 @@ def _root_options(
 
 def output_option(about: str) -> Any:
     """Return the option -o, a path; `about` is its help."""
-    return typer.Option("--output", "-o", help=about, parser=_output_path, metavar="<path>")
-
-
-def _output_path(text: str | Path) -> Path:
-    """Return the path; raises BadParameter for an empty one, which pathlib reads as the current folder."""
-    if text == "":
-        raise typer.BadParameter("must not be empty; the current folder is .")
-    return Path(text)
+    return typer.Option("--output", "-o", help=about, metavar="<path>")
 
 
 OutputFile = Annotated[Path, output_option("File to write, - for stdout.")]

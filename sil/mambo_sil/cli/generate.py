@@ -1,4 +1,4 @@
-"""The commands that generate C: init, presets, schema, generate."""
+"""The commands of the panel Generate: generate, identify-binary."""
 
 import json
 from dataclasses import asdict
@@ -12,78 +12,15 @@ from mambo_codegen.errors import DriftError, echo
 from mambo_sil.cli.command import (
     AsJson,
     OptionalSource,
-    OutputFile,
-    Overwrite,
     Scalar,
     complete_presets,
-    examples,
     load,
     output_option,
-    write_file,
 )
 
 if TYPE_CHECKING:
     from mambo_codegen.bundle.bundle import Changes, Drift
     from mambo_codegen.settings.model import Settings
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands of this module to `app`."""
-    app.command(
-        epilog=examples(
-            "mambo-nmpc init", "mambo-nmpc init table1 -o paper.toml", "mambo-nmpc init -o - | less"
-        )
-    )(init)
-    app.command(name="presets")(list_presets)
-    app.command(epilog=examples("mambo-nmpc schema > controller.schema.json"))(schema)
-    app.command(
-        epilog=examples(
-            "mambo-nmpc generate -o controller",
-            "mambo-nmpc generate controller.toml -o controller --prefix roll_pitch",
-            "mambo-nmpc generate controller.toml -o controller --check",
-            "mambo-nmpc generate --for crazyflie -o app",
-        )
-    )(generate)
-
-
-def init(
-    preset: Annotated[
-        str,
-        typer.Argument(
-            help="Preset to start from; `mambo-nmpc presets` lists them.", autocompletion=complete_presets
-        ),
-    ] = "mambo",
-    output: OutputFile = Path("controller.toml"),
-    force: Overwrite = False,
-) -> None:
-    """Write a controller.toml that holds and explains every setting."""
-    from mambo_codegen.settings import controller_toml, presets
-    from mambo_codegen.settings.toml_file import PRESETS
-
-    text = controller_toml.to_toml(presets.preset(preset), PRESETS.description(preset))
-    if write_file(text, output, force=force):
-        name = echo(str(output))
-        typer.echo(f"wrote {name}; next: mambo-nmpc generate {name} -o controller", err=True)
-
-
-def list_presets(as_json: AsJson = False) -> None:
-    """List the presets and their purpose."""
-    from mambo_codegen.settings.toml_file import PRESETS
-
-    described = {name: PRESETS.description(name) for name in PRESETS.names()}
-    if as_json:
-        typer.echo(json.dumps(described, indent=2))
-        return
-    width = max(map(len, described))
-    for name, description in described.items():
-        typer.echo(f"{name:<{width}}  {description}")
-
-
-def schema() -> None:
-    """Print the JSON schema of controller.toml; editors check and complete TOML with it."""
-    from mambo_codegen.settings.model import Settings
-
-    typer.echo(json.dumps(Settings.json_schema(), indent=2))
 
 
 def generate(
@@ -130,7 +67,9 @@ def generate(
     if amalgamate and target is not None:
         raise typer.BadParameter("--for decides the layout: leave one of them out", param_hint="--amalgamate")
     wanted = None if target is None else find_target(target)
-    settings = load(source or (wanted.preset if wanted else "mambo"), scalar)
+    if source is None:
+        source = "mambo" if wanted is None else wanted.preset
+    settings = load(source, scalar)
     if prefix is not None:
         settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")
     files = render_target(settings, wanted) if wanted else render(settings, amalgamate=amalgamate)
@@ -169,3 +108,37 @@ def _report_drifts(drifts: "tuple[Drift, ...]", output: Path, *, as_json: bool) 
     if drifts:
         raise DriftError(f"{name}: not up to date, {len(drifts)} to write; generate it without --check")
     typer.echo(f"{name}: up to date", err=True)
+
+
+def identify_binary(
+    image: Annotated[Path, typer.Argument(help="ELF, Intel HEX, UF2 or plain binary.", metavar="FILE")],
+    sources: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Controllers to compare with: controller.toml, folders of bundles; the presets always are.",
+            metavar="SOURCE...",
+            autocompletion=complete_presets,
+        ),
+    ] = None,
+    *,
+    as_json: AsJson = False,
+) -> None:
+    """Show which controllers a firmware image holds; exit 1 if it has none, or lacks one of SOURCE."""
+    from mambo_codegen.settings import presets
+    from mambo_sil.board.firmware.identity import held_controllers, identity_text, missing, name_settings
+
+    held = held_controllers(image)
+    given = {echo(source): presets.load_or_bundle(source) for source in sources or ()}
+    known = dict(given)
+    known |= {f"preset {name}": presets.preset(name) for name in presets.names() if name not in known}
+    held = name_settings(held, known)
+    lacking = missing(held, given)
+    if as_json:
+        found = {"controllers": [asdict(one) for one in held], "missing": lacking}
+        typer.echo(json.dumps({"file": str(image), **found}, indent=2))
+    else:
+        typer.echo(identity_text(held, echo(str(image))))
+    for source in lacking:
+        typer.echo(f"{echo(str(image))}: does not hold the settings of {source}", err=True)
+    if not held or lacking:
+        raise typer.Exit(1)

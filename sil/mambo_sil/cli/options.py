@@ -1,17 +1,14 @@
-"""What commands share: option types, a command from a record of options, and printing of results."""
+"""What commands share: option types, and printing of results."""
 
-import inspect
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from mambo_codegen.settings.toml_file import BOARDS
 from mambo_sil.cli.command import AsJson, Scalar, Source, load, output_option
 from mambo_sil.drone.vehicles import VEHICLES
-from mambo_sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
 
 if TYPE_CHECKING:
     from mambo_codegen.boards import Board
@@ -63,96 +60,9 @@ PortName = Annotated[
         metavar="DEVICE|socket://HOST:PORT",
     ),
 ]
-Baud = Annotated[int, typer.Option(help="Rate of the serial port.", min=1)]
 BAUD: Final = 500000
 """The rate of the shipped boards."""
-
-Options = TypeVar("Options")
-
-
-@dataclass(frozen=True)
-class FlyOptions:
-    """The parameters of `fly`; `context` tells which of them the user gave."""
-
-    context: typer.Context
-    source: Source = "mambo"
-    output: Results = Path("flight")
-    vehicle: Drone = "mambo"
-    controller: Annotated[
-        ControllerName,
-        typer.Option(
-            help="The generated C (nmpc), the paper's PD, a PD with feed-forward of the target's velocity "
-            "and acceleration, a PID with more of it and a low-pass, or the reference in Python."
-        ),
-    ] = "nmpc"
-    trajectory: Annotated[
-        str,
-        typer.Option(help=f"{', '.join(CURVE_NAMES)}, or a CSV file with the columns time_s, x_m, y_m."),
-    ] = "bernoulli"
-    size_m: Annotated[float, typer.Option(help="Half-width, radius or step of the curve, in m.")] = 2.0
-    rate_rad_s: Annotated[float, typer.Option(help="Angular rate of the curve, in rad/s.")] = 0.5
-    yaw_rad: Annotated[float, typer.Option(help="Constant yaw, in rad.")] = 0.0
-    push: Annotated[
-        str,
-        typer.Option(help="Steady acceleration along x (north), y (east), in m/s^2.", metavar="X,Y"),
-    ] = "0,0"
-    wind: Annotated[
-        str,
-        typer.Option(help="`gusts`: a mean wind towards north with light turbulence.", metavar="none|gusts"),
-    ] = "none"
-    sensors: Annotated[
-        SensorsName,
-        typer.Option(
-            help="State that controller and inner loops get: the true one, or that of the vehicle's sensors, "
-            "which are the Mambo's, without or with compensation of the rotation in the optical flow, or "
-            "motion capture."
-        ),
-    ] = "none"
-    seed: Annotated[int, typer.Option(help="Seed of gusts and sensor noise, 0 or more.")] = 0
-    motor_lag_s: Annotated[
-        float | None, typer.Option(help="Time constant of the motors, in s; by default the vehicle's.")
-    ] = None
-    start: Annotated[Start, typer.Option(help="Start hovering in the air, or 5 s earlier on the ground.")] = (
-        "hover"
-    )
-    duration_s: Annotated[float, typer.Option(help="Time on the trajectory, in s.")] = 100.0
-    scalar: Scalar = None
-    on: Annotated[
-        str | None,
-        typer.Option(
-            help="Board on whose emulated core the C runs; a flight on this machine must have the same bits.",
-            autocompletion=complete_boards,
-        ),
-    ] = None
-    port: PortName = None
-    baud: Baud = BAUD
-    real_time: Annotated[
-        bool,
-        typer.Option(
-            "--real-time",
-            help="With --port: the board's own clock calls the step, and the drone flies by it; count late "
-            "inputs, lost replies and periods without a step.",
-        ),
-    ] = False
-    repeat: Annotated[
-        Path | None,
-        typer.Option(
-            help="Record of a flight to repeat; also writes the optimizer's iterations.", metavar="FILE"
-        ),
-    ] = None
-    pictures: Annotated[bool, typer.Option(help="Draw the flight, which takes most of the time.")] = True
-    as_json: AsJson = False
-
-
-def command_of(options: type[Options], run: Callable[[Options], None]) -> Callable[..., None]:
-    """Return a command that calls `run`; its parameters are the fields of the dataclass `options`."""
-
-    def command(**given: Any) -> None:
-        run(options(**given))
-
-    command.__signature__ = inspect.signature(options)  # type: ignore[attr-defined] # where typer reads them
-    command.__doc__ = run.__doc__
-    return command
+Baud = Annotated[int | None, typer.Option(help=f"Rate of the serial port; by default {BAUD}.", min=1)]
 
 
 def load_boards(name: str) -> "Sequence[Board]":
@@ -160,6 +70,12 @@ def load_boards(name: str) -> "Sequence[Board]":
     from mambo_codegen import boards
 
     return [boards.load(one) for one in (boards.names() if name == "all" else (name,))]
+
+
+def demand_port(port: str | None, baud: int | None) -> None:
+    """Raise BadParameter for a rate without a port."""
+    if port is None and baud is not None:
+        raise typer.BadParameter("it needs --port: name one, or leave it out", param_hint="--baud")
 
 
 def show(summary: "Summary", text: str, *, as_json: bool) -> None:

@@ -27,7 +27,8 @@ class FlightSummary(ReportedSummary):
     """The results of any flight."""
 
     controller: str
-    settings: str
+    settings: str | None
+    """Digest of the settings; None for a PD, which has none."""
     same_bits_as_host: bool | None
     lost: bool
     crash: Crash | None = None
@@ -96,13 +97,14 @@ class FlySummary(FlightSummary):
     command = "fly"
 
     board: str | None
-    source: str
+    source: str | None
     vehicle: VehicleFile = NOMINAL
     update_period_s: float
     trajectory: str
     trajectory_sha256: str | None
-    size_m: float
-    rate_rad_s: float
+    size_m: float | None
+    """None for a trajectory without a size; so is the rate."""
+    rate_rad_s: float | None
     yaw_rad: float
     push_m_s2: tuple[float, float]
     wind_speed_m_s: float
@@ -127,7 +129,7 @@ class FlySummary(FlightSummary):
         name = PD_TITLES.get(self.controller, f"NMPC, {self.source}")
         parameters = {
             **_course(self),
-            "controller": _controller(self.controller, f"{self.settings[:16]} of {self.source}"),
+            "controller": _controller(self, f" of {self.source}"),
             "start": f"{self.start}, heading {self.yaw_rad:g} rad",
             "disturbances": "push {:g}, {:g} m/s²".format(*self.push_m_s2)
             + f"; wind with gusts {self.wind_speed_m_s:g} m/s; motor lag {self.motor_lag_s:g} s",
@@ -156,20 +158,23 @@ class RepeatSummary(FlightSummary):
         facts = {
             "record": self.repeat,
             **_course(self.scenario),
-            "controller": _controller(self.controller, self.settings[:16]),
+            "controller": _controller(self),
             "seed": str(self.scenario.seed),
         }
         bad = ["the trace differs from the recorded one"] if self.same_bits_as_recorded is False else []
         return self._section(folder, (name, f"Repetition: {name}, {self.repeat}"), facts, bad)
 
 
-def _controller(name: str, settings: str) -> str:
+def _controller(summary: FlightSummary, source: str = "") -> str:
     """Return the controller's name, with its settings if it has any: a PD has none."""
-    return name if name in PD_TITLES else f"{name}, settings {settings}"
+    name, settings = summary.controller, summary.settings
+    return name if settings is None or name in PD_TITLES else f"{name}, settings {settings[:16]}{source}"
 
 
 def _course(flown: FlySummary | Scenario) -> dict[str, str]:
-    shape = "" if flown.trajectory.endswith(".csv") else f", {flown.size_m:g} m, {flown.rate_rad_s:g} rad/s"
+    shape = "" if flown.size_m is None else f", {flown.size_m:g} m"
+    if flown.rate_rad_s is not None:
+        shape += f", {flown.rate_rad_s:g} rad/s"
     return {
         "vehicle": flown.vehicle.name,
         "trajectory": f"{flown.trajectory}{shape}, {flown.duration_s:g} s",

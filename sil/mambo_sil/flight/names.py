@@ -25,6 +25,10 @@ STARTS: Final[tuple[Start, ...]] = get_args(Start)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
+TIMED: Final = tuple(name for name in CURVE_NAMES if name not in ("hover", "step"))
+"""Curves with an angular rate."""
+SIZED: Final = (*TIMED, "step")
+"""Curves with a size."""
 PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"
 PID_FEEDFORWARD: Final = "PID-feedforward"

@@ -292,7 +292,6 @@ def test_other_bits_are_told_and_fail(
                 f"--port {url} must be a device, such as /dev/ttyACM0, or socket://HOST:PORT, such",
             )
             for url in (
-                "",
                 "socket://",
                 "socket://localhost",
                 "socket://:5000",

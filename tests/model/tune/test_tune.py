@@ -15,7 +15,7 @@ import pytest
 
 from mambo_codegen.errors import INTERRUPTED, ForeignFilesError, InvalidSettingsError
 from mambo_codegen.settings import controller_toml, presets
-from mambo_sil.cli.tune import tune
+from mambo_sil.cli.settings import tune
 from mambo_sil.errors import StudyError
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.store import claim

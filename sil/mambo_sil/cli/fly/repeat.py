@@ -2,10 +2,12 @@
 
 from pathlib import Path
 
+import typer
+
 from mambo_codegen.errors import echo
 from mambo_codegen.methods import method_of
-from mambo_sil.cli.flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
-from mambo_sil.cli.options import FlyOptions
+from mambo_sil.cli.fly.fly_options import Output
+from mambo_sil.cli.fly.one_flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
@@ -13,6 +15,7 @@ from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.loop import fly as simulate
+from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Record, flight_of, read_record
 from mambo_sil.results.folders import new_results
 
@@ -21,14 +24,13 @@ ALLOWED = frozenset({"repeat", "output", "pictures", "as_json"})
 """Options allowed with --repeat; the record contains all others."""
 
 
-def fly_again(options: FlyOptions, file: Path) -> None:
+def fly_again(file: Path, output: Output, context: typer.Context) -> None:
     """Repeat the flight recorded in `file`, with the reference instead of the C.
 
     Exits 1 if the drone crashes or is lost, or if a bit differs from the recorded flight.
 
     Raises FlightError and ScenarioError.
     """
-    context = options.context
     for name in context.params.keys() - ALLOWED:
         given = context.get_parameter_source(name)
         if given is not None and given.name == "COMMANDLINE":
@@ -38,11 +40,11 @@ def fly_again(options: FlyOptions, file: Path) -> None:
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
     watched, controller = _controllers(record, flight)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
-    with new_results(options.output, RepeatSummary.command, files) as folder:
+    with new_results(output.output, RepeatSummary.command, files) as folder:
         with progress_bar("repeating") as progress:
             trace = simulate(flight, controller, progress)
         write_trace(trace, folder)
-        if options.pictures:
+        if output.pictures:
             draw_flight(trace, file.name, folder)
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
@@ -53,12 +55,12 @@ def fly_again(options: FlyOptions, file: Path) -> None:
             same_bits_as_host=None,
             controller=record.controller,
             scenario=record.scenario,
-            settings=record.settings.digest,
+            settings=None if record.controller in PD_TITLES else record.settings.digest,
             **judge(trace, record.settings, record.scenario.vehicle),
         )
         summary.write(folder)
-    written = FLIGHT_FILES if options.pictures else TRACE_FILES
-    finish(summary, flight_text(summary), options, written if watched is None else (*written, INNER_STEPS))
+    written = FLIGHT_FILES if output.pictures else TRACE_FILES
+    finish(summary, flight_text(summary), output, written if watched is None else (*written, INNER_STEPS))
 
 
 def _controllers(record: Record, flight: Flight) -> tuple[WatchedController | None, PositionController]:

@@ -17,20 +17,23 @@ from mambo_sil.board.pil.connection import Connection
 from mambo_sil.board.pil.pil_report import BoardFlightSummary, EmulatedCount, board_fields, board_text
 from mambo_sil.board.pil.serial_port import open_port
 from mambo_sil.board.pil.timed import TimedController
-from mambo_sil.cli.flight import (
+from mambo_sil.cli.fly.fly_options import Conditions, Course, Output, Runner
+from mambo_sil.cli.fly.one_flight import (
     FLIGHT_FILES,
+    described_flight,
     finish,
-    flight_of_options,
+    load_settings,
     summary_fields,
     write_flight,
     written,
 )
-from mambo_sil.cli.options import FlyOptions, load
+from mambo_sil.cli.options import BAUD
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.errors import FlightError
 from mambo_sil.flight.controllers.compiled import digest_compiled
 from mambo_sil.flight.controllers.controller_library import build_library
+from mambo_sil.flight.flight_report import judge
 from mambo_sil.flight.loop import fly as simulate
 from mambo_sil.results.folders import new_results
 
@@ -38,32 +41,34 @@ EPISODES = 4
 """Episodes of the self-test digest before the flight: a second on the slowest board."""
 
 
-def connect(port: str, baud: int, settings: Settings) -> AbstractContextManager[Connection]:
+def connect(port: str, baud: int | None, settings: Settings) -> AbstractContextManager[Connection]:
     """Connect to the board at `port`, whose faults go to stderr; raises BoardError."""
     say = partial(typer.echo, err=True)
-    return closing(Connection(port, partial(open_port, port, baud), settings, say=say))
+    return closing(Connection(port, partial(open_port, port, baud or BAUD), settings, say=say))
 
 
-def fly_on_port(options: FlyOptions, port: str) -> None:
-    """Fly once with the controller on the board at `port`; exit 1 if the drone is lost or a bit differs.
+def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: Output) -> None:
+    """Fly once with the controller on a board; exit 1 if the drone is lost or a bit differs.
 
     Raises BoardError, and what `fly_once` raises.
     """
-    if options.controller != "nmpc" or options.on is not None:
+    port = str(runner.port)
+    if runner.controller != "nmpc" or runner.on is not None:
         raise FlightError(f"--port {echo(port)} flies the C on a board: leave out --controller and --on")
-    settings, drone = load(options.source, options.scalar), vehicle_toml.load(options.vehicle)
-    flight = flight_of_options(options, settings, drone)
+    settings, drone = load_settings(runner), vehicle_toml.load(conditions.vehicle)
+    flight = described_flight(course, conditions, runner, settings, drone)
     library = build_library(settings, host_toolchain())
-    with new_results(options.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:
-        with connect(port, options.baud, settings) as board:
+    with new_results(output.output, BoardFlightSummary.command, FLIGHT_FILES) as folder:
+        with connect(port, runner.baud, settings) as board:
             first_difference = board.test()
             same_digest = board.digest(EPISODES) == digest_compiled(library, EPISODES)
-            controller = (TimedController if options.real_time else BoardController)(settings, board)
+            controller = (TimedController if runner.real_time else BoardController)(settings, board)
             with progress_bar("flying") as progress:
                 trace = simulate(flight, controller, progress)
-        write_flight(trace, options, folder)
-        fields = summary_fields(options, settings, drone, flight, trace) | board_fields(board, controller)
-        fields |= _emulated(settings, board.greeting.board)
+        write_flight(trace, runner, output, folder)
+        fields = summary_fields(course, conditions, runner, flight, settings)
+        fields |= judge(trace, settings, drone) | board_fields(board, controller)
+        fields |= {"baud": runner.baud or BAUD} | _emulated(settings, board.greeting.board)
         summary = BoardFlightSummary(
             **fields
             | {
@@ -74,7 +79,7 @@ def fly_on_port(options: FlyOptions, port: str) -> None:
             }
         )
         summary.write(folder)
-    finish(summary, board_text(summary), options, written(options))
+    finish(summary, board_text(summary), output, written(output))
 
 
 def _emulated(settings: Settings, says: str) -> dict[str, object]:

@@ -1,0 +1,261 @@
+"""The commands of the panel Board: footprint, sweep, same-bits."""
+
+import contextlib
+import json
+import os
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_sil.cli.options import (
+    BOARD_NAMES,
+    AsJson,
+    Baud,
+    Drone,
+    OptionalResults,
+    PortName,
+    Results,
+    Scalar,
+    Source,
+    complete_boards,
+    demand_port,
+    load,
+    load_boards,
+    show,
+)
+
+FOOTPRINT_FILES = ("footprint.png", "footprint.svg", "footprint.html")
+
+
+def footprint(
+    source: Source = "mambo",
+    *,
+    scalar: Scalar = None,
+    board: Annotated[
+        str,
+        typer.Option(
+            help=f"{', '.join(BOARD_NAMES)}, all, or a board's TOML file; with --port by default the one "
+            "that the firmware names.",
+            autocompletion=complete_boards,
+        ),
+    ] = "all",
+    optimisation: Annotated[str, typer.Option(help="Optimisation flag of the compiler.")] = "-O2",
+    port: PortName = None,
+    baud: Baud = None,
+    output: OptionalResults = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure flash, RAM, stack and instructions on boards; exit 1 if one exceeds its budget.
+
+    With --port also cycles and stack of the same steps on the board there; exit 1 if its bits differ.
+    """
+    from mambo_sil.board.footprint.footprint_report import FootprintSummary, page, summarise, text
+    from mambo_sil.board.footprint.measure import measure_boards
+    from mambo_sil.cli.progress import progress_bar
+    from mambo_sil.results.folders import new_results
+
+    demand_port(port, baud)
+    settings = load(source, scalar)
+    chosen = load_boards(board)
+    with contextlib.ExitStack() as stack:
+        folder = output and stack.enter_context(
+            new_results(output, FootprintSummary.command, FOOTPRINT_FILES)
+        )
+        on_board = None
+        if port is not None:
+            from mambo_sil.board.footprint.measure import usual_ticks
+            from mambo_sil.board.footprint.on_board import choose_board, measure_on_board
+            from mambo_sil.cli.fly.port import connect
+
+            with connect(port, baud, settings) as connection:
+                chosen = [choose_board(chosen, port, connection.greeting.board)]
+                with progress_bar("flying") as progress:
+                    on_board = measure_on_board(settings, connection, port, usual_ticks(settings), progress)
+        with progress_bar("measuring") as progress:
+            measured, missing = measure_boards(settings, chosen, optimisation, progress)
+        if on_board is not None:
+            measured = [replace(one, on_board=on_board) for one in measured]
+        summary = summarise(measured, source, settings)
+        if folder is not None:
+            from mambo_sil.board.footprint.footprint_plots import draw_footprints
+
+            draw_footprints(measured, folder / "footprint")
+            (folder / "footprint.html").write_text(page(summary), "utf-8")
+            summary.write(folder)
+    show(summary, text(measured), as_json=as_json)
+    for message in missing:
+        typer.echo(message, err=True)
+    if not all(one.good for one in measured):
+        raise typer.Exit(1)
+
+
+SWEEP_FILES = ("sweep.csv", "sweep.png", "sweep.svg")
+
+
+def sweep(
+    source: Source = "mambo-1norm",
+    *,
+    scalar: Scalar = None,
+    board: Annotated[
+        str, typer.Option(help="Board, or its TOML file.", autocompletion=complete_boards)
+    ] = "crazyflie",
+    prediction: Annotated[
+        str, typer.Option(help="Prediction horizons.", metavar="FIRST:LAST[:STEP]")
+    ] = "5:30:5",
+    control: Annotated[str, typer.Option(help="Control horizons.", metavar="FIRST:LAST")] = "1:3",
+    iterations: Annotated[str, typer.Option(help="Iterations.", metavar="N,N")] = "3,5,10",
+    fit: Annotated[
+        bool,
+        typer.Option("--fit", help="Print only the closest-tracking one within the budget.", metavar=""),
+    ] = False,
+    vehicle: Drone = "mambo",
+    output: Results = Path("sweep"),
+    as_json: AsJson = False,
+) -> None:
+    """Measure footprint and tracking error over a grid of horizons and iterations."""
+    from mambo_codegen import boards
+    from mambo_codegen.methods import method_of
+    from mambo_sil.board.footprint.sweep import Grid, budgets, measure_grid
+    from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
+    from mambo_sil.cli.progress import counting_bar
+    from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.experiment.campaign.executors import processes
+    from mambo_sil.results.folders import new_results
+
+    settings = load(source, scalar)
+    if not method_of(settings).iterates:
+        raise InvalidSettingsError(
+            (
+                f'{echo(source)}: cost.norm = "quadratic" must be "1-norm" for a sweep: with a quadratic '
+                "cost there are no horizons and iterations to vary; `mambo-nmpc tune` searches its settings",
+            )
+        )
+    chosen, drone = boards.load(board), vehicle_toml.load(vehicle)
+    grid = Grid(
+        _numbers("--prediction", prediction, 50),
+        _numbers("--control", control, 50),
+        _numbers("--iterations", iterations, 100),
+    )
+    total = len(grid.points())
+    if total == 0:
+        raise InvalidSettingsError(
+            (f"--control {echo(control)} must be at most --prediction {echo(prediction)}",)
+        )
+    with (
+        new_results(output, SweepSummary.command, SWEEP_FILES) as folder,
+        counting_bar("sweeping", "controllers", total) as bar,
+    ):
+        with processes(os.cpu_count() or 1) as pool:
+            points = measure_grid(settings, chosen, grid, pool.run, bar, drone=drone)
+        bar.stage("drawing pictures")
+        from mambo_sil.board.footprint.footprint_plots import draw_sweep
+
+        write_points(points, folder / "sweep.csv")
+        draw_sweep(points, chosen, settings.horizon.update_period_s, folder / "sweep")
+        best = closest_fit(points)
+        summary = SweepSummary(
+            source=source,
+            settings=settings.digest,
+            board=chosen.name,
+            vehicle=drone,
+            budget=budgets(chosen, settings.horizon.update_period_s),
+            points=points,
+            closest_fit=best,
+        )
+        summary.write(folder)
+    shown = ([] if best is None else [best]) if fit else points
+    text = "\n".join(map(point_text, shown)) or f"nothing fits {chosen.title}"
+    show(summary, text, as_json=as_json)
+    typer.echo(f"{echo(str(output))}: {', '.join(SWEEP_FILES)}", err=True)
+    if fit and best is None:
+        raise typer.Exit(1)
+
+
+def _numbers(option: str, text: str, most: int) -> tuple[int, ...]:
+    """Read 5:30, 5:30:5 or 1,3,5; raises InvalidSettingsError."""
+    try:
+        if ":" in text:
+            first, last, *step = (int(word) for word in text.split(":"))
+            (each,) = step or (1,)
+            numbers = tuple(range(first, min(last, most + 1) + 1, each)) if first > 0 else ()
+        else:
+            numbers = tuple(int(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if not numbers or min(numbers) < 1 or max(numbers) > most:
+        raise InvalidSettingsError(
+            (f"{option} {echo(text)} must be numbers in 1..{most}, such as 5:30, 5:30:5 or 1,3,5",)
+        )
+    return numbers
+
+
+def same_bits(
+    source: Source = "mambo",
+    *,
+    scalar: Scalar = None,
+    board: Annotated[
+        str, typer.Option("--boards", help="Boards, separated by commas, or all.", metavar="NAME,NAME")
+    ] = "all",
+    steps: Annotated[
+        int | None,
+        typer.Option(
+            min=100,
+            help="Self-test steps, in hundreds; by default as many as the bundle's self-test digest covers.",
+        ),
+    ] = None,
+    port: PortName = None,
+    baud: Baud = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run the self-test steps in every build, or on the board at a port; exit 1 if a digest differs."""
+    from mambo_codegen.bundle.digest import TICKS, episode_count
+    from mambo_codegen.methods import method_of
+    from mambo_sil.board.footprint.build_digests import (
+        REFERENCE,
+        BuildDigest,
+        count_builds,
+        run_everywhere,
+        run_on_board,
+    )
+    from mambo_sil.cli.progress import progress_bar
+
+    demand_port(port, baud)
+    settings = load(source, scalar)
+    chosen = [one for name in board.split(",") for one in load_boards(name)]
+    count = episode_count(method_of(settings)) if steps is None else steps // TICKS
+    found: list[BuildDigest] = []
+    with contextlib.ExitStack() as stack:
+        progress = stack.enter_context(progress_bar("comparing builds"))
+        if port is None:
+            results = run_everywhere(settings, chosen, count)
+        else:
+            from mambo_sil.cli.fly.port import connect
+
+            results = run_on_board(
+                settings, stack.enter_context(connect(port, baud, settings)), count, progress
+            )
+        for result in results:
+            found.append(result)
+            if port is None:
+                progress(len(found) / count_builds(chosen))
+            if not as_json:
+                what = result.reason if result.digest is None else result.digest
+                typer.echo(f"{result.where:12}{result.compiler:26}{result.optimisation:5}{what}")
+    total = count * TICKS
+    reference = next(result.digest for result in found if result.where == REFERENCE)
+    ran = [result for result in found if result.digest is not None]
+    others = [result for result in ran if result.digest != reference]
+    if as_json:
+        document = {"steps": total, "same": not others, "builds": [asdict(one) for one in found]}
+        typer.echo(json.dumps(document, indent=2))
+    else:
+        typer.echo(
+            f"{len(ran) - len(others)} of {len(ran)} builds have the digest of the reference over {total} "
+            "self-test steps; "
+            f"{len(found) - len(ran)} not run"
+        )
+    if others:
+        raise typer.Exit(1)

@@ -1,0 +1,1 @@
+"""The command `fly` and the commands that fly many times."""

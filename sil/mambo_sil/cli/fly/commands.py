@@ -1,0 +1,206 @@
+"""The commands of the panel Fly: fly, campaign, faults, replay."""
+
+import contextlib
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mambo_codegen.errors import UnwritableError, echo
+from mambo_sil.cli.fly.fly_options import Conditions, Course, Output, Repetition, Runner, command_of
+from mambo_sil.cli.options import (
+    AsJson,
+    Drone,
+    OtherDrone,
+    Results,
+    Scalar,
+    Source,
+    Workers,
+    demand_port,
+    load,
+    output_option,
+    show,
+)
+
+if TYPE_CHECKING:
+    from mambo_sil.cli.progress import Bar
+    from mambo_sil.experiment.campaign.campaign_report import CampaignSummary
+
+
+def _fly(
+    runner: Runner, course: Course, conditions: Conditions, output: Output, repetition: Repetition
+) -> None:
+    """Simulate one flight; write trace, metrics and plots; exit 1 if the drone crashes."""
+    if repetition.repeat is not None:
+        from mambo_sil.cli.fly.repeat import fly_again
+
+        fly_again(repetition.repeat, output, repetition.context)
+        return
+    demand_port(runner.port, runner.baud)
+    if runner.port is not None:
+        from mambo_sil.cli.fly.port import fly_on_port
+
+        fly_on_port(course, conditions, runner, output)
+    else:
+        from mambo_sil.cli.fly.one_flight import fly_once
+
+        fly_once(course, conditions, runner, output)
+
+
+fly = command_of(_fly, Runner, Course, Conditions, Output, Repetition)
+
+
+def campaign(
+    source: Annotated[
+        Path | None, typer.Argument(help="A campaign.toml; the default campaign if none is named.")
+    ] = None,
+    *,
+    output: Annotated[
+        Path,
+        output_option("Folder for the results; a campaign started there is continued."),
+    ] = Path("campaign"),
+    vehicle: OtherDrone = None,
+    flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=100_000)] = 1000,
+    workers: Workers = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Address of a running Dask scheduler; its workers fly, not this machine."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly many random flights with several controllers and compare them; continue an interrupted campaign."""
+    if workers is not None and scheduler is not None:
+        raise typer.BadParameter("it has its own workers: leave out --workers", param_hint="--scheduler")
+    from mambo_sil.cli.progress import counting_bar
+
+    with counting_bar("starting", "flights", flights) as bar:
+        summary = _fly_campaign(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
+    from mambo_sil.experiment.campaign.campaign_report import PICTURE, RECORDS, campaign_text
+    from mambo_sil.experiment.campaign.store import TABLE
+    from mambo_sil.results.folders import SUMMARY
+
+    show(summary, campaign_text(summary, str(output)), as_json=as_json)
+    typer.echo(f"{echo(str(output))}: {TABLE}, {SUMMARY}, {PICTURE}.png, {PICTURE}.svg, {RECORDS}/", err=True)
+
+
+def _fly_campaign(
+    source: Path | None,
+    vehicle: str | None,
+    output: Path,
+    flights: int,
+    bar: "Bar",
+    *,
+    workers: int | None,
+    scheduler: str | None,
+) -> "CampaignSummary":
+    """Fly the missing flights and write the results; if interrupted print how many are finished."""
+    from mambo_sil.experiment.campaign import campaign_file
+    from mambo_sil.experiment.campaign.campaign_report import finish
+    from mambo_sil.experiment.campaign.campaign_run import fly_missing, missing_flights, open_campaign
+    from mambo_sil.experiment.campaign.executors import cluster, processes
+
+    chosen = campaign_file.default(vehicle) if source is None else campaign_file.read(source, vehicle)
+    with open_campaign(chosen, output) as store:
+        bar(len(store.finished))
+        try:
+            if missing_flights(store, flights):
+                pool = processes(workers or os.cpu_count() or 1) if scheduler is None else cluster(scheduler)
+                with pool as open_pool:
+                    bar.stage("flying")
+                    fly_missing(chosen, store, flights, open_pool, bar, running=bar.running)
+            return finish(chosen, store, bar.stage)
+        except KeyboardInterrupt:
+            with contextlib.suppress(UnwritableError):
+                store.export()
+            with contextlib.suppress(OSError):
+                typer.echo(
+                    f"{echo(str(output))}: stopped with {len(store.finished)} of {flights} flights finished; "
+                    "the same command continues from there",
+                    err=True,
+                )
+            raise
+
+
+FAULTS_FILES = ("faults.csv", "faults.png", "faults.svg")
+
+
+def faults(
+    source: Source = "mambo",
+    *,
+    output: Results = Path("faults"),
+    vehicle: Drone = "mambo",
+    scalar: Scalar = None,
+    as_json: AsJson = False,
+) -> None:
+    """Fly with faults of sensors, timing, target and operator; exit 1 if the drone crashes."""
+    from mambo_sil.cli.progress import progress_bar
+    from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.errors import FlightError
+    from mambo_sil.experiment.faults.fault_flights import End, fly_faults
+    from mambo_sil.experiment.faults.faults_report import FaultsSummary, table, write_csv
+    from mambo_sil.flight.controllers.compiled import CompiledController
+    from mambo_sil.results.folders import new_results
+
+    settings, drone = load(source, scalar), vehicle_toml.load(vehicle)
+    with new_results(output, FaultsSummary.command, FAULTS_FILES) as folder:
+        with progress_bar("flying with faults") as bar:
+            try:
+                verdicts = fly_faults(settings, lambda n: CompiledController(settings, n), bar, drone=drone)
+            except FlightError as error:
+                raise FlightError(f"{echo(source)}: {error}") from error
+            bar.stage("drawing pictures")
+            from mambo_sil.experiment.faults.faults_plots import draw_faults
+
+            draw_faults(verdicts, folder / "faults")
+        write_csv(verdicts, folder / "faults.csv")
+        summary = FaultsSummary(
+            source=source, settings=settings.digest, vehicle=drone, flights=list(verdicts)
+        )
+        summary.write(folder)
+    show(summary, table(verdicts), as_json=as_json)
+    if any(verdict.end is End.CRASHED for verdict in verdicts):
+        raise typer.Exit(1)
+
+
+def replay(
+    log: Annotated[
+        Path, typer.Argument(help="A log: trace.csv, CSV of a Crazyflie, or a .ulg of PX4.", metavar="LOG")
+    ],
+    source: Source = "mambo",
+    *,
+    scalar: Scalar = None,
+    output: Results = Path("replayed"),
+    columns: Annotated[
+        str,
+        typer.Option(
+            help="Columns of the log by signal, with sign and factor if needed.",
+            metavar="SIGNAL=COLUMN,...",
+        ),
+    ] = "",
+    as_json: AsJson = False,
+) -> None:
+    """Compare the commands in a log with those of the compiled controller; exit 1 if it is not what flew."""
+    from mambo_sil.model.identify.columns import parse_columns
+    from mambo_sil.model.replay.log_replay import SIGNALS, replay_log, write_curves
+    from mambo_sil.model.replay.replay_plots import draw_replay
+    from mambo_sil.model.replay.replay_report import (
+        CURVES,
+        PICTURES,
+        LogReplaySummary,
+        replay_text,
+        summarise,
+    )
+    from mambo_sil.results.folders import SUMMARY, new_results
+
+    settings = load(source, scalar)
+    replayed = replay_log(log, parse_columns(columns, SIGNALS), settings)
+    summary = summarise(replayed, str(log), source, settings.digest)
+    with new_results(output, LogReplaySummary.command, (CURVES, *PICTURES)) as folder:
+        write_curves(replayed, folder / CURVES)
+        draw_replay(folder / CURVES, folder / "replay")
+        summary.write(folder)
+    show(summary, replay_text(summary), as_json=as_json)
+    typer.echo(f"{echo(str(output))}: {', '.join((CURVES, *PICTURES, SUMMARY))}", err=True)
+    if not summary.good:
+        raise typer.Exit(1)

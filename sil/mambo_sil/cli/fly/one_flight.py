@@ -1,0 +1,320 @@
+"""Run the flight that the options of `fly` describe."""
+
+import hashlib
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+
+from mambo_codegen.errors import echo
+from mambo_codegen.methods import method_of
+from mambo_codegen.numbers.representation import TARGET
+from mambo_codegen.settings.model import Settings
+from mambo_sil.cli.fly.fly_options import RATE_RAD_S, SIZE_M, Conditions, Course, Output, Runner
+from mambo_sil.cli.options import load, show
+from mambo_sil.cli.progress import progress_bar
+from mambo_sil.drone.plant.disturbances import Disturbances
+from mambo_sil.drone.plant.gusts import LIGHT_M_S
+from mambo_sil.drone.plant.vehicle import LARGEST_LAG_S, Vehicle
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
+from mambo_sil.errors import FlightError, TrajectoryError
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.engine.simulate import fly as simulate
+from mambo_sil.flight.flight_report import FlightSummary, FlySummary, flight_text, judge
+from mambo_sil.flight.loop import Flight, PositionController
+from mambo_sil.flight.names import PD_TITLES, SIZED, TIMED
+from mambo_sil.flight.scenario import (
+    LARGEST_RATE_RAD_S,
+    LARGEST_SEED,
+    LARGEST_SIZE_M,
+    LARGEST_YAW_RAD,
+    LONGEST_S,
+    choose_sensors,
+)
+from mambo_sil.flight.traces import Trace, write_csv, write_npz
+from mambo_sil.flight.trajectories import CURVES, Trajectory, Waypoints
+from mambo_sil.results.folders import new_results
+from mambo_sil.results.scratch import scratch_folder
+
+CALM, GUSTS = "none", "gusts"
+TRACE_FILES = ("trace.csv", "trace.npz")
+FLIGHT_FILES = (*TRACE_FILES, "flight.png", "flight.svg")
+
+
+def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Output) -> None:
+    """Fly once, write the results; exit 1 if the drone crashes or is lost, or bits differ.
+
+    Raises FlightError, TrajectoryError, and the errors of loading settings or boards and of building the C.
+    """
+    if runner.real_time:
+        raise FlightError(
+            "--real-time lets the clock of a board call the step: give its --port, or leave it out"
+        )
+    _refuse_settings_of_a_pd(runner)
+    settings, drone = load_settings(runner), vehicle_toml.load(conditions.vehicle)
+    flight = described_flight(course, conditions, runner, settings, drone)
+    with new_results(output.output, FlySummary.command, FLIGHT_FILES) as folder:
+        here = _controller(runner, settings, flight)
+        with progress_bar("flying") as progress:
+            trace = simulate(flight, here if runner.on is None else _on_board(runner, settings), progress)
+        same_bits = None if runner.on is None else trace.same_bits(simulate(flight, here))
+        write_flight(trace, runner, output, folder)
+        fields = summary_fields(course, conditions, runner, flight, settings)
+        summary = FlySummary(**fields | judge(trace, settings, drone) | {"same_bits_as_host": same_bits})
+        summary.write(folder)
+    finish(summary, flight_text(summary), output, written(output))
+
+
+def load_settings(runner: Runner) -> Settings:
+    """Return the settings to fly; a PD, which has none, flies at the rate of the default ones."""
+    return load(named_source(runner), runner.scalar)
+
+
+def named_source(runner: Runner) -> str:
+    """Return the preset or file of the settings."""
+    return "mambo" if runner.source is None else runner.source
+
+
+def described_flight(
+    course: Course, conditions: Conditions, runner: Runner, settings: Settings, drone: VehicleFile
+) -> Flight:
+    """Return the flight that the options describe; raises FlightError and TrajectoryError."""
+    period_s = settings.horizon.update_period_s
+    curve = _trajectory(course)
+    _within("--yaw-rad", course.yaw_rad, -LARGEST_YAW_RAD, LARGEST_YAW_RAD)
+    disturbances = Disturbances(_wind_speed_m_s(conditions.wind), push_m_s2=_push_m_s2(conditions.push))
+    vehicle = _vehicle(conditions, drone)
+    try:
+        sensors = choose_sensors(conditions.sensors, drone)
+    except FlightError as error:
+        raise FlightError(f"--{error}") from error
+    _within("--duration-s", course.duration_s, period_s, LONGEST_S)
+    _within("--seed", conditions.seed, 0, LARGEST_SEED)
+    try:
+        flight = Flight(
+            curve,
+            duration_s=course.duration_s,
+            start=course.start,
+            yaw_rad=course.yaw_rad,
+            vehicle=vehicle,
+            update_period_s=period_s,
+            seeds=(conditions.seed,),
+            disturbances=disturbances,
+            sensors=sensors,
+        )
+    except FlightError as error:
+        source = echo(named_source(runner))
+        raise FlightError(f"{source}: horizon.{error}; only the simulation requires this") from error
+    if runner.controller not in PD_TITLES:
+        _check_ranges(flight, settings, course.trajectory)
+    return flight
+
+
+def summary_fields(
+    course: Course, conditions: Conditions, runner: Runner, flight: Flight, settings: Settings
+) -> dict[str, Any]:
+    """Return the fields of a `FlySummary` that do not follow from the trace."""
+    waypoints = Path(course.trajectory) if isinstance(flight.trajectory, Waypoints) else None
+    flies_settings = runner.controller not in PD_TITLES
+    size_m, rate_rad_s = _size_and_rate(course)
+    return (vars(course) | vars(conditions) | vars(runner)) | {
+        "source": named_source(runner) if flies_settings else None,
+        "settings": settings.digest if flies_settings else None,
+        "board": runner.on,
+        "vehicle": flight.vehicle.drone,
+        "motor_lag_s": flight.vehicle.motor_lag_s,
+        "update_period_s": flight.update_period_s,
+        "size_m": size_m,
+        "rate_rad_s": rate_rad_s,
+        "duration_s": _flown_s(flight),
+        "trajectory_sha256": waypoints and hashlib.sha256(waypoints.read_bytes()).hexdigest(),
+        "push_m_s2": flight.disturbances.push_m_s2,
+        "wind_speed_m_s": flight.disturbances.wind_speed_m_s,
+    }
+
+
+def _flown_s(flight: Flight) -> float:
+    """Return the time on the trajectory, a whole number of update periods; say if it is not the given one."""
+    flown_s = float(flight.times_s()[-1])
+    if math.isclose(flown_s, flight.duration_s, rel_tol=1e-9):
+        return flight.duration_s
+    typer.echo(
+        f"--duration-s = {flight.duration_s:g}: flown {flown_s:g} s, "
+        f"a whole number of update periods of {flight.update_period_s:g} s",
+        err=True,
+    )
+    return flown_s
+
+
+def written(output: Output) -> tuple[str, ...]:
+    """Return the names of the files of one flight, without its summary."""
+    return FLIGHT_FILES if output.pictures else TRACE_FILES
+
+
+def write_flight(trace: Trace, runner: Runner, output: Output, folder: Path) -> None:
+    """Write the files of `written`."""
+    write_trace(trace, folder)
+    if output.pictures:
+        title = PD_TITLES.get(runner.controller, f"NMPC, {echo(named_source(runner))}")
+        draw_flight(trace, title, folder)
+
+
+def write_trace(trace: Trace, folder: Path) -> None:
+    """Write `TRACE_FILES`."""
+    write_csv(trace, folder / "trace.csv")
+    write_npz(trace, folder / "trace.npz")
+
+
+def draw_flight(trace: Trace, title: str, folder: Path) -> None:
+    """Write the pictures of `FLIGHT_FILES`."""
+    from mambo_sil.flight.flight_plots import draw_flights  # matplotlib is slow to import
+
+    draw_flights({title: trace}, folder / "flight")
+
+
+def finish(summary: FlightSummary, text: str, output: Output, files: tuple[str, ...]) -> None:
+    """Print the results, as `text` or JSON, and the files written; exit 1 unless the summary is good."""
+    show(summary, text, as_json=output.as_json)
+    typer.echo(f"{echo(str(output.output))}: {', '.join(files)}", err=True)
+    if not summary.good:
+        raise typer.Exit(1)
+
+
+def _refuse_settings_of_a_pd(runner: Runner) -> None:
+    """Raise FlightError for settings or a scalar type that a PD would not fly."""
+    if runner.controller not in PD_TITLES:
+        return
+    for option, value in (("", runner.source), ("--scalar ", runner.scalar)):
+        if value is not None:
+            raise FlightError(
+                f"{option}{echo(value)}: --controller {runner.controller} has no settings; leave it out, "
+                "or fly it with --controller nmpc"
+            )
+
+
+def _controller(runner: Runner, settings: Settings, flight: Flight) -> PositionController:
+    match runner.controller:
+        case "reference":
+            return method_of(settings).reference_controller()
+        case "nmpc":
+            return CompiledController(settings)
+        case pd:
+            return pd_controller(pd, flight)
+
+
+def _on_board(runner: Runner, settings: Settings) -> PositionController:
+    """Build the C for a board, and load it into the board's emulated core."""
+    from mambo_codegen import boards
+    from mambo_sil.board.emulated import EmulatedController, build_guest  # unicorn is slow to import
+    from mambo_sil.board.firmware.firmware_build import builder
+
+    board = str(runner.on)
+    if runner.controller != "nmpc":
+        raise FlightError(f"--on {echo(board)} runs the C: use it with --controller nmpc only")
+    chosen = boards.load(board)
+    core = chosen.emulated_core.value
+    with scratch_folder() as work:
+        return EmulatedController(settings, build_guest(settings, builder(chosen), work), core)
+
+
+def _trajectory(course: Course) -> Trajectory:
+    size_m, rate_rad_s = _size_and_rate(course)
+    for name, curve in CURVES.items():
+        if name == course.trajectory:
+            return curve(size_m or 0.0, rate_rad_s or 0.0)
+    if not course.trajectory.lower().endswith(".csv"):
+        raise TrajectoryError(
+            f"--trajectory {echo(course.trajectory)} must be {', '.join(CURVES)} or a file ending in .csv"
+        )
+    return Waypoints.read(Path(course.trajectory))
+
+
+def _size_and_rate(course: Course) -> tuple[float | None, float | None]:
+    """Return size and angular rate of the curve, None for what it has not; raises FlightError."""
+    found: list[float | None] = []
+    for option, given, default, largest, curves in (
+        ("--size-m", course.size_m, SIZE_M, LARGEST_SIZE_M, SIZED),
+        ("--rate-rad-s", course.rate_rad_s, RATE_RAD_S, LARGEST_RATE_RAD_S, TIMED),
+    ):
+        if course.trajectory in curves:
+            value = default if given is None else given
+            _within(option, value, -largest, largest)
+            found.append(value)
+        elif given is None:
+            found.append(None)
+        else:
+            raise FlightError(
+                f"{option} = {given:g}: --trajectory {echo(course.trajectory)} has none; leave it out, "
+                f"or fly {', '.join(curves)}"
+            )
+    return found[0], found[1]
+
+
+def _vehicle(conditions: Conditions, drone: VehicleFile) -> Vehicle:
+    """Return the drone with the lag of its motors; raises FlightError."""
+    lag_s = conditions.motor_lag_s
+    if lag_s is None:
+        return Vehicle.of(drone)
+    _within("--motor-lag-s", lag_s, 0.0, LARGEST_LAG_S)
+    if isinstance(drone.attitude, FirstOrderAttitude):
+        raise FlightError(
+            f"--motor-lag-s = {lag_s:g}: vehicle {echo(drone.name)} is simulated without motors "
+            f'(attitude.kind = "{drone.attitude.kind}"); leave it out, or change lag_s in its file'
+        )
+    return replace(Vehicle.of(drone), motor_lag_s=lag_s)
+
+
+def _check_ranges(flight: Flight, settings: Settings, trajectory: str) -> None:
+    """Raise FlightError if the controller, in its scalar type, would refuse a target of the flight."""
+    method, ranges = method_of(settings), settings.ranges
+    numbers, limits = method.numbers, method.limits
+    given = np.abs(flight.targets()[:, :1]).max(axis=0)
+    x, y, vx, vy = numbers.quantize(given, TARGET)[0]
+    for what, refused, largest, unit, key, limit in (
+        ("position", max(x, y) > limits.position, given[0, :2].max(), "m", "position_m", ranges.position_m),
+        (
+            "speed",
+            max(vx, vy) > limits.velocity,
+            given[0, 2:].max(),
+            "m/s",
+            "velocity_m_s",
+            ranges.velocity_m_s,
+        ),
+    ):
+        if refused:
+            raise FlightError(
+                f"--trajectory {echo(trajectory)}: the target's {what} along an axis, up to {largest:g} "
+                f"{unit}, exceeds ranges.{key} = {limit:g}; the controller would refuse it"
+            )
+
+
+def _wind_speed_m_s(wind: str) -> float:
+    if wind not in (CALM, GUSTS):
+        raise FlightError(
+            f"--wind {echo(wind)} must be {CALM} or {GUSTS}; a steady acceleration is --push X,Y, in m/s^2"
+        )
+    return LIGHT_M_S if wind == GUSTS else 0.0
+
+
+def _push_m_s2(text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(word) for word in text.split(","))
+    except ValueError:
+        raise FlightError(f"--push {echo(text)} must be two numbers, as in 0.5,0") from None
+    _within("--push", x, -100.0, 100.0)
+    _within("--push", y, -100.0, 100.0)
+    return x, y
+
+
+def _within(option: str, value: float, low: float, high: float) -> None:
+    """Raise FlightError unless the value of an option is a number from `low` to `high`."""
+    if not math.isfinite(value):
+        raise FlightError(f"{option} = {value} must be a finite number; it must lie in {low:g}..{high:g}")
+    if not low <= value <= high:
+        raise FlightError(f"{option} = {value} must lie in {low:g}..{high:g}")

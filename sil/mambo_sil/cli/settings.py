@@ -1,0 +1,311 @@
+"""The commands of the panel Settings: presets, schema, vehicles, identify, design, tune, diff."""
+
+import contextlib
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mambo_codegen.errors import echo
+from mambo_sil.cli.command import OutputFile, Overwrite, complete_presets, write_file
+from mambo_sil.cli.options import (
+    VEHICLE_NAMES,
+    AsJson,
+    Drone,
+    OptionalResults,
+    OtherDrone,
+    Results,
+    Workers,
+    complete_vehicles,
+    output_option,
+    show,
+)
+
+if TYPE_CHECKING:
+    from optuna import Study
+
+    from mambo_sil.cli.progress import Bar
+    from mambo_sil.model.tune.tuning_file import Tuning
+    from mambo_sil.model.tune.tuning_report import TuneSummary
+
+
+def list_presets(as_json: AsJson = False) -> None:
+    """List the presets and their purpose."""
+    from mambo_codegen.settings.toml_file import PRESETS
+
+    described = {name: PRESETS.description(name) for name in PRESETS.names()}
+    if as_json:
+        typer.echo(json.dumps(described, indent=2))
+        return
+    width = max(map(len, described))
+    for name, description in described.items():
+        typer.echo(f"{name:<{width}}  {description}")
+
+
+def schema() -> None:
+    """Print the JSON schema of controller.toml; editors check and complete TOML with it."""
+    from mambo_codegen.settings.model import Settings
+
+    typer.echo(json.dumps(Settings.json_schema(), indent=2))
+
+
+def vehicles(
+    name: Annotated[
+        str | None,
+        typer.Argument(help="Shipped drone whose vehicle.toml to print.", autocompletion=complete_vehicles),
+    ] = None,
+    *,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of vehicle.toml, for editors.", metavar="")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """List the drones that can be flown, or print the file of one to start from."""
+    from mambo_sil.drone.vehicles import VEHICLES
+    from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+
+    if name is not None and (schema or as_json):
+        raise typer.BadParameter("it prints a TOML file: leave out --schema and --json", param_hint=name)
+    if schema:
+        typer.echo(json.dumps(VehicleFile.json_schema(), indent=2))
+        return
+    if name is not None:
+        typer.echo(VEHICLES.text(name), nl=False)
+        return
+    described = {each: VEHICLES.description(each) for each in VEHICLES.names()}
+    if as_json:
+        typer.echo(json.dumps(described, indent=2))
+        return
+    width = max(map(len, described))
+    for each, description in described.items():
+        typer.echo(f"{each:<{width}}  {description}")
+
+
+def identify(
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Logs of one drone: CSV, also trace.csv and that of the Crazyflie's client, or ULog.",
+            metavar="LOG...",
+        ),
+    ] = None,
+    *,
+    output: Results = Path("identified"),
+    columns: Annotated[
+        str,
+        typer.Option(
+            help="Columns of the CSV files by signal, with sign and factor if needed.",
+            metavar="SIGNAL=COLUMN,...",
+        ),
+    ] = "",
+    manoeuvre: Annotated[
+        Path | None,
+        typer.Option(
+            help="Instead, write what to fly for a log: waypoints (.csv) or a Crazyflie script (.py).",
+            metavar="FILE",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Identify gain, lag and dead time of a drone from flight logs; exit 1 if they do not show them."""
+    if manoeuvre is not None:
+        if logs or columns:
+            raise typer.BadParameter("is used without logs and without --columns", param_hint="--manoeuvre")
+        from mambo_sil.model.identify.manoeuvre import write_manoeuvre
+
+        typer.echo(write_manoeuvre(manoeuvre))
+        return
+    if not logs:
+        raise typer.BadParameter("name a flight log, or --manoeuvre FILE", param_hint="LOG...")
+    from mambo_sil.cli.progress import progress_bar
+    from mambo_sil.model.identify.columns import parse_columns
+    from mambo_sil.model.identify.curves import curves_csv
+    from mambo_sil.model.identify.identify import identify as fit
+    from mambo_sil.model.identify.identify import read_logs
+    from mambo_sil.model.identify.identify_plots import draw_fit
+    from mambo_sil.model.identify.identify_record import CURVES, MODEL, PICTURES, VEHICLE, IdentifySummary
+    from mambo_sil.model.identify.identify_report import identify_text, model_text, vehicle_text
+    from mambo_sil.results.folders import SUMMARY, new_results
+
+    chosen = parse_columns(columns)
+    with progress_bar("reading") as bar:
+        read = read_logs(logs, chosen)
+        bar.stage("fitting")
+        summary, curves = fit(read)
+        bar.stage("drawing")
+        with new_results(output, IdentifySummary.command, (CURVES, *PICTURES, MODEL, VEHICLE)) as folder:
+            (folder / CURVES).write_text(curves_csv(curves), "utf-8")
+            draw_fit(folder / CURVES, summary.split_s, summary.verdicts, folder / "fit")
+            if summary.good:
+                (folder / MODEL).write_text(model_text(summary), "utf-8")
+                (folder / VEHICLE).write_text(vehicle_text(summary), "utf-8")
+            summary.write(folder)
+    show(summary, identify_text(summary), as_json=as_json)
+    models = (MODEL, VEHICLE) if summary.good else ()
+    typer.echo(f"{echo(str(output))}: {', '.join((*models, CURVES, *PICTURES, SUMMARY))}", err=True)
+    if not summary.good:
+        raise typer.Exit(1)
+
+
+def design(
+    vehicle: Annotated[
+        str,
+        typer.Argument(
+            help=f"The drone: {', '.join(VEHICLE_NAMES)}, or a vehicle.toml, also that of `identify`.",
+            metavar="NAME|FILE",
+            autocompletion=complete_vehicles,
+        ),
+    ],
+    output: OutputFile = Path("controller.toml"),
+    force: Overwrite = False,
+) -> None:
+    """Derive settings from a drone; write a controller.toml that says the reason of each."""
+    from mambo_codegen.settings import controller_toml
+    from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.model.derive.derived_settings import controller_text
+
+    source = echo(vehicle)
+    text = controller_text(vehicle_toml.load(vehicle), source)
+    controller_toml.parse(text, f"settings for vehicle {source}")
+    if write_file(text, output, force=force):
+        name = echo(str(output))
+        typer.echo(f"wrote {name}; next: mambo-nmpc fly {name} --vehicle {source}", err=True)
+
+
+def tune(
+    source: Annotated[
+        Path | None, typer.Argument(help="A tune.toml; the default study if none is named.")
+    ] = None,
+    *,
+    output: Annotated[
+        Path,
+        output_option("Folder for the results; a study started there is continued."),
+    ] = Path("tune"),
+    vehicle: OtherDrone = None,
+    trials: Annotated[int, typer.Option(help="Total number of trials.", min=1, max=100_000)] = 100,
+    workers: Workers = None,
+    storage: Annotated[
+        str | None,
+        typer.Option(help="URL of a database that several machines share, instead of a file in the folder."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Search for settings that track well with calm commands; continue an interrupted search."""
+    from mambo_sil.cli.progress import counting_bar
+
+    with counting_bar("starting", "trials", trials) as bar:
+        count = workers or os.cpu_count() or 1
+        summary = _tune(source, vehicle, output, trials, bar, workers=count, storage=storage)
+    from mambo_sil.model.tune.tuning_report import CONTROLLER, FRONT, tune_text
+    from mambo_sil.results.folders import SUMMARY
+
+    show(summary, tune_text(summary), as_json=as_json)
+    written = f"{CONTROLLER}, {FRONT}.csv, {FRONT}.png, {FRONT}.svg, {SUMMARY}"
+    typer.echo(f"{echo(str(output))}: {written}", err=True)
+
+
+def _tune(
+    source: Path | None,
+    vehicle: str | None,
+    output: Path,
+    trials: int,
+    bar: "Bar",
+    *,
+    workers: int,
+    storage: str | None,
+) -> "TuneSummary":
+    """Run the missing trials and write the results."""
+    from mambo_sil.errors import StudyError
+    from mambo_sil.experiment.campaign.store import claim, convert_os_errors
+    from mambo_sil.model.tune import tuning_file
+    from mambo_sil.model.tune.study import demand_optuna, finished_trials, open_study, owner_of
+    from mambo_sil.model.tune.tuning_report import finish
+    from mambo_sil.results.folders import create_folder, lock
+
+    tuning = tuning_file.default(vehicle) if source is None else tuning_file.read(source, vehicle)
+    demand_optuna()
+    with convert_os_errors(output), create_folder(output), lock(output):
+        new = not any(output.iterdir())
+        claim(output, "study", {"command": "tune", **tuning.document()})
+        with contextlib.ExitStack() as stack:
+            try:
+                study = stack.enter_context(open_study(tuning, output, storage))
+            except StudyError:
+                for path in output.iterdir() if new else ():
+                    path.unlink()
+                raise
+            bar(len(finished_trials(study)))
+            if len(finished_trials(study)) < trials:
+                owner = owner_of(output, storage)
+                _search(tuning, study, owner, trials, bar, workers=workers, folder=output)
+            found = finished_trials(study)
+        bar.stage("drawing the front")
+        return finish(tuning, found, output)
+
+
+def _search(
+    tuning: "Tuning",
+    study: "Study",
+    owner: str,
+    trials: int,
+    bar: "Bar",
+    *,
+    workers: int,
+    folder: Path,
+) -> None:
+    """Search until `trials` are finished; if interrupted print how many are."""
+    from mambo_sil.experiment.campaign.executors import processes
+    from mambo_sil.model.tune.study import finished_trials, search
+
+    bar.stage("tuning")
+    try:
+        with processes(workers) as pool:
+            search(tuning, study, owner, trials, pool=pool, progress=bar, running=bar.running)
+    except KeyboardInterrupt:
+        with contextlib.suppress(OSError):
+            typer.echo(
+                f"{echo(str(folder))}: stopped with {len(finished_trials(study))} of {trials} trials "
+                "finished; the same command continues from there",
+                err=True,
+            )
+        raise
+
+
+def diff(
+    a: Annotated[
+        str,
+        typer.Argument(
+            help="A preset, a controller.toml, or the folder of a bundle.",
+            metavar="A",
+            autocompletion=complete_presets,
+        ),
+    ],
+    b: Annotated[
+        str,
+        typer.Argument(help="What to compare it with.", metavar="B", autocompletion=complete_presets),
+    ],
+    *,
+    output: OptionalResults = None,
+    vehicle: Drone = "mambo",
+    as_json: AsJson = False,
+) -> None:
+    """Compare two controllers: settings, gains, poles, flights; exit 0 if they are the same, 1 if not."""
+    from mambo_codegen.settings import presets
+    from mambo_sil.cli.progress import progress_bar
+    from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.experiment.compare.compare import compare
+    from mambo_sil.experiment.compare.diff_record import PICTURES
+    from mambo_sil.experiment.compare.diff_report import diff_text
+    from mambo_sil.results.folders import SUMMARY
+
+    sides = [(source, presets.load_or_bundle(source)) for source in (a, b)]
+    with progress_bar("flying") as bar:
+        summary = compare(sides[0], sides[1], vehicle_toml.load(vehicle), output, bar)
+    show(summary, diff_text(summary), as_json=as_json)
+    if output is not None:
+        pictures = () if summary.same else PICTURES
+        typer.echo(f"{echo(str(output))}: {', '.join((*pictures, SUMMARY))}", err=True)
+    if not summary.same:
+        raise typer.Exit(1)

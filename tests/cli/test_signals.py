@@ -1,0 +1,40 @@
+"""SIGTERM while the command starts: exit 143 at any time."""
+
+import subprocess
+import sys
+
+import pytest
+
+TERMINATE = "os.kill(os.getpid(), signal.SIGTERM)"
+DURING_IMPORT = f"""
+class Finder:
+    def find_spec(self, name, *_):
+        if name == "mambo_sil.cli.settings":
+            {TERMINATE}
+sys.meta_path.insert(0, Finder())
+"""
+DURING_PARSING = f"""
+from mambo_sil.cli import command
+make_context = command.RootGroup.make_context
+def make(*arguments, **options):
+    {TERMINATE}
+    return make_context(*arguments, **options)
+command.RootGroup.make_context = make
+"""
+DURING_COMMAND = f"""
+from mambo_sil.cli import command
+echo = command.typer.echo
+def stop(*arguments, **options):
+    {TERMINATE}
+    echo(*arguments, **options)
+command.typer.echo = stop
+"""
+
+
+@pytest.mark.parametrize("when", [DURING_IMPORT, DURING_PARSING, DURING_COMMAND])
+def test_a_terminated_command_exits_with_143(when: str) -> None:
+    """While modules are imported, while the command line is parsed, and while the command runs."""
+    script = f"import os, signal, sys\n{when}\nfrom mambo_nmpc.__main__ import main\nmain()"
+    line = [sys.executable, "-c", script, "presets"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (143, "", "")
