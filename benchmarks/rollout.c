@@ -15,7 +15,7 @@
 
 #define STEP_S NMPC_PREDICTION_STEP_S
 #define HALF_SQUARE_S2 ((nmpc_real_t)0.5 * NMPC_PREDICTION_STEP_S * NMPC_PREDICTION_STEP_S)
-#define LAST_MOVE (NMPC_CONTROL_HORIZON - 1)
+#define LAST_MOVE (NMPC_HORIZON_CONTROL - 1)
 
 typedef struct {
     nmpc_real_t error_m[2];           /* position less target along x, y */
@@ -29,7 +29,7 @@ static const nmpc_real_t speed_lack_s[2] = ROLLOUT_SPEED_LACK;
 static const nmpc_real_t shift_lack_s2[2] = ROLLOUT_SHIFT_LACK;
 #endif
 
-static nmpc_real_t plan_rad[NMPC_CONTROL_HORIZON][2];
+static nmpc_real_t plan_rad[NMPC_HORIZON_CONTROL][2];
 static float given_rad[2];
 
 static int sign(nmpc_real_t value)
@@ -44,10 +44,10 @@ static nmpc_real_t size(nmpc_real_t value)
 
 /* Return the cost of the plan, and its slope by each move. `gain[axis][angle]` is acceleration by tilt. */
 static nmpc_real_t evaluate(const model_t *start, const nmpc_real_t gain[2][2], const nmpc_real_t last_rad[2],
-                            nmpc_real_t slope[NMPC_CONTROL_HORIZON][2])
+                            nmpc_real_t slope[NMPC_HORIZON_CONTROL][2])
 {
     model_t now = *start;
-    nmpc_real_t signs[NMPC_PREDICTION_HORIZON][2];
+    nmpc_real_t signs[NMPC_HORIZON_PREDICTION][2];
     nmpc_real_t by_error[2] = {0, 0}, by_velocity[2] = {0, 0};
     nmpc_real_t distance_m = 0, variation_rad = 0;
     int i, k, axis;
@@ -57,7 +57,7 @@ static nmpc_real_t evaluate(const model_t *start, const nmpc_real_t gain[2][2], 
     nmpc_real_t acceleration[2] = {0, 0}, by_acceleration[2] = {0, 0};
 #endif
 
-    for (i = 0; i < NMPC_PREDICTION_HORIZON; i++) {
+    for (i = 0; i < NMPC_HORIZON_PREDICTION; i++) {
         const nmpc_real_t *move_rad = plan_rad[(i < LAST_MOVE) ? i : LAST_MOVE];
 #if ROLLOUT_HAS_LAG
         nmpc_real_t shift_s2[2], speed_s[2];
@@ -70,7 +70,7 @@ static nmpc_real_t evaluate(const model_t *start, const nmpc_real_t gain[2][2], 
             now.tilt_rad[k] = move_rad[k] - decay[k] * to_turn_rad;
         }
 #else
-        if (i < NMPC_CONTROL_HORIZON) {
+        if (i < NMPC_HORIZON_CONTROL) {
             for (axis = 0; axis < 2; axis++) {
                 acceleration[axis] = gain[axis][0] * move_rad[0] + gain[axis][1] * move_rad[1];
             }
@@ -91,11 +91,11 @@ static nmpc_real_t evaluate(const model_t *start, const nmpc_real_t gain[2][2], 
     }
 
     for (k = 0; k < 2; k++) {
-        for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+        for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
             slope[i][k] = 0;
         }
     }
-    for (i = NMPC_PREDICTION_HORIZON - 1; i >= 0; i--) {
+    for (i = NMPC_HORIZON_PREDICTION - 1; i >= 0; i--) {
         nmpc_real_t *by_move = slope[(i < LAST_MOVE) ? i : LAST_MOVE];
 
         by_error[0] += signs[i][0];
@@ -125,7 +125,7 @@ static nmpc_real_t evaluate(const model_t *start, const nmpc_real_t gain[2][2], 
         }
     }
 
-    for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+    for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
         for (k = 0; k < 2; k++) {
             const nmpc_real_t change_rad = plan_rad[i][k] - ((i > 0) ? plan_rad[i - 1][k] : last_rad[k]);
             const nmpc_real_t effort = NMPC_EFFORT_WEIGHT * (nmpc_real_t)sign(change_rad);
@@ -143,13 +143,13 @@ static nmpc_real_t evaluate(const model_t *start, const nmpc_real_t gain[2][2], 
 /* RPROP, rprop+, with the rule to stop. */
 static void minimize(const model_t *start, const nmpc_real_t gain[2][2], const nmpc_real_t last_rad[2])
 {
-    nmpc_real_t slope[NMPC_CONTROL_HORIZON][2], before_rad[NMPC_CONTROL_HORIZON][2];
-    nmpc_real_t step_rad[NMPC_CONTROL_HORIZON][2];
-    int direction[NMPC_CONTROL_HORIZON][2];
+    nmpc_real_t slope[NMPC_HORIZON_CONTROL][2], before_rad[NMPC_HORIZON_CONTROL][2];
+    nmpc_real_t step_rad[NMPC_HORIZON_CONTROL][2];
+    int direction[NMPC_HORIZON_CONTROL][2];
     nmpc_real_t cost = 0;
     int iteration, i, k;
 
-    for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+    for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
         for (k = 0; k < 2; k++) {
             step_rad[i][k] = NMPC_INITIAL_STEP_RAD;
             before_rad[i][k] = plan_rad[i][k];
@@ -163,7 +163,7 @@ static void minimize(const model_t *start, const nmpc_real_t gain[2][2], const n
         if ((iteration > 0) && (size(cost - previous) < NMPC_TOLERANCE)) {
             break;
         }
-        for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+        for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
             for (k = 0; k < 2; k++) {
                 const int downhill = -sign(slope[i][k]);
                 nmpc_real_t next_rad = plan_rad[i][k];
@@ -203,7 +203,7 @@ void run(const float error[4], const float last[2], float moves[4])
     const model_t start = {{error[0], error[2]}, {error[1], error[3]}, {last[0], last[1]}};
     int i, k;
 
-    for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+    for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
         for (k = 0; k < 2; k++) {
             if (!ROLLOUT_KEEPS_PLAN || (last[0] != given_rad[0]) || (last[1] != given_rad[1])) {
                 plan_rad[i][k] = last_rad[k];

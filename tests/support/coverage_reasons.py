@@ -27,7 +27,7 @@ REASONS: Final[tuple[Reason, ...]] = (
     ),
     *reasons(
         "src/nmpc_cost.c",
-        "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {",
+        "for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {",
         "the counter bounds the loop for static analysis; the sign changes run out first",
         "branch 3 never taken",
     ),

@@ -97,7 +97,7 @@ _ROUNDED: Final = "rounds to the same steps on every path that the iterations th
 
 _ABSOLUTE: Final = "return (value < (nmpc_sum_t)0) ? -value : value;"
 _SIGN: Final = "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);"
-_CHANGES: Final = "for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {"
+_CHANGES: Final = "for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {"
 _STEP_MAX: Final = "#define NMPC_STEP_MAX_RAD <{}> /* Delta_max, Table I */"
 _STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
 _NEAREST: Final = ("one more", "one less")

@@ -35,7 +35,7 @@ OPTIMIZER, STEP, HELPERS = "src/nmpc_optimizer.c", "src/nmpc.c", "src/nmpc_math.
 FAULTS = {
     "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
     "the sign of zero is one": (HELPERS, "(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
-    "one predicted step too few": (COST, "i < NMPC_PREDICTION_HORIZON; i++)", "i < NMPC_PREDICTION_HORIZON - 1; i++)"),
+    "one predicted step too few": (COST, "i < NMPC_HORIZON_PREDICTION; i++)", "i < NMPC_HORIZON_PREDICTION - 1; i++)"),
     "one iteration too many": (OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
     "pitch takes roll's response": (COST, "subgradient_x[response]", "subgradient_x[response - angle]"),
     "roll and pitch change places": (STEP, "command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),

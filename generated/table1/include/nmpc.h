@@ -105,7 +105,7 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights);
  * Any input may be passed. If one is NaN, infinite or out of range, the status names it and the command repeats
  * the last one: that of the last good step or of nmpc_reset(); level after nmpc_init(). The next good input is
  * processed as usual.
- * Work: NMPC_ITERATIONS evaluations of the cost, of NMPC_PREDICTION_HORIZON prediction steps each, for every
+ * Work: NMPC_ITERATIONS evaluations of the cost, of NMPC_HORIZON_PREDICTION prediction steps each, for every
  * good input; bad input returns before them. */
 nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
                         nmpc_real_t thrust_acceleration_m_s2, nmpc_command_t *command);

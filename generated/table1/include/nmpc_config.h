@@ -47,10 +47,10 @@ typedef float nmpc_sum_t;
 
 /* Horizons, in prediction steps. A move is the set-point of one angle, roll or pitch, held for one prediction
  * step: an absolute angle, not a change. The last moves are held to the end of the prediction horizon. */
-#define NMPC_PREDICTION_HORIZON 10 /* N_p, Table I */
-#define NMPC_CONTROL_HORIZON 2 /* N_c, Table I */
+#define NMPC_HORIZON_PREDICTION 10 /* N_p, Table I */
+#define NMPC_HORIZON_CONTROL 2 /* N_c, Table I */
 #define NMPC_ANGLES 2 /* roll phi, pitch theta */
-#define NMPC_MOVES (NMPC_ANGLES * NMPC_CONTROL_HORIZON)
+#define NMPC_MOVES (NMPC_ANGLES * NMPC_HORIZON_CONTROL)
 
 /* The paper has one tau, 0.01 s. Here a control step, from k to k + 1, and a prediction step, from k + i to
  * k + i + 1, may differ in length: N_p = 10 prediction steps of 0.01 s end before the Mambo's attitude loop has

@@ -19,9 +19,9 @@
 #endif
 
 /* Assertions at compile time: an array of negative size stops the build. */
-typedef char nmpc_assert_horizons[((NMPC_CONTROL_HORIZON >= 1)
-                                   && (NMPC_CONTROL_HORIZON <= NMPC_PREDICTION_HORIZON)
-                                   && (NMPC_PREDICTION_HORIZON <= 50)
+typedef char nmpc_assert_horizons[((NMPC_HORIZON_CONTROL >= 1)
+                                   && (NMPC_HORIZON_CONTROL <= NMPC_HORIZON_PREDICTION)
+                                   && (NMPC_HORIZON_PREDICTION <= 50)
                                    && (NMPC_ITERATIONS <= 100)) ? 1 : -1];
 typedef char nmpc_assert_scalar_has_4_bytes[(sizeof(nmpc_real_t) == 4U) ? 1 : -1];
 typedef char nmpc_assert_bits_have_the_size_of_a_scalar[(sizeof(nmpc_bits_t) == sizeof(nmpc_real_t)) ? 1 : -1];

@@ -46,7 +46,7 @@ static inline void distance_subgradient(const nmpc_axis_errors_t *errors, nmpc_r
     }
     /* Prediction step i, counted from 0, is the last before a change of sign. The sign changes at most N_p - 1
      * times; the counter makes that bound explicit for static analysis. */
-    for (count = 1; (changes != 0U) && (count < NMPC_PREDICTION_HORIZON); count++) {
+    for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {
         const unsigned int i = (NMPC_LAST_STEP - 1U) - nmpc_lowest_set_bit(changes);
 
         NMPC_UNROLL
@@ -82,13 +82,13 @@ nmpc_sum_t nmpc_cost_evaluate(nmpc_t *self)
 
     /* Eq 12a: the distance over the horizon. After the control horizon the last moves are held. */
     NMPC_UNROLL
-    for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+    for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
         nmpc_predictor_apply_moves(prediction, moves_rad, i, &rollout_x, &rollout_y);
         predict_error(&rollout_x, &errors_x);
         predict_error(&rollout_y, &errors_y);
     }
     NMPC_UNROLL
-    for (i = NMPC_CONTROL_HORIZON; i < NMPC_PREDICTION_HORIZON; i++) {
+    for (i = NMPC_HORIZON_CONTROL; i < NMPC_HORIZON_PREDICTION; i++) {
         predict_error(&rollout_x, &errors_x);
         predict_error(&rollout_y, &errors_y);
     }
@@ -106,7 +106,7 @@ nmpc_sum_t nmpc_cost_evaluate(nmpc_t *self)
         nmpc_sum_t gradient = (nmpc_sum_t)0;
 
         NMPC_UNROLL
-        for (i = 0; i < NMPC_CONTROL_HORIZON; i++) {
+        for (i = 0; i < NMPC_HORIZON_CONTROL; i++) {
             const int k = (NMPC_ANGLES * i) + angle;
             const int response = k / NMPC_ANGLES_PER_RESPONSE;
             const nmpc_real_t change_rad = moves_rad[k] - previous_rad;

@@ -10,7 +10,7 @@
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
-const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES] = {
+const nmpc_real_t nmpc_predictor_response_sum[NMPC_HORIZON_PREDICTION][NMPC_RESPONSES] = {
     { 1.0f, 0.0f },
     { 4.0f, 1.0f },
     { 9.0f, 5.0f },

@@ -42,7 +42,7 @@ extern "C" {
  * which have equal lags, share one. */
 #define NMPC_ANGLES_PER_RESPONSE 2 /* 2 if roll and pitch have one response, else 1 */
 #define NMPC_RESPONSES (NMPC_MOVES / NMPC_ANGLES_PER_RESPONSE)
-extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_PREDICTION_HORIZON][NMPC_RESPONSES];
+extern const nmpc_real_t nmpc_predictor_response_sum[NMPC_HORIZON_PREDICTION][NMPC_RESPONSES];
 
 /* Evaluate eq 8 at the present yaw and thrust, and start the roll-out along x and along y. */
 void nmpc_predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
