@@ -266,7 +266,7 @@ def report(
     as_json: AsJson = False,
 ) -> None:
     """Collect results on one HTML page that needs no network and no other file."""
-    from mambo_sil.pages.report.report_page import ReportSummary, report_page
+    from mambo_sil.pages.report_page import ReportSummary, report_page
     from mambo_sil.results.html_page import new_page
 
     with new_page(output, "report") as write:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mambo_sil.pages.report.report_page import report_page
+from mambo_sil.pages.report_page import report_page
 from tests.support.browser import Browser, browser
 from tests.support.results import FOLDERS
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mambo_sil.experiment.campaign.store import DATABASE
 from mambo_sil.flight.animation import LONGEST_S, animate
 from mambo_sil.flight.traces import Trace
-from mambo_sil.pages.report.report_page import read_summary
+from mambo_sil.pages.report_page import read_summary
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.html_page import render_page
 from tests.support import command

@@ -1,1 +1,0 @@
-"""One page of whatever has been run."""
