@@ -21,7 +21,7 @@ WARNING_FLAGS: Final = (
 
 PROOF_PREPROCESSING: Final = ("-msse2", "-mfpmath=sse", "-U__GNUC__")
 """Preprocessor flags for Frama-C, which analyses a 32-bit machine: SSE2 instead of x87 (FLT_EVAL_METHOD 0),
-and standard C instead of builtins of GCC and clang."""
+and standard C in the four small functions with a quicker form for gcc and clang; a test compares them."""
 
 PROOF_FLAGS: Final = (
     "-machdep x86_32",

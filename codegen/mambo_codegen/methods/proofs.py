@@ -10,6 +10,7 @@ FLOAT_PROOFS: Final = {
         "-eva",
         "-eva-precision 2",
         "-eva-split-return auto",  # analyse accepted and refused inputs apart
+        "-eva-split-return-function nmpc_between:0,nmpc_within:0",  # nmpc_clamp calls them
     ),
     # NaN is a legal value. Precision 0, without relations between variables: from a stored comparison
     # Frama-C 25 derives x >= y from !(x < y), which is false for NaN.

@@ -139,17 +139,6 @@ static inline int nmpc_reaches(nmpc_real_t value, nmpc_real_t limit)
 {
     return (nmpc_bits(value) & NMPC_MAGNITUDE_BITS) >= nmpc_bits(limit);
 }
-
-/* Saturate `value` at +/- `limit`. */
-static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
-{
-    nmpc_real_t clamped = value;
-
-    if (nmpc_within(value, limit) == 0) {
-        clamped = (value < (nmpc_real_t)0) ? -limit : limit;
-    }
-    return clamped;
-}
 #else
 /* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
 static inline int nmpc_within(nmpc_real_t value, nmpc_real_t limit)
@@ -162,13 +151,18 @@ static inline int nmpc_reaches(nmpc_real_t value, nmpc_real_t limit)
 {
     return (value >= limit) || (value <= -limit);
 }
+#endif
 
 /* Saturate `value` at +/- `limit`. */
 static inline nmpc_real_t nmpc_clamp(nmpc_real_t value, nmpc_real_t limit)
 {
-    return (value > limit) ? limit : ((value < -limit) ? -limit : value);
+    nmpc_real_t clamped = value;
+
+    if (nmpc_within(value, limit) == 0) {
+        clamped = (value < (nmpc_real_t)0) ? -limit : limit;
+    }
+    return clamped;
 }
-#endif
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD, with absolute errors of at most 1.2e-07. */
 void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine);
