@@ -20,6 +20,7 @@ INFINITY_PASSES = Harm(_MATH, r"\(value <= maximum\)", "1")
 UNCHECKED_HEADING = Harm(_STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1")
 NULL_FOLLOWED = Harm(_STEP, r"\(state != NULL\) && ", "")
 UNSET_COMMAND = Harm(_STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", "")
+UNLIMITED_CLAMP = Harm(_MATH, r"\(value < \(nmpc_real_t\)0\) \? -limit", "(value < (nmpc_real_t)0) ? value")
 """Faults that the C of both norms can have."""
 
 

@@ -198,6 +198,58 @@ def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(
     assert f"digest: 0x{self_test_digest(method_of(settings), 1000):08X} after 100000 steps\n" in printed
 
 
+VARIANTS = Path(__file__).parent / "variants.c"
+
+
+def variants_differ(folder: Path, right: str = "", wrong: str = "") -> str:
+    """Return where the functions for gcc, with a fault, differ from those for other compilers."""
+    require("gcc", "gcc")
+    header = placed(ONE_NORM, folder) / "src" / "nmpc_math.h"
+    text = header.read_text("utf-8")
+    plain = re.sub(r"\bnmpc_(?!config|real_t|sum_t|bits_t|steps_t)", "plain_", text)
+    plain = plain.replace("NMPC_MATH_H", "PLAIN_MATH_H").replace("NMPC_UNROLL", "PLAIN_UNROLL")
+    (header.parent / "plain_math.h").write_text(plain.replace("__GNUC__", "OTHER_COMPILER"), "utf-8")
+    assert right in text
+    header.write_text(text.replace(right, wrong), "utf-8")
+    includes = ("-Iinclude", "-Isrc")
+    shell(
+        "gcc",
+        "-std=c11",
+        "-O2",
+        "-funroll-loops",
+        "-Wall",
+        "-Werror",
+        *includes,
+        VARIANTS,
+        "-o",
+        "variants",
+        folder=folder,
+    )
+    return subprocess.run([folder / "variants"], capture_output=True, text=True, check=False).stdout
+
+
+@pytest.mark.long
+def test_the_functions_that_the_proof_reads_equal_those_that_gcc_compiles(tmp_path: Path) -> None:
+    """For all 2^32 floats, and all words of signs: the proof holds for what gcc and clang compile."""
+    assert variants_differ(tmp_path) == ""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("MAGNITUDE_BITS) <= nmpc_bits", "MAGNITUDE_BITS) < nmpc_bits"),
+        ("MAGNITUDE_BITS) >= nmpc_bits", "MAGNITUDE_BITS) > nmpc_bits"),
+        ("0x7FFFFFFFUL", "0x7FFFFFFEUL"),
+        ("return __builtin_fabsf(value)", "return value"),
+        ("__builtin_ctzl(word)", "__builtin_ctzl(word << 1)"),
+    ],
+)
+def test_a_fault_in_the_functions_for_gcc_is_found(right: str, wrong: str, tmp_path: Path) -> None:
+    """In each of the four functions that the proof does not read."""
+    assert "they differ for the" in variants_differ(tmp_path, right, wrong)
+
+
 def test_another_digest_than_the_reference_s_fails_the_example(mambo: Path) -> None:
     """The example prints both digests, and stops."""
     require("make", "make")

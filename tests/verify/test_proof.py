@@ -16,6 +16,7 @@ from tests.support.alarms import (
     NAN_PASSES,
     NULL_FOLLOWED,
     UNCHECKED_HEADING,
+    UNLIMITED_CLAMP,
     UNSET_COMMAND,
     Alarm,
     Fault,
@@ -67,6 +68,7 @@ FAULTS = {
         ROLL,
     ),
     "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
+    "a clamp that does not limit": Fault("take_numbers", UNLIMITED_CLAMP, ROLL),
     "the cost starts uninitialised": Fault(
         "take_numbers", UNINITIALISED, Alarm(DRIVER, "(void)stored[i];", "initialization")
     ),

@@ -16,6 +16,7 @@ from tests.support.alarms import (
     NAN_PASSES,
     NULL_FOLLOWED,
     UNCHECKED_HEADING,
+    UNLIMITED_CLAMP,
     UNSET_COMMAND,
     Alarm,
     Fault,
@@ -65,6 +66,9 @@ UNPROVEN = {
         "take_numbers",
         Harm(STEP, r"nmpc_clamp\((nmpc_attitude_roll[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"),
         Alarm(DRIVER, "roll_is_within_the_limit", "user assertion"),
+    ),
+    "a clamp that does not limit": Fault(
+        "take_numbers", UNLIMITED_CLAMP, Alarm(DRIVER, "roll_is_within_the_limit", "user assertion")
     ),
     "a set command is not clamped": Fault(
         "take_numbers",

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * The functions of nmpc_math.h for gcc and clang against those for other compilers (plain_*), for every float and
+ * every word of signs; returns 0 if they agree, else prints where they do not. */
+#include <stdio.h>
+
+#include "nmpc_math.h"
+#include "plain_math.h"
+
+#define INFINITE 0x7F800000U
+#define STRIDE 2654435761U /* odd: each of the 2^32 words has its turn, and a fault is found early */
+
+static float real_of(unsigned int bits)
+{
+    union {
+        unsigned int bits;
+        float real;
+    } view;
+
+    view.bits = bits;
+    return view.real;
+}
+
+static int differ_for(unsigned int bits)
+{
+    static const float limits[] = {NMPC_TILT_LIMIT_RAD, 3.4028235e38F};
+    const float value = real_of(bits);
+    const int is_nan = (value != value);
+    unsigned int i;
+    int differ = (is_nan == 0) && (nmpc_absolute(value) != plain_absolute(value));
+
+    for (i = 0U; i < (sizeof limits / sizeof limits[0]); i++) {
+        differ |= (nmpc_within(value, limits[i]) != plain_within(value, limits[i]));
+        differ |= (is_nan == 0) && (nmpc_reaches(value, limits[i]) != plain_reaches(value, limits[i]));
+    }
+    /* What holds for one limit holds for all: the bits of positive floats are ordered as they are. */
+    differ |= (bits < INFINITE) && !(value < real_of(bits + 1U));
+    return differ;
+}
+
+int main(void)
+{
+    unsigned int bits = 0U;
+    nmpc_steps_t word;
+
+    for (word = 1U; word < ((nmpc_steps_t)1 << NMPC_LAST_STEP); word++) {
+        if (nmpc_lowest_set_bit(word) != plain_lowest_set_bit(word)) {
+            printf("they differ for the word %lx\n", (unsigned long)word);
+            return 1;
+        }
+    }
+    do {
+        if (differ_for(bits) != 0) {
+            printf("they differ for the float with the bits %08x\n", bits);
+            return 1;
+        }
+        bits += STRIDE;
+    } while (bits != 0U);
+    return 0;
+}
