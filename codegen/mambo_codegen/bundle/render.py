@@ -184,6 +184,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
                 if key != "prefix"  # every public name shows it
             ],
             "version": __version__,
+            "semantic_version": __version__.replace(".dev", "-dev"),
             "digest": settings.short_digest,
             "settings_id": _settings_id(settings),
             "fixed": numbers.formats is not None,
