@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_codegen import boards
+from mambo_codegen import __version__, boards
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
 from mambo_sil.board.footprint import footprint_report
@@ -186,7 +186,7 @@ def campaign_folder(folder: Path, *, finished: bool = True) -> None:
     """Write a campaign of four flights, one of which crashes with the second controller."""
     flight = Scenario().model_dump(include={"trajectory", "size_m", "rate_rad_s", "duration_s", "sensors"})
     document = {"seed": 7, "flight": flight, "controllers": [{"name": "pd"}, {"name": "mambo"}]}
-    identity = {"generator": "mambo-nmpc 0.1.0", "command": "campaign", **document}
+    identity = {"generator": f"mambo-nmpc {__version__}", "command": "campaign", **document}
     (folder / "campaign.json").write_text(json.dumps(identity), "utf-8")
     columns = [f"{name}_{key}" for name in ("pd", "mambo") for key in ("crashed", "iae_m_s", "trace_sha256")]
     cells = [(0, 60.0 + flight, "ab", int(flight == 3), 4.0 + flight, "cd") for flight in range(4)]

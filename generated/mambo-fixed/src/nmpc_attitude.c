@@ -5,7 +5,7 @@
  */
 #include "nmpc_attitude.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x00BB556DUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x22D24429UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

@@ -7,7 +7,7 @@
 
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x80B9AE27UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF8CA429DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

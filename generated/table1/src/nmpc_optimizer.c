@@ -8,7 +8,7 @@
 #include "nmpc_cost.h"
 #include "nmpc_math.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xD76A4655UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x4C6F9794UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 

@@ -271,11 +271,11 @@ def test_a_campaign_of_another_version_is_refused(source: Path, whole: Path, tmp
     shutil.copytree(whole, folder)
     (folder / DATABASE).unlink()
     identity = json.loads((folder / "campaign.json").read_text())
-    (folder / "campaign.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0.old"}))
+    (folder / "campaign.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0"}))
     before = contents(folder)
     said = run("campaign", str(source), "--flights", str(FLIGHTS), "-o", str(folder), code=2)[1]
     assert said.endswith(
-        "out: holds a campaign of mambo-nmpc 0.1.0.old, which this version does not read; "
+        "out: holds a campaign of mambo-nmpc 0.1.0, which this version does not read; "
         "go on with that version, or name another folder with -o\n"
     )
     assert contents(folder) == before

@@ -197,9 +197,9 @@ def test_a_study_of_another_version_is_refused(source: Path, whole: Path, tmp_pa
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
     identity = json.loads((folder / "study.json").read_text())
-    (folder / "study.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0.old"}))
+    (folder / "study.json").write_text(json.dumps(identity | {"generator": "mambo-nmpc 0.1.0"}))
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    with pytest.raises(ForeignFilesError, match=r"holds a study of mambo-nmpc 0\.1\.0\.old, .* go on with"):
+    with pytest.raises(ForeignFilesError, match=r"holds a study of mambo-nmpc 0\.1\.0, .* go on with"):
         claim(folder, "study", {"command": "tune", **tuning_file.read(source).document()})
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
