@@ -146,6 +146,6 @@ def test_a_missing_template_is_a_bug_with_a_traceback(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("Traceback")
-    assert "TemplateNotFound" in done.stderr.splitlines()[-1]
+    assert "TemplatesNotFound: " in done.stderr.splitlines()[-1]
     assert "nmpc_observer.c.j2" in done.stderr.splitlines()[-1]
     assert not (tmp_path / "c").exists()
