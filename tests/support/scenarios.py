@@ -118,10 +118,12 @@ LATE: Final = changed(
         "roll": {"gain": 0.9, "lag_s": 0.03, "dead_time_s": 0.0613},
         "pitch": {"gain": 1.1, "lag_s": 0.07, "dead_time_s": 0.1005},
         "yaw_lag_s": 0.3,
+        "roll_trim_rad": 0.013,
+        "pitch_trim_rad": -0.021,
     },
     sensors={"position_rate_hz": 50, "position_delay_s": 0.006},
 )
-"""Two different angles, whose dead times are no multiples of a tick."""
+"""Two different angles with trims, whose dead times are no multiples of a tick."""
 
 
 FELT: Final = VehicleFile.model_validate(
@@ -201,7 +203,10 @@ def drones() -> st.SearchStrategy[VehicleFile]:
         }
     )
     cascades = st.fixed_dictionaries({"rate_hz": tick, "roll": axis, "pitch": axis, "yaw": axis})
-    firsts = st.fixed_dictionaries({"rate_hz": tick, "roll": response, "pitch": response})
+    trim = _within(-0.2, 0.2)
+    firsts = st.fixed_dictionaries(
+        {"rate_hz": tick, "roll": response, "pitch": response, "roll_trim_rad": trim, "pitch_trim_rad": trim}
+    )
     return st.one_of(
         st.sampled_from([vehicle_toml.load(name) for name in vehicle_toml.names()]),
         st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors),

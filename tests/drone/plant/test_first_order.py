@@ -80,6 +80,21 @@ def test_a_tilt_accelerates_by_its_share_of_g_against_drag() -> None:
     np.testing.assert_allclose(truth(state).velocity_m_s[:, 0], expected, rtol=1e-8)
 
 
+def test_at_its_trims_a_drone_does_not_accelerate() -> None:
+    """The angles are those that it reports; level, it accelerates as if tilted by minus its trims."""
+    trims = {"roll_trim_rad": 0.03, "pitch_trim_rad": -0.02}
+    gain = {"gain": 1.0, "lag_s": 0.05}
+    drone = changed(FLOWN, body={"drag_1_s": 0.0}, attitude=trims | {"roll": gain, "pitch": gain})
+    states = fly(drone, (0.03, -0.02), 400)
+    at_trim, later = (truth(states[tick]).velocity_m_s[:, 0] for tick in (200, 400))
+    np.testing.assert_allclose(at_trim, later, atol=1e-9)
+    levelled = truth(fly(drone, (0.0, 0.0), 100)[-1]).velocity_m_s[:, 0]
+    tilted = truth(fly(changed(drone, attitude=dict.fromkeys(trims, 0.0)), (0.0, 0.0), 100)[-1])
+    assert not tilted.velocity_m_s[:2].any()
+    expected = 0.87 * 9.81 * np.array([np.tan(-0.02) * np.cos(0.03), -np.sin(0.03)]) * 0.5
+    np.testing.assert_allclose(levelled[:2], expected, rtol=2e-3)
+
+
 def test_air_push_battery_and_payload_act_on_the_body() -> None:
     """Still and level: drag towards the air, the push's acceleration, and thrust over the whole mass."""
     vehicle = Vehicle.of(FLOWN)

@@ -99,7 +99,7 @@ FAULTS: dict[str, tuple[str, list[str]]] = {
         [
             "body = 3 must be a section; write [body] and its keys below",
             "attitude = 4 must be a section; write [attitude] and its keys below",
-            "mambo is not a section; there are body, rotors, attitude, altitude, sensors",
+            "mambo is not a section; there are body, rotors, attitude, altitude, sensors, uncertainty",
         ],
     ),
     "torques without rotors": (

@@ -113,6 +113,9 @@ def test_a_first_order_drone_is_copied() -> None:
         assert each == 0.82
     assert (model.roll_lag_s, model.pitch_delay_s, model.drag_1_s) == (0.047, 0.091, 0.15)
     assert model.acceleration_per_tilt == 0.87
+    assert "trim" not in controller_text(drone, "crazyflie-flown")
+    trimmed = settings_for(changed(drone, attitude={"roll_trim_rad": 0.01, "pitch_trim_rad": -0.02})).model
+    assert (trimmed.roll_trim_rad, trimmed.pitch_trim_rad) == (0.01, -0.02)
 
 
 @pytest.mark.parametrize(("ratio", "tilt_rad"), [(1.05, 0.155), (1.3, 0.347), (1.9, 0.5), (9.0, 0.5)])

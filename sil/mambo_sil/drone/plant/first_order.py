@@ -1,7 +1,7 @@
 """A drone of whose code nothing is known: gain, lag and dead time of each angle, as a log shows them.
 
     angle(t) follows gain x command(t - dead time) with a first-order lag, yaw its reference
-    horizontal acceleration = k x that of the thrust at these angles - drag (v - air) + push
+    horizontal acceleration = k x that of the thrust at these angles less their trims - drag (v - air) + push
     vertical acceleration = g - that of the thrust
 
 with k the acceleration per tilt: the angles are those that the drone reports, and its thrust need not point
@@ -62,6 +62,7 @@ class FirstOrderDrone:
     def __init__(self, drone: VehicleFile, attitude: FirstOrderAttitude) -> None:
         self._step_s, self._attitude = drone.step_s, attitude
         self._responses = attitude.roll, attitude.pitch
+        self._trim_rad = np.array([[attitude.roll_trim_rad], [attitude.pitch_trim_rad], [0.0]])
         self.decays = tuple(decay_of(response, drone.step_s) for response in self._responses)
         nodes_s = drone.step_s * np.append(NODES[1:], 1.0)
         self.yaw_decay = exponential(-nodes_s / attitude.yaw_lag_s)
@@ -121,7 +122,7 @@ class FirstOrderDrone:
         """Return the acceleration (3, n) in the world by thrust, push and gravity."""
         thrust = np.zeros_like(angles_rad)
         thrust[2] = -around.thrust_acceleration_m_s2
-        acceleration = to_world(*sine_cosine(angles_rad), thrust)
+        acceleration = to_world(*sine_cosine(angles_rad - self._trim_rad), thrust)
         for axis in range(2):
             acceleration[axis] = (
                 self._attitude.acceleration_per_tilt_g * acceleration[axis] + around.push_m_s2[axis]

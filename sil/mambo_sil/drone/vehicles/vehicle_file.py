@@ -19,6 +19,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MocapSensors,
     NoSensors,
     RotorFigures,
+    Uncertainty,
     VehicleSection,
 )
 
@@ -40,6 +41,7 @@ class VehicleFile(VehicleSection):
     attitude: AnyAttitude = Field(description="The attitude loop, with yaw.")
     altitude: AltitudeGains = Field(description="The altitude loop.")
     sensors: AnySensors = Field(NoSensors(), description="The sensors that --sensors switches on.")
+    uncertainty: Uncertainty | None = Field(None, description="How well a log has shown these values.")
 
     @model_validator(mode="before")
     @classmethod

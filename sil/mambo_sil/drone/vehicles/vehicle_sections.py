@@ -27,6 +27,8 @@ Rate = Annotated[int, Field(ge=50, le=2000)]
 Lag = Annotated[float, Field(ge=0.001, le=2)]
 Delay = Annotated[float, Field(ge=0, le=LONGEST_DELAY_S)]
 Noise = Annotated[float, Field(ge=0, le=1e6)]
+Trim = Annotated[float, Field(ge=-0.2, le=0.2)]
+HalfWidth = Annotated[float, Field(ge=0, le=1e6)]
 
 
 class Body(VehicleSection):
@@ -134,6 +136,8 @@ class FirstOrderAttitude(VehicleSection):
     acceleration_per_tilt_g: Annotated[float, Field(ge=0.1, le=3)] = Field(
         1.0, description="Horizontal acceleration over that which the tilt of the log would give."
     )
+    roll_trim_rad: Trim = Field(0.0, description="Reported roll at which the drone does not accelerate.")
+    pitch_trim_rad: Trim = Field(0.0, description="Reported pitch at which the drone does not accelerate.")
 
 
 class AltitudeGains(VehicleSection):
@@ -142,6 +146,23 @@ class AltitudeGains(VehicleSection):
     p_n_m: Gain = Field(description="Thrust per metre of height error.")
     d_n_s_m: Gain = Field(description="Thrust per m/s of vertical speed, against it.")
     thrust_max_n: Positive = Field(description="Largest total thrust; more than the weight.")
+
+
+class Uncertainty(VehicleSection):
+    """Half-widths of the 95 % intervals of the values that a log has shown; no flight reads them."""
+
+    drag_1_s: HalfWidth | None = Field(None, description="That of body.drag_1_s.")
+    roll_gain: HalfWidth | None = Field(None, description="That of attitude.roll.gain.")
+    roll_lag_s: HalfWidth | None = Field(None, description="That of attitude.roll.lag_s.")
+    roll_dead_time_s: HalfWidth | None = Field(None, description="That of attitude.roll.dead_time_s.")
+    pitch_gain: HalfWidth | None = Field(None, description="That of attitude.pitch.gain.")
+    pitch_lag_s: HalfWidth | None = Field(None, description="That of attitude.pitch.lag_s.")
+    pitch_dead_time_s: HalfWidth | None = Field(None, description="That of attitude.pitch.dead_time_s.")
+    acceleration_per_tilt_g: HalfWidth | None = Field(
+        None, description="That of attitude.acceleration_per_tilt_g."
+    )
+    roll_trim_rad: HalfWidth | None = Field(None, description="That of attitude.roll_trim_rad.")
+    pitch_trim_rad: HalfWidth | None = Field(None, description="That of attitude.pitch_trim_rad.")
 
 
 class NoSensors(VehicleSection):

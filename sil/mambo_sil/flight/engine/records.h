@@ -51,6 +51,7 @@ typedef struct {
     double yaw_lag_s;
     double yaw_decay[3];
     double acceleration_per_tilt_g;
+    double trim_rad[2];
 
     /* Altitude loop. */
     double altitude_p_n_m;

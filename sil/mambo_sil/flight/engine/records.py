@@ -30,7 +30,7 @@ _STOCK: Final = (
 _CASCADE: Final = ("cascade", "rate_max_rad_s", "output_max")
 _FIRST_ORDER: Final = (
     *("response_gain", "response_lag_s", "late_ticks", "decay_before", "decay_after"),
-    *("yaw_lag_s", "yaw_decay", "acceleration_per_tilt_g"),
+    *("yaw_lag_s", "yaw_decay", "acceleration_per_tilt_g", "trim_rad"),
 )
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
@@ -184,6 +184,7 @@ def _attitude(drone: VehicleFile) -> dict[str, Any]:
                 [decay.before for decay in whole.decays],
                 [decay.after for decay in whole.decays],
                 *(first_order.yaw_lag_s, whole.yaw_decay, first_order.acceleration_per_tilt_g),
+                [first_order.roll_trim_rad, first_order.pitch_trim_rad],
             )
             return values | {"attitude": 2} | dict(zip(_FIRST_ORDER, follows, strict=True))
 

@@ -98,6 +98,9 @@ def _attitude(drone: VehicleFile) -> Iterator[Derived]:
             yield Derived("model", f"{name}_delay_s", axis.dead_time_s, f"As attitude.{name}.dead_time_s")
         share = drone.attitude.acceleration_per_tilt_g
         yield Derived("model", "acceleration_per_tilt", share, "As attitude.acceleration_per_tilt_g")
+        for name in ("roll_trim_rad", "pitch_trim_rad"):
+            if trim_rad := getattr(drone.attitude, name):
+                yield Derived("model", name, trim_rad, f"As attitude.{name}")
         return
     for name, fit in zip(("roll", "pitch"), fit_steps(drone), strict=True):
         words = f"Fitted to the answer of the attitude loop to a step; leaves {100.0 * fit.error:.1f} % (rms)"
