@@ -53,6 +53,12 @@ def test_a_log_becomes_a_model() -> None:
     assert vehicle["attitude"]["roll"]["gain"] == summary["model"]["roll_gain"]
     assert vehicle["attitude"]["acceleration_per_tilt_g"] == summary["model"]["acceleration_per_tilt"]
     assert vehicle["body"]["drag_1_s"] == summary["model"]["drag_1_s"]
+    for name in ("roll_trim_rad", "pitch_trim_rad"):
+        assert vehicle["attitude"][name] == summary["model"][name]
+    uncertainty = load("out/vehicle.toml").uncertainty
+    assert uncertainty is not None
+    assert uncertainty.roll_gain == float(f"{summary['roll']['first_order']['gain']['within']:.2g}")
+    assert None not in uncertainty.model_dump().values()
     curves = read_curves(Path("out/fit.csv"))
     assert curves["time_s"][-1] > summary["split_s"] > 10.0
 
@@ -70,6 +76,28 @@ def test_a_vehicle_that_is_data_is_identified_again() -> None:
         assert other.gain == pytest.approx(one.gain, abs=0.005)
         assert other.lag_s + other.dead_time_s == pytest.approx(one.lag_s + one.dead_time_s, abs=0.002)
     assert found.acceleration_per_tilt_g == pytest.approx(truth.acceleration_per_tilt_g, abs=0.01)
+
+
+def test_the_screen_says_what_is_written() -> None:
+    """The vehicle of a loop with an integrator has none: its gain, lag and dead time are printed, too."""
+    run("identify", "--manoeuvre", "eight.csv")
+    run("fly", "--trajectory", "eight.csv", "--duration-s", "20", "--no-pictures", "-o", "flight")
+    said, _ = run("identify", "flight/trace.csv", "-o", "out")
+    settings, vehicle = controller_toml.read(Path("out/model.toml")), load("out/vehicle.toml").attitude
+    assert isinstance(vehicle, FirstOrderAttitude)
+    rows = {line[:28].strip(): line[28:].split() for line in said.splitlines()}
+    assert float(rows["integrator, 1/s"][0]) == pytest.approx(settings.model.roll_integral_1_s, abs=0.005)
+    flown = vehicle.roll
+    times = f"{1e3 * flown.lag_s:.0f} + {1e3 * flown.dead_time_s:.0f} ms"
+    assert " ".join(rows["without it, vehicle.toml"]).startswith(f"{flown.gain:.3f}, {times}")
+
+
+def test_a_bad_log_of_several_is_left_out() -> None:
+    """Its reason is said, and the exit code is that of the others."""
+    Path("broken.csv").write_text("time_s,roll_rad\n0,0\n", "utf-8")
+    said, _ = run("identify", made("a.csv", Flown(duration_s=16.0)), "broken.csv", "-o", "out")
+    assert "left out: broken.csv: has no column for roll_command_rad" in said
+    assert "a.csv: 16.0 s used" in said
 
 
 def test_json_is_the_summary() -> None:

@@ -134,6 +134,17 @@ def _correlated(keep: float, noise: Array) -> Array:
     return found
 
 
+def filter_velocity(columns: Mapping[str, Array], lag_s: float) -> dict[str, Array]:
+    """Return a log whose velocity went through a low-pass."""
+    keep = np.exp(-TICKS * TICK_S / lag_s)
+    return {
+        name: lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0]
+        if name in ("vx_m_s", "vy_m_s")
+        else values
+        for name, values in columns.items()
+    }
+
+
 def drop_and_jitter(columns: Mapping[str, Array], random: Generator) -> dict[str, Array]:
     """Return a log without 10 % of its rows, with times wrong by 3 ms (rms) and another zero of time."""
     time = columns["time_s"]

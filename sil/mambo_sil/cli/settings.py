@@ -131,9 +131,9 @@ def identify(
 
     chosen = parse_columns(columns)
     with progress_bar("reading") as bar:
-        read = read_logs(logs, chosen)
+        read, left_out = read_logs(logs, chosen)
         bar.stage("fitting")
-        summary, curves = fit(read)
+        summary, curves = fit(read, left_out)
         bar.stage("drawing")
         with new_results(output, IdentifySummary.command, (CURVES, *PICTURES, MODEL, VEHICLE)) as folder:
             (folder / CURVES).write_text(curves_csv(curves), "utf-8")

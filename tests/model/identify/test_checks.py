@@ -1,12 +1,14 @@
 """Logs that contradict themselves: each fault is told by name, with the option that mends it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.identify import identify
+from mambo_sil.model.identify.signals import DEGREE
 from tests.support.logs import Array, Flown, Truth, fly, log_of
 
 Columns = dict[str, Array]
@@ -182,6 +184,97 @@ def test_tilt_and_velocity_of_two_clocks_give_no_motion() -> None:
     assert any("s apart, as if of two clocks" in remark for remark in summary.remarks)
     assert "dead time of 28" in summary.roll.reasons[0]
     assert "share a clock" in summary.roll.reasons[0]
+
+
+def tumble(log: Columns, share: float) -> Columns:
+    """Let the drone turn over and over in the last part of a log, as a quaternion shows it."""
+    begin = round((1.0 - share) * len(log["time_s"]))
+    turning = np.arange(len(log["time_s"]) - begin) / 8.0
+    spoilt = {name: values.copy() for name, values in log.items()}
+    spoilt["roll_rad"][begin:] = (turning + np.pi) % (2.0 * np.pi) - np.pi
+    spoilt["pitch_rad"][begin:] = 1.5 * np.sin(turning)
+    return spoilt
+
+
+@pytest.mark.parametrize("share", [0.1, 0.4])
+@pytest.mark.parametrize("factor", [1.0, 1.0 / DEGREE])
+def test_a_tumble_is_cut_out_and_the_rest_is_used(share: float, factor: float) -> None:
+    """No unit is suspected, in radians or in degrees that the columns name, and the model is that before."""
+    spoilt = scale(factor, *ANGLES)(tumble(FLOWN, share))
+    log = log_of(spoilt)
+    if factor > 1.0:
+        signals = {
+            name: replace(signal, value=DEGREE * signal.value, column=f"deg*{name}")
+            if name in ANGLES
+            else signal
+            for name, signal in log.signals.items()
+        }
+        log = replace(log, signals=signals)
+    summary = identify([log])[0]
+    assert any("a tumble beyond 45 degrees is cut out" in remark for remark in summary.remarks)
+    assert summary.roll.verdict == summary.pitch.verdict == "good"
+    assert summary.roll.fitted is not None
+    assert abs(summary.roll.fitted.gain.value - Truth().gain[0]) < 0.03
+    assert (1.0 - share) * 30.0 - 1.5 < summary.duration_s < (1.0 - share) * 30.0
+
+
+def test_a_bad_log_of_a_pool_is_left_out_with_its_reason() -> None:
+    """A tumble from start to end, a wrong sign, a wrong unit; all of them bad are refused."""
+    upside_down = log_of(tumble(FLOWN, 1.0), "tumble.csv")
+    negated = log_of(scale(-1.0, "roll_rad")(FLOWN), "negated.csv")
+    degrees = log_of(scale(57.3, "roll_rad")(FLOWN), "degrees.csv")
+    summary = identify([upside_down, negated, log_of(FLOWN), degrees], ["cut.csv: is empty"])[0]
+    assert [log.name for log in summary.logs] == ["made.csv"]
+    assert summary.roll.verdict == "good"
+    left_out = [remark for remark in summary.remarks if remark.startswith("left out: ")]
+    for remark, words in zip(
+        left_out,
+        (
+            "cut.csv: is empty",
+            "tumble.csv: has no stretch",
+            "negated.csv: roll: com",
+            "degrees.csv: more than",
+        ),
+        strict=True,
+    ):
+        assert remark.startswith(f"left out: {words}")
+    with pytest.raises(LogError) as raised:
+        identify([upside_down, negated])
+    assert [fault.split(":")[0] for fault in raised.value.faults] == ["tumble.csv", "negated.csv"]
+
+
+def test_a_tone_does_not_show_a_sign() -> None:
+    """Commands of 1.6 Hz: a delay of half a period more looks like the other sign."""
+    time_s = FLOWN["time_s"]
+    random = np.random.default_rng(1)
+    wave = 0.1 * np.sin(10.0 * time_s)
+    tilt = 0.07 * np.sin(10.0 * (time_s - 0.19)) + 0.02 * random.normal(size=len(time_s))
+    both = {"roll_command_rad": wave, "pitch_command_rad": wave, "roll_rad": tilt, "pitch_rad": tilt}
+    for seed in range(5):
+        noise = np.random.default_rng(seed).normal(size=len(time_s))
+        log = {"time_s": time_s} | both | {"roll_rad": tilt + 0.01 * noise}
+        assert identify([log_of(log)])[0].duration_s > 29.0
+
+
+def test_a_unit_that_the_columns_name_is_not_asked_for() -> None:
+    """A command that is read as degrees and 57 times too large: both columns are named instead."""
+    log = log_of(scale(57.3, "roll_command_rad")(without_motion(FLOWN)))
+    command = replace(log.signals["roll_command_rad"], column="deg*cmd.roll")
+    signals = dict(log.signals) | {"roll_command_rad": command}
+    with pytest.raises(LogError, match=r"read as deg\*cmd.roll and roll_rad: one of these units is wrong"):
+        identify([replace(log, signals=signals)])
+
+
+def test_logs_of_two_drones_are_said_to_be_of_two_drones() -> None:
+    """Other gains, or another lag: nothing is said of clocks; a log of the same drone is not doubted."""
+    for other in (Truth(gain=(1.0, 1.0)), Truth(lag_s=(0.12, 0.12), delay_s=(0.02, 0.02))):
+        flown = without_motion(fly(other, Flown(), 1, 2)[0])
+        roll = identify([log_of(without_motion(FLOWN)), log_of(flown, "b.csv")])[0].roll
+        assert roll.verdict == "weak"
+        assert "the drones of the logs differ: gain 0.8" in roll.reasons[0]
+        assert "clock" not in " ".join(roll.reasons)
+    same = without_motion(fly(Truth(), Flown(), 1, 2)[0])
+    assert identify([log_of(without_motion(FLOWN)), log_of(same)])[0].roll.verdict == "good"
 
 
 def test_logs_whose_clocks_differ_are_doubted() -> None:

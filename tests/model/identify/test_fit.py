@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 
 from mambo_sil.model.identify.identify import identify
 from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.identify.response import AxisParameters, Interval
-from tests.support.logs import Array, Flown, Truth, drop_and_jitter, fly, log_of
+from tests.support.logs import NAMES, Array, Flown, Truth, drop_and_jitter, filter_velocity, fly, log_of
 
 TRUTH = Truth()
 
@@ -100,6 +101,45 @@ def test_positions_serve_where_velocities_are_missing() -> None:
     motion = found(log).motion
     assert motion is not None
     assert abs(motion.acceleration_per_tilt.value - TRUTH.acceleration_per_tilt) < 0.05
+
+
+@pytest.mark.parametrize(("frequency_rad_s", "damping"), [(15.0, 0.6), (12.0, 0.4)])
+def test_a_response_of_second_order_has_no_integrator(frequency_rad_s: float, damping: float) -> None:
+    """An integrator would fit it too, with a wrong gain; the interval of the gain holds the true one."""
+    step_s = 0.01
+    log = dict(fly(TRUTH, Flown(duration_s=44.0), 1)[0])
+    drone = ([frequency_rad_s**2], [1.0, 2.0 * damping * frequency_rad_s, frequency_rad_s**2])
+    ((top,), bottom, _) = cont2discrete(drone, step_s)
+    random = np.random.default_rng(1)
+    for name in ("roll", "pitch"):
+        noise = 0.002 * random.normal(size=len(log["time_s"]))
+        log[f"{name}_rad"] = 0.92 * lfilter(top, bottom, log[f"{name}_command_rad"]) + noise
+    summary = found({name: log[name] for name in ("time_s", *NAMES[:5])})
+    for fit in fits(summary):
+        assert fit.integral_1_s is None
+        assert abs(fit.gain.value - 0.92) <= fit.gain.within < 0.06
+    assert "integral" not in " ".join(summary.model)
+
+
+@pytest.mark.parametrize(("drag_1_s", "rate_rad_s"), [(0.15, 1.2), (0.456, 1.5)])
+def test_a_filtered_velocity_does_not_hide_the_drag(drag_1_s: float, rate_rad_s: float) -> None:
+    """A lag of 30 ms is found, and the drag lies in its interval; without the lag it is 0.06 to 0.1 low."""
+    truth = replace(TRUTH, drag_1_s=drag_1_s)
+    for log in fly(truth, Flown(rate_rad_s=rate_rad_s), 5, 3):
+        motion = found(filter_velocity(log, 0.03)).motion
+        assert motion is not None
+        assert abs(motion.drag_1_s.value - drag_1_s) < min(motion.drag_1_s.within, 0.1)
+        assert motion.drag_1_s.within < 0.2
+        assert abs(motion.velocity_lag_s.value - 0.03) < motion.velocity_lag_s.within + 0.01
+
+
+def test_many_logs_do_not_remove_the_bias_of_gusts() -> None:
+    """A controller tilts against gusts: the interval of acceleration per tilt holds what that hides."""
+    motion = found(*fly(TRUTH, Flown(size_m=0.5, gusts_m_s2=0.2), 6, 7)).motion
+    assert motion is not None
+    share = motion.acceleration_per_tilt
+    left = (1.0 - motion.r2) * share.value
+    assert share.within - left < abs(share.value - TRUTH.acceleration_per_tilt) < share.within
 
 
 def test_several_logs_are_pooled() -> None:

@@ -63,9 +63,44 @@ def test_the_log_of_the_crazyflie_client_is_read(tmp_path: Path) -> None:
     path.write_text("\n".join(lines), "utf-8")
     sparse = read(Path("log.csv"))
     assert len(sparse.signals["vy_m_s"].value) == len(FLOWN["time_s"]) - 2
-    assert len(sparse.signals["roll_rad"].value) == len(FLOWN["time_s"]) - 1
+    assert len(sparse.signals["roll_rad"].value) == len(FLOWN["time_s"]) - 2
     names = ("controller.roll", "controller.pitch", "stateEstimate.roll", "stateEstimate.pitch")
-    assert sparse.remarks == tuple(f"log.csv: 1 of 2000 rows have no {name}" for name in names)
+    assert sparse.remarks == (
+        "log.csv: 1 rows with fewer cells than the header are left out, the first in line 6",
+        *(f"log.csv: 1 of 1999 rows have no {name}" for name in names),
+    )
+
+
+def test_rows_and_cells_that_are_no_samples_are_counted(tmp_path: Path) -> None:
+    """A lost cell moves the others to the left, so its row is left out; inf and nan are missing."""
+    path = write_log(FLOWN, tmp_path / "log.csv")
+    lines = path.read_text("utf-8").splitlines()
+    cells = [line.split(",") for line in lines]
+    del cells[100][2], cells[101][0]
+    cells[200][1], cells[300][3], cells[400][3] = "inf", "nan", "-Infinity"
+    path.write_text("\n".join(map(",".join, cells)), "utf-8")
+    log = read(Path("log.csv"))
+    assert log.remarks[:2] == (
+        "log.csv: 2 rows with fewer cells than the header are left out, the first in line 101",
+        "log.csv: 3 cells without a finite number are taken as missing, the first in line 201",
+    )
+    assert len(log.signals["roll_rad"].value) == len(FLOWN["time_s"]) - 4
+    whole = log_of(FLOWN).signals["roll_rad"]
+    kept = np.isin(np.round(whole.time_s, 6), np.round(log.signals["roll_rad"].time_s, 6))
+    np.testing.assert_allclose(log.signals["roll_rad"].value, whole.value[kept], atol=1e-7)
+
+
+def test_a_bad_file_of_a_pool_is_left_out(tmp_path: Path) -> None:
+    """With its fault; but a path without a file is a mistake of the command line."""
+    path, broken = write_log(FLOWN, tmp_path / "log.csv"), tmp_path / "broken.csv"
+    broken.write_text("no log", "utf-8")
+    (log,), left_out = read_logs([broken, path], {})
+    assert log.name.endswith("log.csv")
+    assert left_out[0].endswith(
+        "broken.csv: has no column for time_s (time_s, Timestamp); name it: --columns time_s=COLUMN"
+    )
+    with pytest.raises(LogError, match="no such file"):
+        read_logs([path, tmp_path / "no.csv"], {})
 
 
 def test_the_estimate_of_a_trace_goes_before_the_truth(tmp_path: Path) -> None:
@@ -132,6 +167,7 @@ def test_positions_are_no_commanded_angles(tmp_path: Path) -> None:
         (f"{REQUIRED}\n0,1e999,-inf,1,1\n", "holds no number"),
         (f"{REQUIRED}\n0,\0,0,0,0\n", "must be a number"),
         (b"\0" * 2000, "has no column"),
+        (f"{REQUIRED}\n0,0,0,0,0\n0.01,0,0,0,0,0\n", "line 3: has 6 cells, the header 5; delete the line"),
     ],
 )
 def test_what_is_no_log_is_told(text: str | bytes, words: str, tmp_path: Path) -> None:
@@ -144,7 +180,7 @@ def test_many_faults_of_a_file_are_counted(tmp_path: Path) -> None:
     text = f"{REQUIRED}\n" + "0,x,x,x,x\n" * 1000
     faults = faults_of(tmp_path / "a.csv", text)
     assert len(faults) == 6
-    assert faults[-1] == "and 3995 more fields that are no number"
+    assert faults[-1] == "and 3995 more faults of rows and cells"
 
 
 def test_rare_signals_are_left_out(tmp_path: Path) -> None:
@@ -189,7 +225,7 @@ def test_a_ulog_is_read(quaternion: bool, tmp_path: Path) -> None:
     """With angles or a quaternion as set-point; and the fit is that of the CSV."""
     path = tmp_path / "log.ulg"
     path.write_bytes(ulog(FLOWN, quaternion=quaternion))
-    log = read_logs([path], {})[0]
+    (log,), _ = read_logs([path], {})
     demand_same(log, 1e-6)
     assert log.signals["z_m"].value[0] == -1.0
     found, wanted = identify([log])[0], identify([log_of(FLOWN)])[0]
@@ -211,7 +247,8 @@ def test_what_is_no_ulog_is_told(tmp_path: Path) -> None:
         with pytest.raises(LogError, match=words):
             read_logs([path], {})
     path.write_bytes(whole[: len(whole) // 2 + 1])
-    assert len(read_logs([path], {})[0].signals["roll_rad"].value) < 400
+    (log,), _ = read_logs([path], {})
+    assert len(log.signals["roll_rad"].value) < 400
 
 
 def test_ulog_without_pyulog_names_what_to_install(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.identify.manoeuvre import SINES_HZ, waypoints_csv
 from mambo_sil.model.identify.response import FittedResponse
 from mambo_sil.model.identify.segments import PERIOD_S, HeldCommand, Segment
-from mambo_sil.model.identify.signals import COMMANDS, Signal
+from mambo_sil.model.identify.signals import COMMANDS, FlightLog, Signal
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def rise_s(summary: IdentifySummary, name: str, share: float) -> float:
 @pytest.mark.long
 def test_the_stock_loops_are_identified(trace: Path) -> None:
     """Through noise: gain 1, the integrator, and the rise times of docs/explanation/plant.md."""
-    summary = identify(read_logs([trace], {}))[0]
+    summary = identify(*read_logs([trace], {}))[0]
     loops = {"roll": (1.0, 0.245, 0.415), "pitch": (0.77, 0.155, 0.25)}
     for name, (integral_1_s, most_s, nearly_s) in loops.items():
         axis = summary.axes[name]
@@ -91,10 +91,29 @@ def test_the_stock_loops_are_identified(trace: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(("begin_s", "end_s"), [(0.0, 9.0), (8.0, 19.0), (9.0, 18.0), (10.0, 20.0)])
+def test_a_short_log_does_not_lose_the_integrator(trace: Path, begin_s: float, end_s: float) -> None:
+    """From the middle of a flight, too, where a larger gain without an integrator fits almost as well."""
+    (log,), _ = read_logs([trace], {})
+    signals = {}
+    for name, signal in log.signals.items():
+        kept = (signal.time_s >= begin_s) & (signal.time_s <= end_s)
+        signals[name] = Signal(signal.time_s[kept], signal.value[kept], signal.column)
+    summary = identify([FlightLog(log.name, signals)])[0]
+    for axis in summary.axes.values():
+        assert axis.verdict == "weak"
+        assert axis.fitted is not None
+        assert axis.fitted.integral_1_s is not None
+        assert abs(axis.fitted.gain.value - 1.0) < axis.fitted.gain.within + 0.015
+        assert axis.first_order is not None
+        assert abs(axis.first_order.gain.value - 1.0) < axis.first_order.gain.within + 0.015
+
+
+@pytest.mark.long
 def test_the_drag_of_the_plant_is_identified(trace: Path) -> None:
     """From the true motion: 0.067 1/s, and g per radian."""
     columns = {name: Column(name) for name in KNOWN if name not in COMMANDS}
-    motion = identify(read_logs([trace], columns))[0].motion
+    motion = identify(*read_logs([trace], columns))[0].motion
     assert motion is not None
     assert abs(motion.acceleration_per_tilt.value - 1.0) < 0.001
     assert abs(motion.drag_1_s.value - 0.067) < 0.002

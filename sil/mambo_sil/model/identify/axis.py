@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from mambo_sil.model.identify.checks import EXCITED_RAD, NO_COMMAND_RAD
 from mambo_sil.model.identify.identify_record import AxisResult, Verdict
 from mambo_sil.model.identify.response import (
     AxisParameters,
-    FirstOrder,
     FittedResponse,
+    Interval,
     fit_response,
+    fit_second_order,
     intervals,
     residuals,
     root_mean_square,
@@ -35,7 +36,10 @@ SHORT_DELAY_S, LONG_DELAY_S = 0.002, 0.15
 """Dead times beyond which an offset between two clocks is likely."""
 
 LARGEST_SPREAD_S: Final = 0.03
-"""Difference of lag plus dead time between logs beyond which their clocks are doubted."""
+"""Difference of lag plus dead time between logs beyond which their clocks are doubted; of lag, the drone."""
+
+LARGEST_SPREAD_GAIN: Final = 0.05
+"""Difference of the gain between logs beyond which they are taken as of different drones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +48,8 @@ class AxisFit:
 
     whole: FittedResponse
     intervals: AxisParameters
-    first_order: FirstOrder
+    first_order: AxisParameters
+    """Without an integrator, whether or not `whole` has one."""
     half: FittedResponse
     r2: float
     error_rad: float
@@ -55,7 +60,10 @@ class AxisFit:
 def fit_axis(segments: Sequence[Segment], axis: int) -> AxisFit | None:
     """Fit one axis and choose its order; None without a command.
 
-    The integrator is taken if it lowers the held-out error and its interval does not hold 0.
+    The integrator is taken if it lowers the held-out error, also that of a response of second order, which it
+    can imitate with a wrong gain, and its interval does not hold 0. The interval of the gain without it holds
+    the gain of the better of both where they lower the error, and its interval where they do by as much as
+    makes an integrator worth it.
     """
     if command_deviation_rad(segments, axis) < NO_COMMAND_RAD:
         return None
@@ -67,16 +75,26 @@ def fit_axis(segments: Sequence[Segment], axis: int) -> AxisFit | None:
     spread = root_mean_square([tilt - tilt.mean() for tilt in tilts])
     every = [segment.counted for segment in segments]
     plain = fit_response(segments, axis, every, integrator=False)
-    whole, known, chosen = plain, intervals(plain, segments, axis, every), 0
-    if errors[1] < WORTH * errors[0]:
+    first_order = intervals(plain, segments, axis, every)
+    whole, known, chosen = plain, first_order, 0
+    if errors[1] < errors[0]:
+        imitated = fit_second_order(segments, axis, first)
+        other_error = root_mean_square(residuals(imitated, segments, axis, second))
         richer = fit_response(segments, axis, every, integrator=True)
+        better = richer if errors[1] < other_error else fit_second_order(segments, axis, every)
+        missed = intervals(better, segments, axis, every).gain
+        if min(errors[1], other_error) >= WORTH * errors[0]:
+            missed = Interval(missed.value, 0.0)
+        first_order = known = _cover(first_order, missed)
         found = intervals(richer, segments, axis, every)
-        if found.integral_1_s is not None and found.integral_1_s.value > found.integral_1_s.within:
+        integral = found.integral_1_s
+        worth = errors[1] < WORTH * min(errors[0], other_error)
+        if worth and integral is not None and integral.value > integral.within:
             whole, known, chosen = richer, found, 1
     return AxisFit(
         whole,
         known,
-        FirstOrder(plain.gain, plain.lag_s, plain.delay_s),
+        first_order,
         halves[chosen],
         1.0 - (errors[chosen] / max(spread, 1e-300)) ** 2,
         errors[chosen],
@@ -110,6 +128,12 @@ def judge_axis(
         offset_rad=sum(fit.whole.offset_rad) / len(fit.whole.offset_rad),
         tilt_noise_rad=tilt_noise_rad,
     )
+
+
+def _cover(known: AxisParameters, gain: Interval) -> AxisParameters:
+    """Return the parameters with an interval of the gain that also holds the interval `gain`."""
+    within = max(known.gain.within, abs(gain.value - known.gain.value) + gain.within)
+    return replace(known, gain=Interval(known.gain.value, within))
 
 
 def command_deviation_rad(segments: Sequence[Segment], axis: int) -> float:
@@ -150,7 +174,7 @@ def _weaknesses(command_rad: float, flown_s: float, fit: AxisFit) -> list[str]:
 
 
 def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int, whole: FittedResponse) -> list[str]:
-    """Return the remark that the logs, each fitted alone, have different sums of lag and dead time."""
+    """Return the remark that the logs, each fitted alone, differ: as drones do, or as clocks."""
     useful = [
         each
         for each in pieces
@@ -159,12 +183,26 @@ def _disagreement(pieces: Sequence[Sequence[Segment]], axis: int, whole: FittedR
     if len(useful) < 2:
         return []
     integrator = whole.integral_1_s > 0.0
-    fits = [
-        fit_response(each, axis, [segment.counted for segment in each], integrator=integrator)
-        for each in useful
-    ]
-    sums = [fit.lag_s + fit.delay_s for fit in fits]
-    if max(sums) - min(sums) <= LARGEST_SPREAD_S:
+    fits = []
+    for each in useful:
+        counted = [segment.counted for segment in each]
+        fits.append(intervals(fit_response(each, axis, counted, integrator=integrator), each, axis, counted))
+    gains, lags = [fit.gain for fit in fits], [fit.lag_s for fit in fits]
+    sums_s = [fit.sum_s.value for fit in fits]
+    listed = ", ".join(f"{1e3 * each:.0f}" for each in sums_s)
+    if _differ(gains, LARGEST_SPREAD_GAIN) or _differ(lags, LARGEST_SPREAD_S):
+        each_gain = ", ".join(f"{gain.value:.2f}" for gain in gains)
+        each_lag = ", ".join(f"{1e3 * lag.value:.0f}" for lag in lags)
+        return [
+            f"the drones of the logs differ: gain {each_gain}; lag {each_lag} ms; lag plus dead time "
+            f"{listed} ms; identify each drone from its own logs"
+        ]
+    if max(sums_s) - min(sums_s) <= LARGEST_SPREAD_S:
         return []
-    listed = ", ".join(f"{1e3 * each:.0f}" for each in sums)
     return [f"lag plus dead time of the logs is {listed} ms: do command and measured tilt share a clock?"]
+
+
+def _differ(found: Sequence[Interval], spread: float) -> bool:
+    """Return whether the least and the largest value are further apart than `spread` and their intervals."""
+    least, largest = min(found, key=lambda each: each.value), max(found, key=lambda each: each.value)
+    return largest.value - least.value > max(spread, least.within + largest.within)

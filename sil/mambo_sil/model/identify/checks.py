@@ -29,6 +29,10 @@ NO_COMMAND_RAD: Final = 0.1 * DEGREE
 EXCITED_RAD: Final = 1.0 * DEGREE
 """Standard deviation of a command or tilt below which its sign is not judged."""
 
+_OFTEN, _SELDOM = 0.05, 0.01
+_HALF_TURN_RAD: Final = 1.01 * np.pi
+"""Share of the samples beyond a limit from which on the angle is in degrees."""
+
 _LAGS: Final = range(-30, 41)
 """Delays of the tilt behind the command that are tried, in grid periods."""
 
@@ -52,16 +56,25 @@ class Checked:
 
 
 def check_units(log: FlightLog) -> tuple[str, ...]:
-    """Return a fault for each angle that is mostly beyond 45 degrees, which is then in degrees."""
-    beyond = [
-        name for name in REQUIRED if np.percentile(np.abs(log.signals[name].value), 95) > LARGEST_TILT_RAD
-    ]
-    if not beyond:
+    """Return a fault that names the angles that are in degrees.
+
+    A measured angle of a tumble is beyond 45 degrees too, but never beyond half a turn; a command that is
+    often beyond 45 degrees is not in radians. A column with a factor is in the unit that this says.
+    """
+
+    def often_beyond(name: str, limit_rad: float, share: float) -> bool:
+        size = np.abs(log.signals[name].value)
+        return "*" not in log.signals[name].column and float(np.mean(size > limit_rad)) > share
+
+    commands = [name for name in COMMANDS if often_beyond(name, LARGEST_TILT_RAD, _OFTEN)]
+    turned = [name for name in TILTS if often_beyond(name, _HALF_TURN_RAD, _SELDOM)]
+    if not commands and not turned:
         return ()
-    fixes = ",".join(_in_degrees(log, name) for name in beyond)
+    found = [name for name in REQUIRED if often_beyond(name, LARGEST_TILT_RAD, _OFTEN)]
+    fixes = ",".join(_in_degrees(log, name) for name in found)
     return (
-        f"{log.name}: more than 5 % of the samples of {', '.join(beyond)} are beyond 0.79 rad (45 degrees); "
-        f"are they in degrees? Then write --columns {fixes}",
+        f"{log.name}: more than 5 % of the samples of {', '.join(found)} are beyond 0.79 rad (45 degrees), "
+        f"as no tumble is; are they in degrees? Then write --columns {fixes}",
     )
 
 
@@ -104,8 +117,8 @@ def _axis_faults(log: FlightLog, segment: Segment, axis: int, tilt: Hypothesis |
     wrong_tilt = tilt is not None and (tilt.roll, tilt.pitch)[axis] < 0.0
     if min(command.std(), angle.std()) < 0.5 * EXCITED_RAD:
         return [_frame_fault(log, axis, negated)] if wrong_tilt else []
-    lag, correlation = _best_lag(command, angle)
-    if correlation < -_RELATED:
+    lag, correlation, least = _best_lag(command, angle)
+    if least < -max(_RELATED, correlation + _MARGIN):
         if tilt is None:
             fix = f"one of them has the wrong sign: --columns {negated[0]} or --columns {negated[1]}"
         elif wrong_tilt:
@@ -122,10 +135,11 @@ def _axis_faults(log: FlightLog, segment: Segment, axis: int, tilt: Hypothesis |
     ratio = abs(correlation) * float(angle.std() / command.std())
     for one, factor in ((COMMANDS[axis], 1.0 / ratio), (TILTS[axis], ratio)):
         if correlation > _RELATED and 0.3 / DEGREE < factor < 2.0 / DEGREE:
-            faults.append(
-                f"{log.name}: {name}: measured over commanded angle is {ratio:.3g}; is {one} in degrees? "
-                f"Then write --columns {_in_degrees(log, one)}"
-            )
+            fix = f"is {one} in degrees? Then write --columns {_in_degrees(log, one)}"
+            if "*" in log.signals[one].column:
+                columns = " and ".join(log.signals[each].column for each in (COMMANDS[axis], TILTS[axis]))
+                fix = f"they are read as {columns}: one of these units is wrong"
+            faults.append(f"{log.name}: {name}: measured over commanded angle is {ratio:.3g}; {fix}")
     return faults
 
 
@@ -216,21 +230,27 @@ def _swapped(segment: Segment) -> bool:
     commands = [segment.command_means(axis) for axis in range(2)]
     if min(each.std() for each in (*commands, *segment.tilt_rad)) < 0.5 * EXCITED_RAD:
         return False
-    own = [abs(_best_lag(commands[axis], segment.tilt_rad[axis])[1]) for axis in range(2)]
-    other = [abs(_best_lag(commands[axis], segment.tilt_rad[1 - axis])[1]) for axis in range(2)]
+    own = [_most(commands[axis], segment.tilt_rad[axis]) for axis in range(2)]
+    other = [_most(commands[axis], segment.tilt_rad[1 - axis]) for axis in range(2)]
     return all(theirs > max(_CORRELATED, mine + _MARGIN) for theirs, mine in zip(other, own, strict=True))
 
 
-def _best_lag(command: FloatArray, angle: FloatArray) -> tuple[int, float]:
-    """Return the delay, in grid periods, at which angle and command correlate most, and the correlation."""
+def _most(command: FloatArray, angle: FloatArray) -> float:
+    """Return the largest size of their correlation."""
+    _, largest, least = _best_lag(command, angle)
+    return max(largest, -least)
+
+
+def _best_lag(command: FloatArray, angle: FloatArray) -> tuple[int, float, float]:
+    """Return the delay, in grid periods, at which the correlation is largest, that one, and the least."""
     found = {}
     for lag in _LAGS:
         early = command[max(0, -lag) : len(command) - max(0, lag)]
         late = angle[max(0, lag) : len(angle) - max(0, -lag)]
         early, late = early - early.mean(), late - late.mean()
         found[lag] = float(early @ late / max(np.sqrt((early @ early) * (late @ late)), 1e-300))
-    best = max(found, key=lambda lag: abs(found[lag]))
-    return best, found[best]
+    best = max(found, key=lambda lag: found[lag])
+    return best, found[best], min(found.values())
 
 
 def _negated(log: FlightLog, signal: str) -> str:

@@ -1,4 +1,7 @@
-"""Read a flight log from CSV: one row a sample, one clock; an empty or NaN cell is a missing sample."""
+"""Read a flight log from CSV: one row a sample, one clock; a cell without a number is a missing sample.
+
+A row with fewer cells than the header is left out, because a lost cell moves the others into wrong columns.
+"""
 
 import csv
 import io
@@ -44,10 +47,11 @@ def read_csv(
     columns, faults = choose_columns(header, chosen, signals)
     if faults:
         raise LogError(tuple(f"{name}: {fault}" for fault in faults))
-    values, faults = _values(rows, {signal: header.index(each.name) for signal, each in columns.items()})
+    places = {signal: header.index(each.name) for signal, each in columns.items()}
+    values, faults, remarks = _values(rows, places, len(header))
     if faults:
         raise LogError(tuple(f"{name}: {fault}" for fault in faults))
-    return _log(name, columns, values)
+    return _log(name, columns, values, [f"{name}: {remark}" for remark in remarks])
 
 
 def read_text(path: Path) -> str:
@@ -87,36 +91,60 @@ def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _values(
-    rows: Iterator[tuple[int, list[str]]], places: Mapping[str, int]
-) -> tuple[dict[str, FloatArray], list[str]]:
-    """Return each signal as (k,), NaN for a missing sample, and the faults; `places` has field numbers."""
+    rows: Iterator[tuple[int, list[str]]], places: Mapping[str, int], width: int
+) -> tuple[dict[str, FloatArray], list[str], list[str]]:
+    """Return each signal as (k,), NaN for a missing sample, faults and remarks.
+
+    `places` has field numbers, `width` is the number of cells of the header.
+    """
     found: dict[str, list[float]] = {signal: [] for signal in places}
     faults: list[str] = []
-    more = 0
+    short: list[int] = []
+    not_finite: list[int] = []
     for line, row in rows:
-        if not any(row):
+        if len(row) > width:
+            faults.append(f"line {line + 1}: has {len(row)} cells, the header {width}; delete the line")
+        elif any(row) and len(row) < width:
+            short.append(line + 1)
+        if not any(row) or len(row) != width:
             continue
         for signal, place in places.items():
-            text = row[place].strip() if place < len(row) else ""
-            try:
-                value = float(text) if text else math.nan
-            except ValueError:
-                if len(faults) < _MOST_FAULTS:
-                    faults.append(f"line {line + 1}: {signal} = {echo(text)} must be a number")
-                else:
-                    more += 1
-                value = math.nan
-            found[signal].append(value if abs(value) < LARGEST_VALUE else math.nan)
-    if more:
-        faults.append(f"and {more} more fields that are no number")
-    return {signal: np.array(values) for signal, values in found.items()}, faults
+            text = row[place].strip()
+            value = _number(text)
+            if value is None:
+                faults.append(f"line {line + 1}: {signal} = {echo(text)} must be a number")
+            elif text and not math.isfinite(value):
+                not_finite.append(line + 1)
+            found[signal].append(math.nan if value is None else value)
+    if (more := len(faults) - _MOST_FAULTS) > 0:
+        faults[_MOST_FAULTS:] = [f"and {more} more faults of rows and cells"]
+    remarks = [
+        f"{len(lines)} {what}, the first in line {lines[0]}"
+        for lines, what in (
+            (short, "rows with fewer cells than the header are left out"),
+            (not_finite, "cells without a finite number are taken as missing"),
+        )
+        if lines
+    ]
+    return {signal: np.array(values) for signal, values in found.items()}, faults, remarks
 
 
-def _log(name: str, columns: Mapping[str, Column], values: Mapping[str, FloatArray]) -> FlightLog:
-    """Return the log of the columns' values; raises LogError."""
+def _number(text: str) -> float | None:
+    """Return the number of a cell, NaN for an empty one or one of no physical size, None for other text."""
+    try:
+        value = float(text) if text else math.nan
+    except ValueError:
+        return None
+    return value if abs(value) < LARGEST_VALUE else math.nan
+
+
+def _log(
+    name: str, columns: Mapping[str, Column], values: Mapping[str, FloatArray], remarks: list[str]
+) -> FlightLog:
+    """Return the log of the columns' values with `remarks` on its rows; raises LogError."""
     time_s = columns[TIME].factor * values[TIME]
     timed = np.isfinite(time_s)
-    faults, remarks, signals = [], [], {}
+    faults, signals = [], {}
     for signal, column in columns.items():
         if signal == TIME:
             continue

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -10,49 +11,59 @@ import numpy as np
 from mambo_codegen.errors import echo
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.axis import AxisFit, fit_axis, judge_axis
-from mambo_sil.model.identify.checks import EXCITED_RAD, NAMES, check_log, check_units
+from mambo_sil.model.identify.checks import EXCITED_RAD, NAMES, Checked, check_log, check_units
 from mambo_sil.model.identify.columns import Column
 from mambo_sil.model.identify.csv_log import read_csv
 from mambo_sil.model.identify.curves import Curves
 from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary, LogResult, Noise
 from mambo_sil.model.identify.motion import Motion, explained, fit_motion
-from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s
+from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s, tumbled
 from mambo_sil.model.identify.signals import POSITION, TILTS, VELOCITY, FlightLog
 from mambo_sil.model.identify.ulog import read_ulog
 
 SHARES: Final = (0.4, 1.5)
 """Bounds on a plausible acceleration per tilt."""
 
+LARGEST_TRIM_RAD: Final = 0.2
+"""Bound on a plausible trim: that of the settings."""
+
 LEAST_EXPLAINED, GOOD_EXPLAINED = 0.8, 0.9
 """Share of the motion that tilt must explain. In hover tilt mostly answers gusts, which biases the fit."""
 
 
-def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> list[FlightLog]:
-    """Read CSV files and, by their ending .ulg, ULog files; raises LogError with the faults of all."""
+def read_logs(paths: Sequence[Path], columns: Mapping[str, Column]) -> tuple[list[FlightLog], list[str]]:
+    """Read CSV files and, by their ending .ulg, ULog files; return the logs, and the faults of other files.
+
+    Raises LogError with all faults if there is no log at all, or a path names no file, or a file twice.
+    """
     logs: list[FlightLog] = []
     faults: list[str] = []
+    mistaken = False
     ulogs = [path.suffix.lower() == ".ulg" for path in paths]
     if columns and all(ulogs):
+        mistaken = True
         faults.append("--columns is for CSV files; a ULog needs none")
     for path, is_ulog in zip(paths, ulogs, strict=True):
         if sum(path.resolve() == other.resolve() for other in paths) > 1:
+            mistaken = True
             faults.append(f"{echo(str(path))}: is named twice; a log counts once")
             continue
         try:
             logs.append(read_ulog(path) if is_ulog else read_csv(path, columns))
         except LogError as error:
+            mistaken |= not path.is_file()
             faults += error.faults
-    if faults:
+    if mistaken or not logs:
         raise LogError(tuple(dict.fromkeys(faults)))
-    return logs
+    return logs, faults
 
 
-def identify(logs: Sequence[FlightLog]) -> tuple[IdentifySummary, Curves]:
-    """Fit both axes and the motion on all logs.
+def identify(logs: Sequence[FlightLog], left_out: Sequence[str] = ()) -> tuple[IdentifySummary, Curves]:
+    """Fit both axes and the motion on all logs without a fault; `left_out` has those of other files.
 
-    Raises LogError with all faults of units, signs and clocks.
+    Raises LogError with all faults of units, signs and clocks if every log has one.
     """
-    pieces, remarks, shared_clock = _check(logs)
+    logs, pieces, remarks, shared_clock = _check(logs, left_out)
     segments = [segment for piece in pieces for segment in piece]
     longest = max(segments, key=lambda each: len(each.time_s))
     fits = [fit_axis(segments, axis) for axis in range(2)]
@@ -95,31 +106,46 @@ def model_keys(axes: Sequence[AxisResult], motion: Motion | None) -> dict[str, f
     return {key: float(f"{value:.4g}") for key, value in keys.items()}
 
 
-def _check(logs: Sequence[FlightLog]) -> tuple[list[list[Segment]], list[str], bool]:
-    """Return the stretches of each log, remarks, and whether tilt and velocity share a clock in all logs."""
-    faults: list[str] = []
+def _check(
+    logs: Sequence[FlightLog], left_out: Sequence[str]
+) -> tuple[list[FlightLog], list[list[Segment]], list[str], bool]:
+    """Return the logs without a fault, their stretches, remarks, and whether tilt and velocity share a clock.
+
+    The remarks name what the pool leaves out. Raises LogError if nothing is left.
+    """
+    faults = list(left_out)
     remarks: list[str] = []
-    pieces, shared_clock = [], True
+    sound, pieces, shared_clock = [], [], True
     for log in logs:
-        remarks += log.remarks
-        units = check_units(log)
-        faults += units
-        pieces.append([] if units else cut(log))
-        if units:
+        checked, segments = _check_one(log)
+        if checked.faults:
+            faults += checked.faults
             continue
-        if not pieces[-1]:
-            faults.append(
-                f"{log.name}: has no stretch of {SHORTEST_S:g} s in the air without a gap of 0.2 s or a tilt "
-                "beyond 45 degrees; fly longer, or log more reliably"
-            )
-            continue
-        checked = check_log(log, pieces[-1])
-        faults += checked.faults
-        remarks += checked.remarks
+        sound.append(log)
+        pieces.append(segments)
+        remarks += [*log.remarks, *checked.remarks]
         shared_clock &= checked.one_clock
-    if faults:
+    if not sound:
         raise LogError(tuple(faults))
-    return pieces, remarks, shared_clock
+    return sound, pieces, [*(f"left out: {fault}" for fault in faults), *remarks], shared_clock
+
+
+def _check_one(log: FlightLog) -> tuple[Checked, list[Segment]]:
+    """Return the faults or remarks of a log, and its stretches."""
+    if units := check_units(log):
+        return Checked(units, ()), []
+    segments = cut(log)
+    if not segments:
+        why = (
+            f"{log.name}: has no stretch of {SHORTEST_S:g} s in the air without a gap of 0.2 s or a tilt "
+            "beyond 45 degrees; fly longer, or log more reliably"
+        )
+        return Checked((why,), ()), []
+    checked = check_log(log, segments)
+    if share := tumbled(log):
+        words = f"{log.name}: a tumble beyond 45 degrees is cut out, {share:.0%} of the samples"
+        checked = replace(checked, remarks=(words, *checked.remarks))
+    return checked, segments
 
 
 def _fit_motion(segments: Sequence[Segment], *, shared_clock: bool) -> tuple[Motion | None, str]:
@@ -129,10 +155,14 @@ def _fit_motion(segments: Sequence[Segment], *, shared_clock: bool) -> tuple[Mot
     motion = None if why else fit_motion(moved)
     if motion is not None:
         share = motion.acceleration_per_tilt.value
-        if SHARES[0] <= share <= SHARES[1]:
+        trim_rad = max(abs(trim.value) for trim in motion.trim_rad)
+        if SHARES[0] <= share <= SHARES[1] and trim_rad <= LARGEST_TRIM_RAD:
             biased = f"tilt explains only {motion.r2:.2f} of the motion: acceleration and drag may be biased"
             return motion, biased if motion.r2 < GOOD_EXPLAINED else ""
-        why = f"{share:.2f} g per radian; plausible are {SHARES[0]}..{SHARES[1]}"
+        why = (
+            f"{share:.2f} g per radian and a trim of {trim_rad:.2f} rad; plausible are "
+            f"{SHARES[0]}..{SHARES[1]}, and at most {LARGEST_TRIM_RAD}"
+        )
     return None, f"acceleration per tilt, drag and trim are not fitted: {why}"
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from mambo_sil.model.identify.motion import Motion
-from mambo_sil.model.identify.response import AxisParameters, FirstOrder, Interval
+from mambo_sil.model.identify.response import AxisParameters, Interval
 from mambo_sil.model.identify.signals import DEGREE
 from mambo_sil.results.number_format import three_digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
@@ -18,7 +18,7 @@ CURVES: Final = "fit.csv"
 PICTURES: Final = ("fit.png", "fit.svg")
 AXIS_ROWS: Final = (
     *("gain", "lag + dead time, ms", "lag, ms", "dead time, ms", "integrator, 1/s"),
-    *("held-out R2", "verdict"),
+    *("without it, vehicle.toml", "held-out R2", "verdict"),
 )
 
 
@@ -37,8 +37,8 @@ class AxisResult:
     other_error_rad: Number
     """The same with an integrator if `fitted` has none, and without if it has one."""
     fitted: AxisParameters | None
-    first_order: FirstOrder | None
-    """The model without an integrator, whether or not `fitted` has one."""
+    first_order: AxisParameters | None
+    """The model without an integrator, whether or not `fitted` has one: that of `vehicle.toml`."""
     offset_rad: Number
     """Mean measured tilt at no command."""
     tilt_noise_rad: Number
@@ -117,11 +117,14 @@ def axis_cells(axis: AxisResult) -> list[str]:
     """Return the values of `AXIS_ROWS` of an axis in words."""
     fit = axis.fitted
     r2 = "-" if axis.held_out_r2 != axis.held_out_r2 else f"{axis.held_out_r2:.3f}"
-    if fit is None:
-        return ["-"] * 5 + [r2, axis.verdict]
+    if fit is None or axis.first_order is None:
+        return ["-"] * 6 + [r2, axis.verdict]
     times = [_plus_minus(each, 1e3, 0) for each in (fit.sum_s, fit.lag_s, fit.delay_s)]
     integral = "-" if fit.integral_1_s is None else _plus_minus(fit.integral_1_s, 1.0, 2)
-    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, r2, axis.verdict]
+    plain = axis.first_order
+    flown = f"{plain.gain.value:.3f}, {1e3 * plain.lag_s.value:.0f} + {1e3 * plain.delay_s.value:.0f} ms"
+    written = "as above" if fit.integral_1_s is None else flown
+    return [_plus_minus(fit.gain, 1.0, 3), *times, integral, written, r2, axis.verdict]
 
 
 def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
@@ -134,6 +137,7 @@ def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
         ("acceleration per tilt", f"{_plus_minus(motion.acceleration_per_tilt, 1.0, 3)} g per radian"),
         ("drag", f"{_plus_minus(motion.drag_1_s, 1.0, 3)} 1/s"),
         ("trim of roll, pitch", f"{trim} degrees"),
+        ("lag of the velocity", f"{_plus_minus(motion.velocity_lag_s, 1e3, 0)} ms"),
         ("motion explained", f"R2 {motion.r2:.3f}; rms left {motion.disturbance_m_s2:.3f} m/s^2"),
     ]
 

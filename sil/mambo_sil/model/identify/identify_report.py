@@ -60,9 +60,23 @@ def vehicle_text(summary: IdentifySummary) -> str:
     """Return a vehicle.toml of kind first_order; both axes must have a model."""
     motion = summary.motion
     share, drag = "1.0  # not identified", "0.0  # not identified"
+    trims: list[str] = []
+    within: dict[str, Interval] = {}
     if motion is not None:
         share = _round(motion.acceleration_per_tilt.value)
         drag = _round(max(motion.drag_1_s.value, 0.0))
+        within = {"drag_1_s": motion.drag_1_s, "acceleration_per_tilt_g": motion.acceleration_per_tilt}
+        for name, trim in zip(summary.axes, motion.trim_rad, strict=True):
+            trims.append(f"{name}_trim_rad = {_round(trim.value)}")
+            within[f"{name}_trim_rad"] = trim
+    responses = []
+    for name, axis in summary.axes.items():
+        if (fit := axis.first_order) is None:
+            raise ValueError(f"{name} has no model")
+        found = {"gain": fit.gain, "lag_s": fit.lag_s, "dead_time_s": fit.delay_s}
+        values = ", ".join(f"{key} = {_round(each.value)}" for key, each in found.items())
+        responses.append(f"{name} = {{ {values} }}")
+        within |= {f"{name}_{key}": each for key, each in found.items()}
     lines = [
         *_heading(summary),
         "",
@@ -73,14 +87,12 @@ def vehicle_text(summary: IdentifySummary) -> str:
         "[attitude]",
         'kind = "first_order"',
         f"acceleration_per_tilt_g = {share}",
+        *trims,
+        *responses,
+        "",
+        "[uncertainty]  # half-widths of the 95 % intervals; no flight reads them",
+        *(f"{key} = {float(f'{each.within:.2g}')!r}" for key, each in within.items()),
     ]
-    for name, axis in summary.axes.items():
-        if (fit := axis.first_order) is None:
-            raise ValueError(f"{name} has no model")
-        lines.append(
-            f"{name} = {{ gain = {_round(fit.gain)}, lag_s = {_round(fit.lag_s)}, "
-            f"dead_time_s = {_round(fit.delay_s)} }}"
-        )
     return "\n".join(lines) + "\n"
 
 

@@ -2,10 +2,12 @@
 
 Increments of velocity over half a second are regressed on integrals over the same time:
 
-    change of v = share * integral(T tilt) - drag * integral(v) + constants, turned by yaw
+    change of v = share * (integral(T tilt) - lag * change of (T tilt)) - drag * integral(v)
+                  + constants, turned by yaw
 
 T tilt is the horizontal part of the thrust over mass T; where T is not logged, its vertical part is taken as
-g. The constants, in axes ahead and right, are the trim.
+g. The lag is that of the logged velocity, which a filter makes late: without it the drag would be too small.
+The constants, in axes ahead and right, are the trim.
 """
 
 from collections.abc import Sequence
@@ -16,7 +18,7 @@ import numpy as np
 
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import FloatArray
-from mambo_sil.model.identify.response import NORMAL_95, WIDENING, Interval, newey_west
+from mambo_sil.model.identify.response import NORMAL_95, SURPLUS_S, WIDENING, Interval, newey_west
 from mambo_sil.model.identify.segments import PERIOD_S, Segment
 
 SPAN_S: Final = 0.5
@@ -25,6 +27,9 @@ _LEAST_POWER: Final = 1e-6
 _STRIDE: Final = 5
 _CORRELATION: Final = 80
 """Strides over which what is left is taken as correlated: 4 s, because gusts last for seconds."""
+_LAG_COLUMN: Final = 4
+"""Column of the regression for the lag of the velocity. A comparison of hypotheses leaves it out, because it
+would hide that tilt and velocity are of two clocks."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,8 @@ class Motion:
     drag_1_s: Interval
     trim_rad: tuple[Interval, Interval]
     """Measured tilt at which the drone does not accelerate."""
+    velocity_lag_s: Interval
+    """Lag of the logged velocity behind the measured tilt."""
     r2: float
     disturbance_m_s2: float
     """Rms of the acceleration, averaged over `SPAN_S`, that the model does not explain."""
@@ -59,7 +66,7 @@ class Motion:
 def explained(segments: Sequence[Segment], hypothesis: Hypothesis = AS_LOGGED) -> float:
     """Return the R2 of the velocity increments under a hypothesis, with a share of g of 0 or more."""
     slopes, changes = _stack(segments, hypothesis)
-    free, *others = slopes.T
+    free, *others = slopes.T[:_LAG_COLUMN]
     rest = np.column_stack([*others])
     change = changes - rest @ np.linalg.lstsq(rest, changes, rcond=None)[0]
     tilt = free - rest @ np.linalg.lstsq(rest, free, rcond=None)[0]
@@ -82,7 +89,7 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
     errors = [change - slope @ found for slope, change in parts]
     covariance = newey_west([slope for slope, _ in parts], errors, _CORRELATION)
     within = (NORMAL_95 * WIDENING * np.sqrt(np.maximum(np.diag(covariance), 0.0))).tolist()
-    share, drag, ahead, right = found.tolist()
+    share, drag, ahead, right, late = found.tolist()
     weight = GRAVITY_M_S2 * share
     error = np.concatenate(errors)
     left = float(np.sum(error**2) / np.sum((changes - changes.mean()) ** 2))
@@ -93,6 +100,7 @@ def fit_motion(segments: Sequence[Segment]) -> Motion:
             Interval(-right / weight, abs(within[3] / weight)),
             Interval(ahead / weight, abs(within[2] / weight)),
         ),
+        Interval(-late / share, abs(within[4] / share) + SURPLUS_S),
         1.0 - left,
         float(np.sqrt(np.mean(error**2))) / SPAN_S,
     )
@@ -113,7 +121,7 @@ def _stack(segments: Sequence[Segment], hypothesis: Hypothesis) -> tuple[FloatAr
 
 
 def _regression(segment: Segment, hypothesis: Hypothesis) -> tuple[FloatArray, FloatArray]:
-    """Return slopes (2 m, 4) and changes of velocity (2 m,) of one stretch: x, then y."""
+    """Return slopes (2 m, 5) and changes of velocity (2 m,) of one stretch: x, then y."""
     velocity = segment.velocity_m_s
     if velocity is None:
         raise ValueError("the stretch has no velocities")
@@ -128,8 +136,9 @@ def _regression(segment: Segment, hypothesis: Hypothesis) -> tuple[FloatArray, F
         thrust = GRAVITY_M_S2 / (np.cos(roll) * np.cos(pitch))
     ahead, right = -thrust * np.cos(roll) * np.sin(pitch), thrust * np.sin(roll)
     cosine, sine = np.cos(hypothesis.yaw * segment.yaw_rad), np.sin(hypothesis.yaw * segment.yaw_rad)
+    pull = np.stack([cosine * ahead - sine * right, sine * ahead + cosine * right])
     rates = (
-        np.stack([cosine * ahead - sine * right, sine * ahead + cosine * right]),
+        pull,
         -velocity,
         np.stack([cosine, sine]),
         np.stack([-sine, cosine]),
@@ -138,7 +147,7 @@ def _regression(segment: Segment, hypothesis: Hypothesis) -> tuple[FloatArray, F
     integrals = [
         np.pad(np.cumsum(0.5 * (r[:, 1:] + r[:, :-1]), axis=1) * PERIOD_S, ((0, 0), (1, 0))) for r in rates
     ]
-    slopes = np.stack(
-        [(each[:, span:] - each[:, :-span])[:, ::_STRIDE].ravel() for each in integrals], axis=1
+    *slopes, changes = (
+        (each[:, span:] - each[:, :-span])[:, ::_STRIDE].ravel() for each in (*integrals, pull, velocity)
     )
-    return slopes, (velocity[:, span:] - velocity[:, :-span])[:, ::_STRIDE].ravel()
+    return np.stack(slopes, axis=1), changes

@@ -3,6 +3,8 @@
     measured = gain * G(command delayed by the dead time) + offset
     G(s) = 1 / (lag s + 1), with the integrator (s + k) / (lag s^2 + s + k)
 
+A response of second order without an integrator is k / (lag s^2 + s + k).
+
 Output error: the model is driven by the commands alone. Gain and offsets are solved linearly inside the
 search for the other parameters, of which it takes the logarithms.
 """
@@ -24,8 +26,12 @@ from mambo_sil.model.identify.segments import PERIOD_S, Segment
 _LOW: Final = np.log([0.005, 0.001, 0.02])
 _HIGH: Final = np.log([2.0, 0.3, 10.0])
 """Bounds on lag, dead time (s) and integrator (1/s)."""
+_HIGH_SECOND_ORDER: Final = np.log([2.0, 0.3, 200.0])
 
 _STARTS: Final = ((0.1, 0.03, 0.7), (0.05, 0.1, 0.7))
+_STARTS_INTEGRATOR: Final = (*_STARTS, (0.25, 0.02, 1.0), (0.1, 0.03, 2.0))
+"""With an integrator the error has several minima: a lag with a larger gain is one of them."""
+_STARTS_SECOND_ORDER: Final = ((0.05, 0.03, 10.0), (0.05, 0.1, 10.0))
 _STEP: Final = 1e-3
 CORRELATION_S: Final = 1.0
 """Time over which residuals are taken as correlated (Newey and West 1987)."""
@@ -61,10 +67,12 @@ class FittedResponse:
     integral_1_s: float
     offset_rad: tuple[float, ...]
     """Measured tilt at no command, one value a segment."""
+    zero: float = 1.0
+    """Factor on s in the numerator: 0 for a response of second order, whose k is `integral_1_s`."""
 
     def predict(self, segment: Segment, axis: int, offset_rad: float) -> FloatArray:
         """Return the modelled tilt (m,) of a segment."""
-        return self.gain * _unit_response(self.logs, segment, axis) + offset_rad
+        return self.gain * _unit_response(self.logs, segment, axis, self.zero) + offset_rad
 
     @property
     def lag_at_bound(self) -> bool:
@@ -80,22 +88,41 @@ class FittedResponse:
 
 def fit_response(segments: Sequence[Segment], axis: int, masks: Masks, *, integrator: bool) -> FittedResponse:
     """Fit one axis of all segments at once, on the samples of `masks`."""
-    order = 3 if integrator else 2
-    low, high = _LOW[:order], _HIGH[:order]
+    if integrator:
+        return _fit(segments, axis, masks, _STARTS_INTEGRATOR, _HIGH, zero=1.0)
+    return _fit(segments, axis, masks, [start[:2] for start in _STARTS], _HIGH[:2], zero=1.0)
+
+
+def fit_second_order(segments: Sequence[Segment], axis: int, masks: Masks) -> FittedResponse:
+    """Fit a response of second order, with which an integrator must compete."""
+    return _fit(segments, axis, masks, _STARTS_SECOND_ORDER, _HIGH_SECOND_ORDER, zero=0.0)
+
+
+def _fit(
+    segments: Sequence[Segment],
+    axis: int,
+    masks: Masks,
+    starts: Sequence[Sequence[float]],
+    high: FloatArray,
+    *,
+    zero: float,
+) -> FittedResponse:
+    """Fit lag, dead time and, if `starts` have three values, k."""
 
     def residual(logs: FloatArray) -> FloatArray:
-        gain, parts = _project(logs, segments, axis, masks)
+        gain, parts = _project(logs, segments, axis, masks, zero)
         return np.concatenate([tilt - gain * unit for unit, tilt, _, _ in parts])
 
+    bounds = (_LOW[: len(high)], high)
     found = [
-        least_squares(residual, np.log(start[:order]), bounds=(low, high), x_scale=0.3, diff_step=_STEP)
-        for start in _STARTS
+        least_squares(residual, np.log(start), bounds=bounds, x_scale=0.3, diff_step=_STEP)
+        for start in starts
     ]
     logs = min(found, key=lambda one: float(one.cost)).x
-    gain, parts = _project(logs, segments, axis, masks)
+    gain, parts = _project(logs, segments, axis, masks, zero)
     offsets = tuple(tilt_mean - gain * unit_mean for _, _, unit_mean, tilt_mean in parts)
-    values = np.exp(logs).tolist()
-    return FittedResponse(gain, values[0], values[1], values[2] if integrator else 0.0, offsets)
+    lag_s, delay_s, *rest = np.exp(logs).tolist()
+    return FittedResponse(gain, lag_s, delay_s, rest[0] if rest else 0.0, offsets, zero)
 
 
 def residuals(
@@ -111,15 +138,6 @@ def residuals(
 def root_mean_square(parts: Sequence[FloatArray]) -> float:
     """Return the rms of all samples."""
     return float(np.sqrt(np.mean(np.square(np.concatenate(list(parts))))))
-
-
-@dataclass(frozen=True)
-class FirstOrder:
-    """The best model of an axis without an integrator."""
-
-    gain: float
-    lag_s: float
-    delay_s: float
 
 
 @dataclass(frozen=True)
@@ -181,7 +199,7 @@ def newey_west(slopes: Sequence[FloatArray], errors: Sequence[FloatArray], windo
     return np.asarray(bread @ meat @ bread * (samples / max(samples - parameters, 1)))
 
 
-def _unit_response(logs: FloatArray, segment: Segment, axis: int) -> FloatArray:
+def _unit_response(logs: FloatArray, segment: Segment, axis: int, zero: float) -> FloatArray:
     """Return G of the command (m,), which the beginning of the segment finds in steady state."""
     lag, delay, *rest = np.exp(logs).tolist()
     command = segment.command_means(axis, delay)
@@ -190,13 +208,13 @@ def _unit_response(logs: FloatArray, segment: Segment, axis: int) -> FloatArray:
         top, bottom = np.array([1.0 - keep]), np.array([1.0, -keep])
     else:
         (integral,) = rest
-        top, bottom = _integrating_filter(lag, integral)
+        top, bottom = _second_order_filter(lag, integral, zero)
     state = lfilter_zi(top, bottom) * command[0]
     return np.asarray(lfilter(top, bottom, command, zi=state)[0])
 
 
-def _integrating_filter(lag_s: float, integral_1_s: float) -> tuple[FloatArray, FloatArray]:
-    """Return numerator (2,) and denominator (3,) of the response with an integrator to period means.
+def _second_order_filter(lag_s: float, integral_1_s: float, zero: float) -> tuple[FloatArray, FloatArray]:
+    """Return numerator (2,) and denominator (3,) of (zero s + k) / (lag s^2 + s + k) for period means.
 
     The exponential of a 2 x 2 matrix with trace 2 m and the eigenvalues m +- q is
     e^m (cosh q + sinh q / q (A - m)).
@@ -207,19 +225,19 @@ def _integrating_filter(lag_s: float, integral_1_s: float) -> tuple[FloatArray, 
     ratio = (cmath.sinh(q) / q).real if abs(q) > 1e-9 else 1.0
     step = math.exp(middle) * (cmath.cosh(q).real * np.eye(2) + ratio * (system - middle * np.eye(2)))
     drive = np.linalg.solve(system, step - np.eye(2)) @ [0.0, PERIOD_S]
-    read = np.array([integral_1_s, 1.0]) / lag_s
+    read = np.array([integral_1_s, zero]) / lag_s
     trace = step[0, 0] + step[1, 1]
     top = np.array([read @ drive, read @ (step - trace * np.eye(2)) @ drive])
     return top, np.array([1.0, -trace, math.exp(2.0 * middle)])
 
 
 def _project(
-    logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks
+    logs: FloatArray, segments: Sequence[Segment], axis: int, masks: Masks, zero: float
 ) -> tuple[float, list[tuple[FloatArray, FloatArray, float, float]]]:
     """Return the best gain, and of each segment unit response and tilt without their means, and the means."""
     parts = []
     for segment, mask in zip(segments, masks, strict=True):
-        unit, tilt = _unit_response(logs, segment, axis)[mask], segment.tilt_rad[axis][mask]
+        unit, tilt = _unit_response(logs, segment, axis, zero)[mask], segment.tilt_rad[axis][mask]
         unit_mean, tilt_mean = (float(each.mean()) for each in (unit, tilt))
         parts.append((unit - unit_mean, tilt - tilt_mean, unit_mean, tilt_mean))
     power = sum(float(unit @ unit) for unit, _, _, _ in parts)
@@ -237,9 +255,11 @@ def _slopes(
         for index in range(len(logs)):
             step = np.zeros(len(logs))
             step[index] = 10.0 * _STEP
-            above, below = (_unit_response(logs + sign * step, segment, axis) for sign in (1.0, -1.0))
+            above, below = (
+                _unit_response(logs + sign * step, segment, axis, response.zero) for sign in (1.0, -1.0)
+            )
             columns.append(response.gain * (above - below)[mask] / (20.0 * _STEP))
-        columns.append(_unit_response(logs, segment, axis)[mask])
+        columns.append(_unit_response(logs, segment, axis, response.zero)[mask])
         offsets = np.zeros((int(mask.sum()), len(segments)))
         offsets[:, number] = 1.0
         found.append(np.column_stack([*columns, offsets]))

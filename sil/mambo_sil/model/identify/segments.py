@@ -137,6 +137,11 @@ def _cut_stretch(
     ]
 
 
+def tumbled(log: FlightLog) -> float:
+    """Return the share of the samples of either tilt that are beyond 45 degrees, whichever has more."""
+    return max(float(np.mean(np.abs(log.signals[name].value) > LARGEST_TILT_RAD)) for name in TILTS)
+
+
 def duration_s(segments: Sequence[Segment]) -> float:
     """Return the time that all stretches take together."""
     return sum(len(segment.time_s) for segment in segments) * PERIOD_S
