@@ -85,7 +85,7 @@ bench: $(SETUP_BENCH) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.commands
 	$(BIN)/python -m benchmarks.rotorpy_flights
 	$(BIN)/python -m benchmarks.times
-	$(BIN)/python -m benchmarks.exact_times
+	$(BIN)/python -m benchmarks.quadratic_times
 
 bench-peers: $(SETUP_TEST) $(SETUP_PEERS)
 	$(BIN)/python -m benchmarks.peers

@@ -1,65 +1,112 @@
-"""Compare the outcomes of two controllers bit for bit."""
+"""Compare two controllers of one method bit for bit, with all that may go wrong in their inputs."""
 
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from mambo_codegen.methods.one_norm.controller import OneNormStep
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.step_inputs import StepInputs, random_steps
 
-FIELDS = ("status", "command_rad", "cost", "gradient", "plan_rad", "iterations", "converged")
-
-
-class Controller(Protocol):
-    """What reference and compiled controller share."""
-
-    def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
-        """Start over."""
-
-    def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
-        """Replace the weights."""
-
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> OneNormStep:
-        """Compute the next commands."""
-
-
-def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[StepInputs]:
-    """Draw the inputs of consecutive steps of n controllers."""
-    return random_steps(settings, n, steps, np.random.default_rng(seed))
+BAD_COMMANDS = (np.nan, np.inf, 4.0, -4.0)
 
 
 class Run(NamedTuple):
     """What a controller answered: the statuses of its setters, and the outcome of every step."""
 
     setters: list[NDArray[np.int64]]
-    steps: list[OneNormStep]
+    steps: list[Any]
 
 
-def run(controller: Controller, inputs: list[StepInputs], seed: int) -> Run:
-    """Step a fresh controller through `inputs`, reset and reweighted halfway, bad values among the good."""
+def inputs_of_steps(settings: Settings, n: int, steps: int, seed: int) -> list[StepInputs]:
+    """Draw the inputs of consecutive steps of n controllers."""
     rng = np.random.default_rng(seed)
-    setters: list[NDArray[np.int64]] = []
-    steps: list[OneNormStep] = []
+    drawn, most = random_steps(settings, n, steps, rng), method_of(settings).outage_steps
+    return drawn if most is None else _with_flights(settings, drawn, most, rng)
+
+
+def _with_flights(
+    settings: Settings, drawn: list[StepInputs], most: int, rng: np.random.Generator
+) -> list[StepInputs]:
+    """Replace inputs that are drawn for each step by those of flights, for a method that estimates.
+
+    Of five controllers two get independent inputs; two fly: state, target and yaw change little from step to
+    step, and jump at times; the last flies and misses its state at times, for fewer steps than it may, for as
+    many, and for more.
+    """
+    n, ranges, period_s = len(drawn[0].thrust), settings.ranges, settings.horizon.update_period_s
+    flying = np.arange(n) % 5 >= 2
+    scale = 10.0 ** rng.uniform(-3, 0.5, (n, 1))
+    yaw, yaw_rate = rng.uniform(-7, 7, n), rng.choice([0.0, 1.0, -3.0], n)
+    position, velocity = rng.normal(0, 1, (n, 2)), rng.normal(0, 1, (n, 2))
+    left = np.zeros(n, np.int64)
+    for inputs in drawn:
+        jumps = rng.random(n) < 0.03
+        velocity = np.where(jumps[:, None], rng.normal(0, 1, (n, 2)), velocity + rng.normal(0, 0.02, (n, 2)))
+        position = np.where(jumps[:, None], rng.normal(0, 2, (n, 2)), position + (period_s * velocity))
+        yaw = np.where(rng.random(n) < 0.02, rng.choice([1024.0, -1024.0, np.pi, 0.0], n), yaw)
+        yaw = np.clip(yaw + (period_s * yaw_rate), -1024, 1024)
+        target = np.concatenate([position, velocity], axis=1)
+        state = np.concatenate(
+            [
+                target + (scale * rng.normal(0, 1, (n, 4))),
+                settings.limits.tilt_rad * rng.uniform(-1, 1, (n, 2)),
+                yaw[:, None],
+            ],
+            axis=1,
+        )
+        bounds = [ranges.position_m] * 2 + [ranges.velocity_m_s] * 2
+        calm = flying & (rng.random(n) < 0.97)
+        inputs.target[:, :4] = np.where(
+            calm[:, None], np.clip(target, np.negative(bounds), bounds), inputs.target[:, :4]
+        )
+        state[:, :4] = np.clip(state[:, :4], np.negative(bounds), bounds)
+        inputs.state[:] = np.where(calm[:, None], state, inputs.state)
+        starts = (left == 0) & (rng.random(n) < 0.1) & (np.arange(n) % 5 == 4)
+        lengths = rng.choice([1, 2, max(1, most - 1), max(1, most), most + 1, most + 3], n)
+        left = np.where(starts, lengths, np.maximum(left - 1, 0))
+        inputs.state[left > 0, 6] = np.nan
+    return drawn
+
+
+def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
+    """Step a fresh controller through `inputs`, bad values among the good.
+
+    Halfway it is reset. What else its method sets is set then, if it is weights, or in every seventh step.
+    """
+    rng = np.random.default_rng(seed)
+    takes_weights = bool(method_of(controller.settings).weight_limits)
+    found = Run([], [])
     for index, case in enumerate(inputs):
+        command = rng.uniform(-1.5, 1.5, (len(case.thrust), 2))
+        command[::5, 0] = rng.choice(BAD_COMMANDS, len(command[::5]))
         if index == len(inputs) // 2:
-            n = len(case.thrust)
-            command = rng.uniform(-1.5, 1.5, (n, 2))
-            command[::5, 0] = rng.choice([np.nan, np.inf, 4.0, -4.0], len(command[::5]))
-            weights = 10.0 ** rng.uniform(-2, 6, (n, 2))
-            weights[3::7] = rng.choice([0.0, 1e6], weights[3::7].shape)
-            weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1e6], len(weights[::7]))
-            setters += [controller.reset(command), controller.set_weights(weights)]
-        steps.append(controller.step(case.state, case.target, case.thrust))
-    return Run(setters, steps)
+            found.setters.append(controller.reset(command))
+            if takes_weights:
+                found.setters.append(controller.set_weights(_weights(rng, len(command))))
+        elif index % 7 == 5 and not takes_weights:
+            found.setters.append(controller.set_command(command))
+        found.steps.append(controller.step(case.state, case.target, case.thrust))
+    return found
+
+
+def _weights(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+    weights = 10.0 ** rng.uniform(-2, 6, (n, 2))
+    weights[3::7] = rng.choice([0.0, 1e6], weights[3::7].shape)
+    weights[::7, 1] = rng.choice([-1.0, np.nan, np.inf, 1.1e6], len(weights[::7]))
+    return weights
 
 
 def differences(a: Run, b: Run) -> dict[str, int]:
     """Count by field the values that differ in any bit; empty when there are none."""
     counts = {
-        name: count_differing([getattr(s, name) for s in a.steps], [getattr(s, name) for s in b.steps])
-        for name in FIELDS
+        field.name: count_differing(
+            [getattr(step, field.name) for step in a.steps], [getattr(step, field.name) for step in b.steps]
+        )
+        for field in fields(a.steps[0])
     }
     counts["setters"] = count_differing(a.setters, b.setters)
     return {name: count for name, count in counts.items() if count}

@@ -247,3 +247,21 @@ def quadratic_settings(scalar: str = "float32", **horizon: Any) -> Settings:
     document = presets.preset("mambo").model_dump()
     changed = {"code": document["code"] | {"scalar": scalar}, "horizon": document["horizon"] | horizon}
     return Settings.model_validate(document | changed)
+
+
+EVERYTHING = settings_of(
+    ONE_MOVE
+    | {
+        "horizon.ramp_s": 0.4,
+        "model.drag_1_s": 0.067,
+        "model.roll_trim_rad": 0.02,
+        "model.pitch_trim_rad": -0.01,
+        "model.roll_gain": 0.9,
+        "model.pitch_gain": 1.1,
+        "damping.pitch_rate_feedback_s": 0.02,
+        "observer.age_s": 0.013,
+        "observer.outage_s": 0.05,
+        "limits.tilt_rad": 0.25,
+    }
+)
+"""Settings with every part of the method: two moves, trims, drag, age and feedback."""

@@ -20,10 +20,10 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.extension import build_extension, load_extension
 from tests.support.one_norm import ONE_NORM
-from tests.support.parity import Controller
 from tests.support.tools import toolchain
 
 MAMBO = ONE_NORM
+Controller = OneNormController | CompiledController
 HOVER_STATE, HOVER_TARGET, HOVER_THRUST = np.zeros(7), np.array([0.5, -0.4, 0.0, 0.0]), 9.81
 
 

@@ -1,14 +1,14 @@
-"""A wrong line of C turns parity red: a dozen faults by hand; `test_mutation.py` makes every small one."""
+"""A wrong line of C turns parity red: some by hand, of both methods; `test_mutation.py` makes every small one."""
 
 import pytest
 
 from mambo_codegen.bundle.render import render
-from mambo_codegen.methods.one_norm.controller import OneNormController
-from mambo_codegen.methods.one_norm.method import OneNorm
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import load_library
 from tests.support.parity import Run, differences, inputs_of_steps, run
+from tests.support.quadratic import EVERYTHING
 from tests.support.tools import toolchain
 
 BACKTRACKING = Settings.model_validate(
@@ -27,12 +27,10 @@ BACKTRACKING = Settings.model_validate(
         "target": {"acceleration": "tracked"},
     }
 )
-CASES = 400
-INPUTS = inputs_of_steps(BACKTRACKING, CASES, steps=12, seed=0)
 PREDICTOR, PREDICTOR_H, COST = "src/nmpc_predictor.c", "src/nmpc_predictor.h", "src/nmpc_cost.c"
 TRACKER, TRACKER_H = "src/nmpc_tracker.c", "src/nmpc_tracker.h"
 OPTIMIZER, STEP, HELPERS = "src/nmpc_optimizer.c", "src/nmpc.c", "src/nmpc_math.h"
-FAULTS = {
+ONE_NORM_FAULTS = {
     "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
     "the sign of zero is one": (HELPERS, "(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
     "one predicted step too few": (COST, "i < NMPC_HORIZON_PREDICTION; i++)", "i < NMPC_HORIZON_PREDICTION - 1; i++)"),
@@ -58,29 +56,72 @@ FAULTS = {
     "bad input gets a level command": (STEP, "    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
 }  # fmt: skip
 """The one place in a file that reads so, and what it reads instead."""
+QUADRATIC_FAULTS = {
+    "x and y change places": ("src/nmpc.c", "*right = (y * self->attitude.cosine) - (x", "*right = (x * self->attitude.cosine) - (y"),
+    "no velocity of the target": ("src/nmpc.c", "- (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis])", "- (nmpc_real_t)0"),
+    "the target accelerates the other way": ("src/nmpc.c", "nmpc_observer_disturbance(self, axis) - self->tracker", "nmpc_observer_disturbance(self, axis) + self->tracker"),
+    "the limits change places": ("src/nmpc.c", "state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2", "state[NMPC_RIGHT], NMPC_FORWARD_LIMIT_M_STEP2"),
+    "one step less of outage": ("src/nmpc.c", "#define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)", "#define NMPC_NO_ESTIMATE NMPC_OUTAGE_STEPS"),
+    "rates over a gap": ("src/nmpc.c", "if (self->missed == 0U) {", "if (self->missed != NMPC_NO_ESTIMATE) {"),
+    "no turn of the model": ("src/nmpc.c", "        nmpc_attitude_turn(self, sine, cosine);\n", "        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n"),
+    "a turn of the model after an outage": ("src/nmpc.c", "        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n", "        nmpc_attitude_turn(self, sine, cosine);\n"),
+    "measured attitude": ("src/nmpc.c", "minimize(self, target, self->attitude.tilt_m_step2);", "minimize(self, target, tilt_m_step2);"),
+    "no prediction in an outage": ("src/nmpc.c", "    nmpc_observer_predict(self, world_m_step2);\n", "    if (state != NULL) { nmpc_observer_predict(self, world_m_step2); }\n"),
+    "a bad thrust allows a command": ("src/nmpc.c", "((has_target != 0) && (has_thrust != 0))", "(has_target != 0)"),
+    "a command of others leaves the model": ("src/nmpc.c", "    nmpc_attitude_set_command(self, self->command_rad[0], self->command_rad[1]);\n", ""),
+    "a reset keeps the estimate": ("src/nmpc.c", "    self->missed = NMPC_NO_ESTIMATE;\n", ""),
+    "a reset keeps the target": ("src/nmpc.c", "    nmpc_tracker_clear(self);\n", ""),
+    "no clamp of feedback": ("src/nmpc.c", "nmpc_clamp(nmpc_attitude_pitch(self) + feedback_rad[1], NMPC_TILT_LIMIT_RAD)", "(nmpc_attitude_pitch(self) + feedback_rad[1])"),
+    "saturated only in roll": ("src/nmpc.c", "(nmpc_reaches(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2) != 0)", "0"),
+    "drag the other way": ("src/nmpc_observer.h", "           - (NMPC_DRAG_1_STEP", "           + (NMPC_DRAG_1_STEP"),
+    "no age of the velocity": ("src/nmpc_observer.c", "+ (NMPC_AGE_STEPS * acceleration_m_step2)", "+ (nmpc_real_t)0"),
+    "a start forgets the disturbance": ("src/nmpc_observer.c", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n    }", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n        self->observer.disturbance_m_step2[axis] = (nmpc_real_t)0;\n    }"),
+    "no limit of the disturbance": ("src/nmpc_observer.c", "                       NMPC_DISTURBANCE_LIMIT_M_STEP2);", "                       (nmpc_real_t)1000);"),
+    "pitch the same way as roll": ("src/nmpc_attitude.c", "-(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD))", "NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD)"),
+    "no trim of roll": ("src/nmpc_attitude.c", "state->roll_rad - NMPC_ROLL_TRIM_RAD", "state->roll_rad"),
+    "rows of the other axis": ("src/nmpc_attitude.c", "next(tilt_rows[axis], state)", "next(tilt_rows[1 - axis], state)"),
+    "the tilt stays": ("src/nmpc_attitude.c", "    turn(attitude->tilt_m_step2, sine_change, cosine_change);\n", ""),
+    "the first move alone": ("src/nmpc_optimizer.c", "first - (ratios[axis] * second_change)", "first"),
+    "the ratio of the other axis": ("src/nmpc_optimizer.c", "(ratios[axis] * second_change)", "(ratios[1 - axis] * second_change)"),
+    "the second move has no limit": ("src/nmpc_optimizer.c", "nmpc_clamp(second, limit_m_step2) - second", "second - second"),
+}  # fmt: skip
+
+
+class Bench:
+    """Runs changed C of some settings through the same inputs as their reference."""
+
+    def __init__(self, settings: Settings, n: int, steps: int) -> None:
+        self._settings, self._n = settings, n
+        self.files = render(settings, with_digest=False)
+        self._inputs = inputs_of_steps(settings, n, steps, seed=0)
+        self._expected = run(method_of(settings).reference_controller(n), self._inputs, seed=0)
+
+    def differences(self, changed: dict[str, str]) -> dict[str, int]:
+        """Build the C, without optimisation to save time, and count the values that differ in any bit."""
+        library = load_library(self.files | changed, toolchain("gcc", "-O0"))
+        found: Run = run(CompiledController(self._settings, self._n, library), self._inputs, seed=0)
+        return differences(self._expected, found)
 
 
 @pytest.fixture(scope="module")
-def expected() -> Run:
-    """Run the reference once for all faults."""
-    return run(OneNormController(OneNorm(BACKTRACKING), CASES), INPUTS, seed=0)
+def benches() -> dict[str, Bench]:
+    """Run the references once for all faults."""
+    return {"one_norm": Bench(BACKTRACKING, 400, 12), "quadratic": Bench(EVERYTHING, 100, 40)}
 
 
-def found(files: dict[str, str]) -> Run:
-    """Build the C in `files`, without optimisation to save time, and run it through the same inputs."""
-    library = load_library(files, toolchain("gcc", "-O0"))
-    return run(CompiledController(BACKTRACKING, CASES, library), INPUTS, seed=0)
-
-
-def test_the_generated_code_passes(expected: Run) -> None:
+@pytest.mark.parametrize("method", ["one_norm", "quadratic"])
+def test_the_generated_code_passes(method: str, benches: dict[str, Bench]) -> None:
     """Without a fault no bit differs."""
-    assert differences(expected, found(render(BACKTRACKING, with_digest=False))) == {}
+    assert benches[method].differences({}) == {}
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_caught(fault: str, expected: Run) -> None:
+@pytest.mark.parametrize(
+    ("method", "fault"),
+    [("one_norm", fault) for fault in ONE_NORM_FAULTS] + [("quadratic", fault) for fault in QUADRATIC_FAULTS],
+)
+def test_a_fault_is_caught(method: str, fault: str, benches: dict[str, Bench]) -> None:
     """The faulty C compiles, and some bit differs."""
-    path, right, wrong = FAULTS[fault]
-    files = render(BACKTRACKING, with_digest=False)
-    assert files[path].count(right) == 1, "the template has changed: adapt the fault"
-    assert differences(expected, found(files | {path: files[path].replace(right, wrong)})) != {}
+    bench, faults = benches[method], {"one_norm": ONE_NORM_FAULTS, "quadratic": QUADRATIC_FAULTS}[method]
+    path, right, wrong = faults[fault]
+    assert bench.files[path].count(right) == 1, "the template has changed: adapt the fault"
+    assert bench.differences({path: bench.files[path].replace(right, wrong)}) != {}

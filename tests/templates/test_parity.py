@@ -1,4 +1,4 @@
-"""The generated C computes the bits of the reference: per sub-block, then whole steps."""
+"""The sub-blocks of the 1-norm, and those of both methods, compute the bits of the reference."""
 
 from typing import Any
 
@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
-from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.tracker import Tracker, unknown_motion
@@ -17,19 +16,13 @@ from mambo_codegen.numbers.trigonometry import SINE_ERRORS
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.limits import YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.controller_library import build_library
-from tests.support.builds import libraries, share_of
 from tests.support.cases import CORNER_HORIZONS, SCALARS, settings_case
 from tests.support.extension import build_extension
-from tests.support.parity import differences, inputs_of_steps, run
-from tests.support.tools import toolchain
 
 FEW_SETTINGS = [
     pytest.param(index, marks=[] if index in {2, 5} else pytest.mark.long)
     for index in range(len(CORNER_HORIZONS) + 1)
 ]
-MANY_SETTINGS = range(50)
 
 
 def bits(values: Any) -> bytes:
@@ -202,35 +195,3 @@ def test_tracker_equals_the_reference(index: int, scalar: str, kind: str) -> Non
             size = np.abs(getattr(motion, name)).max()
             limits_reached |= {name} if size == blocks.numbers.constant(limit, "acceleration") else set()
     assert limits_reached == set(limits)
-
-
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("index", FEW_SETTINGS)
-def test_steps_equal_the_reference(index: int, scalar: str) -> None:
-    """Over random and corner cases, resets and reweightings, no bit differs."""
-    settings = settings_case(index, scalar)
-    n = 250
-    inputs = inputs_of_steps(settings, n, steps=4, seed=index)
-    expected = run(OneNormController(OneNorm(settings), n), inputs, index)
-    library = build_library(settings, toolchain("gcc"))
-    assert differences(expected, run(CompiledController(settings, n, library), inputs, index)) == {}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("index", MANY_SETTINGS)
-def test_steps_by_the_thousand_equal_the_reference_in_every_build(index: int, scalar: str) -> None:
-    """In 100,000 steps with each of 10 settings no bit differs, at every optimisation, with gcc and clang.
-
-    Nor in 20,000 with each of 40 others, which run in two builds each.
-    """
-    settings = settings_case(index, scalar)
-    builds, percentage = share_of(index)
-    chunk = 5000
-    built = libraries(settings, builds)
-    for seed in range(5 * percentage // 100):
-        inputs = inputs_of_steps(settings, chunk, steps=4, seed=seed)
-        expected = run(OneNormController(OneNorm(settings), chunk), inputs, seed)
-        for build, library in built.items():
-            found = run(CompiledController(settings, chunk, library), inputs, seed)
-            assert differences(expected, found) == {}, f"{build} for {settings!r}"

@@ -1,4 +1,4 @@
-"""With a quadratic cost the C computes the bits of the reference: per sub-block, then whole steps."""
+"""The sub-blocks of a quadratic cost compute the bits of the reference."""
 
 from typing import Any
 
@@ -8,22 +8,15 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState
-from mambo_codegen.methods.quadratic.controller import QuadraticController
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.methods.quadratic.observer import Estimate, KalmanObserver
 from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.settings.model import Settings
-from mambo_sil.flight.controllers.compiled import CompiledController
-from mambo_sil.flight.controllers.controller_library import build_library
-from tests.support.builds import libraries, share_of
 from tests.support.extension import build_extension
 from tests.support.quadratic import CORNER_SETTINGS, quadratic_case
-from tests.support.quadratic_parity import differences, inputs_of_steps, run
-from tests.support.tools import toolchain
 
 SCALARS = ("float32", "float64")
 FEW_SETTINGS = range(len(CORNER_SETTINGS) + 2)
-MANY_SETTINGS = range(50)
 CASES = 300
 
 
@@ -184,48 +177,3 @@ def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
             free = law.rows[axis] @ state[axis]
             kinds.add(tuple((np.sign(free) * (np.abs(free) > limits[axis])).tolist()))
     assert len(kinds) == 3**law.moves
-
-
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("index", FEW_SETTINGS)
-def test_steps_equal_the_reference(index: int, scalar: str) -> None:
-    """Over flights, outages, jumps, resets, commands of others and bad values no stored bit differs."""
-    settings = quadratic_case(index, scalar)
-    n = 100
-    inputs = inputs_of_steps(settings, n, steps=60, seed=index)
-    expected = run(QuadraticController(Quadratic(settings), n), inputs, index)
-    library = build_library(settings, toolchain("gcc"))
-    assert differences(expected, run(CompiledController(settings, n, library), inputs, index)) == {}
-
-
-def test_the_inputs_reach_what_is_to_be_compared() -> None:
-    """Every status, outages shorter and longer than admitted, commands at the limit and within."""
-    settings = quadratic_case(1, "float64")
-    found = run(QuadraticController(Quadratic(settings), 200), inputs_of_steps(settings, 200, 60, 1), 1)
-    most = Quadratic(settings).observer.outage_steps + 1
-    missed = np.array([step.missed for step in found.steps])
-    statuses = np.array([*found.setters, *(step.status for step in found.steps)])
-    assert set(np.unique(statuses)) == {0, 2, 3, 4, 6}
-    assert (missed == most).any()
-    assert ((missed[:-1] > 1) & (missed[:-1] < most) & (missed[1:] == 0)).any()
-    assert ((missed[:-1] == most) & (missed[1:] == 0)).any()
-    share = np.mean([step.saturated for step in found.steps])
-    assert 0.05 < share < 0.95
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("scalar", SCALARS)
-@pytest.mark.parametrize("index", MANY_SETTINGS)
-def test_steps_by_the_thousand_equal_the_reference_in_every_build(index: int, scalar: str) -> None:
-    """In 100,000 steps with each of 10 settings no bit differs, at every optimisation, with gcc and clang.
-
-    Nor in 20,000 with each of 40 others, which run in two builds each.
-    """
-    settings = quadratic_case(index, scalar)
-    builds, percentage = share_of(index)
-    n, steps = 5 * percentage, 200
-    inputs = inputs_of_steps(settings, n, steps, seed=index)
-    expected = run(QuadraticController(Quadratic(settings), n), inputs, index)
-    for build, library in libraries(settings, builds).items():
-        found = run(CompiledController(settings, n, library), inputs, index)
-        assert differences(expected, found) == {}, f"{build} for {settings!r}"

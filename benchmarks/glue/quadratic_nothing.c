@@ -1,5 +1,5 @@
 #define _POSIX_C_SOURCE 199309L
-#include "exact.h"
+#include "quadratic.h"
 
 void run(const float state[16], float moves[2])
 {

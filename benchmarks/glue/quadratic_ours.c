@@ -1,5 +1,5 @@
 #define _POSIX_C_SOURCE 199309L
-#include "exact.h"
+#include "quadratic.h"
 #include "nmpc_attitude.h"
 #include "nmpc_optimizer.h"
 

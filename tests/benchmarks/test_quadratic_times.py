@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.exact_times import OURS, SETTINGS, Array, build, one_pass, share_limited, write_problem
+from benchmarks.quadratic_times import OURS, SETTINGS, Array, build, one_pass, share_limited, write_problem
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.method import Quadratic

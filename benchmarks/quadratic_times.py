@@ -48,7 +48,7 @@ OURS: Final = Ours(
     scalar="float32",
     sources=("src/nmpc_optimizer.c", "src/nmpc_math.c"),
     includes=("include", "src"),
-    glue="glue/exact_ours.c",
+    glue="glue/quadratic_ours.c",
     settings=SETTINGS,
 )
 
@@ -124,12 +124,12 @@ def contenders(work: Path) -> dict[str, tuple[Program, Path]]:
     """Write the C of each contender into a folder in `work`; raises NotHereError without the peers."""
     (daqp,) = (peer for peer in PEERS if peer.name == "daqp")
     found: dict[str, tuple[Program, Path]] = {}
-    nothing = replace(OURS, sources=(), glue="glue/exact_nothing.c", title="clock and call")
+    nothing = replace(OURS, sources=(), glue="glue/quadratic_nothing.c", title="clock and call")
     for name, program in {
         "nothing": nothing,
         "ours": OURS,
-        "daqp": replace(daqp, glue="glue/exact_daqp.c", defines=("DAQP_SINGLE_PRECISION",)),
-        "daqp-float64": replace(daqp, glue="glue/exact_daqp.c", defines=(), title="DAQP, double"),
+        "daqp": replace(daqp, glue="glue/quadratic_daqp.c", defines=("DAQP_SINGLE_PRECISION",)),
+        "daqp-float64": replace(daqp, glue="glue/quadratic_daqp.c", defines=(), title="DAQP, double"),
     }.items():
         folder = work / name
         folder.mkdir()

@@ -1,5 +1,5 @@
 #define _POSIX_C_SOURCE 199309L
-#include "exact.h"
+#include "quadratic.h"
 #include "api.h"
 #include "utils.h"
 #include "problem.h"

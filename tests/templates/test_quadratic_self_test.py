@@ -1,0 +1,118 @@
+"""The self-test of a quadratic cost notices a wrong constant or sign."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from mambo_codegen.bundle.flags import COMPILE_FLAGS
+from mambo_codegen.bundle.render import render
+from tests.support.bundles import place
+from tests.support.mutants import mutants
+from tests.support.quadratic import EVERYTHING
+from tests.support.tools import require
+
+STEP, OBSERVER, ATTITUDE = "src/nmpc.c", "src/nmpc_observer.c", "src/nmpc_attitude.c"
+OPTIMIZER = "src/nmpc_optimizer.c"
+
+_NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?f")
+
+
+@pytest.fixture(scope="module")
+def files() -> dict[str, str]:
+    """Render the bundle once."""
+    return render(EVERYTHING)
+
+
+class SelfTest:
+    """Builds the program whose result says whether a bundle's self-test notices."""
+
+    def __init__(self, files: dict[str, str], folder: Path) -> None:
+        (digest,) = re.findall(r"#define NMPC_SELF_TEST_DIGEST (\w+)", "\n".join(files.values()))
+        self._folder = place(files, folder)
+        self._gcc = require("gcc", "gcc")
+        self._sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
+        (folder / "run.c").write_text(
+            '#include "nmpc.h"\n#include "nmpc_self_test.h"\n'
+            "int main(void) { static nmpc_t self; unsigned long digest = 0; int i;\n"
+            "    if (nmpc_self_test(&self) != 0) { return 1; }\n"
+            "    for (i = 0; i < NMPC_SELF_TEST_EPISODES; i++) {\n"
+            "        digest = nmpc_self_test_episode(&self, i, digest);\n    }\n"
+            f"    return (digest == {digest}) ? 0 : 2; }}\n",
+            "utf-8",
+        )
+        for source in [*self._sources, "run.c"]:
+            self._compile(source)
+
+    def _compile(self, source: str) -> None:
+        subprocess.run(
+            [
+                self._gcc,
+                *COMPILE_FLAGS,
+                "-w",
+                "-Iinclude",
+                "-Isrc",
+                "-c",
+                source,
+                "-o",
+                f"{Path(source).stem}.o",
+            ],
+            cwd=self._folder,
+            check=True,
+            capture_output=True,
+        )
+
+    def result(self, changed: dict[str, str]) -> int:
+        """Return 0 if the self-test and its digest pass with the `changed` files."""
+        before = {path: (self._folder / path).read_text("utf-8") for path in changed}
+        place(changed, self._folder)
+        headers = any(path.endswith(".h") for path in changed)
+        rebuilt = self._sources if headers else list(changed)
+        for source in rebuilt:
+            self._compile(source)
+        objects = [f"{Path(source).stem}.o" for source in [*self._sources, "run.c"]]
+        subprocess.run([self._gcc, *objects, "-o", "run"], cwd=self._folder, check=True, capture_output=True)
+        code = subprocess.run(["./run"], cwd=self._folder, check=False, timeout=60).returncode
+        place(before, self._folder)
+        for source in rebuilt:
+            self._compile(source)
+        return code
+
+
+@pytest.mark.long
+def test_the_self_test_notices_every_constant_of_every_table(files: dict[str, str], tmp_path: Path) -> None:
+    """Each number of the rows and ratios, and of the attitude model, larger by a millionth."""
+    bench = SelfTest(files, tmp_path)
+    assert bench.result({}) == 0
+    unnoticed, count = [], 0
+    for path in (OPTIMIZER, ATTITUDE):
+        text = files[path]
+        for number in _NUMBER.finditer(text):
+            if float(number[0][:-1]) == 0:
+                continue
+            count += 1
+            larger = f"({number[0]} * 1.000001f)"
+            changed = text[: number.start()] + larger + text[number.end() :]
+            if bench.result({path: changed}) == 0:
+                unnoticed.append(f"{path}: {number[0]}")
+    assert count == 2 * ((2 * 8) + 1 + 4 + 4 + 1)
+    assert unnoticed == []
+
+
+def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
+    files: dict[str, str], tmp_path: Path
+) -> None:
+    """Each plus made a minus and the other way round, in step, observer, attitude model and optimizer."""
+    bench = SelfTest(files, tmp_path)
+    unnoticed, count = [], 0
+    for path in (STEP, OBSERVER, ATTITUDE, OPTIMIZER):
+        text = files[path]
+        for mutant in mutants(path, text):
+            if {text[mutant.start : mutant.end].strip(), mutant.wrong.strip()} != {"+", "-"}:
+                continue
+            count += 1
+            if bench.result({path: mutant.apply(text)}) == 0:
+                unnoticed.append(mutant.wrong_line)
+    assert count > 30
+    assert unnoticed == []
