@@ -1,6 +1,6 @@
 """Tables of campaigns: figures out of results, and Markdown out of figures."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -21,6 +21,21 @@ def read_campaign(results: Path) -> Figures:
     """Return statistics of each controller, improvements, and medians by motor lag."""
     folder = results / "campaign"
     found = summary(folder)
+    return _quantiles(found) | {
+        "improvements": [one for one in found["improvements"] if not one["index"].startswith("seen_")],
+        "motor_lags": _by_motor_lag(read_table(folder / DATABASE), list(found["controllers"])),
+    }
+
+
+def read_opponents(results: Path) -> Figures:
+    """Return statistics of each controller by campaign, and improvements of both errors, seen and true."""
+    found = {name: summary(results / name) for name in ("drawn", "slow-motors")}
+    compared = [one for one in found["drawn"]["improvements"] if one["index"] in ("iae_m_s", "seen_iae_m_s")]
+    return {name: _quantiles(one) for name, one in found.items()} | {"improvements": compared}
+
+
+def _quantiles(found: Figures) -> Figures:
+    """Return crashes and quantiles of each controller in the record of a campaign."""
     shown = ("iae_m_s", "seen_iae_m_s", "command_variation_rad")
     return {
         "flights": found["flights"],
@@ -28,8 +43,6 @@ def read_campaign(results: Path) -> Figures:
             name: {"crashed": one["crashed"], "quantiles": {key: one["quantiles"][key] for key in shown}}
             for name, one in found["controllers"].items()
         },
-        "improvements": [one for one in found["improvements"] if not one["index"].startswith("seen_")],
-        "motor_lags": _by_motor_lag(read_table(folder / DATABASE), list(found["controllers"])),
     }
 
 
@@ -117,3 +130,23 @@ def campaign_motor_lag(figures: Figures) -> str:
         )
         rows.append(row)
     return table(rows)
+
+
+def opponents(campaign_name: str) -> Callable[[Figures], str]:
+    """Return what writes crashes and quantiles of a campaign of the opponents."""
+    return lambda figures: campaign(figures[campaign_name])
+
+
+def opponents_ratios(figures: Figures) -> str:
+    """Return the ratio of the errors of the PID with feed-forward to each controller's, flight by flight."""
+    rows: dict[str, Row] = {}
+    for index, error in (("seen_iae_m_s", "error seen"), ("iae_m_s", "true error")):
+        for one in figures["improvements"]:
+            if one["index"] == index:
+                name = title(one["controller"])
+                row = rows.setdefault(name, {"PID with feed-forward over": name})
+                row[f"{error}: median (95 %)"] = (
+                    f"{three(one['median'])} ({three(one['low'])} .. {three(one['high'])})"
+                )
+                row[f"{error}: the other is closer in"] = f"{_percent(one['better']['share'])} %"
+    return table(list(rows.values()))

@@ -16,7 +16,15 @@ from benchmarks.evidence.board_tables import (
     read_faults,
     read_footprints,
 )
-from benchmarks.evidence.campaign_tables import campaign, campaign_motor_lag, campaign_ratios, read_campaign
+from benchmarks.evidence.campaign_tables import (
+    campaign,
+    campaign_motor_lag,
+    campaign_ratios,
+    opponents,
+    opponents_ratios,
+    read_campaign,
+    read_opponents,
+)
 from benchmarks.evidence.item import RESULTS, Figures, Item
 from benchmarks.evidence.pictures import draw_envelope
 from benchmarks.evidence.tables import (
@@ -134,6 +142,25 @@ ITEMS: Final = (
         "campaign",
         "",
         {"campaign": campaign, "campaign-ratios": campaign_ratios, "campaign-motor-lag": campaign_motor_lag},
+    ),
+    Item(
+        name="opponents",
+        commands=(
+            f"mambo-nmpc campaign {_HERE}/opponents.toml -o {RESULTS}/opponents/drawn",
+            f"mambo-nmpc campaign {_HERE}/opponents-slow-motors.toml --flights 300 "
+            f"-o {RESULTS}/opponents/slow-motors",
+        ),
+        controllers=_FLOWN,
+        paths=(
+            *(*_FLIGHT, f"{_EXPERIMENT}/campaign"),
+            *(f"{_HERE}/opponents.toml", f"{_HERE}/opponents-slow-motors.toml"),
+        ),
+        read=read_opponents,
+        tables={
+            "opponents": opponents("drawn"),
+            "opponents-ratios": opponents_ratios,
+            "opponents-slow-motors": opponents("slow-motors"),
+        },
     ),
     _campaign("campaign-older-flow", "--flights 100 ", {"campaign-older-flow": campaign}),
     _campaign("campaign-quick-motors", "--flights 100 ", {"campaign-quick-motors": campaign}),

@@ -165,7 +165,7 @@ def test_an_unknown_item_is_refused() -> None:
 
 # README
 
-SUMMARISED = ("table2.md", "campaign.md")
+SUMMARISED = ("table2.md", "opponents.md", "opponents-slow-motors.md")
 """Tables whose figures README repeats."""
 
 
