@@ -55,7 +55,7 @@ COMMANDS = (
             "faults slow-table1.toml --vehicle slow.toml",
             "table2",
             "diff slow-table1.toml slow-mambo-1norm.toml --vehicle slow.toml",
-            "sweep slow-table1.toml --vehicle slow.toml --prediction 5 --control 1 --iterations 3",
+            "sweep slow-table1.toml --vehicle slow.toml --vary horizon.prediction=5:5:1",
         )
     ),
 )

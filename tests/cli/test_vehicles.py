@@ -76,7 +76,7 @@ def test_a_wrong_drone_is_refused_and_nothing_is_left(command: str) -> None:
     if command == "tune":
         require_module("optuna")
     Path("wrong.toml").write_text(DRONE.replace("0.03\n", "-1\n", 1), "utf-8")
-    source = ["mambo-1norm"] if command == "sweep" else []
+    source = ["--vary", "limits.tilt_rad=0.2:0.3:2"] if command == "sweep" else []
     _, said = run(command, *source, "--vehicle", "wrong.toml", "-o", "out", code=2)
     assert said.startswith("wrong.toml: body.mass_kg = -1 must lie in 0.001..100")
     assert not Path("out").exists()
@@ -164,7 +164,7 @@ def test_faults_and_sweeps_state_their_drone() -> None:
     """In their summaries."""
     run("faults", "--vehicle", "mine.toml", "-o", "faults")
     assert summary("faults")["vehicle"]["name"] == "mine"
-    small = ["mambo-1norm", "--prediction", "5", "--control", "1", "--iterations", "3"]
+    small = ["--vary", "cost.response_time_s=0.2:0.2:1"]
     run("sweep", *small, "--vehicle", "mine.toml", "-o", "mine")
     run("sweep", *small, "-o", "mambo")
     assert summary("mine")["vehicle"]["name"] == "mine"

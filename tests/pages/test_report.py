@@ -42,7 +42,12 @@ SEEN = {
         "Play",
     ),
     "footprint": ("3000 B", "is over its budget", "Arduino Mega 2560", "there is no emulator", "incomplete"),
-    "sweep": ("closest tracking that fits: prediction 10", "All 5 controllers", "IAE, m s", "\N{EN DASH}"),
+    "sweep": (
+        "that fits: horizon.prediction 10, horizon.control 1",
+        "All 6 controllers",
+        "IAE, m s",
+        "\N{EN DASH}",
+    ),
     "faults": ("state NaN to the end", "crashed", "2376.50", "OK, BAD_STATE"),
     "verify": ("incomplete: 1 of 2 checks passed", "cppcheck is missing", "update_period_s"),
     "regress": ("1 of 2 flights passed, 1 failed", "the trace differs", "fly --repeat", ">1.5<", "0.750"),
@@ -425,7 +430,7 @@ def test_colours_are_told_from_the_paper_by_weak_eyes_too() -> None:
 def test_what_the_commands_write_is_read() -> None:
     """The commands whose summaries no function writes, for real, and one page of their folders."""
     board_builder("crazyflie")
-    small = ["--prediction", "5", "--control", "1", "--iterations", "5"]
+    small = ["--vary", "cost.response_time_s=0.2:0.2:1"]
     for line in (
         ["fly", "--duration-s", "12", "-o", "fly"],
         ["fly", "--controller", "pd", "--start", "take-off", "--duration-s", "2", "-o", "pd"],

@@ -15,7 +15,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.sizes import Added, Parts, SectionBytes
 from mambo_sil.board.footprint import footprint_report
 from mambo_sil.board.footprint.measure import Footprint
-from mambo_sil.board.footprint.sweep import Point, budgets
+from mambo_sil.board.footprint.sweep import Axis, Point, budgets
 from mambo_sil.board.footprint.sweep_report import SweepSummary
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, Drawn, WorstFlight
@@ -142,15 +142,22 @@ def footprint_folder(folder: Path) -> None:
 
 
 def sweep_folder(folder: Path) -> None:
-    """Write a sweep of four points, one of which did not fly."""
+    """Write a sweep of six points, one of which did not fly, and one of which is refused."""
+    keys = ("horizon.prediction", "horizon.control")
+    axes = [Axis(keys[0], (1, 5, 10, 15)), Axis(keys[1], (1, 2))]
     flown = ((prediction, control) for prediction in (5, 10) for control in (1, 2))
-    points = [Point(np_, nc, 5, 3000 + np_, 100, 200.0, 4000.0, 0.1, 3.0 / np_, nc < 2) for np_, nc in flown]
-    points.append(Point(15, 1, 5, 3015, 100, np.nan, np.nan, np.nan, np.nan, False))
+    points = [
+        Point(dict(zip(keys, (np_, nc), strict=True)), 3000 + np_, 100, 200, 4000, 0.1, 3.0 / np_, nc < 2)
+        for np_, nc in flown
+    ]
+    points.append(Point(dict(zip(keys, (15, 1), strict=True)), 3015, 100))
+    points.append(Point(dict(zip(keys, (1, 2), strict=True)), refusal=HOSTILE))
     SweepSummary(
         source=HOSTILE,
         settings=Settings().digest,
         board=HOSTILE,
-        budget=budgets(boards.load("crazyflie"), 0.01),
+        budget=budgets(boards.load("crazyflie"), Settings(), axes),
+        axes=axes,
         points=points,
         closest_fit=points[2],
     ).write(folder)

@@ -61,8 +61,8 @@ mambo-nmpc footprint --board my-board.toml --json
 mambo-nmpc footprint controller.toml --port /dev/ttyACM0 -o measured
 mambo-nmpc same-bits mambo --boards mambo,crazyflie
 mambo-nmpc same-bits controller.toml --port /dev/ttyACM0
-mambo-nmpc sweep --prediction 5:30:5 --control 1:3 --iterations 3,5,10 -o sweep
-mambo-nmpc sweep --board rp2040 --fit
+mambo-nmpc sweep --vary cost.response_time_s=0.1:0.5:5 -o sweep
+mambo-nmpc sweep mambo-1norm --vary horizon.prediction=5:30:6 --vary optimizer.iterations=3:9:3 --fit
 mambo-nmpc vehicles
 mambo-nmpc vehicles generic > my-drone.toml
 mambo-nmpc vehicles --schema > vehicle.schema.json

@@ -1,11 +1,13 @@
 """The commands of the panel Board: footprint, sweep, same-bits."""
 
 import contextlib
+import difflib
 import json
+import math
 import os
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +28,10 @@ from mambo_sil.cli.options import (
     load_boards,
     show,
 )
+
+if TYPE_CHECKING:
+    from mambo_codegen.settings.model import Settings
+    from mambo_sil.board.footprint.sweep import Axis
 
 FOOTPRINT_FILES = ("footprint.png", "footprint.svg", "footprint.html")
 
@@ -93,20 +99,23 @@ def footprint(
 
 
 SWEEP_FILES = ("sweep.csv", "sweep.png", "sweep.svg")
+MOST_KEYS, MOST_VALUES = 2, 100
 
 
 def sweep(
-    source: Source = "mambo-1norm",
+    source: Source = "mambo",
     *,
     scalar: Scalar = None,
     board: Annotated[
         str, typer.Option(help="Board, or its TOML file.", autocompletion=complete_boards)
     ] = "crazyflie",
-    prediction: Annotated[
-        str, typer.Option(help="Prediction horizons.", metavar="FIRST:LAST[:STEP]")
-    ] = "5:30:5",
-    control: Annotated[str, typer.Option(help="Control horizons.", metavar="FIRST:LAST")] = "1:3",
-    iterations: Annotated[str, typer.Option(help="Iterations.", metavar="N,N")] = "3,5,10",
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            help="A key of the settings and its values: from FIRST to LAST, COUNT of them. Once or twice.",
+            metavar="KEY=FIRST:LAST:COUNT",
+        ),
+    ],
     fit: Annotated[
         bool,
         typer.Option("--fit", help="Print only the closest-tracking one within the budget.", metavar=""),
@@ -115,10 +124,9 @@ def sweep(
     output: Results = Path("sweep"),
     as_json: AsJson = False,
 ) -> None:
-    """Measure footprint and tracking error over a grid of horizons and iterations."""
+    """Vary one or two settings; measure footprint and tracking error of each controller."""
     from mambo_codegen import boards
-    from mambo_codegen.methods import method_of
-    from mambo_sil.board.footprint.sweep import Grid, budgets, measure_grid
+    from mambo_sil.board.footprint.sweep import budgets, grid, measure_grid
     from mambo_sil.board.footprint.sweep_report import SweepSummary, closest_fit, point_text, write_points
     from mambo_sil.cli.progress import counting_bar
     from mambo_sil.drone.vehicles import vehicle_toml
@@ -126,42 +134,28 @@ def sweep(
     from mambo_sil.results.folders import new_results
 
     settings = load(source, scalar)
-    if not method_of(settings).iterates:
-        raise InvalidSettingsError(
-            (
-                f'{echo(source)}: cost.norm = "quadratic" must be "1-norm" for a sweep: with a quadratic '
-                "cost there are no horizons and iterations to vary; `mambo-nmpc tune` searches its settings",
-            )
-        )
     chosen, drone = boards.load(board), vehicle_toml.load(vehicle)
-    grid = Grid(
-        _numbers("--prediction", prediction, 50),
-        _numbers("--control", control, 50),
-        _numbers("--iterations", iterations, 100),
-    )
-    total = len(grid.points())
-    if total == 0:
-        raise InvalidSettingsError(
-            (f"--control {echo(control)} must be at most --prediction {echo(prediction)}",)
-        )
+    axes = _axes(vary, settings)
+    budget = budgets(chosen, settings, axes)
     with (
         new_results(output, SweepSummary.command, SWEEP_FILES) as folder,
-        counting_bar("sweeping", "controllers", total) as bar,
+        counting_bar("sweeping", "controllers", len(grid(axes))) as bar,
     ):
         with processes(os.cpu_count() or 1) as pool:
-            points = measure_grid(settings, chosen, grid, pool.run, bar, drone=drone)
+            points = measure_grid(settings, chosen, axes, pool.run, bar, drone=drone)
         bar.stage("drawing pictures")
         from mambo_sil.board.footprint.footprint_plots import draw_sweep
 
         write_points(points, folder / "sweep.csv")
-        draw_sweep(points, chosen, settings.horizon.update_period_s, folder / "sweep")
+        draw_sweep(points, axes, budget, chosen.title, folder / "sweep")
         best = closest_fit(points)
         summary = SweepSummary(
             source=source,
             settings=settings.digest,
             board=chosen.name,
             vehicle=drone,
-            budget=budgets(chosen, settings.horizon.update_period_s),
+            budget=budget,
+            axes=axes,
             points=points,
             closest_fit=best,
         )
@@ -174,22 +168,49 @@ def sweep(
         raise typer.Exit(1)
 
 
-def _numbers(option: str, text: str, most: int) -> tuple[int, ...]:
-    """Read 5:30, 5:30:5 or 1,3,5; raises InvalidSettingsError."""
-    try:
-        if ":" in text:
-            first, last, *step = (int(word) for word in text.split(":"))
-            (each,) = step or (1,)
-            numbers = tuple(range(first, min(last, most + 1) + 1, each)) if first > 0 else ()
-        else:
-            numbers = tuple(int(word) for word in text.split(","))
-    except ValueError:
-        numbers = ()
-    if not numbers or min(numbers) < 1 or max(numbers) > most:
+def _axes(vary: list[str], settings: "Settings") -> "list[Axis]":
+    """Read --vary; raises InvalidSettingsError."""
+    if len(vary) > MOST_KEYS:
+        raise InvalidSettingsError((f"--vary: {len(vary)} keys are too many; name one or two",))
+    axes = [_axis(text, settings) for text in vary]
+    if len({axis.key for axis in axes}) < len(axes):
+        raise InvalidSettingsError((f"--vary: {axes[0].key} is there twice; name two keys",))
+    return axes
+
+
+def _axis(text: str, settings: "Settings") -> "Axis":
+    """Read KEY=FIRST:LAST:COUNT; whole numbers stay whole. Raises InvalidSettingsError."""
+    from mambo_codegen.settings.controller_keys import KEYS
+    from mambo_sil.board.footprint.sweep import Axis
+
+    key, _, span = text.partition("=")
+    free = [path for path, one in KEYS.items() if one.low is not None and settings.uses(*path.split("."))]
+    if key not in free:
+        near = [path for path in free if path.endswith(f".{key}")]
+        near = near or difflib.get_close_matches(key, free, n=1, cutoff=0.0)
         raise InvalidSettingsError(
-            (f"{option} {echo(text)} must be numbers in 1..{most}, such as 5:30, 5:30:5 or 1,3,5",)
+            (
+                f"--vary {echo(text)}: {echo(key)} is not a number that settings with cost.norm = "
+                f'"{settings.cost.norm}" use; did you mean {near[0]}?',
+            )
         )
-    return numbers
+    try:
+        first, last, number = span.split(":")
+        low, high, count = float(first), float(last), int(number)
+    except ValueError:
+        low, high, count = math.nan, math.nan, 0
+    if not (math.isfinite(low) and math.isfinite(high) and 1 <= count <= MOST_VALUES):
+        raise InvalidSettingsError(
+            (
+                f"--vary {echo(text)} must be KEY=FIRST:LAST:COUNT with a COUNT in 1..{MOST_VALUES}, "
+                "such as cost.response_time_s=0.1:0.5:5",
+            )
+        )
+    step = (high - low) / max(count - 1, 1)
+    values = [float(f"{low + step * index:.12g}") for index in range(count)]
+    if KEYS[key].kind == "whole number":
+        return Axis(key, tuple(dict.fromkeys(round(value) for value in values)))
+    return Axis(key, tuple(dict.fromkeys(values)))
 
 
 def same_bits(

@@ -10,11 +10,10 @@ import matplotlib as mpl
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator
+from matplotlib.ticker import MaxNLocator
 
-from mambo_codegen.boards import Board
 from mambo_sil.board.footprint.measure import Footprint
-from mambo_sil.board.footprint.sweep import Point, budgets
+from mambo_sil.board.footprint.sweep import Axis, Point
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
 from mambo_sil.results.style import COLUMN_INCHES, COMMAND, FLOWN, PAGE_INCHES, QUIET, SMALL, THIN, style
 
@@ -55,63 +54,67 @@ def _format(value: float) -> str:
 
 
 def draw_sweep(
-    points: Sequence[Point], board: Board, update_period_s: float, stem: Path
+    points: Sequence[Point], axes: Sequence[Axis], budget: Mapping[str, float], title: str, stem: Path
 ) -> tuple[Path, Path]:
-    """Draw flash, RAM, time and IAE against the prediction horizon; write stem.png and stem.svg.
+    """Draw flash, RAM, time and IAE against the first key; write stem.png and stem.svg.
 
-    Colour: control horizon. Line style: iterations. Dots: within budget. Dashed grey line: the budget.
+    A line for each value of the second key. Dots: within budget. Dashed grey line: the budget. Crosses at the
+    bottom: refused settings.
     """
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 5.6), layout="constrained")
-        limits = budgets(board, update_period_s)
-        for axes, quantity in zip(figure.subplots(2, 2).flat, _SWEPT, strict=True):
-            _draw_swept(axes, points, quantity, limits.get(quantity))
-        handles, labels = axes.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)))
-        figure.suptitle(board.title, parse_math=False)
+        for panel, quantity in zip(figure.subplots(2, 2).flat, _SWEPT, strict=True):
+            _draw_swept(panel, points, axes, quantity, budget.get(quantity))
+        _add_legend(figure, panel, 3)
+        figure.suptitle(title, parse_math=False)
         return save(figure, stem)
 
 
-def _draw_swept(axes: Axes, points: Sequence[Point], quantity: str, limit: float | None) -> None:
-    """Draw one quantity of `_SWEPT` against the prediction horizon, and its limit if that is near."""
-    controls = sorted({point.control for point in points})
-    iterations = sorted({point.iterations for point in points})
-    for (row, control), (column, count) in product(enumerate(controls), enumerate(iterations)):
-        line = [p for p in points if (p.control, p.iterations) == (control, count)]
-        x, y = [p.prediction for p in line], [getattr(p, quantity) for p in line]
-        colour, dashes = f"C{row}", ("-", "--", "-.", ":")[column % 4]
-        label = f"{control} {'move' if control == 1 else 'moves'}, {count} iterations"
-        axes.plot(x, y, color=colour, linestyle=dashes, label=label)
-        fits = [(p.prediction, getattr(p, quantity)) for p in line if p.fits]
-        axes.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour)
-    if limit is not None and limit < 3 * max(getattr(p, quantity) for p in points):
-        axes.axhline(limit, color=QUIET, linestyle=(0, (6, 3)), linewidth=THIN)
-    axes.set(xlabel="prediction horizon", ylabel=_SWEPT[quantity])
-    axes.xaxis.set_major_locator(FixedLocator(_ticks(sorted({point.prediction for point in points}))))
-    if quantity in ("iae_m_s", "time_ms"):
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(PlainLogFormatter())
-        axes.yaxis.set_minor_formatter(PlainLogFormatter())
+def _draw_swept(
+    panel: Axes, points: Sequence[Point], axes: Sequence[Axis], quantity: str, limit: float | None
+) -> None:
+    """Draw one quantity of `_SWEPT` against the first key, and its limit if that is near."""
+    first, *rest = axes
+    for row, values in enumerate(product(*(axis.values for axis in rest))):
+        others = {axis.key: value for axis, value in zip(rest, values, strict=True)}
+        line = [point for point in points if others.items() <= point.values.items()]
+        x, y = [point.values[first.key] for point in line], [getattr(point, quantity) for point in line]
+        colour, dashes = f"C{row % 10}", ("-", "--", "-.", ":")[row // 10 % 4]
+        label = ", ".join(f"{key} {value:g}" for key, value in others.items())
+        panel.plot(x, y, color=colour, linestyle=dashes, label=label or "_")
+        fits = [(point.values[first.key], getattr(point, quantity)) for point in line if point.fits]
+        panel.plot(*zip(*fits, strict=True) if fits else ([], []), "o", color=colour)
+    refused = sorted({point.values[first.key] for point in points if point.refusal is not None})
+    panel.plot(refused, [0.03] * len(refused), "x", color=QUIET, transform=panel.get_xaxis_transform())
+    measured = [value for value in (getattr(point, quantity) for point in points) if math.isfinite(value)]
+    if limit is not None and measured and limit < 3 * max(measured):
+        panel.axhline(limit, color=QUIET, linestyle=(0, (6, 3)), linewidth=THIN)
+    panel.set(xlabel=first.key, ylabel=_SWEPT[quantity])
+    panel.xaxis.set_major_locator(MaxNLocator(7, integer=all(isinstance(one, int) for one in first.values)))
+    if measured and max(measured) > 2.0 * min(measured) and quantity in ("iae_m_s", "time_ms"):
+        panel.set_yscale("log")
+        panel.yaxis.set_major_formatter(PlainLogFormatter())
+        panel.yaxis.set_minor_formatter(PlainLogFormatter())
 
 
-def _ticks(horizons: Sequence[int]) -> list[int]:
-    """Return the swept horizons, or every second, third ... of more than ten."""
-    return list(horizons[:: -(-len(horizons) // 10)])
+def _add_legend(figure: Figure, panel: Axes, columns: int) -> None:
+    """Add the legend of the second key, if there is one."""
+    handles, labels = panel.get_legend_handles_labels()
+    if labels:
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(columns, len(labels)))
 
 
-def sweep_panels(points: Sequence[Point], budgets: Mapping[str, float]) -> list[Markup]:
-    """Return a picture of each swept quantity against the prediction horizon; the first has the legend."""
+def sweep_panels(points: Sequence[Point], axes: Sequence[Axis], budget: Mapping[str, float]) -> list[Markup]:
+    """Return a picture of each measured quantity against the first key; the first has the legend."""
     pictures: list[Markup] = []
     with style():
         for quantity, label in _SWEPT.items():
             if all(math.isnan(getattr(point, quantity)) for point in points):
                 continue
             figure = Figure(figsize=(COLUMN_INCHES, 2.9), layout="constrained")
-            axes = figure.subplots()
-            _draw_swept(axes, points, quantity, budgets.get(quantity))
+            panel = figure.subplots()
+            _draw_swept(panel, points, axes, quantity, budget.get(quantity))
             if not pictures:
-                figure.legend(loc="outside lower center", ncols=2)
-            pictures.append(
-                inline(figure, f"{label} against the prediction horizon; the table has the values")
-            )
+                _add_legend(figure, panel, 2)
+            pictures.append(inline(figure, f"{label} against {axes[0].key}; the table has the values"))
     return pictures

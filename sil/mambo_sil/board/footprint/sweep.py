@@ -1,18 +1,20 @@
-"""Sweep horizons and iterations: footprint on a board, and tracking of the Table II case."""
+"""Vary one or two settings: footprint on a board, and tracking of the Table II case."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
 
 from mambo_codegen.boards import Board
+from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.settings.controller_toml import validate
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.footprint.measure import measure_footprint
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.errors import WorkerError
+from mambo_sil.errors import FlightError, WorkerError
 from mambo_sil.experiment.table2.table2 import CASES
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.simulate import fly
@@ -27,53 +29,51 @@ Run = Callable[[Callable[..., Any], Iterable[tuple[Any, ...]]], Iterator[tuple[i
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Values to sweep: prediction horizons, control horizons, iterations."""
+class Axis:
+    """A key of the settings, such as cost.effort_weight, and the values that it takes."""
 
-    prediction: tuple[int, ...]
-    control: tuple[int, ...]
-    iterations: tuple[int, ...]
-
-    def points(self) -> list[tuple[int, int, int]]:
-        """Return every combination whose control horizon is at most its prediction horizon."""
-        return [
-            (prediction, control, iterations)
-            for prediction, control, iterations in product(self.prediction, self.control, self.iterations)
-            if control <= prediction
-        ]
+    key: str
+    values: tuple[Number, ...]
 
 
 @dataclass(frozen=True)
 class Point:
-    """One controller of the grid on the board; NaN where not measured, and then `fits` is False."""
+    """One controller on the board; NaN where not measured, and then `fits` is False."""
 
-    prediction: int
-    control: int
-    iterations: int
-    flash_bytes: int
-    ram_bytes: int
-    stack_bytes: Number
-    instructions: Number
-    time_ms: Number
-    iae_m_s: Number
-    fits: bool
+    values: dict[str, Number]
+    """The varied keys."""
+    flash_bytes: Number = math.nan
+    ram_bytes: Number = math.nan
+    stack_bytes: Number = math.nan
+    instructions: Number = math.nan
+    time_ms: Number = math.nan
+    iae_m_s: Number = math.nan
+    fits: bool = False
+    refusal: str | None = None
+    """Why these settings are no controller, or cannot fly."""
+
+
+def grid(axes: Sequence[Axis]) -> list[dict[str, Number]]:
+    """Return every combination of the values, the last key's varying fastest."""
+    keys = [axis.key for axis in axes]
+    return [dict(zip(keys, values, strict=True)) for values in product(*(axis.values for axis in axes))]
 
 
 def measure_grid(
     settings: Settings,
     board: Board,
-    grid: Grid,
+    axes: Sequence[Axis],
     run: Run,
     progress: Callable[[int], None],
     *,
     drone: VehicleFile = NOMINAL,
 ) -> list[Point]:
-    """Return the points of the grid in order; `run` measures them, in any order.
+    """Return the points of `grid` in order; `run` measures them, in any order.
 
     Calls `progress` with the number of measured points. Raises WorkerError if a worker fails.
     """
     documents = settings.model_dump(), board.model_dump(), drone.model_dump()
-    jobs = [((*documents, *point),) for point in grid.points()]
+    jobs = [(*documents, values) for values in grid(axes)]
     found: dict[int, Point] = {}
     progress(0)
     try:
@@ -85,32 +85,36 @@ def measure_grid(
     return [found[number] for number in sorted(found)]
 
 
-def budgets(board: Board, update_period_s: float) -> dict[str, float]:
-    """Return the budget of the board by field of `Point`."""
+def budgets(board: Board, settings: Settings, axes: Sequence[Axis]) -> dict[str, float]:
+    """Return the budget of the board by field of `Point`, if all points have the same."""
     budget = board.budget
-    return {
-        "flash_bytes": budget.flash_bytes,
-        "ram_bytes": budget.ram_bytes,
-        "time_ms": 1000.0 * update_period_s * budget.period_share,
-    }
+    found: dict[str, float] = {"flash_bytes": budget.flash_bytes, "ram_bytes": budget.ram_bytes}
+    if all(axis.key != "horizon.update_period_s" for axis in axes):
+        found["time_ms"] = 1000.0 * settings.horizon.update_period_s * budget.period_share
+    return found
 
 
-def _measure_point(job: tuple[dict[str, Any], dict[str, Any], dict[str, Any], int, int, int]) -> Point:
-    """Measure one point in a worker process; `job` is plain data, since generic models do not pickle."""
-    document, board_document, drone, prediction, control, iterations = job
-    board = Board.model_validate(board_document)
-    document["horizon"] |= {"prediction": prediction, "control": control}
-    document["optimizer"] |= {"iterations": iterations}
-    chosen = Settings.model_validate(document)
-    footprint = measure_footprint(chosen, board, counted_ticks=COUNTED_TICKS)
-    case = next(iter(CASES.values()))
-    vehicle = Vehicle.of(VehicleFile.model_validate(drone))
-    flight = Flight(case, vehicle=vehicle, update_period_s=chosen.horizon.update_period_s)
-    metrics = measure(fly(flight, CompiledController(chosen)))
+def _measure_point(
+    document: dict[str, Any], board: dict[str, Any], drone: dict[str, Any], values: Mapping[str, Number]
+) -> Point:
+    """Measure one point in a worker process; the arguments are plain data: generic models do not pickle."""
+    for key, value in values.items():
+        section, name = key.split(".")
+        document[section][name] = value
+    try:
+        chosen = validate(document, "")
+        vehicle = Vehicle.of(VehicleFile.model_validate(drone))
+        case = next(iter(CASES.values()))
+        flight = Flight(case, vehicle=vehicle, update_period_s=chosen.horizon.update_period_s)
+        controller = CompiledController(chosen)
+    except InvalidSettingsError as error:
+        return Point(dict(values), refusal="; ".join(fault.removeprefix(": ") for fault in error.faults))
+    except FlightError as error:
+        return Point(dict(values), refusal=f"horizon.{error}")
+    footprint = measure_footprint(chosen, Board.model_validate(board), counted_ticks=COUNTED_TICKS)
+    metrics = measure(fly(flight, controller))
     return Point(
-        prediction=prediction,
-        control=control,
-        iterations=iterations,
+        dict(values),
         flash_bytes=footprint.added.flash.total,
         ram_bytes=footprint.added.ram.total,
         stack_bytes=math.nan if footprint.stack is None else footprint.stack.bytes,

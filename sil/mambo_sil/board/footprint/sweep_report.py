@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from mambo_sil.board.footprint.sweep import Point
+from mambo_sil.board.footprint.sweep import Axis, Point
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
 
 class SweepSummary(ReportedSummary):
-    """A grid of horizons and iterations; `budget` is what `budgets` returns."""
+    """The points of a grid over one or two keys; `budget` is what `budgets` returns."""
 
     command = "sweep"
 
@@ -22,6 +22,7 @@ class SweepSummary(ReportedSummary):
     board: str
     vehicle: VehicleFile = NOMINAL
     budget: dict[str, Number]
+    axes: list[Axis]
     points: list[Point]
     closest_fit: Point | None
 
@@ -30,35 +31,40 @@ class SweepSummary(ReportedSummary):
         from mambo_sil.board.footprint.footprint_plots import sweep_panels  # noqa: PLC0415 - loaded when drawing
 
         best = self.closest_fit
-        finding = (
-            "nothing fits"
-            if best is None
-            else f"closest tracking that fits: prediction {best.prediction}, {best.control} moves, "
-            f"{best.iterations} iterations"
-        )
-        pictures = sweep_panels(self.points, self.budget) if self.points else []
+        finding = "nothing fits" if best is None else f"closest tracking that fits: {values_text(best)}"
+        pictures = sweep_panels(self.points, self.axes, self.budget) if self.points else []
         title = f"Sweep of {self.source} on {self.board}, vehicle {self.vehicle.name}"
         return Section("sweep", title, best is not None, finding, {"summary": self, "pictures": pictures})
 
 
 def closest_fit(points: Sequence[Point]) -> Point | None:
-    """Return the fitting point that is not lost with the least IAE, of equal ones the shortest horizons."""
+    """Return the fitting point that is not lost with the least IAE, of equal ones with the least flash."""
     fitting = [point for point in points if point.fits and not math.isnan(point.iae_m_s)]
-    return min(fitting, key=lambda p: (p.iae_m_s, p.prediction, p.control, p.iterations), default=None)
+    return min(fitting, key=lambda point: (point.iae_m_s, point.flash_bytes), default=None)
 
 
 def write_points(points: Sequence[Point], path: Path) -> None:
-    """Write a CSV file with one line for each point."""
+    """Write a CSV file with one line for each point: the varied keys, then what was measured."""
+    measured = [field.name for field in fields(Point) if field.name != "values"]
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(Point)], lineterminator="\n")
+        writer = csv.DictWriter(file, [*points[0].values, *measured], lineterminator="\n")
         writer.writeheader()
-        writer.writerows(asdict(point) for point in points)
+        for point in points:
+            row = asdict(point)
+            writer.writerow(row.pop("values") | row)
+
+
+def values_text(point: Point) -> str:
+    """Spell the varied keys of a point."""
+    return ", ".join(f"{key} {value:g}" for key, value in point.values.items())
 
 
 def point_text(point: Point) -> str:
     """Spell a point in a line."""
+    if point.refusal is not None:
+        return f"{values_text(point)}  refused: {point.refusal}"
     return (
-        f"prediction {point.prediction:2}  control {point.control:2}  iterations {point.iterations:3}  "
+        f"{values_text(point)}  "
         f"flash {point.flash_bytes} B  RAM {point.ram_bytes} B  stack {point.stack_bytes:g} B  "
         f"instructions {point.instructions:g}  IAE {point.iae_m_s:.4g} m s  "
         f"{'fits' if point.fits else 'not shown to fit'}"
