@@ -1,6 +1,7 @@
 """Checks of the arguments of Python calls: ArgumentError names argument, value and rule."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,12 @@ def require_choice(name: str, value: object, choices: Sequence[str]) -> None:
 def require_kind(name: str, value: object, kind: type | tuple[type, ...], words: str) -> None:
     """Raise ArgumentError unless `value` is of a type, which `words` call "a path", say."""
     require(isinstance(value, kind), name, value, f"be {words}")
+
+
+def require_path(name: str, value: object, kind: str) -> None:
+    """Raise ArgumentError unless `value` can be the path of a file; `kind` says of which file."""
+    whole = isinstance(value, str | Path) and "\0" not in str(value)
+    require(whole, name, value, f"be the path of {kind}")
 
 
 def is_whole(value: object, low: int, high: int) -> bool:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -190,6 +191,9 @@ def test_a_wrong_argument_of_fly_is_refused_by_name(wrong: dict[str, Any], messa
         (Vehicle, ("mambo",), 'airframe = "mambo" must be an Airframe; Vehicle.from_preset'),
         (Vehicle.from_preset, (3,), "name = 3 must be one of crazyflie"),
         (Vehicle.from_file, (None,), "path = None must be the path of a vehicle.toml"),
+        (Vehicle.from_file, ("a\0b",), r"path = \"a.*b\" must be the path of a vehicle.toml"),
+        (Vehicle.of, ("mambo",), 'drone = "mambo" must be a VehicleFile; from_preset'),
+        (Controller.from_file, ("a\0b",), r"path = \"a.*b\" must be the path of a controller.toml"),
         (Controller, ("mambo",), 'settings = "mambo" must be Settings; from_preset'),
         (Controller, (ONE_NORM, 1.5), "n = 1.5 must be a whole number"),
         (Controller, (ONE_NORM, True), "n = True must be a whole number"),
@@ -261,6 +265,12 @@ def test_bad_numbers_give_a_status_and_no_exception() -> None:
     )
     assert outcome.status[0] != 0
     assert np.isfinite(outcome.command_rad).all()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        far = DroneState([1e300, 0.0], [0.0, 0.0], [0.0, 0.0, 0.0])
+        assert (
+            Controller.from_preset("crazyflie").step(far, TargetState([0.0, 0.0], [0.0, 0.0])).status[0] != 0
+        )
 
 
 @pytest.mark.parametrize("frame", AXES)

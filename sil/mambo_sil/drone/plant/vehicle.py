@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from mambo_sil.arguments import require_kind, require_per_flight
+from mambo_sil.arguments import require_kind, require_path, require_per_flight
 from mambo_sil.drone.plant.airframe import MAMBO, NOMINAL, Airframe, airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.cascade import CascadeLoop
@@ -110,7 +110,8 @@ class Vehicle:
 
     @classmethod
     def of(cls, drone: VehicleFile) -> "Vehicle":
-        """Return a drone as it is described."""
+        """Return a drone as it is described; raises ArgumentError for what is no VehicleFile."""
+        require_kind("drone", drone, VehicleFile, "a VehicleFile; from_preset and from_file read one")
         return cls(airframe_of(drone), drone.motor_lag_s, drone.body.drag_1_s, drone=drone)
 
     @classmethod
@@ -125,7 +126,7 @@ class Vehicle:
 
         Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
         """
-        require_kind("path", path, (str, Path), "the path of a vehicle.toml")
+        require_path("path", path, "a vehicle.toml")
         return cls.of(vehicle_toml.read(Path(path)))
 
     @cached_property

@@ -11,7 +11,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
-from mambo_sil.arguments import is_whole, of_shape, require, require_kind
+from mambo_sil.arguments import is_whole, of_shape, require, require_kind, require_path
 from mambo_sil.errors import ArgumentError
 from mambo_sil.flight.api.states import DroneState, TargetState
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -44,7 +44,7 @@ class Controller:
 
         Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
         """
-        require_kind("path", path, (str, Path), "the path of a controller.toml")
+        require_path("path", path, "a controller.toml")
         return cls(controller_toml.read(Path(path)), n)
 
     @property

@@ -47,7 +47,8 @@ def as_array(
     given = np.asarray(values)
     if given.shape != shape:
         raise ValueError(f"expected an array of shape {shape}, got {given.shape}")
-    return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
+    with np.errstate(over="ignore"):  # infinity, which the C refuses
+        return numbers.quantize(given.reshape(-1, len(quantities)), quantities).reshape(shape)
 
 
 def empty_outcome(method: Method, n: int, integer: DTypeLike) -> dict[str, NDArray[Any]]:
