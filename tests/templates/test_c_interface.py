@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from mambo_codegen.bundle.render import render
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.inputs import Status
 from mambo_codegen.methods.one_norm.controller import OneNormController
 from mambo_codegen.methods.one_norm.method import OneNorm
@@ -20,6 +21,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.controller_library import build_library
 from tests.support.extension import build_extension, load_extension
 from tests.support.one_norm import ONE_NORM
+from tests.support.quadratic import EVERYTHING
 from tests.support.tools import toolchain
 
 MAMBO = ONE_NORM
@@ -139,29 +141,30 @@ def test_weights_change_the_cost_and_bad_ones_nothing(kind: str) -> None:
         assert cost(bad, Status.BAD_WEIGHT) == initial
 
 
-def test_null_pointers_get_a_status_and_a_safe_command() -> None:
-    """Each argument null by itself: a status, and the last good command where there is room for one."""
-    extension = build_extension(MAMBO)
-    ffi, lib = extension.ffi, extension.lib
+@pytest.mark.parametrize("chosen", [MAMBO, EVERYTHING], ids=["one_norm", "quadratic"])
+def test_null_pointers_get_a_status_and_a_safe_command(chosen: Settings) -> None:
+    """Each argument null by itself: a status, the last good command if there is room for one, no change."""
+    extension, method = build_extension(chosen), method_of(chosen)
+    ffi, lib, null = extension.ffi, extension.lib, extension.ffi.NULL
     self = ffi.new("nmpc_t *")
     state, target = ffi.new("nmpc_state_t *"), ffi.new("nmpc_target_t *", {"position_m": [0.5, 0.5]})
     command = ffi.new("nmpc_command_t *")
-    lib.nmpc_init(ffi.NULL)
+    other = ffi.new("nmpc_weights_t *") if method.weight_limits else command
+    lib.nmpc_init(null)
     lib.nmpc_init(self)
     assert lib.nmpc_step(self, state, target, 9.81, command) == Status.OK
-    last = command.roll_rad, command.pitch_rad
-    for arguments in ((self, ffi.NULL, target), (self, state, ffi.NULL)):
+    last, before = (command.roll_rad, command.pitch_rad), bytes(ffi.buffer(self))
+    for arguments in ((self, null, target), (self, state, null)):
         command.roll_rad = command.pitch_rad = 9.0
         assert lib.nmpc_step(*arguments, 9.81, command) == Status.NULL_POINTER
         assert (command.roll_rad, command.pitch_rad) == last
     command.roll_rad = command.pitch_rad = 9.0
-    assert lib.nmpc_step(ffi.NULL, state, target, 9.81, command) == Status.NULL_POINTER
+    assert lib.nmpc_step(null, state, target, 9.81, command) == Status.NULL_POINTER
     assert (command.roll_rad, command.pitch_rad) == (0, 0)
-    assert lib.nmpc_step(self, state, target, 9.81, ffi.NULL) == Status.NULL_POINTER
-    assert lib.nmpc_reset(self, ffi.NULL) == Status.NULL_POINTER
-    assert lib.nmpc_reset(ffi.NULL, command) == Status.NULL_POINTER
-    assert lib.nmpc_set_weights(self, ffi.NULL) == Status.NULL_POINTER
-    assert lib.nmpc_set_weights(ffi.NULL, ffi.new("nmpc_weights_t *")) == Status.NULL_POINTER
+    assert lib.nmpc_step(self, state, target, 9.81, null) == Status.NULL_POINTER
+    for setter, argument in ((lib.nmpc_reset, command), (getattr(lib, f"nmpc_{method.setter}"), other)):
+        assert setter(self, null) == setter(null, argument) == Status.NULL_POINTER
+    assert bytes(ffi.buffer(self)) == before
 
 
 TRACKED = presets.load("mambo-1norm")

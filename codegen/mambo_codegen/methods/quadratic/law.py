@@ -4,7 +4,7 @@ Along right and forward the drone's error obeys, in seconds and metres,
 
     e' = v,  v' = a + w,  w' = -j,  j' = -j / 1 s
 
-with a from the attitude model (`codegen.attitude`), w the disturbance less the target's acceleration, and j
+with a from `attitude_constants.py`, w the disturbance less the target's acceleration, and j
 the target's jerk. The cost is the sum over all control steps of
 
     e^2 + (weight v)^2 + (response^3 (u_k - u_k-1) / T_s)^2
