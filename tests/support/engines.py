@@ -341,6 +341,9 @@ def injected(path: Path, fault: Fault, inputs: FloatArray) -> FloatArray:
     address = int(_INTERFACE.cast("intptr_t", _INTERFACE.addressof(engine, "record")))
     inner = Native(ffi.cast("engine_controller_t", address), pointer("char *", memory), 0)
     faulty = native_faulty(ffi.dlopen(str(path)), inner, [fault], memory)
+    record: Any = ffi.cast("engine_faulty_t *", faulty.instance(0))
+    if not any(record.columns):  # an effect that does not use them must not show them
+        record.columns = (2, 5)
     engine.run_faulty(
         _INTERFACE.cast("void *", int(ffi.cast("intptr_t", faulty.instance(0)))),
         *(pointer("double *", array) for array in (inputs, found)),

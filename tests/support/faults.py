@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,15 +11,17 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.experiment.faults.fault import (
     Alteration,
     Fault,
+    FreezeState,
+    KeepInputs,
+    ScaleState,
+    SetState,
+    SetThrust,
+    ShiftState,
+    ShiftTarget,
     WeightChange,
-    freeze_state,
-    keep_inputs,
+    WrapYaw,
     move_target,
-    report_thrust,
-    scale_state,
-    set_state,
     shift_yaw,
-    wrap_yaw,
 )
 from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller, ReweightedController
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -30,32 +31,32 @@ from mambo_sil.flight.trajectories import Bernoulli
 UPDATES: Final = 101
 
 ALTERATIONS: Final[tuple[Alteration, ...]] = (
-    keep_inputs,
-    freeze_state,
-    set_state(slice(0, 7), math.nan, on=3, of=10),
-    set_state(3, -math.inf),
-    set_state(slice(4, 6), 0.05, on=2, of=3),
-    scale_state([0.9, 1.1, 0.8, 1.2, 0.7, 1.3, 1.4]),
+    KeepInputs(),
+    FreezeState(),
+    SetState(range(7), math.nan, on=3, of=10),
+    SetState(range(3, 4), -math.inf),
+    SetState(range(4, 6), 0.05, on=2, of=3),
+    ScaleState((0.9, 1.1, 0.8, 1.2, 0.7, 1.3, 1.4)),
     shift_yaw(math.pi),
-    Alteration(shift_yaw(0.0).effect, (0.1, 0.2, -0.3, 0.4, -0.05, 0.06, 0.7)),
-    wrap_yaw,
+    ShiftState((0.1, 0.2, -0.3, 0.4, -0.05, 0.06, 0.7)),
+    WrapYaw(),
     move_target(0.5),
-    Alteration(move_target(0.0).effect, (0.1, 0.2, -0.3, 0.4, -0.5, 0.6)),
-    report_thrust(5.0),
-    report_thrust(math.nan),
+    ShiftTarget((0.1, 0.2, -0.3, 0.4, -0.5, 0.6)),
+    SetThrust(5.0),
+    SetThrust(math.nan),
 )
 """Every effect; on every number that it changes."""
 
 FAULTS: Final[tuple[Fault | None, ...]] = (
     None,
     *(Fault(20, 60, alter) for alter in ALTERATIONS),
-    Fault(0, 30, freeze_state),
+    Fault(0, 30, FreezeState()),
     Fault(20, 60, drop_every=1),
     Fault(20, 60, drop_every=3),
     Fault(20, 60, late_updates=1),
     Fault(20, 60, late_updates=7),
     Fault(3, 90, late_updates=20),
-    Fault(20, 60, set_state(0, math.nan), 4, 5),
+    Fault(20, 60, SetState(range(1), math.nan), 4, 5),
 )
 """Faults of the inputs, from the first update on, missing updates, late commands, and all of these."""
 
@@ -68,12 +69,8 @@ CHANGES: Final = (
 
 PATIENCE: Final = tuple(1 + row % 4 if row % 2 else 2**31 for row in range(len(FAULTS)))
 
-SHOWN: Final = tuple(
-    fault if any(fault.alter.columns) else replace(fault, alter=replace(fault.alter, columns=(2, 5)))
-    for fault in FAULTS
-    if fault is not None
-)
-"""The same for inputs of any numbers; columns that an effect does not use are there."""
+SHOWN: Final = tuple(fault for fault in FAULTS if fault is not None)
+"""The same for inputs of any numbers."""
 
 
 def any_inputs() -> FloatArray:

@@ -22,14 +22,14 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import (
     ControllerInput,
     Fault,
+    FreezeState,
+    ScaleState,
+    SetState,
+    SetThrust,
     WeightChange,
-    freeze_state,
+    WrapYaw,
     move_target,
-    report_thrust,
-    scale_state,
-    set_state,
     shift_yaw,
-    wrap_yaw,
 )
 from mambo_sil.experiment.faults.fault_flights import End, Verdict, fly_faults
 from mambo_sil.experiment.faults.faults_report import table
@@ -73,24 +73,24 @@ def fly_with(fault: Fault | None) -> Trace:
 
 def test_a_fault_alters_only_the_inputs_that_it_names() -> None:
     """Each fault is applied to inputs of distinct values; all other values stay."""
-    frozen = freeze_state(NOW, BEGAN, 3)
+    frozen = FreezeState()(NOW, BEGAN, 3)
     assert (frozen.state.tolist(), frozen.target.tolist()) == (BEGAN.state.tolist(), NOW.target.tolist())
-    burst = set_state(0, math.inf, on=2, of=5)
+    burst = SetState(range(1), math.inf, on=2, of=5)
     assert [burst(NOW, BEGAN, since).state[0] for since in range(6)] == [math.inf] * 2 + [1.0] * 3 + [
         math.inf
     ]
     assert burst(NOW, BEGAN, 0).state[1:].tolist() == NOW.state[1:].tolist()
-    assert scale_state([1, 1, 1, 1, 2, 2, 2])(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 10, 12, 14]
+    assert ScaleState((1, 1, 1, 1, 2, 2, 2))(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 10, 12, 14]
     assert shift_yaw(1.0)(NOW, BEGAN, 0).state.tolist() == [1, 2, 3, 4, 5, 6, 8]
     assert move_target(100.0)(NOW, BEGAN, 0).target.tolist() == [100, 1, 2, 3, 4, 5]
-    assert report_thrust(0.0)(NOW, BEGAN, 0).thrust_acceleration_m_s2 == 0.0
+    assert SetThrust(0.0)(NOW, BEGAN, 0).thrust_acceleration_m_s2 == 0.0
     assert NOW.state.tolist() == [1, 2, 3, 4, 5, 6, 7]
 
 
 @pytest.mark.parametrize("yaw_rad", [-7.0, -3.2, -3.0, 0.0, 3.1, 3.2, 100.0])
 def test_a_wrapped_yaw_is_the_same_heading_within_half_a_turn(yaw_rad: float) -> None:
     """The wrapped yaw is in [-pi, pi) and differs by a multiple of 2 pi."""
-    wrapped = wrap_yaw(replace(NOW, state=np.array([0.0] * 6 + [yaw_rad])), BEGAN, 0).state[6]
+    wrapped = WrapYaw()(replace(NOW, state=np.array([0.0] * 6 + [yaw_rad])), BEGAN, 0).state[6]
     assert -math.pi <= wrapped < math.pi
     assert math.isclose(math.remainder(wrapped - yaw_rad, 2 * math.pi), 0.0, abs_tol=1e-12)
 
@@ -104,7 +104,7 @@ def test_without_a_fault_the_wrapper_changes_no_bit() -> None:
 
 def test_a_fault_begins_and_ends_on_time() -> None:
     """The controller rejects exactly the updates with NaN."""
-    status = fly_with(Fault(20, 50, set_state(0, math.nan))).status[:, 0]
+    status = fly_with(Fault(20, 50, SetState(range(1), math.nan))).status[:, 0]
     assert np.flatnonzero(status == Status.BAD_STATE).tolist() == list(range(20, 50))
     assert np.unique(status).tolist() == [Status.OK, Status.BAD_STATE]
 
@@ -112,7 +112,7 @@ def test_a_fault_begins_and_ends_on_time() -> None:
 def test_a_frozen_state_is_the_state_at_the_onset() -> None:
     """During the fault the controller receives the state of the first update of the fault."""
     recorder = Recorder()
-    fly_start(FaultyController(recorder, [Fault(30, 60, freeze_state)]))
+    fly_start(FaultyController(recorder, [Fault(30, 60, FreezeState())]))
     shown = recorder.states
     assert all(np.array_equal(shown[update], shown[30]) for update in range(30, 60))
     assert not np.array_equal(shown[60], shown[30])
@@ -180,7 +180,7 @@ def test_a_fault_of_one_flight_does_not_affect_the_others() -> None:
     compiled = CompiledController(MAMBO, 3)
     reweighted = ReweightedController(compiled, 3, [WeightChange(1, 10, (0.0, 0.0))])
     caller = LevellingCaller(reweighted, compiled, np.array([2, 2, 2]))
-    nan = Fault(30, 80, set_state(0, math.nan))
+    nan = Fault(30, 80, SetState(range(1), math.nan))
     together = fly_start(FaultyController(caller, [None, nan, None]), flights=3)
     alone = fly_start(CompiledController(MAMBO))
     for row in (0, 2):
@@ -205,7 +205,7 @@ def test_a_levelling_caller_commands_zero_tilt_after_its_patience() -> None:
     """The last command is held for 20 rejected steps, then zero tilt; the controller restarts from zero."""
     compiled = CompiledController(MAMBO)
     caller = LevellingCaller(compiled, compiled, np.array([20]))
-    trace = fly_start(FaultyController(caller, [Fault(30, 80, set_state(0, math.nan))]))
+    trace = fly_start(FaultyController(caller, [Fault(30, 80, SetState(range(1), math.nan))]))
     command = trace.command_rad[:, 0]
     assert (command[30:49] == command[29]).all()
     assert command[29].any()
@@ -214,9 +214,9 @@ def test_a_levelling_caller_commands_zero_tilt_after_its_patience() -> None:
 
 
 CHOSEN = (
-    FaultScenario("outage", 1.0, set_state(0, math.nan), answers=frozenset({Status.BAD_STATE})),
+    FaultScenario("outage", 1.0, SetState(range(1), math.nan), answers=frozenset({Status.BAD_STATE})),
     FaultScenario("moved", math.inf, move_target(3.0), moved_m=3.0),
-    FaultScenario("wrapped", math.inf, wrap_yaw, turning=True),
+    FaultScenario("wrapped", math.inf, WrapYaw(), turning=True),
     FaultScenario("wrongly refused", 1.0, answers=frozenset({Status.BAD_STATE})),
 )
 

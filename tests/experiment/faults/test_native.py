@@ -10,7 +10,18 @@ from hypothesis import strategies as st
 from mambo_codegen.methods.inputs import Status
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from mambo_sil.experiment.faults.fault import Alteration, Effect, Fault, WeightChange
+from mambo_sil.experiment.faults.fault import (
+    Fault,
+    FreezeState,
+    KeepInputs,
+    ScaleState,
+    SetState,
+    SetThrust,
+    ShiftState,
+    ShiftTarget,
+    WeightChange,
+    WrapYaw,
+)
 from mambo_sil.experiment.faults.injection import FaultyController
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.pd import PdController
@@ -68,14 +79,20 @@ NUMBERS = st.sampled_from([0.0, -0.0, math.nan, math.inf, -math.inf, 1e300, 1e-3
 @st.composite
 def faults(draw: st.DrawFn) -> Fault:
     """Draw a fault, which may end before it begins or act on nothing."""
-    numbers = draw(st.lists(NUMBERS | st.floats(), min_size=7, max_size=7))
-    effect = draw(st.sampled_from(Effect))
-    if effect is Effect.WRAP_YAW:
-        numbers[0] = math.pi
-    count = 6 if effect is Effect.SHIFT_TARGET else 7
-    columns = sorted((draw(st.integers(0, 7)), draw(st.integers(0, 7))))
-    on, of = draw(st.integers(0, 5)), draw(st.integers(1, 5))
-    alter = Alteration(effect, tuple(numbers[:count]), (columns[0], columns[1]), on, of)
+    number = NUMBERS | st.floats()
+    columns = st.tuples(st.integers(0, 7), st.integers(0, 7)).map(lambda ends: range(min(ends), max(ends)))
+    alter = draw(
+        st.one_of(
+            st.builds(KeepInputs),
+            st.builds(FreezeState),
+            st.builds(SetState, columns, number, st.integers(0, 5), st.integers(1, 5)),
+            st.builds(ScaleState, st.tuples(*[number] * 7)),
+            st.builds(ShiftState, st.tuples(*[number] * 7)),
+            st.builds(WrapYaw),
+            st.builds(ShiftTarget, st.tuples(*[number] * 6)),
+            st.builds(SetThrust, number),
+        )
+    )
     begin, end = draw(st.integers(0, UPDATES)), draw(st.integers(0, UPDATES + 5))
     return Fault(begin, end, alter, draw(st.integers(0, 4)), draw(st.integers(0, 30)))
 

@@ -3,10 +3,7 @@
 A fault is a pure function of the controller's correct inputs and of the updates since its onset.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import IntEnum
-from typing import Final
 
 import numpy as np
 
@@ -22,95 +19,113 @@ class ControllerInput:
     thrust_acceleration_m_s2: float
 
 
-class Effect(IntEnum):
-    """What a fault does to the inputs; the engine has the same numbers in faults.c."""
+@dataclass(frozen=True)
+class KeepInputs:
+    """The correct inputs."""
 
-    KEEP = 0
-    FREEZE_STATE = 1
-    SET_STATE = 2
-    SCALE_STATE = 3
-    SHIFT_STATE = 4
-    WRAP_YAW = 5
-    SHIFT_TARGET = 6
-    SET_THRUST = 7
+    def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given.
+
+        `now` are the correct inputs, `began` those at the onset, `since` counts the updates since then; so it
+        is for every alteration.
+        """
+        return now
 
 
-@dataclass(frozen=True, eq=False)
-class Alteration:
-    """A fault at the inputs of a controller.
+@dataclass(frozen=True)
+class FreezeState:
+    """The state stays that at the onset; target and thrust stay correct."""
 
-    values:  of SCALE_STATE the factor of each column, of SHIFT_STATE and SHIFT_TARGET what is added to each,
-             of SET_STATE and SET_THRUST the value, of WRAP_YAW half a turn.
-    columns: first and behind the last column of SET_STATE.
-    on, of:  SET_STATE acts in the first `on` of every `of` updates.
-    """
+    def __call__(self, now: ControllerInput, began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        return replace(now, state=began.state)
 
-    effect: Effect = Effect.KEEP
-    values: tuple[float, ...] = ()
-    columns: tuple[int, int] = (0, 0)
+
+@dataclass(frozen=True)
+class SetState:
+    """Columns of the state are overwritten with `value` in the first `on` of every `of` updates."""
+
+    columns: range
+    value: float
     on: int = 1
     of: int = 1
 
-    def __call__(self, now: ControllerInput, began: ControllerInput, since: int) -> ControllerInput:
-        """Return the controller's inputs.
-
-        `now` are the correct ones, `began` those at the onset, `since` counts the updates since then.
-        """
-        given, values = now, np.asarray(self.values)
-        match self.effect:
-            case Effect.FREEZE_STATE:
-                given = replace(now, state=began.state)
-            case Effect.SET_STATE if since % self.of < self.on:
-                given = replace(now, state=now.state.copy())
-                given.state[slice(*self.columns)] = values[0]
-            case Effect.SCALE_STATE:
-                given = replace(now, state=now.state * values)
-            case Effect.SHIFT_STATE:
-                given = replace(now, state=now.state + values)
-            case Effect.WRAP_YAW:
-                given = replace(now, state=now.state.copy())
-                given.state[6] = (now.state[6] + values[0]) % (2.0 * values[0]) - values[0]
-            case Effect.SHIFT_TARGET:
-                given = replace(now, target=now.target + values)
-            case Effect.SET_THRUST:
-                given = replace(now, thrust_acceleration_m_s2=self.values[0])
-        return given
+    def __call__(self, now: ControllerInput, _began: ControllerInput, since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        if since % self.of >= self.on:
+            return now
+        state = now.state.copy()
+        state[self.columns.start : self.columns.stop] = self.value
+        return replace(now, state=state)
 
 
-keep_inputs: Final = Alteration()
-"""The correct inputs."""
+@dataclass(frozen=True)
+class ScaleState:
+    """The state is multiplied by seven factors, as a wrong unit does."""
 
-freeze_state: Final = Alteration(Effect.FREEZE_STATE)
-"""The state stays that at the onset; target and thrust stay correct."""
+    factors: tuple[float, ...]
 
-wrap_yaw: Final = Alteration(Effect.WRAP_YAW, (np.pi,))
-"""The measured yaw is wrapped to [-pi, pi): it jumps where the heading passes south."""
-
-
-def set_state(column: int | slice, value: float, *, on: int = 1, of: int = 1) -> Alteration:
-    """Overwrite columns of the state with `value` in the first `on` of every `of` updates."""
-    first, stop = (column.start, column.stop) if isinstance(column, slice) else (column, column + 1)
-    return Alteration(Effect.SET_STATE, (value,), (first, stop), on, of)
+    def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        return replace(now, state=now.state * np.array(self.factors))
 
 
-def scale_state(scale: Sequence[float]) -> Alteration:
-    """Multiply the state by `scale` (7,), as a wrong unit does."""
-    return Alteration(Effect.SCALE_STATE, tuple(scale))
+@dataclass(frozen=True)
+class ShiftState:
+    """Seven numbers are added to the state."""
+
+    by: tuple[float, ...]
+
+    def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        return replace(now, state=now.state + np.array(self.by))
 
 
-def shift_yaw(shift_rad: float) -> Alteration:
+@dataclass(frozen=True)
+class WrapYaw:
+    """The measured yaw is wrapped to [-pi, pi): it jumps where the heading passes south."""
+
+    def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        state = now.state.copy()
+        state[6] = (state[6] + np.pi) % (2.0 * np.pi) - np.pi
+        return replace(now, state=state)
+
+
+@dataclass(frozen=True)
+class ShiftTarget:
+    """Six numbers are added to the target."""
+
+    by: tuple[float, ...]
+
+    def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        return replace(now, target=now.target + np.array(self.by))
+
+
+@dataclass(frozen=True)
+class SetThrust:
+    """The thrust acceleration is overwritten."""
+
+    value_m_s2: float
+
+    def __call__(self, now: ControllerInput, _began: ControllerInput, _since: int) -> ControllerInput:
+        """Return what the controller is given."""
+        return replace(now, thrust_acceleration_m_s2=self.value_m_s2)
+
+
+Alteration = KeepInputs | FreezeState | SetState | ScaleState | ShiftState | WrapYaw | ShiftTarget | SetThrust
+"""What happens to the inputs of a controller."""
+
+
+def shift_yaw(shift_rad: float) -> ShiftState:
     """Add `shift_rad` to the measured yaw."""
-    return Alteration(Effect.SHIFT_STATE, (*[0.0] * 6, shift_rad))
+    return ShiftState((*[0.0] * 6, shift_rad))
 
 
-def move_target(by_m: float) -> Alteration:
+def move_target(by_m: float) -> ShiftTarget:
     """Move the target along x."""
-    return Alteration(Effect.SHIFT_TARGET, (by_m, *[0.0] * 5))
-
-
-def report_thrust(value_m_s2: float) -> Alteration:
-    """Overwrite the thrust acceleration."""
-    return Alteration(Effect.SET_THRUST, (value_m_s2,))
+    return ShiftTarget((by_m, *[0.0] * 5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +140,7 @@ class Fault:
 
     begin: int
     end: int
-    alter: Alteration = keep_inputs
+    alter: Alteration = KeepInputs()
     drop_every: int = 0
     late_updates: int = 0
 

@@ -1,5 +1,6 @@
 """Fill the engine's records of the wrappers in injection.py."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -7,12 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import IntArray
-from mambo_sil.experiment.faults.fault import Fault, WeightChange
+from mambo_sil.experiment.faults.fault import (
+    Alteration,
+    Fault,
+    FreezeState,
+    KeepInputs,
+    ScaleState,
+    SetState,
+    SetThrust,
+    ShiftState,
+    ShiftTarget,
+    WeightChange,
+    WrapYaw,
+)
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.engine_library import ffi, pointer
 from mambo_sil.flight.engine.native import Native, foreign, native
 
 _NONE: Final = Fault(0, 0)
+_EFFECTS: Final = (KeepInputs, FreezeState, SetState, ScaleState, ShiftState, WrapYaw, ShiftTarget, SetThrust)
+"""The alterations at the places that are their numbers in faults.c."""
 
 
 def native_faulty(
@@ -24,11 +39,8 @@ def native_faulty(
     saved = None if instances is None else np.empty_like(instances[0])
     records = ffi.new("engine_faulty_t[]", len(chosen))
     for row, (fault, history) in enumerate(zip(chosen, histories, strict=True)):
-        record, alter = records[row], fault.alter
-        record.effect = alter.effect
-        record.values = (*alter.values, *[0.0] * (len(record.values) - len(alter.values)))
-        record.columns = alter.columns
-        record.on, record.of = alter.on, alter.of
+        record = records[row]
+        _fill_alteration(record, fault.alter)
         record.begin, record.end = fault.begin, fault.end
         record.drop_every, record.late_updates = fault.drop_every, fault.late_updates
         record.controller, record.self = inner.step, inner.instance(row)
@@ -38,6 +50,27 @@ def native_faulty(
             record.memory_bytes = instances.shape[1]
     kept = inner, histories, instances, saved
     return Native(engine.engine_faulty_step, records, ffi.sizeof("engine_faulty_t"), kept)
+
+
+def _fill_alteration(record: Any, alter: Alteration) -> None:
+    """Fill the members of an engine_faulty_t that say what happens to the inputs."""
+    values: tuple[float, ...] = ()
+    record.on, record.of = 1, 1
+    match alter:
+        case SetState():
+            values = (alter.value,)
+            record.columns = (alter.columns.start, alter.columns.stop)
+            record.on, record.of = alter.on, alter.of
+        case ScaleState():
+            values = alter.factors
+        case ShiftState() | ShiftTarget():
+            values = alter.by
+        case WrapYaw():
+            values = (math.pi,)
+        case SetThrust():
+            values = (alter.value_m_s2,)
+    record.effect = _EFFECTS.index(type(alter))
+    record.values = (*values, *[0.0] * (len(record.values) - len(values)))
 
 
 def native_levelling(engine: Any, inner: Native, compiled: CompiledController, patience: IntArray) -> Native:

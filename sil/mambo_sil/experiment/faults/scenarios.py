@@ -1,7 +1,7 @@
 """The list of faults: name, duration, effect, and the statuses that the controller must return."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from mambo_codegen.methods import method_of
@@ -10,14 +10,14 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.faults.fault import (
     Alteration,
-    freeze_state,
-    keep_inputs,
+    FreezeState,
+    KeepInputs,
+    ScaleState,
+    SetState,
+    SetThrust,
+    WrapYaw,
     move_target,
-    report_thrust,
-    scale_state,
-    set_state,
     shift_yaw,
-    wrap_yaw,
 )
 
 TO_THE_END: Final = math.inf
@@ -36,7 +36,7 @@ class FaultScenario:
 
     name: str
     duration_s: float
-    alter: Alteration = keep_inputs
+    alter: Alteration = field(default_factory=KeepInputs)
     drop_every: int = 0
     late_updates: int = 0
     weights: tuple[float, float] | None = None
@@ -58,8 +58,8 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     """
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
-    outage = set_state(slice(0, 7), _NAN)
-    bursts = set_state(slice(0, 7), _NAN, on=3, of=10)
+    outage = SetState(range(7), _NAN)
+    bursts = SetState(range(7), _NAN, on=3, of=10)
     jump = move_target(jump_m)
     bad_state, bad_target = _only(Status.BAD_STATE), _only(Status.BAD_TARGET)
     bad_thrust = _only(Status.BAD_THRUST)
@@ -77,9 +77,9 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario(
             f"state NaN to the end, {levels_out}", TO_THE_END, outage, answers=bad_state, levelled=True
         ),
-        FaultScenario("x infinite, 1 s", 1.0, set_state(0, math.inf), answers=bad_state),
-        FaultScenario("vy minus infinite, 1 s", 1.0, set_state(3, -math.inf), answers=bad_state),
-        *(FaultScenario(f"state frozen, {span_s:g} s", span_s, freeze_state) for span_s in (0.2, 1.0, 5.0)),
+        FaultScenario("x infinite, 1 s", 1.0, SetState(range(1), math.inf), answers=bad_state),
+        FaultScenario("vy minus infinite, 1 s", 1.0, SetState(range(3, 4), -math.inf), answers=bad_state),
+        *(FaultScenario(f"state frozen, {span_s:g} s", span_s, FreezeState()) for span_s in (0.2, 1.0, 5.0)),
         FaultScenario("every 2nd tick dropped, 5 s", 5.0, drop_every=2, answers=_only(Status.OK, NOT_CALLED)),
         FaultScenario("all ticks dropped, 0.2 s", 0.2, drop_every=1, answers=_only(NOT_CALLED)),
         FaultScenario("all ticks dropped, 1 s", 1.0, drop_every=1, answers=_only(NOT_CALLED)),
@@ -90,10 +90,10 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         ),
         FaultScenario(f"target jumps {jump_m:g} m and stays", TO_THE_END, jump, moved_m=jump_m),
         FaultScenario("target beyond the range, 1 s", 1.0, move_target(beyond_m), answers=bad_target),
-        FaultScenario("thrust reported as zero, 1 s", 1.0, report_thrust(0.0), answers=bad_thrust),
-        FaultScenario("thrust NaN, 1 s", 1.0, report_thrust(_NAN), answers=bad_thrust),
+        FaultScenario("thrust reported as zero, 1 s", 1.0, SetThrust(0.0), answers=bad_thrust),
+        FaultScenario("thrust NaN, 1 s", 1.0, SetThrust(_NAN), answers=bad_thrust),
         FaultScenario("yaw a turn off, to the end", TO_THE_END, shift_yaw(2.0 * math.pi)),
-        FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, wrap_yaw, turning=True),
+        FaultScenario("yaw wrapped at pi, turning, to the end", TO_THE_END, WrapYaw(), turning=True),
         FaultScenario("yaw half a turn off, 1 s", 1.0, shift_yaw(math.pi)),
         FaultScenario("attitude in degrees, 5 s", 5.0, _scaled(1.0, _DEGREES_PER_RAD)),
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
@@ -118,6 +118,6 @@ def _only(*statuses: int) -> frozenset[int]:
     return frozenset(int(status) for status in statuses)
 
 
-def _scaled(position: float, attitude: float) -> Alteration:
+def _scaled(position: float, attitude: float) -> ScaleState:
     """Scale position and velocity by one factor, roll, pitch and yaw by another."""
-    return scale_state([position] * 4 + [attitude] * 3)
+    return ScaleState((*[position] * 4, *[attitude] * 3))
