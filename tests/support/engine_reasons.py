@@ -140,7 +140,19 @@ REASONS: Final[Mapping[Key, str]] = {
     },
     **{
         ("pd.c", "(void)thrust_acceleration_m_s2;", change): "only silences a warning"
-        for change in ("left out", "left out #1")
+        for change in ("left out", "left out #1", "left out #2")
+    },
+    **{
+        ("pd.c", line, change): "no error, jerk or tilt of a flight equals its limit in every bit"
+        for line, change in (
+            (
+                "const double jerk_m_s3 = (magnitude(change) <= pid->jerk_limit_m_s3) ? change : <real>;",
+                "<= -> <",
+            ),
+            ("if ((magnitude(target[0] - state[0]) < pid->integrated_error_m)", "< -> <="),
+            ("&& (magnitude(target[1] - state[1]) < pid->integrated_error_m)", "< -> <="),
+            ("< (pid->tilt_limit_rad * pid->tilt_limit_rad))) {", "< -> <="),
+        )
     },
     ("rigid_body.h", "to_world(r, state + VELOCITY, rate + POSITION);", "+ -> - #1"): "POSITION is 0",
     **{
