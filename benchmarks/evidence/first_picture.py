@@ -14,7 +14,7 @@ from mambo_sil.results.style import BLUE, BROAD, BROWN, ORANGE, PAGE_INCHES, TAR
 
 FLOWN: Final = {
     "pd": ("the paper's PD", ORANGE),
-    "table1": ("the paper's NMPC, its Table I", VERMILION),
+    "table1": ("the paper's NMPC, Table I", VERMILION),
     "pid-feedforward": ("PID with feed-forward, tuned", BROWN),
     "mambo": ("this MPC, quadratic cost", BLUE),
 }
@@ -47,7 +47,7 @@ def draw_first_picture(results: Path) -> None:
     flights = {name: np.load(results / name / "trace.npz") for name in FLOWN}
     means = read_distances(results)
     with style():
-        figure = Figure(figsize=(PAGE_INCHES, 2.0), layout="constrained")
+        figure = Figure(figsize=(PAGE_INCHES, 1.8), layout="constrained")
         lap, bars = figure.subplots(1, 2, width_ratios=(2, 1.25))
         _draw_lap(lap, flights)
         _draw_bars(bars, means)
