@@ -198,7 +198,7 @@ REASONS: Final[Mapping[Key, str]] = {
             "const mask_t any_axis = (flight->impulse_n_s[0] != <real>) "
             "| (flight->impulse_n_s[1] != <real>) | (flight->impulse_n_s[2] != <real>);",
             change,
-        ): "a push of zero changes nothing but the sign of a zero"
+        ): "an impulse of zero changes nothing but the sign of a zero"
         for change in ("zero -> one", "zero -> one #1", "zero -> one #2")
     },
 }

@@ -1,4 +1,4 @@
-"""Wind, battery, payload, push, and the link between controller and stock loops."""
+"""Wind, battery, payload, impulse, and the link between controller and stock loops."""
 
 import math
 
@@ -173,7 +173,7 @@ def test_payload_is_added_at_its_time() -> None:
     np.testing.assert_allclose(trace.position_m[:, 0, 2], -1.1, atol=1e-9)
 
 
-def test_push_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
+def test_an_impulse_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
     """The change is along the axes of the world for any heading, at that time and in that flight only."""
     disturbances = Disturbances(impulse_n_s=(np.array([0.0063, 0.0]), -0.00063, 0.0), impulse_time_s=0.5)
     trace = hover(1.0, 2, yaw_rad=0.8, disturbances=disturbances)
@@ -183,8 +183,8 @@ def test_push_changes_the_velocity_at_once_by_impulse_over_mass() -> None:
 
 @pytest.mark.parametrize("part", [(0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01)])
 @pytest.mark.parametrize("loaded", [True, False])
-def test_a_push_meets_the_mass_of_its_instant(part: tuple[float, float, float], loaded: bool) -> None:
-    """A payload counts from its own tick on: due with the push it is carried, one tick later it is not."""
+def test_an_impulse_meets_the_mass_of_its_instant(part: tuple[float, float, float], loaded: bool) -> None:
+    """A payload counts from its own tick on: due with the impulse it is carried, one tick later it is not."""
     disturbances = Disturbances(
         payload_kg=0.007, payload_time_s=0.01 if loaded else 0.015, impulse_n_s=part, impulse_time_s=0.01
     )
@@ -251,8 +251,9 @@ def test_each_flight_has_the_gusts_of_its_own_wind_at_the_given_height() -> None
         (Disturbances(battery_sag_1_s=np.array([0.0, 2.0])), [1.0, 0.99], 0.0, 0.0),
         (Disturbances(payload_kg=np.array([0.0, 0.005])), 1.0, [0.0, 0.005], 0.0),
         (Disturbances(impulse_n_s=(0.0, np.array([0.0, 0.0063]), 0.0)), 1.0, 0.0, [0.0, 0.1]),
+        (Disturbances(push_m_s2=(0.0, np.array([0.0, 0.5]))), 1.0, 0.0, 0.0),
     ],
-    ids=["battery", "payload", "push"],
+    ids=["battery", "payload", "impulse", "push"],
 )
 def test_each_disturbance_acts_alone_and_in_its_flight_only(
     disturbances: Disturbances,
@@ -260,7 +261,7 @@ def test_each_disturbance_acts_alone_and_in_its_flight_only(
     payload_kg: float | list[float],
     velocity_m_s: float | list[float],
 ) -> None:
-    """By default payload and push are due at t = 0, not before; all others stay off."""
+    """By default payload and impulse are due at t = 0, not before; all others stay off."""
     world = World(disturbances, Vehicle(), (0, 0), 1.1)
     state, early = world.tick(at_rest(2), -STEP_S)
     assert early is not None
@@ -272,6 +273,7 @@ def test_each_disturbance_acts_alone_and_in_its_flight_only(
     np.testing.assert_array_equal(moment.payload_kg, np.broadcast_to(payload_kg, 2))
     np.testing.assert_allclose(state.body[4], np.broadcast_to(velocity_m_s, 2), rtol=1e-12)
     assert moment.air_m_s is None
+    assert moment.push_m_s2 is disturbances.push_m_s2
 
 
 def test_wind_blows_towards_north_by_default() -> None:
@@ -284,7 +286,7 @@ def test_wind_blows_towards_north_by_default() -> None:
 
 
 def test_without_disturbances_nothing_happens() -> None:
-    """The state is the one given, and there is no battery, payload or wind to apply."""
+    """The state is the one given, and there is nothing to apply."""
     state = at_rest()
     assert World(Disturbances(), Vehicle(), (0,), 1.1).tick(state, 0.0) == (state, None)
 
