@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from mambo_sil.cli.command import AsJson, OptionalSource, Scalar
+from mambo_sil.cli.command import AsJson, Scalar, complete_presets
 from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards
 from mambo_sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
 
@@ -70,7 +70,12 @@ class Conditions:
 class Runner:
     """The controller, and where it runs."""
 
-    source: OptionalSource = None
+    source: Annotated[
+        str | None,
+        typer.Argument(
+            help="A preset or a controller.toml; by default mambo.", autocompletion=complete_presets
+        ),
+    ] = None
     controller: Annotated[
         ControllerName,
         typer.Option(
