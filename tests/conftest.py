@@ -19,6 +19,18 @@ settings.register_profile(
 settings.load_profile("house")
 
 
+@pytest.hookimpl(tryfirst=True)  # before the marks select
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as long all cases but the first of a test that says `first_is_quick`."""
+    known = set[str]()
+    for item in items:
+        if item.get_closest_marker("first_is_quick"):
+            function = item.nodeid.partition("[")[0]
+            if function in known:
+                item.add_marker("long")
+            known.add(function)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _own_environment() -> Iterator[None]:
     """Keep builds out of the user's compile cache, in one for all workers and runs, and hide an outer make.

@@ -31,6 +31,7 @@ def plan_all(program: Ours, folder: Path) -> list[Array]:
     return [plans(library, random_inputs(600), follows=follows)[0] for follows in (False, True)]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("chosen", [presets.load("table1"), ONE_NORM], ids=["no lag", "lag"])
 def test_plain_roll_out_plans_what_the_generated_c_plans(chosen: Settings, tmp_path: Path) -> None:
     """In double both have the same plans, with and without lag, with and without warm start."""

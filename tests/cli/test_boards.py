@@ -123,6 +123,7 @@ def test_flying_on_the_mega_is_the_flight_of_this_machine(tmp_path: Path) -> Non
     assert (summary["board"], summary["same_bits_as_host"]) == ("mega", True)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "command", [["fly", "--on", "mega"], ["same-bits", "--boards", "mega", "--steps", "100"]]
 )

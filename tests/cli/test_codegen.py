@@ -74,6 +74,7 @@ def test_init_makes_the_folder_of_its_file() -> None:
     assert [path.name for path in Path("made/too").iterdir()] == ["controller.toml"]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("force", [[], ["--force"]])
 def test_init_that_fails_leaves_everything_as_it_was(force: list[str]) -> None:
     """No half file, no folder made for it, and the old file whole; what is no file is not replaced."""
@@ -235,6 +236,7 @@ def test_debug_shows_the_traceback() -> None:
     assert "SourceNotFoundError: nope is neither" in result.stderr
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("arguments", ["schema", "--help", "generate --help", "--version", ""])
 def test_output_that_nobody_reads_ends_quietly(arguments: str) -> None:
     """A closed pipe (| head) ends the command as the signal would, without a traceback, help included."""
@@ -246,6 +248,7 @@ def test_output_that_nobody_reads_ends_quietly(arguments: str) -> None:
     assert (result.returncode, result.stderr) == (errors.NO_READER, b"")
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("arguments", [["schema"], ["--help"], ["generate", "-o", "out", "--json"]])
 def test_stdout_that_takes_nothing_gets_a_message(arguments: list[str]) -> None:
     """A full disk or a closed stdout is said in one line, without a traceback."""

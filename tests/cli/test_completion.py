@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("line", "expected"),
     [

@@ -75,6 +75,7 @@ ODD_COMPILER = '#!/bin/sh\ncase "$*" in *loop.c*) exit 1 ;; esac\nexec {} "$@"\n
 SAID = "the simulation runs in NumPy"
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("line", COMMANDS)
 def test_numpy_needs_no_engine(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a compiler that refuses the engine, only the engine c says that it flies in NumPy."""
@@ -117,6 +118,7 @@ def demand_said(arguments: list[str], folder: Path) -> None:
     assert said
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("line", ["fly --duration-s 0.5", "campaign campaign.toml --flights 1 --workers 1"])
 def test_an_unknown_engine_is_refused(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The message names both; also in a worker."""

@@ -85,6 +85,7 @@ def test_an_option_without_effect_is_refused(line: str, message: str, tmp_path: 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "line",
     [

@@ -62,6 +62,7 @@ def test_a_suite_passes_and_leaves_its_results(passed: Path) -> None:
     assert (out / "regress.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_a_broken_bound_fails_and_its_flight_repeats_bit_for_bit() -> None:
     """Exit 1 names flight, metric, value and bound; the record is that of the flight."""
     break_suite()
@@ -82,6 +83,7 @@ def test_a_broken_bound_fails_and_its_flight_repeats_bit_for_bit() -> None:
     assert not list(Path("out/flights").iterdir())
 
 
+@pytest.mark.long
 def test_recorded_flights_are_the_same_again_and_others_fail() -> None:
     """--update records; the same controller passes with the same bits, one with other weights fails."""
     _, said = run("regress", "mine.toml", "-o", "out", "--update")

@@ -126,6 +126,7 @@ def test_a_campaign_flies_another_drone_and_its_flights_repeat() -> None:
     assert 'flight.vehicle = "mine" instead of "mambo"' in said
 
 
+@pytest.mark.long
 def test_a_study_states_its_drone() -> None:
     """In its summary and in its identity."""
     require_module("optuna")
@@ -136,6 +137,7 @@ def test_a_study_states_its_drone() -> None:
     assert json.loads(Path("out/study.json").read_text("utf-8"))["vehicle"]["name"] == "mine"
 
 
+@pytest.mark.long
 def test_a_suite_flies_any_drone() -> None:
     """Those that its groups name, or the one of the option, which has a baseline of its own."""
     text = GROUP + 'vehicle = ["mambo", "mine.toml"]\n'

@@ -174,6 +174,7 @@ def test_riccati_without_a_solution_is_an_error() -> None:
         solve_riccati(mp.matrix([[4, 0], [1, 1]]), mp.matrix([0, 1]), mp.eye(2), mp.eye(1))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("processor", [{}, WITHOUT_FUSED], ids=["as it is", "without fused operations"])
 def test_constants_have_the_committed_digits(processor: dict[str, str]) -> None:
     """All of them; `python -m tests.support.golden_gains --write` writes them anew."""

@@ -27,6 +27,7 @@ def test_a_folder_is_made_of_the_preset_of_its_target_and_kept(name: str, tmp_pa
     assert json.loads((tmp_path / "out" / "manifest.json").read_text("utf-8"))["target"] == name
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", TARGETS)
 def test_the_library_is_the_amalgamated_one_with_every_prefix(name: str) -> None:
     """What a target compiles is what the other tests prove; its own files carry the prefix too."""

@@ -53,6 +53,7 @@ NOT_RUN = {
 """The console blocks that are not run, by page: the reason, which is in the title of the block."""
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.long) if name in LONG else name for name in NAMES]
 )

@@ -56,6 +56,7 @@ def test_a_command_of_other_bits_is_found() -> None:
         demand_reference(flight, trace, method_of(settings).reference_controller())
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("preset", ["mambo", pytest.param("table1", marks=pytest.mark.long)])
 @pytest.mark.parametrize("condition", CONDITIONS)

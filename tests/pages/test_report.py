@@ -136,6 +136,7 @@ def demand_sound(page: str) -> None:
             assert attributes["aria-label"]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("kind", FOLDERS)
 def test_a_folder_of_each_command_is_shown(kind: str) -> None:
     """What it found is on the page, in markup that holds, and hostile names are text."""

@@ -348,6 +348,7 @@ SUBJECTS = {
 }
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_the_firmware_s_flags_build_it_without_a_word(name: str, tmp_path: Path) -> None:
     """Every warning of the firmware is an error there."""

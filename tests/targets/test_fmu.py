@@ -200,6 +200,7 @@ def test_a_unit_answers_as_its_description_says(version: str, tmp_path: Path) ->
     other.close()
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", [*SUBJECTS, "fixed"])
 def test_the_sources_build_without_a_word_and_have_every_function(name: str, tmp_path: Path) -> None:
     """All warnings on and fatal; an importer finds each function of the standard's header in the library."""

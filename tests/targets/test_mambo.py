@@ -166,6 +166,7 @@ def test_lost_states_are_counted_and_end_level(tmp_path: Path) -> None:
     assert list(outage[-1]) == [0.0, 0.0, 2.0, 60.0]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("optimisation", ["-O0", "-O3"])
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_the_flags_of_both_toolboxes_build_it_without_a_word(

@@ -83,6 +83,7 @@ def shell(*command: str | Path, folder: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("name", by_default("mambo"))
 def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: Path) -> None:
@@ -174,6 +175,7 @@ def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: b
     assert not (tmp_path / "build").exists()
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "settings",
     [
@@ -304,6 +306,7 @@ def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path, *, amalgama
     shell("two/firmware", folder=tmp_path)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("amalgamate", [False, True])
 def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path, *, amalgamate: bool) -> None:
     """Objects of another processor, of other flags, or without -fPIC are never linked."""

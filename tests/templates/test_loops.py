@@ -59,6 +59,7 @@ def is_bounded(loop: re.Match[str], code: str) -> bool:
     return bool(re.fullmatch(rf"{counter} = {NUMBER}", begin)) and counts and not disturbed
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 def test_the_work_of_the_generated_c_is_bounded(scalar: str) -> None:
     """A preset and corners of the horizon, in every scalar type."""
@@ -71,6 +72,7 @@ def test_the_work_of_the_generated_c_is_bounded(scalar: str) -> None:
 ITERATION = "for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {"
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "wrong",
     [

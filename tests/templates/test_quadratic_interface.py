@@ -31,6 +31,7 @@ DIALECTS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("dialect", "scalar"),
     [
@@ -51,6 +52,7 @@ def test_every_dialect_compiles_without_a_word(dialect: str, scalar: str, tmp_pa
         assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("amalgamate", [False, True], ids=["folders", "amalgamated"])
 def test_other_prefix_and_layout_pass_the_strictest_build_and_the_self_test(

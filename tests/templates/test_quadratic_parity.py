@@ -62,6 +62,7 @@ class SubBlocks:
         return self.pointer("nmpc_real_t", values)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
 def test_observer_equals_the_reference(index: int, scalar: str) -> None:
@@ -107,6 +108,7 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
     compare(Estimate(*[np.zeros((1, 2), blocks.scalar)] * 3))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("index", FEW_SETTINGS)
 def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:

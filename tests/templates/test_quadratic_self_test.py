@@ -100,6 +100,7 @@ def test_the_self_test_notices_every_constant_of_every_table(files: dict[str, st
     assert unnoticed == []
 
 
+@pytest.mark.long
 def test_the_self_test_notices_a_wrong_sign_anywhere_in_the_step(
     files: dict[str, str], tmp_path: Path
 ) -> None:

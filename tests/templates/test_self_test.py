@@ -79,12 +79,14 @@ class Bench:
         return [mutant for mutant in mutants(SELF_TEST, self.text) if start < mutant.start < end]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "float64", "fixed"])
 def test_the_first_step_with_a_wrong_output_is_named(scalar: str, tmp_path: Path) -> None:
     """Status, roll, pitch, cost and both gradients, each alone; 0 for the right controller."""
     assert Bench(scalar, tmp_path).passes()
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "line",
     [

@@ -78,6 +78,7 @@ def over_broken_settings(examples: int, folder: Path) -> Callable[[], None]:
     return test
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 def test_a_few_settings_go_the_whole_way(scalar: str) -> None:
     """Any valid settings: no warning, the self-test passes, and C and reference differ in no bit."""

@@ -33,6 +33,7 @@ def _compilers() -> None:
     require("clang", "clang")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_compilers")
 @pytest.mark.parametrize(
     "settings",

@@ -147,6 +147,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
     assert set(outcomes["missed"]) == set(range(52))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("scalar", "check", "tool", "package"),
     [

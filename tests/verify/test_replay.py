@@ -33,6 +33,7 @@ def test_the_cases_have_outcomes_of_every_status() -> None:
     assert set(statuses) == {int(status) for status in Status}
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("right", "wrong", "what"),
     [

@@ -78,6 +78,7 @@ def test_an_unlisted_finding_fails(scalar: str, harm: str, tmp_path: Path) -> No
     assert wrong.path in result.evidence
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scalar", ["float32", pytest.param("fixed", marks=pytest.mark.long)])
 def test_the_manual_has_the_number_of_deviating_lines(scalar: str, tmp_path: Path) -> None:
     """By rule, file and scalar type of preset mambo-1norm without its tracker, as cppcheck finds them."""

@@ -69,6 +69,7 @@ def test_the_self_test_detects_a_wrong_controller_on_eight_bits(mega: Builder, t
         assert machine.call("run") == first_wrong_step
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("preset", "scalar"), [("mambo", "float32"), ("table1", "float32"), ("mambo", "fixed")]
 )

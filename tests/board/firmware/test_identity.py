@@ -115,6 +115,7 @@ def test_the_greeting_of_a_board_is_found() -> None:
     assert [one.digest for one in held_controllers(Path("image"))] == [MAMBO.short_digest]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("calls", [True, False])
 def test_a_linked_controller_is_found_if_its_version_is_called(calls: bool) -> None:
     """Else the linker drops the string, exit 1, and the command says so."""

@@ -31,6 +31,7 @@ HELPERS = {
 """The helper that multiplies two floats; none with an FPU."""
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("board", CORES)
 def test_every_byte_of_a_controller_has_one_owner(board: str, tmp_path: Path) -> None:
     """Parts add up: tables are the controller's own, arithmetic is the compiler's, RAM is the instance."""

@@ -54,6 +54,7 @@ def gcc_frames(folder: Path) -> dict[str, int]:
     return {place.rpartition(":")[2]: int(size) for place, size, _ in rows}
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("board", "optimisation"),
     [

@@ -121,6 +121,7 @@ def counted(settings: Settings, elf: Path, ticks: int, searched: int) -> Instruc
     return count_instructions(settings, elf, "cortex-m4", ticks, searched)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", CORES)
 def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
     """The count of a known function is exact: loop, long block, jump over data, conditional instructions."""
@@ -163,6 +164,7 @@ def it_blocks(image: Image) -> dict[int, list[int]]:
     return blocks
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", IN_PROCESS)
 def test_counting_blocks_agrees_with_counting_instructions(name: str, tmp_path: Path) -> None:
     """Counting by basic block and counting every instruction give the same functions and totals."""

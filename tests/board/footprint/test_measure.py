@@ -52,6 +52,7 @@ def test_the_crazyflie_keeps_its_promises() -> None:
     assert footprint.fits
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.3), ("mambo-1norm", 1.25), ("table1", 1.13)])
 def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
     """Most instructions met over least, on the Cortex-M4F; the first step of a flight is the cheapest."""
@@ -137,6 +138,7 @@ def test_a_tiny_budget_is_exceeded_everywhere() -> None:
     assert "nmpc_optimizer_minimize" in largest[1]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("name", "scalar", "wrong", "kind"),
     [
@@ -172,6 +174,7 @@ def test_wider_arithmetic_is_reported_with_its_caller(
         assert find_forbidden(image, "float64") == ()
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("preset", "most"), [("mambo", 1300), ("mambo-1norm", 5100), ("table1", 4400)])
 def test_fixed_point_keeps_its_promises(preset: str, most: int) -> None:
     """A step takes a tenth of the instructions of float32 on the Mambo, and at most 400 B of stack."""

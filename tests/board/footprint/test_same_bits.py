@@ -46,6 +46,7 @@ FAULTS = {
 """Faults by name: file, the line, what it becomes."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("names", "scalar"),
     [
@@ -73,6 +74,7 @@ def test_every_build_has_the_digest_of_the_reference(names: tuple[str, ...], sca
     assert {one.digest for one in found} == {f"0x{self_test_digest(OneNorm(settings), 3):08X}"}
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("fault", "compiler"), list(zip(FAULTS, BOARD_COMPILERS, strict=True)))
 def test_a_wrong_bundle_has_another_digest(fault: str, compiler: str, tmp_path: Path) -> None:
     """A changed order of additions changes the digest."""
@@ -102,6 +104,7 @@ def test_other_settings_and_other_steps_have_other_digests() -> None:
     assert len({*digests, self_test_digest(OneNorm(MAMBO), 4)}) == len(digests) + 1
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", ["float32", "float64"])
 @pytest.mark.parametrize("index", [0, 3, 7, 9])
 def test_c_has_the_digest_of_the_reference(index: int, scalar: str) -> None:

@@ -102,6 +102,7 @@ def test_points_read_back(tmp_path: Path) -> None:
         np.testing.assert_array_equal(read, list(expected.values()))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "points", [[POINT], [UNMEASURED], [POINT, point(20, 2, 1.0, fits=False)], [REFUSED], [POINT, REFUSED]]
 )
@@ -147,6 +148,7 @@ def test_the_command_writes_table_and_pictures_and_answers_with_the_closest(tmp_
     assert summary["points"][1]["refusal"].startswith(refusal.replace("= 3 ", "= 3.0 "))
 
 
+@pytest.mark.long
 def test_whole_numbers_stay_whole() -> None:
     """Rounded, each once; two keys give all pairs, of which settings may refuse some."""
     board_builder("crazyflie")

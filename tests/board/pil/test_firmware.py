@@ -61,6 +61,7 @@ def demand_same_bits(summary: dict[str, Any], steps: int, board: str) -> None:
     assert set(summary["link_faults"]) <= {"repeated"}
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("board", "preset", "scalar"),
     [*CASES, *(pytest.param(*case, marks=pytest.mark.long) for case in LONG_CASES)],

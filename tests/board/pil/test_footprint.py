@@ -86,6 +86,7 @@ def test_a_flight_says_why_there_is_no_count(tmp_path: Path, monkeypatch: pytest
     assert "emulated           not counted: no compiler for " in said
 
 
+@pytest.mark.long
 def test_a_process_needs_the_name_of_a_board(tmp_path: Path) -> None:
     """Without, exit 2 and no results; with one, its own steps beside the count of that board."""
     board_builder("crazyflie")

@@ -78,6 +78,7 @@ CHANGES: Final[dict[str, Callable[[int, random.Random], bytes]]] = {
 }
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", CHANGES)
 def test_spoiled_bytes_do_not_change_the_flight(name: str, elf: Path, desk: Trace) -> None:
     """One byte of 100 on either way: most frames are hit once, and repeated."""
@@ -113,6 +114,7 @@ def test_a_doubled_frame_makes_no_second_step(faults: Faults, elf: Path, desk: T
     assert fly_through(elf, faults, desk)[0] == {}
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("way", ["to_board", "from_board"])
 def test_a_lost_frame_is_repeated(way: str, elf: Path) -> None:
     """Of a lost reply the step was made: the board repeats its answer."""
@@ -172,6 +174,7 @@ def test_other_firmware_is_refused_by_name(elf: Path) -> None:
     assert "mambo-nmpc generate --for pil" in said
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("path", "old", "new", "message"),
     [
@@ -220,6 +223,7 @@ def test_another_version_is_refused_by_name(
         connect(line.port, [])
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("faults", "message"),
     [
@@ -238,6 +242,7 @@ def test_a_board_that_does_not_answer_is_told(faults: Faults, message: str, elf:
         connect(line.port, [], IMPATIENT)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("path", "edit", "message"),
     [

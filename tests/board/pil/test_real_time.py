@@ -83,6 +83,7 @@ def test_boards_in_qemu_fly_by_their_own_clock(board: str, scalar: str, tmp_path
         demand_consistent(json.loads(run("fly", *options, "--real-time")[0]), 50)
 
 
+@pytest.mark.long
 def test_a_step_that_is_slower_than_the_period_is_told(tmp_path: Path) -> None:
     """A step of 25 ms, two periods and a half: periods without a step, and every bit."""
     ended = "    ended = pil_board_cycles();"

@@ -109,6 +109,7 @@ def test_a_flight_without_faults_is_that_of_the_desk_with_a_delay(elf: Path) -> 
     assert real_time.delay_s.most == 0.0
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("preset", "scalar"), [("mambo", "float64"), ("mambo", "fixed"), ("mambo-1norm", "float32")]
 )
@@ -328,6 +329,7 @@ def test_no_step_is_made_on_request_while_the_clock_runs(elf: Path) -> None:
         assert fly(FLIGHT, TimedController(SETTINGS, board)).same_bits(fly(FLIGHT, Expected()))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("period_s", "cycles"), [(0.0149, 15), (0.0151, 15), (1 / 300, 3), (0.2, 200)])
 def test_the_period_is_rounded_to_the_clock_of_the_board(
     period_s: float, cycles: int, tmp_path: Path

@@ -20,6 +20,7 @@ NONE = np.zeros((3, 1))
 HOVER_N = np.array([CRAZYFLIE.weight_n])
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("size_rad", [0.02, 0.3])
 def test_the_crazyflie_answers_a_step_as_its_firmware(axis: int, size_rad: float) -> None:

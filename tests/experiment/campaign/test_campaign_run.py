@@ -75,6 +75,7 @@ def fly_on_threads(
     return (folder / "flights.csv").read_bytes()
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("batch", [2, 100])
 def test_the_table_depends_neither_on_batches_nor_on_workers(
     batch: int, source: Path, whole: Path, tmp_path: Path

@@ -100,6 +100,7 @@ def reference_run(index: int, scalar: str) -> tuple[list[StepInputs], Run]:
     return inputs, Run([], [reference.step(case.state, case.target, case.thrust) for case in inputs])
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     ("name", "scalar", "index"),
     [pytest.param(*case, marks=[] if case in QUICK else pytest.mark.long) for case in CASES],
@@ -159,6 +160,7 @@ def test_a_guest_that_dies_is_named(function: str, bad_guest: Machine) -> None:
     assert bad_guest.call("fine") == 70007
 
 
+@pytest.mark.first_is_quick
 def test_a_guest_that_never_returns_is_named(bad_guest: Machine) -> None:
     """An endless loop is reported with function, time limit and address; the machine stays usable."""
     with pytest.raises(

@@ -51,6 +51,7 @@ def unified(values: FloatArray) -> bytes:
     return np.where(np.isnan(values), np.nan, values).tobytes()
 
 
+@pytest.mark.first_is_quick
 def test_elementary_functions(engine: Path) -> None:
     """Sine, cosine, arc tangent and arc sine of 50,000 numbers, corners among them."""
     with np.errstate(all="ignore"):
@@ -59,6 +60,7 @@ def test_elementary_functions(engine: Path) -> None:
     assert unified(tabulate(engine)) == unified(expected)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("derotated", [False, True])
 @pytest.mark.parametrize("noise_scale", [0.0, 1.0])
 def test_sensors_and_estimators(engine: Path, noise_scale: float, derotated: bool) -> None:

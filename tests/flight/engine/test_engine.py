@@ -65,6 +65,7 @@ def assert_same_bits(flight: Flight, kind: str) -> None:
             assert found.tobytes() == expected.tobytes(), (lanes, column.name)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("kind", [*PD_NAMES, *SCALARS])
 @pytest.mark.parametrize("batch", BATCHES.values(), ids=BATCHES)
 def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...], kind: str) -> None:
@@ -72,6 +73,7 @@ def test_a_batch_of_every_kind_has_the_bits_of_numpy(batch: tuple[Scenario, ...]
     assert_same_bits(flight_of(batch, PERIOD_S), kind)
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(data=st.data())
 def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:

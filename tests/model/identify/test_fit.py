@@ -32,6 +32,7 @@ def demand_truth(summary: IdentifySummary, truth: Truth) -> None:
         assert abs(fit.gain.value - truth.gain[axis]) < 0.02
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_thirty_seconds_of_the_figure_of_eight_suffice(seed: int) -> None:
     """With noise, gusts and 10 % lost rows, wrong times and another zero of time; motion and trim, too."""
@@ -49,6 +50,7 @@ def test_thirty_seconds_of_the_figure_of_eight_suffice(seed: int) -> None:
             assert abs(trim.value - truth) < 0.01
 
 
+@pytest.mark.long
 def test_one_frequency_cannot_tell_lag_from_dead_time() -> None:
     """Their sum and the gain are found; the interval of the lag says so, and the verdict is weak."""
     time_s, lag_s = 0.01 * np.arange(3000.0), 0.14
@@ -121,6 +123,7 @@ def test_a_response_of_second_order_has_no_integrator(frequency_rad_s: float, da
     assert "integral" not in " ".join(summary.model)
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(("drag_1_s", "rate_rad_s"), [(0.15, 1.2), (0.456, 1.5)])
 def test_a_filtered_velocity_does_not_hide_the_drag(drag_1_s: float, rate_rad_s: float) -> None:
     """A lag of 30 ms is found, and the drag lies in its interval; without the lag it is 0.06 to 0.1 low."""

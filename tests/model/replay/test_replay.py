@@ -35,6 +35,7 @@ def trace_rows() -> list[dict[str, str]]:
     return list(csv.DictReader(Path("flight/trace.csv").read_text("utf-8").splitlines()))
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize(
     "options",
     [
@@ -104,6 +105,7 @@ def crazyflie_log(rows: list[dict[str, str]], commands: str) -> Iterator[list[ob
             yield [10 * number + delay, *(values.get(name, "") for name in names)]
 
 
+@pytest.mark.first_is_quick
 @pytest.mark.parametrize("commands", ["nmpc", "mine"])
 def test_a_crazyflie_log_is_replayed_without_options(commands: str, tmp_path: Path) -> None:
     """Seven digits, blocks one after the other; an own prefix is named by --columns."""
