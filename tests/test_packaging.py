@@ -95,7 +95,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_wheel_and_source_archive_hold_every_tracked_file_and_no_other(source: Path, tmp_path: Path) -> None:
     """A package missing in pyproject.toml, or a file that an earlier build left, changes the list."""
     expected = {installed(path) for path in tracked() if path.startswith(tuple(f"{name}/" for name in ROOTS))}
-    assert {"mambo_nmpc/py.typed", "mambo_templates/src/nmpc.c.j2"} <= expected
+    assert {"mambo_nmpc/py.typed", "mambo_templates/common/nmpc.c.j2"} <= expected
     assert files_of(wheel_of(source, tmp_path)) == expected
 
     python = environment(tmp_path / "builder", "hatchling>=1.27")

@@ -1,1 +1,1 @@
-"""The Jinja templates of a bundle, as text; `mambo_codegen.bundle.render` is their only reader."""
+"""The Jinja templates: the C, firmware folders, pages."""

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from mambo_codegen.methods._interface import LinearLaw, Method, ReferenceController, Step, StepResult
+from mambo_codegen.methods.interface import LinearLaw, Method, ReferenceController, Step, StepResult
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.methods.quadratic.method import Quadratic
 from mambo_codegen.settings.sections import Sections

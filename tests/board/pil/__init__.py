@@ -1,1 +1,1 @@
-"""Tests of the wing `pil` of `sil`, and of the firmware it talks to."""
+"""Tests of processor in the loop, and of its firmware."""

@@ -1,1 +1,1 @@
-"""Tests of campaign."""
+"""Tests of suites of flights."""

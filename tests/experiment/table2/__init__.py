@@ -1,1 +1,1 @@
-"""Tests of paper."""
+"""Tests of Table II."""

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from mambo_codegen.methods._interface import Method, StepResult
+from mambo_codegen.methods.interface import Method, StepResult
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.formats import refusals

@@ -56,7 +56,7 @@ class QuadraticController:
     """n controllers with a quadratic cost in NumPy that compute the bits of the generated C."""
 
     def __init__(self, constants: QuadraticConstants, n: int = 1) -> None:
-        self.settings, self._design = constants.settings, constants
+        self.settings, self._constants = constants.settings, constants
         self._numbers, self._products = constants.numbers, arithmetic(constants)
         self._inputs = Inputs(constants)
         self._observer = KalmanObserver(constants, self._products)
@@ -92,7 +92,7 @@ class QuadraticController:
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> QuadraticStep:
-        """Compute the next commands; the inputs are those of `OneNormController.step`."""
+        """Compute the next commands; the inputs are those of `ReferenceController.step`."""
         states, targets, thrusts = self._inputs.quantize(state, target, thrust_acceleration_m_s2)
         has_state, has_target, has_thrust = self._inputs.check(states, targets, thrusts)
         zero = self._numbers.computed(0)
@@ -105,7 +105,7 @@ class QuadraticController:
             command_rad=self._numbers.to_si(memory.command_rad, *COMMAND),
             missed=memory.missed,
             saturated=memory.saturated,
-            stored=self._numbers.to_si(self.stored, *self._design.stored),
+            stored=self._numbers.to_si(self.stored, *self._constants.stored),
         )
 
     def _restarted(self, command_rad: Real) -> QuadraticMemory:

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods._interface import LinearLaw, Method, StepResult
+from mambo_codegen.methods.interface import LinearLaw, Method, StepResult
 from mambo_codegen.methods.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.quadratic import formats, law
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants

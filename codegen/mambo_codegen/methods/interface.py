@@ -36,7 +36,12 @@ class ReferenceController(Protocol):
     memory: Any
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Step:
-        """Compute the next commands."""
+        """Compute the next commands.
+
+        state (n, 7): x, y (m), vx, vy (m/s), roll, pitch, yaw (rad), world frame, north-east-down.
+        target (n, 4): x, y (m), vx, vy (m/s); (n, 6) with ax, ay (m/s^2) where the acceleration is given.
+        thrust_acceleration_m_s2 (n,): thrust over mass, up.
+        """
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Forget the past, and hold `command_rad` (n, 2)."""
