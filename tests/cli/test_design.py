@@ -35,7 +35,7 @@ def test_it_writes_a_file_that_flies() -> None:
 
 @pytest.mark.long
 def test_a_log_gives_settings_with_two_commands() -> None:
-    """`identify`, then `design`: the drone of the log flies closer with them than with a preset."""
+    """`identify`, then `design`: the drone of the log flies closer with them than with any preset."""
     run("identify", "--manoeuvre", "eight.csv")
     drone = ("--vehicle", "crazyflie-flown", "--sensors", "mocap", "--no-pictures")
     flown = ("--trajectory", "eight.csv", "--duration-s", "30", "-o", "log")
@@ -46,7 +46,7 @@ def test_a_log_gives_settings_with_two_commands() -> None:
     for source in ("controller.toml", "mambo", "crazyflie"):
         run("fly", source, *drone, "--duration-s", "20")
         errors[source] = json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["iae_m_s"]
-    assert errors["controller.toml"] < 0.5 * min(errors["mambo"], errors["crazyflie"])
+    assert errors["controller.toml"] < 0.6 * min(errors["mambo"], errors["crazyflie"])
 
 
 def test_tune_starts_from_it() -> None:

@@ -280,7 +280,7 @@ def test_a_campaign_whose_flights_cannot_be_read_is_refused() -> None:
     """Text instead of a database; and the CSV without a database, as version 0.1 wrote it."""
     database = Path(made("campaign"), DATABASE)
     database.write_text("flight,seed\n" * 100)
-    assert "flights.sqlite: is not the database of a campaign" in run("campaign", code=2)
+    assert "flights.sqlite: cannot be read as the database of a campaign" in run("campaign", code=2)
     database.rename("campaign/flights.csv")
     said = run("campaign", code=2).replace("\n", " ")
     assert "campaign: has flights.csv without flights.sqlite, as mambo-nmpc 0.1 wrote it; report it" in said

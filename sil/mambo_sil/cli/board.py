@@ -199,7 +199,7 @@ def _axis(text: str, settings: "Settings") -> "Axis":
         low, high, count = float(first), float(last), int(number)
     except ValueError:
         low, high, count = math.nan, math.nan, 0
-    if not (math.isfinite(low) and math.isfinite(high) and 1 <= count <= MOST_VALUES):
+    if not (math.isfinite(high - low) and 1 <= count <= MOST_VALUES):
         raise InvalidSettingsError(
             (
                 f"--vary {echo(text)} must be KEY=FIRST:LAST:COUNT with a COUNT in 1..{MOST_VALUES}, "

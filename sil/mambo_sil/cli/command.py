@@ -104,7 +104,7 @@ class Command(TyperCommand):
             value = given.get(parameter.name or "")
             if "" in (value if isinstance(value, list | tuple) else (value,)):
                 named: Any = parameter  # typer hides the class of parameters
-                raise typer.BadParameter("must not be empty; the current folder is .", ctx, named)
+                raise typer.BadParameter("must not be empty", ctx, named)
         return super().parse_args(ctx, args)
 
 

@@ -178,7 +178,18 @@ GOOD = "limits.tilt_rad=0.2:0.3:2"
         (vary("code.scalar=1:2:2"), "code.scalar is not a number"),
         *(
             (vary(f"limits.tilt_rad={span}"), "must be KEY=FIRST:LAST:COUNT with a COUNT in 1..100, such as")
-            for span in ("", "1", "1:2", "1:2:x", "nan:2:3", "1:inf:3", "1:2:0", "1:2:101", "1:2:3:4")
+            for span in (
+                "",
+                "1",
+                "1:2",
+                "1:2:x",
+                "nan:2:3",
+                "1:inf:3",
+                "-1e308:1e308:3",
+                "1:2:0",
+                "1:2:101",
+                "1:2:3:4",
+            )
         ),
         (vary(GOOD, GOOD), "limits.tilt_rad is there twice"),
         (vary(GOOD, GOOD, GOOD), "3 keys are too many; name one or two"),
@@ -199,7 +210,7 @@ def test_a_sweep_yields_the_points_in_order() -> None:
     """A longer horizon takes more flash and instructions, and no less RAM."""
     board_builder("crazyflie")
     axes = Axis(PREDICTION, (5, 8)), Axis(CONTROL, (1, 2))
-    points = measured(ONE_NORM, boards.load("crazyflie"), *axes)
+    points = measured(with_option(ONE_NORM, "optimizer.iterations", 3), boards.load("crazyflie"), *axes)
     assert [one.values for one in points] == grid(axes)
     assert all(p.fits and math.isfinite(p.iae_m_s) for p in points)
     for less, more in ((0, 1), (0, 2), (1, 3), (2, 3)):

@@ -39,7 +39,9 @@ def test_what_cannot_be_read_is_no_database(tmp_path: Path) -> None:
     (tmp_path / "text").write_text("flight,mass_kg\n" * 100)
     (tmp_path / "empty").touch()
     for name in (".", "absent", "empty", "text"):
-        with pytest.raises(ResultsError, match=r"is not the database of a campaign: .*; run campaign again"):
+        with pytest.raises(
+            ResultsError, match=r"cannot be read as the database of a campaign: .*; run campaign again"
+        ):
             read_table(tmp_path / name)
 
 

@@ -218,6 +218,14 @@ def test_a_tumble_is_cut_out_and_the_rest_is_used(share: float, factor: float) -
     assert (1.0 - share) * 30.0 - 1.5 < summary.duration_s < (1.0 - share) * 30.0
 
 
+def test_spikes_beyond_half_a_turn_name_the_column() -> None:
+    """Of three in a hundred samples, as a lost packet leaves them."""
+    spoilt = {name: values.copy() for name, values in FLOWN.items()}
+    spoilt["roll_rad"][::33] = 999.0
+    with pytest.raises(LogError, match="more than 1 % of the samples of roll_rad are beyond half a turn"):
+        identify([log_of(spoilt)])
+
+
 def test_a_bad_log_of_a_pool_is_left_out_with_its_reason() -> None:
     """A tumble from start to end, a wrong sign, a wrong unit; all of them bad are refused."""
     upside_down = log_of(tumble(FLOWN, 1.0), "tumble.csv")

@@ -60,10 +60,12 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
     settings, drone = load_settings(runner), vehicle_toml.load(conditions.vehicle)
     flight = described_flight(course, conditions, runner, settings, drone)
     with new_results(output.output, FlySummary.command, FLIGHT_FILES) as folder:
-        here = _controller(runner, settings, flight)
+        flies = _controller(runner, settings, flight) if runner.on is None else _on_board(runner, settings)
         with progress_bar("flying") as progress:
-            trace = simulate(flight, here if runner.on is None else _on_board(runner, settings), progress)
-        same_bits = None if runner.on is None else trace.same_bits(simulate(flight, here))
+            trace = simulate(flight, flies, progress)
+        same_bits = None
+        if runner.on is not None:
+            same_bits = trace.same_bits(simulate(flight, _controller(runner, settings, flight)))
         write_flight(trace, runner, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
         summary = FlySummary(**fields | judge(trace, settings, drone) | {"same_bits_as_host": same_bits})

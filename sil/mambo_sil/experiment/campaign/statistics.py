@@ -48,7 +48,8 @@ def read_table(path: Path) -> Table:
                         columns.setdefault(title, array("d")).append(cell)
     except sqlite3.Error as error:
         raise ResultsError(
-            f"{echo(str(path))}: is not the database of a campaign: {error}; run campaign again"
+            f"{echo(str(path))}: cannot be read as the database of a campaign: {error}; run campaign "
+            "again, which also repairs what a killed run left"
         ) from error
     return {title: np.array(values) for title, values in columns.items()}
 

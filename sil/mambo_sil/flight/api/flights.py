@@ -96,7 +96,7 @@ def fly(
         duration_s=duration_s,
         flights=len(given),
         start=start,
-        yaw_rad=yaw_rad,
+        yaw_rad=np.asarray(yaw_rad, np.float64),
         vehicle=vehicle,
         update_period_s=controller.update_period_s,
         seeds=given,

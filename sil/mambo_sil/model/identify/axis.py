@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from mambo_sil.drone.vehicles.vehicle_sections import LONGEST_DELAY_S
 from mambo_sil.model.identify.checks import EXCITED_RAD, NO_COMMAND_RAD
 from mambo_sil.model.identify.identify_record import AxisResult, Verdict
 from mambo_sil.model.identify.response import (
@@ -144,8 +145,10 @@ def command_deviation_rad(segments: Sequence[Segment], axis: int) -> float:
 
 def _refusals(command_rad: float, flown_s: float, fit: AxisFit) -> list[str]:
     """Return why an axis is refused."""
-    gain = fit.whole.gain
+    gain, delay_s = fit.whole.gain, max(fit.whole.delay_s, fit.first_order.delay_s.value)
     found = {
+        f"a dead time of {1e3 * delay_s:.0f} ms, and at most {1e3 * LONGEST_DELAY_S:g} ms can be flown: do "
+        "command and measured tilt share a clock?": delay_s > LONGEST_DELAY_S,
         f"commanded by {command_rad / DEGREE:.1f} degrees (rms); 1 degree is needed": command_rad
         < EXCITED_RAD,
         f"{flown_s:.0f} s of flight; {SHORTEST_FIT_S:g} s are needed": flown_s < SHORTEST_FIT_S,

@@ -70,11 +70,14 @@ def check_units(log: FlightLog) -> tuple[str, ...]:
     turned = [name for name in TILTS if often_beyond(name, _HALF_TURN_RAD, _SELDOM)]
     if not commands and not turned:
         return ()
-    found = [name for name in REQUIRED if often_beyond(name, LARGEST_TILT_RAD, _OFTEN)]
+    often = [name for name in REQUIRED if often_beyond(name, LARGEST_TILT_RAD, _OFTEN)]
+    found = [name for name in REQUIRED if name in often or name in turned]
     fixes = ",".join(_in_degrees(log, name) for name in found)
+    share = "more than 5 % of the samples of {} are beyond 0.79 rad (45 degrees), as no tumble is"
+    spikes = "more than 1 % of the samples of {} are beyond half a turn"
     return (
-        f"{log.name}: more than 5 % of the samples of {', '.join(found)} are beyond 0.79 rad (45 degrees), "
-        f"as no tumble is; are they in degrees? Then write --columns {fixes}",
+        f"{log.name}: {(share if often else spikes).format(', '.join(found))}; are they in degrees? "
+        f"Then write --columns {fixes}",
     )
 
 
