@@ -1,13 +1,11 @@
 """Every command of these tests runs in an empty folder."""
 
-from pathlib import Path
-
 import pytest
 
 
 @pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def _in_the_folder(in_an_empty_folder: None) -> None:
+    """Every command runs in an empty folder."""
 
 
 @pytest.fixture

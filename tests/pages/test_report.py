@@ -26,6 +26,8 @@ from tests.support import command
 from tests.support.results import FOLDERS, HOSTILE, campaign_folder, fly_folder, trace
 from tests.support.tools import board_builder
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 VOID = {"meta", "input", "br", "img", "circle", "line", "path", "rect", "use"}
 SEEN = {
     "fly": ("max error", "Play", "crazyflie, bit for bit as on the host", "wind with gusts 3 m/s"),
@@ -86,11 +88,6 @@ class Outline(HTMLParser):
     def handle_endtag(self, tag: str) -> None:
         """Demand that the last one opened is closed."""
         assert tag in VOID or self.open.pop() == tag
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def run(*arguments: str, code: int = 0) -> str:

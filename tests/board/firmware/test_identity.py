@@ -14,6 +14,8 @@ from mambo_sil.board.firmware.identity import held_controllers
 from tests.support.command import run
 from tests.support.linking import builder_with
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 MAMBO = preset("mambo")
 FIXED = with_option(MAMBO, "code.scalar", "fixed")
 OWN = with_option(MAMBO, "cost.response_time_s", 0.3)
@@ -47,11 +49,6 @@ def uf2(content: bytes) -> bytes:
         + b"\x30\x6f\xb1\x0a"
         for k, (start, value) in enumerate(pieces)
     )
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize("form", [bytes, intel_hex, uf2])

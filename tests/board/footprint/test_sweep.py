@@ -23,6 +23,8 @@ from tests.support.command import run
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import board_builder
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 PREDICTION, CONTROL = "horizon.prediction", "horizon.control"
 AXES = (Axis(PREDICTION, (10, 20)), Axis(CONTROL, (2,)))
 POINT = Point(
@@ -37,11 +39,6 @@ POINT = Point(
 )
 UNMEASURED = replace(POINT, stack_bytes=math.nan, instructions=math.nan, time_ms=math.nan)
 REFUSED = Point({PREDICTION: 1, CONTROL: 2}, refusal="horizon.control = 2 must lie in 1..1")
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def point(prediction: int, flash_bytes: int, iae_m_s: float, *, fits: bool = True) -> Point:

@@ -20,6 +20,8 @@ from tests.support.command import run
 from tests.support.serial_line import Line, build_firmware, serial_line
 from tests.support.tools import require_module
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 CASES = [
     ("host", "mambo", "float32"),
     ("host", "mambo", "float64"),
@@ -38,9 +40,8 @@ LONG_CASES = [
 
 
 @pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _pyserial() -> None:
     require_module("serial")
-    monkeypatch.chdir(tmp_path)
 
 
 def flown(line: Line, source: str, *options: str, code: int = 0) -> dict[str, Any]:

@@ -13,14 +13,15 @@ from tests.support.command import run
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line
 from tests.support.tools import board_builder, only, require_module
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 SETTINGS = presets.preset("mambo")
 ALL = [boards.load(name) for name in boards.names()]
 
 
 @pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _pyserial() -> None:
     require_module("serial")
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.long

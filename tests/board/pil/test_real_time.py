@@ -19,13 +19,14 @@ from tests.support.command import run
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line
 from tests.support.tools import require_module
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 SETTINGS: Final = presets.preset("mambo")
 
 
 @pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _pyserial() -> None:
     require_module("serial")
-    monkeypatch.chdir(tmp_path)
 
 
 def demand_consistent(summary: dict[str, Any], periods: int) -> None:

@@ -17,13 +17,10 @@ from mambo_sil.experiment.compare.compared_flights import answers
 from mambo_sil.experiment.compare.control_terms import axis_laws, observer_gains
 from tests.support.command import run
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 MAMBO = preset("mambo")
 SLOWER = with_option(MAMBO, "cost.response_time_s", 0.4)
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def compared(*arguments: str) -> dict[str, Any]:

@@ -15,13 +15,10 @@ from mambo_sil.model.identify.identify import identify, read_logs
 from mambo_sil.model.identify.signals import DEGREE, FlightLog
 from tests.support.logs import Flown, Truth, crazyflie_columns, fly, log_of, ulog, write_log
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 FLOWN = fly(Truth(), Flown(duration_s=20.0), 1)[0]
 REQUIRED = "time_s,roll_command_rad,pitch_command_rad,roll_rad,pitch_rad"
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def read(path: Path, columns: str = "") -> FlightLog:

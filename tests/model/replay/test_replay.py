@@ -16,12 +16,9 @@ from mambo_sil.model.identify.signals import TARGET, TARGET_ACCELERATION
 from tests.support.command import run
 from tests.support.logs import ulog
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 FLOWN = ("fly", "--duration-s", "4", "--no-pictures")
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def replayed(*arguments: str, code: int = 0) -> dict[str, Any]:

@@ -22,13 +22,10 @@ from tests.support import command
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import only, require, toolchain
 
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
 SLOW = "[horizon]\nupdate_period_s = 0.02\n"
 MAMBO, CRAZYFLIE = vehicle_toml.preset("mambo"), vehicle_toml.preset("crazyflie")
-
-
-@pytest.fixture(autouse=True)
-def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def run(*arguments: str, code: int = 0) -> tuple[str, str]:
