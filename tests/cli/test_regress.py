@@ -41,7 +41,7 @@ def _passed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def _suite(_in_an_empty_folder: None) -> None:
+def _suite(_in_the_folder: None) -> None:
     Path("mine.toml").write_text(SUITE, "utf-8")
 
 

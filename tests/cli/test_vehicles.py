@@ -36,7 +36,7 @@ GROUP = "[flight]\nduration_s = 1.0\n[flights.eight]\nbounds = { iae_m_s = 9.0 }
 
 
 @pytest.fixture(autouse=True)
-def _drone(_in_an_empty_folder: None) -> None:
+def _drone(_in_the_folder: None) -> None:
     """Put a drone where the commands run."""
     Path("mine.toml").write_text(DRONE, "utf-8")
 

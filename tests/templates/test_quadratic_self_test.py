@@ -8,8 +8,8 @@ import pytest
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.bundle.render import render
+from tests.mutation.mutants import mutants
 from tests.support.bundles import place
-from tests.support.mutants import mutants
 from tests.support.quadratic import EVERYTHING
 from tests.support.tools import require
 

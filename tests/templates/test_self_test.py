@@ -10,8 +10,8 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.errors import BuildError
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.toolchain import Toolchain
+from tests.mutation.mutants import Mutant, mutants
 from tests.support.bundles import place
-from tests.support.mutants import Mutant, mutants
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from tests.support.mutants import Mutant, Token, tokens_of
+from tests.mutation.mutants import Mutant, Token, tokens_of
 
 CHOSEN: Final = "mutant_number"
 """The global variable: the number of a mutant, 0 for the C as it is."""

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from tests.support.reasons import Reason, reasons
+from tests.mutation.reasons import Reason, reasons
 
 _SELF_TEST: Final = (
     "a build that computes the bits of the reference passes its self-test: it never finds a difference"

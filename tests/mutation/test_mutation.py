@@ -9,11 +9,11 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from tests.support.mutants import mutants
-from tests.support.mutation import FILES, Bench, Fate
-from tests.support.mutation_reasons import REASONS
+from tests.mutation.mutants import mutants
+from tests.mutation.mutation import FILES, Bench, Fate
+from tests.mutation.mutation_reasons import REASONS
+from tests.mutation.reasons import is_explained
 from tests.support.one_norm import ONE_NORM
-from tests.support.reasons import is_explained
 from tests.support.subjects import subject
 from tests.support.tools import require
 

@@ -12,10 +12,10 @@ from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.verify.check import Subject
+from tests.mutation.coverage_reasons import REASONS
+from tests.mutation.reasons import Key, is_explained, plain
 from tests.support.cases import SCALARS, settings_case
-from tests.support.coverage_reasons import REASONS
 from tests.support.one_norm import ONE_NORM
-from tests.support.reasons import Key, is_explained, plain
 from tests.support.subjects import played_fault, subject
 from tests.support.tools import require
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
 from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.settings.model import Settings
-from tests.support.reasons import Reason, reasons
+from tests.mutation.reasons import Reason, reasons
 
 
 def _steps_stay_short(settings: Settings) -> bool:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from tests.support.reasons import Key
+from tests.mutation.reasons import Key
 
 _LONGER: Final = "an array one element longer than it must be"
 _FIRST_IMAGE: Final = "start and first reading take the same image"

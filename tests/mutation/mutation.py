@@ -15,8 +15,8 @@ from mambo_sil.verify import tape_replay
 from mambo_sil.verify.calls import outcome_type
 from mambo_sil.verify.cases import cases
 from mambo_sil.verify.check import Subject
-from tests.support.mutants import Mutant, mutants
-from tests.support.schemata import ORIGINAL, can_share, refused_numbers, with_mutants
+from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.schemata import ORIGINAL, can_share, refused_numbers, with_mutants
 
 FILES: Final = (
     "include/nmpc_config.h",

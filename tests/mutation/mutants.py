@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.numbers import literals
-from tests.support.reasons import Key, plain
+from tests.mutation.reasons import Key, plain
 
 _TOKEN: Final = re.compile(
     r"""(?P<define>^[ \t]*\#[ \t]*define[ \t]+\w+(\([^)]*\))?(?=[ \t]))

@@ -1,6 +1,6 @@
 """Small faults of the engine's C change a flight or a block, except those with a reason.
 
-python -m tests.engine.test_mutants FILE ...   try every fault of some files and print which are not noticed
+python -m tests.mutation.test_engine_mutants FILE ...   try every fault of files, print which go unnoticed
 """
 
 import faulthandler
@@ -32,7 +32,8 @@ from mambo_sil.flight.names import PD_NAMES
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.trajectories import Hover
 from mambo_sil.results.shared_library import LIBRARY_FLAGS
-from tests.support.engine_reasons import reason
+from tests.mutation.engine_reasons import reason
+from tests.mutation.mutants import Mutant, mutants
 from tests.support.engines import BLOCKS, TICKS, estimates, injected, tabulate, truths
 from tests.support.evaluations import LIMIT_RAD, bits
 from tests.support.evaluations import traces as evaluated
@@ -45,7 +46,6 @@ from tests.support.faults import (
     faulty_controller,
     faulty_flight,
 )
-from tests.support.mutants import Mutant, mutants
 from tests.support.one_norm import ONE_NORM
 from tests.support.scenarios import BATCHES
 from tests.support.tools import toolchain

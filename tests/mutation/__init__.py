@@ -1,0 +1,1 @@
+"""The mutation tester of the C: small faults, and what notices them."""
