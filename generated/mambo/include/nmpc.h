@@ -78,7 +78,10 @@ typedef struct {
 /* One controller, defined at the end of this file. Access it through these functions only. */
 typedef struct nmpc_controller nmpc_t;
 
-/* Forget everything, and take level attitude for the last command. A null pointer is ignored. */
+/* Forget everything, and take level attitude for the last command. A null pointer is ignored.
+ *
+ * Call it first: no other function notices that it was not, and an estimate from memory that nobody set can command
+ * the tilt limit for ever with status NMPC_OK. */
 void nmpc_init(nmpc_t *self);
 
 /* The same, but with `command` as the last command, each angle clamped to the tilt limit, for a bumpless transfer from

@@ -85,7 +85,10 @@ typedef struct {
 /* One controller, defined at the end of this file. Access it through these functions only. */
 typedef struct nmpc_controller nmpc_t;
 
-/* Set the weights of the settings, and level attitude as the last command. A null pointer is ignored. */
+/* Set the weights of the settings, and level attitude as the last command. A null pointer is ignored.
+ *
+ * Call it first: no other function notices that it was not. Zeroed memory then commands 0 for ever, other memory
+ * anything, NaN too, and every status is NMPC_OK. */
 void nmpc_init(nmpc_t *self);
 
 /* Set the last command and the whole plan to `command`, each angle clamped to the tilt limit, for a bumpless
