@@ -1,6 +1,7 @@
 """Fixtures for all tests, and the skip of those that want a compiler where there is none."""
 
 import os
+import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -12,6 +13,10 @@ from tests.support.tools import require
 
 # Arrays of tests are small: threads of NumPy's linear algebra take processor time from the other workers.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Hundreds of tests start Python: each would compile all modules again, a second of processor time.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 settings.register_profile(
     "house", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
