@@ -3,6 +3,9 @@
 import importlib.util
 import os
 import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NoReturn
 
@@ -67,6 +70,17 @@ def only(folder: Path, *patterns: str) -> str:
             if not (folder / tool.name).exists():
                 (folder / tool.name).symlink_to(tool)
     return str(folder)
+
+
+@contextmanager
+def without_compilers_of_boards() -> Iterator[None]:
+    """Hide all tools but the compiler of this machine.
+
+    `fly --port` then counts no instructions on the emulated core of the board, which takes most of its time.
+    """
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PATH", only(Path(folder), "gcc", "cc", "as", "ld"))
+        yield
 
 
 def toolchain(compiler: str, optimisation: str | None = None) -> Toolchain:

@@ -18,7 +18,7 @@ from mambo_sil.board.firmware.firmware_build import ENTRY, builder
 from mambo_sil.board.firmware.stack import bound_stack
 from tests.support.command import run
 from tests.support.serial_line import Line, build_firmware, serial_line
-from tests.support.tools import require_module
+from tests.support.tools import require_module, without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
@@ -45,8 +45,9 @@ def _pyserial() -> None:
 
 
 def flown(line: Line, source: str, *options: str, code: int = 0) -> dict[str, Any]:
-    """Fly with the board on `line`; return the summary."""
-    said, _ = run("fly", source, "--port", line.port, *options, "--no-pictures", "--json", code=code)
+    """Fly with the board on `line`; return the summary. `test_footprint` has the flights with a count."""
+    with without_compilers_of_boards():
+        said, _ = run("fly", source, "--port", line.port, *options, "--no-pictures", "--json", code=code)
     summary: dict[str, Any] = json.loads(said)
     return summary
 

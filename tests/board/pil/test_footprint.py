@@ -11,7 +11,7 @@ from mambo_sil.board.footprint.on_board import choose_board
 from mambo_sil.errors import BoardError
 from tests.support.command import run
 from tests.support.serial_line import Faults, build_firmware, edited, serial_line
-from tests.support.tools import board_builder, only, require_module
+from tests.support.tools import board_builder, require_module, without_compilers_of_boards
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 
@@ -77,12 +77,11 @@ def test_a_flight_on_a_known_board_has_the_count_beside_the_cycles(tmp_path: Pat
             assert emulated is None
 
 
-def test_a_flight_says_why_there_is_no_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flight_says_why_there_is_no_count(tmp_path: Path) -> None:
     """Without the compiler of the board it flies all the same."""
     board_builder("crazyflie")
-    with serial_line(build_firmware(SETTINGS, "crazyflie", tmp_path / "pil")) as line:
-        (tmp_path / "bin").mkdir()
-        monkeypatch.setenv("PATH", only(tmp_path / "bin", "gcc", "cc", "as", "ld"))
+    elf = build_firmware(SETTINGS, "crazyflie", tmp_path / "pil")
+    with serial_line(elf) as line, without_compilers_of_boards():
         said, _ = run("fly", "--port", line.port, "--duration-s", "0.1", "--no-pictures")
     assert "emulated           not counted: no compiler for " in said
 

@@ -12,6 +12,8 @@ from mambo_sil.model.identify.response import AxisParameters, Interval
 from tests.support.logs import NAMES, Array, Flown, Truth, drop_and_jitter, filter_velocity, fly, log_of
 
 TRUTH = Truth()
+FLIGHTS = 40
+"""Flights of each kind whose intervals are held against the truth."""
 
 
 def found(*logs: dict[str, Array]) -> IdentifySummary:
@@ -227,22 +229,25 @@ def demand_cover(estimates: list[Interval], truths: list[float], least: float) -
     ],
 )
 def test_intervals_cover_the_truth_in_ninety_of_a_hundred(truth: Truth, flown: Flown) -> None:
-    """Of gain, sum, lag and dead time of both axes, with lost rows and wrong times; and of the motion."""
+    """Of gain, sum, lag and dead time of both axes, with lost rows and wrong times; and of the motion.
+
+    Each of the three kinds of flight is flown `FLIGHTS` times.
+    """
     random = np.random.default_rng(5)
-    summaries = [found(drop_and_jitter(log, random)) for log in fly(truth, flown, 100, 7)]
+    summaries = [found(drop_and_jitter(log, random)) for log in fly(truth, flown, FLIGHTS, 7)]
     for axis in range(2):
         whole = [fits(summary)[axis] for summary in summaries]
         sums = truth.lag_s[axis] + truth.delay_s[axis]
-        demand_cover([fit.gain for fit in whole], [truth.gain[axis]] * 100, 0.9)
-        demand_cover([fit.sum_s for fit in whole], [sums] * 100, 0.9)
+        demand_cover([fit.gain for fit in whole], [truth.gain[axis]] * FLIGHTS, 0.9)
+        demand_cover([fit.sum_s for fit in whole], [sums] * FLIGHTS, 0.9)
         plain = [fit for fit in whole if fit.integral_1_s is None]
-        assert len(plain) >= 90
+        assert len(plain) >= 0.9 * FLIGHTS
         demand_cover([fit.lag_s for fit in plain], [truth.lag_s[axis]] * len(plain), 0.9)
         demand_cover([fit.delay_s for fit in plain], [truth.delay_s[axis]] * len(plain), 0.9)
     motions = [summary.motion for summary in summaries if summary.motion]
-    assert len(motions) == 100
+    assert len(motions) == FLIGHTS
     shares = [motion.acceleration_per_tilt for motion in motions]
-    demand_cover(shares, [truth.acceleration_per_tilt] * 100, 0.9)
-    demand_cover([motion.drag_1_s for motion in motions], [truth.drag_1_s] * 100, 0.9)
+    demand_cover(shares, [truth.acceleration_per_tilt] * FLIGHTS, 0.9)
+    demand_cover([motion.drag_1_s for motion in motions], [truth.drag_1_s] * FLIGHTS, 0.9)
     for axis in range(2):
-        demand_cover([motion.trim_rad[axis] for motion in motions], [truth.trim_rad[axis]] * 100, 0.9)
+        demand_cover([motion.trim_rad[axis] for motion in motions], [truth.trim_rad[axis]] * FLIGHTS, 0.9)
