@@ -4,16 +4,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from mambo_sil.model.identify.identify import identify
 from mambo_sil.model.identify.identify_record import IdentifySummary
-from mambo_sil.model.identify.response import AxisParameters, Interval
+from mambo_sil.model.identify.response import AxisParameters, Interval, filter_command
 from tests.support.logs import NAMES, Array, Flown, Truth, drop_and_jitter, filter_velocity, fly, log_of
 
 TRUTH = Truth()
 FLIGHTS = 40
 """Flights of each kind whose intervals are held against the truth."""
+
+
+@pytest.mark.parametrize("samples", [1, 2, 1000])
+@pytest.mark.parametrize(("top", "bottom"), [([0.05], [1.0, -0.95]), ([0.3, -0.2], [1.0, -1.5, 0.6])])
+def test_the_filter_is_that_of_scipy(samples: int, top: list[float], bottom: list[float]) -> None:
+    """In steady state before its first command."""
+    command = 2.0 + np.cumsum(np.random.default_rng(samples).normal(size=samples))
+    expected, _ = lfilter(top, bottom, command, zi=lfilter_zi(top, bottom) * command[0])
+    answer = filter_command(np.array(top), np.array(bottom), command)
+    np.testing.assert_allclose(answer, expected, rtol=1e-11)
 
 
 def found(*logs: dict[str, Array]) -> IdentifySummary:
