@@ -68,6 +68,7 @@ tools:
 	fi
 
 generated: $(SETUP)
+	$(BIN)/python -m benchmarks.generated
 	$(BIN)/mambo-nmpc generate mambo -o generated/mambo
 	$(BIN)/mambo-nmpc generate mambo --scalar fixed -o generated/mambo-fixed
 	$(BIN)/mambo-nmpc generate table1 -o generated/table1

@@ -76,7 +76,7 @@ Libraries = Annotated[tuple[Library, ...], _LIST]
 class _BoardSection(BaseModel):
     """Base of all sections: frozen, without unknown keys and implicit conversion, with a source."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
     source: Words = Field(description="where the values of this section come from")
     confidence: Literal["high", "medium", "low"] = Field(description='reliability: "high", "medium" or "low"')

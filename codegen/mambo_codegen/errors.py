@@ -84,6 +84,10 @@ class BuildError(MamboNmpcError):
     """The C cannot be compiled: no compiler, no headers, or an error of the compiler."""
 
 
+class CacheError(MamboNmpcError):
+    """The user's cache folder cannot be used, or other users can write to it."""
+
+
 class DriftError(MamboNmpcError):
     """A bundle on disk differs from what its settings generate."""
 

@@ -27,10 +27,6 @@ class ResultsError(MamboNmpcError):
     """A folder has no results, or damaged ones; the message names it and what was expected."""
 
 
-class CacheError(MamboNmpcError):
-    """The compile cache cannot be used, or other users can write to it."""
-
-
 class BusyError(MamboNmpcError):
     """Another run is using the result folder."""
 

@@ -31,6 +31,28 @@ def test_help_loads_no_heavy_library(arguments: list[str]) -> None:
     assert not {*HEAVY, SETTINGS} & set(done.stderr.split())
 
 
+@pytest.mark.parametrize(
+    ("arguments", "unwanted"),
+    [
+        (["generate", "-o", "controller"], {"cffi", "matplotlib", "mpmath", "scipy"}),
+        (["fly", "--no-pictures", "--duration-s", "1"], {"matplotlib", "mpmath", "pycparser", "scipy"}),
+        (
+            ["design", "mambo", "-o", "controller.toml"],
+            {"matplotlib", "pycparser", "scipy.signal", "scipy.stats"},
+        ),
+    ],
+    ids=lambda words: words[0] if isinstance(words, list) else "",
+)
+@pytest.mark.usefixtures("in_an_empty_folder")
+def test_a_command_loads_only_what_it_needs(arguments: list[str], unwanted: set[str]) -> None:
+    """With a preset, whose constants are shipped; each of these takes a tenth of a second or more."""
+    line = [sys.executable, "-c", SCRIPT.replace("raise", "sys.exit(leaving.code)"), *arguments]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "numpy" in done.stderr.split()
+    assert not unwanted & set(done.stderr.split())
+
+
 def test_every_command_has_its_line() -> None:
     """The first sentence of what it does, in the panel of what it is for."""
     said, _ = run("--help")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mambo_codegen.errors import BuildError
-from mambo_sil.errors import CacheError
-from mambo_sil.results.cache import build_cached, cache_folder
+from mambo_codegen.errors import BuildError, CacheError
+from mambo_codegen.user_cache import cache_folder
+from mambo_sil.results.cache import build_cached
 
 
 def make(folder: Path) -> Path:

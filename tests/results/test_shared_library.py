@@ -6,9 +6,8 @@ from pathlib import Path
 import cffi
 import pytest
 
-from mambo_codegen.errors import BuildError
+from mambo_codegen.errors import BuildError, CacheError
 from mambo_codegen.toolchain import Toolchain
-from mambo_sil.errors import CacheError
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 from tests.support.tools import require, toolchain
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import jinja2
 
 from mambo_codegen import __version__, boards
-from mambo_codegen.bundle.digest import TICKS, TICKS_PER_INPUT, episode_count, input_scales, self_test_digest
+from mambo_codegen.bundle.digest import TICKS, TICKS_PER_INPUT, episode_count, input_scales, kept_digest
 from mambo_codegen.bundle.flags import (
     COMPILE_FLAGS,
     PROOF_FLAGS,
@@ -22,6 +22,7 @@ from mambo_codegen.bundle.fmu import fmu_variables
 from mambo_codegen.bundle.products import products, term
 from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
+from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
@@ -148,6 +149,7 @@ def _environment() -> jinja2.Environment:
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
+        bytecode_cache=TemplateCache(),
     )
     environment.filters |= {name: _number_filter(name) for name in ("real", "row", "rows")}
     environment.filters["term"] = term
@@ -210,7 +212,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "ticks": TICKS,
             "held": TICKS_PER_INPUT,
             "self_test_steps": TICKS * episode_count(method),
-            "self_test_digest": self_test_digest(method, episode_count(method)) if with_digest else None,
+            "self_test_digest": kept_digest(method) if with_digest else None,
             "spread": input_scales(method),
             "boards": [
                 {

@@ -69,5 +69,6 @@ class SettingsSection(BaseModel):
         strict=True,
         allow_inf_nan=False,
         validate_default=True,
+        defer_build=True,
         field_title_generator=lambda name, _: name,
     )

@@ -55,7 +55,9 @@ Three = tuple[float, float, float]
 class _Record(BaseModel):
     """A frozen model that rejects unknown keys, infinity and NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True, defer_build=True
+    )
 
 
 OF_THE_VEHICLE: Final = (

@@ -8,45 +8,18 @@ import contextlib
 import hashlib
 import os
 import shutil
-import stat
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from mambo_sil.errors import CacheError
+from mambo_codegen.errors import CacheError
+from mambo_codegen.user_cache import cache_folder
 
 _WORK: Final = "build-"
 _ABANDONED_S: Final = 3600.0
 """Age beyond which the work folder of a build is regarded as left by a killed process."""
-
-
-def cache_folder() -> Path:
-    """Return the cache folder, which is made for this user alone where there is none.
-
-    It is $XDG_CACHE_HOME/mambo-nmpc, by default ~/.cache/mambo-nmpc. Raises CacheError if it cannot be made,
-    or if others may write to it: compiled code is loaded from there.
-    """
-    try:
-        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "mambo-nmpc"
-    except RuntimeError:
-        raise CacheError("this user has no home folder for the compile cache; set XDG_CACHE_HOME") from None
-    if not folder.is_absolute():
-        raise CacheError(f"the cache folder {folder} must be an absolute path; set XDG_CACHE_HOME")
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = folder.stat()
-    except OSError as error:
-        raise CacheError(
-            f"cannot use the cache folder {folder}: {error.strerror}; set XDG_CACHE_HOME"
-        ) from error
-    if status.st_uid != os.getuid() or status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        raise CacheError(
-            f"others may write to the cache folder {folder}, from which compiled code is loaded; "
-            "take that right from them (chmod go-w), or set XDG_CACHE_HOME to a folder of yours"
-        )
-    return folder
 
 
 def build_cached(name: str, build: Callable[[Path], Path]) -> Path:

@@ -6,14 +6,15 @@ import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-import cffi
-
-from mambo_codegen.errors import BuildError
+from mambo_codegen.errors import BuildError, CacheError
 from mambo_codegen.toolchain import Toolchain
-from mambo_sil.errors import CacheError
 from mambo_sil.results.cache import build_cached
+
+if TYPE_CHECKING:
+    import _cffi_backend
+    import cffi
 
 LIBRARY_FLAGS: Final = (
     *("-fPIC", "-shared"),
@@ -43,7 +44,7 @@ class LibrarySource:
     key: object
     files: Callable[[], Mapping[str, str]]
     flags: tuple[str, ...]
-    interface: cffi.FFI
+    interface: "_cffi_backend.FFI | cffi.FFI"
     libraries: tuple[str, ...] = ()
 
 
@@ -74,7 +75,7 @@ def load_shared_library(source: LibrarySource, toolchain: Toolchain) -> Any:
     return _LOADED[name]
 
 
-def _load(path: Path, interface: cffi.FFI) -> Any:
+def _load(path: Path, interface: "_cffi_backend.FFI | cffi.FFI") -> Any:
     """Load the shared library at `path`; raises CacheError if that fails."""
     try:
         return interface.dlopen(str(path))

@@ -19,7 +19,7 @@ Number = Annotated[int | float, BeforeValidator(lambda value: math.nan if value 
 class Summary(BaseModel):
     """The keys of every summary; unknown keys, which a later version may add, are ignored."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
+    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
 
     command: ClassVar[str]
     generator: str = f"{GENERATOR}{__version__}"

@@ -12,44 +12,15 @@ A command held over a step gives the constants below. All arithmetic has 40 digi
 float64 once.
 """
 
-import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.quadratic.riccati import Matrix, hold, mp
+from mambo_codegen.kept import keep
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.sections import Damping, Model, Sections
-
-_LEAK_1_S: Final = "0.001"
-"""The integral part decays at this rate, so that a loop that never answers has a bounded model."""
-
-_SETTLING: Final = 42
-"""Lags after which what decays with at least half their rate is below 1e-9."""
-
-
-@dataclass(frozen=True)
-class AttitudeLoop:
-    """The loop of roll or pitch, in seconds; `integral_1_s` is its integral gain over its angle gain."""
-
-    lag_s: Any
-    delay_s: Any
-    integral_1_s: Any
-
-    def rates(self, period_s: Any) -> tuple[Matrix, Matrix]:
-        """Return the rates (3, 3) of [a, i / integral, c] and of the command (3, 1), in 1/s.
-
-        Without a delay a follows the command itself, and c, which nothing reads, follows within a period.
-        """
-        prompt = self.delay_s == 0
-        follow = 1 / (period_s if prompt else self.delay_s)
-        a, c, u = 1 / self.lag_s, mp.mpf(0) if prompt else 1 / self.lag_s, 1 / self.lag_s
-        return (
-            mp.matrix([[-a, self.integral_1_s * a, c], [-1, -mp.mpf(_LEAK_1_S), 0], [0, 0, -follow]]),
-            mp.matrix([[u if prompt else 0], [1], [follow]]),
-        )
 
 
 @dataclass(frozen=True)
@@ -81,28 +52,24 @@ class AttitudeConstants:
     limit_m_step2: float
 
 
-def attitude_loops(model: Model, damping: Damping) -> tuple[AttitudeLoop, AttitudeLoop]:
-    """Return the loops of roll and pitch, with what rate feedback takes off their lags."""
+LoopValues = tuple[float, float, float, float]
+"""A loop of roll or pitch: lag, what rate feedback takes off the lag, and dead time, in s; its integral gain
+over its angle gain, in 1/s."""
+
+
+def attitude_loops(model: Model, damping: Damping) -> tuple[LoopValues, LoopValues]:
+    """Return the loops of roll and pitch."""
     return (
-        AttitudeLoop(
-            mp.mpf(model.roll_lag_s) - mp.mpf(damping.roll_rate_feedback_s),
-            mp.mpf(model.roll_delay_s),
-            mp.mpf(model.roll_integral_1_s),
-        ),
-        AttitudeLoop(
-            mp.mpf(model.pitch_lag_s) - mp.mpf(damping.pitch_rate_feedback_s),
-            mp.mpf(model.pitch_delay_s),
-            mp.mpf(model.pitch_integral_1_s),
-        ),
+        (model.roll_lag_s, damping.roll_rate_feedback_s, model.roll_delay_s, model.roll_integral_1_s),
+        (model.pitch_lag_s, damping.pitch_rate_feedback_s, model.pitch_delay_s, model.pitch_integral_1_s),
     )
 
 
 def attitude_constants(settings: Sections) -> AttitudeConstants:
     """Derive the constants of the attitude model."""
-    model, period_s = settings.model, mp.mpf(settings.horizon.update_period_s)
-    loops = attitude_loops(model, settings.damping)
-    rows = [_rows(loop, period_s) for loop in loops]
-    step_s = settings.horizon.update_period_s
+    model, step_s = settings.model, settings.horizon.update_period_s
+    solutions = [_solution(step_s, loop) for loop in attitude_loops(model, settings.damping)]
+    rows = [solution["rows"] for solution in solutions]
     gain = GRAVITY_M_S2 * model.acceleration_per_tilt * (step_s * step_s)
     loop_gains = np.array([model.roll_gain, model.pitch_gain])
     trim_rad = np.array([model.roll_trim_rad, model.pitch_trim_rad])
@@ -118,32 +85,16 @@ def attitude_constants(settings: Sections) -> AttitudeConstants:
         tilt_row=np.array([row[0] for row in rows]),
         integral_row=np.array([row[1] for row in rows]),
         lagged_share=np.array([row[2][3] for row in rows]),
-        limit_m_step2=max(_peak(*axis, period_s) for axis in zip(rows, loops, strict=True)) * largest,
+        limit_m_step2=max(solution["peak"] for solution in solutions) * largest,
     )
 
 
-def _rows(loop: AttitudeLoop, period_s: Any) -> list[list[float]]:
-    """Return the next a, i and c from [a, i, c, u], (3, 4)."""
-    transition, inputs = hold(*loop.rates(period_s), period_s)
-    share = loop.integral_1_s
-    for other in range(3):
-        if other != 1:
-            transition[1, other] *= share
-            transition[other, 1] = transition[other, 1] / share if share else mp.mpf(0)
-    inputs[1] *= share
-    return [[float(value) for value in (*transition[row, :], inputs[row])] for row in range(3)]
+def _solution(update_period_s: float, loop: LoopValues) -> dict[str, Any]:
+    """Return what `solve_attitude` returns."""
 
+    def solve() -> dict[str, Any]:
+        from mambo_codegen.methods.quadratic.solutions import solve_attitude  # noqa: PLC0415 - imports mpmath
 
-def _peak(rows: list[list[float]], loop: AttitudeLoop, period_s: Any) -> float:
-    """Return a bound of |a|, |i|, |c| for |u| <= 1: the sums of the absolute impulse responses.
+        return solve_attitude(update_period_s, loop)
 
-    When all but a slow integral part has settled, responses keep their signs: the sum of the rest is exact.
-    Twice that, since the components of a vector that turns are at most the sum of both.
-    """
-    response, sums = [row[3] for row in rows], [0.0] * 3
-    for _ in range(math.ceil(_SETTLING * max(loop.lag_s, loop.delay_s, period_s) / period_s)):
-        a, i, c = response
-        sums = [total + abs(value) for total, value in zip(sums, response, strict=True)]
-        response = [((row[0] * a) + (row[1] * i)) + (row[2] * c) for row in rows]
-    rest = mp.lu_solve(mp.eye(3) - mp.matrix([row[:3] for row in rows]), mp.matrix(response))
-    return 2.02 * max(1.0, *(total + float(abs(value)) for total, value in zip(sums, rest, strict=True)))
+    return cast(dict[str, Any], keep("attitude", (update_period_s, loop), solve))

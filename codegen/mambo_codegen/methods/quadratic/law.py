@@ -16,27 +16,22 @@ the state, [e, v, w, j, a, i, c, u_k-1]; the limits of the command cut it off.
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.quadratic.attitude_constants import AttitudeLoop, attitude_loops
-from mambo_codegen.methods.quadratic.riccati import Matrix, feedback_gain, hold, mp, solve_riccati, sum_costs
+from mambo_codegen.kept import keep
+from mambo_codegen.methods.quadratic.attitude_constants import LoopValues, attitude_loops
 from mambo_codegen.methods.rate_feedback import lag_refusals
 from mambo_codegen.settings.key import Refusal
-from mambo_codegen.settings.sections import Cost, Sections
+from mambo_codegen.settings.sections import Sections
 
 STATES: Final = ("e", "v", "w", "j", "a", "i", "c", "u")
 MOVED: Final = ("e", "v", "a", "i", "c", "u")
 """The states that the command moves."""
-_COMMAND: Final = 7
 MOST_OUTAGE_STEPS: Final = 250
 """The controller counts the control steps of an outage in one byte."""
-
-_JERK_POLE_1_S: Final = 1
-_DISTURBANCE_POLE_1_S: Final = "0.001"
 
 
 @dataclass(frozen=True)
@@ -57,11 +52,31 @@ class LawConstants:
     spectral_radius: NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class LawSolution:
+    """The law along one axis, in lists of floats.
+
+    rows, ratio: as in `LawConstants`.
+    curvature:   (2, 2) second derivatives of the cost by the two free moves; None for one.
+    closed_loop: (6, 6) transition of the states `MOVED` without the limits of the command, in SI units.
+    """
+
+    rows: list[list[float]]
+    ratio: float
+    curvature: list[list[float]] | None
+    closed_loop: list[list[float]]
+
+    @property
+    def spectral_radius(self) -> float:
+        """The largest absolute eigenvalue of the closed loop."""
+        return float(np.max(np.abs(np.linalg.eigvals(np.array(self.closed_loop)))))
+
+
 def law_constants(settings: Sections) -> LawConstants:
     """Derive the constants of the law."""
     laws = _laws(settings)
     return LawConstants(
-        moves=laws[0].rows.shape[0],
+        moves=len(laws[0].rows),
         rows=np.array([law.rows for law in laws]),
         ratios=np.array([law.ratio for law in laws]),
         spectral_radius=np.array([law.spectral_radius for law in laws]),
@@ -84,97 +99,20 @@ def closed_loops(settings: Sections) -> NDArray[np.float64]:
     return np.array([law.closed_loop for law in _laws(settings)])
 
 
-def _laws(settings: Sections) -> list["_Law"]:
-    horizon = settings.horizon
-    return [
-        _law(horizon.update_period_s, horizon.ramp_s, settings.cost, loop)
-        for loop in attitude_loops(settings.model, settings.damping)
-    ]
+def _laws(settings: Sections) -> list[LawSolution]:
+    return [_law(settings, loop) for loop in attitude_loops(settings.model, settings.damping)]
 
 
-@lru_cache(maxsize=128)
-def _law(update_period_s: float, ramp_s: float, cost: Cost, loop: AttitudeLoop) -> "_Law":
-    return _Law(update_period_s, ramp_s, cost, loop)
+def _law(settings: Sections, loop: LoopValues) -> LawSolution:
+    period_s, ramp_s, cost = settings.horizon.update_period_s, settings.horizon.ramp_s, settings.cost
+    inputs = period_s, ramp_s, cost.response_time_s, cost.velocity_weight_s, loop
 
+    def solve() -> dict[str, Any]:
+        from mambo_codegen.methods.quadratic.solutions import solve_law  # noqa: PLC0415 - imports mpmath
 
-class _Law:
-    """The law along one axis."""
+        return solve_law(*inputs)
 
-    def __init__(self, update_period_s: float, ramp_s: float, cost: Cost, loop: AttitudeLoop) -> None:
-        period_s = mp.mpf(update_period_s)
-        self._transition, self._input = _model(loop, period_s)
-        self._state_cost = mp.zeros(8)
-        self._state_cost[0, 0] = mp.mpf(1)
-        self._state_cost[1, 1] = mp.mpf(cost.velocity_weight_s) ** 2
-        self._input_cost = mp.matrix([[(mp.mpf(cost.response_time_s) ** 3 / period_s) ** 2]])
-        self._to_go = solve_riccati(self._transition, self._input, self._state_cost, self._input_cost)
-        self.curvature: list[list[float]] | None = None
-        ramp = round(ramp_s / update_period_s)
-        rows, ratio = self._two_moves(ramp) if ramp else self._one_move()
-        scale = _scale(loop, period_s)
-        self.rows = np.array(
-            [[float(rows[move, k] * scale[k]) for k in range(8)] for move in range(rows.rows)]
-        )
-        self.ratio = float(ratio)
-        self.closed_loop = self._closed_loop(rows)
-        self.spectral_radius = float(np.max(np.abs(np.linalg.eigvals(self.closed_loop))))
-
-    def _one_move(self) -> tuple[Matrix, Any]:
-        rows = -feedback_gain(self._transition, self._input, self._input_cost, self._to_go)
-        rows[0, _COMMAND] += 1
-        return rows, mp.mpf(0)
-
-    def _two_moves(self, ramp: int) -> tuple[Matrix, Any]:
-        """Sum the cost over both moves as a quadratic form of state and moves, and minimise it."""
-        form = mp.zeros(10)
-        form[:8, :8] = self._to_go
-        first, second = mp.zeros(1, 10), mp.zeros(1, 10)
-        first[8], first[_COMMAND] = mp.mpf(1), mp.mpf(-1)
-        second[9], second[8] = mp.mpf(1) / ramp, mp.mpf(-1) / ramp
-        for change, steps in ((second, ramp), (first, 1)):
-            transition, cost = mp.eye(10), mp.zeros(10)
-            transition[:8, :8] = self._transition
-            transition[:8, :] += self._input * change
-            cost[:8, :8] = self._state_cost
-            cost += self._input_cost[0] * (change.T * change)
-            form = sum_costs(transition, cost, form, steps)
-        curvature = form[8:, 8:]
-        self.curvature = [[float(curvature[row, column]) for column in (0, 1)] for row in (0, 1)]
-        return -(mp.inverse(curvature) * form[8:, :8]), curvature[0, 1] / curvature[0, 0]
-
-    def _closed_loop(self, rows: Matrix) -> NDArray[np.float64]:
-        """Return the transition of the states that the command moves, without its limits."""
-        change = rows[0, :].copy()
-        change[_COMMAND] -= 1
-        loop = self._transition + (self._input * change)
-        moved = [STATES.index(name) for name in MOVED]
-        return np.array([[float(loop[row, column]) for column in moved] for row in moved])
-
-
-def _model(loop: AttitudeLoop, period_s: Any) -> tuple[Matrix, Matrix]:
-    """Return how the state answers a change of the command, (8, 8) and (8, 1)."""
-    rates, inputs = mp.zeros(7), mp.zeros(7, 1)
-    rates[0, 1] = rates[1, 2] = rates[1, 4] = mp.mpf(1)
-    rates[2, 2] = -mp.mpf(_DISTURBANCE_POLE_1_S)
-    rates[2, 3] = mp.mpf(-1)
-    rates[3, 3] = mp.mpf(-_JERK_POLE_1_S)
-    rates[4:, 4:], inputs[4:, 0] = loop.rates(period_s)
-    transition, command = hold(rates, inputs, period_s)
-    joint, change = mp.eye(8), mp.zeros(8, 1)
-    joint[:7, :7], joint[:7, 7] = transition, command
-    change[:7, 0], change[7] = command, mp.mpf(1)
-    return joint, change
-
-
-def _scale(loop: AttitudeLoop, period_s: Any) -> list[Any]:
-    """Return the factors from rows for SI units to rows for steps: moves in m/step^2, the jerk in m/step^3.
-
-    The integral part counts as an acceleration.
-    """
-    share = loop.integral_1_s
-    integral = 1 / share if share else mp.mpf(0)
-    one = mp.mpf(1)
-    return [period_s**2, period_s, one, 1 / period_s, one, integral, one, one]
+    return LawSolution(**keep("law", inputs, solve))
 
 
 def refusals(settings: Sections) -> list[Refusal]:

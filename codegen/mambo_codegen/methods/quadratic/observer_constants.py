@@ -5,11 +5,12 @@ of given densities enters velocity, disturbance and both measurements.
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_codegen.methods.quadratic.riccati import hold, mp, solve_riccati
+from mambo_codegen.kept import keep
 from mambo_codegen.settings.sections import Sections
 
 
@@ -40,13 +41,13 @@ class ObserverConstants:
 def observer_constants(settings: Sections) -> ObserverConstants:
     """Derive the constants of the observer."""
     observer, update_s = settings.observer, settings.horizon.update_period_s
-    period_s = mp.mpf(update_s)
+    period_s = Fraction(update_s)
     return ObserverConstants(
         gain=_gain(settings),
-        disturbance_limit_m_step2=float(mp.mpf(observer.disturbance_limit_m_s2) * period_s**2),
-        velocity_limit_m_step=float(mp.mpf(settings.ranges.velocity_m_s) * period_s),
-        drag_1_step=float(mp.mpf(settings.model.drag_1_s) * period_s),
-        age_steps=float(mp.mpf(observer.age_s) / period_s),
+        disturbance_limit_m_step2=float(Fraction(observer.disturbance_limit_m_s2) * period_s**2),
+        velocity_limit_m_step=float(Fraction(settings.ranges.velocity_m_s) * period_s),
+        drag_1_step=float(Fraction(settings.model.drag_1_s) * period_s),
+        age_steps=float(Fraction(observer.age_s) / period_s),
         outage_steps=round(observer.outage_s / update_s),
         steps_per_s=1 / update_s,
         steps2_per_s2=1 / (update_s * update_s),
@@ -55,25 +56,17 @@ def observer_constants(settings: Sections) -> ObserverConstants:
 
 def _gain(settings: Sections) -> NDArray[np.float64]:
     """Return the gain (3, 2) of the stationary Kalman filter, for velocities in m/step and so on."""
-    observer, period_s = settings.observer, mp.mpf(settings.horizon.update_period_s)
+    observer, period_s = settings.observer, settings.horizon.update_period_s
+    noise = (
+        observer.acceleration_noise,
+        observer.disturbance_noise,
+        observer.position_noise,
+        observer.velocity_noise,
+    )
 
-    def density(value: float) -> object:
-        return mp.mpf(value) ** 2
+    def solve() -> list[list[float]]:
+        from mambo_codegen.methods.quadratic.solutions import solve_observer  # noqa: PLC0415 - imports mpmath
 
-    transition, _ = hold(mp.matrix([[0, 1, 0], [0, 0, 1], [0, 0, 0]]), mp.zeros(3, 1), period_s)
-    measured = mp.matrix([[1, 0, 0], [0, 1, 0]])
-    process = mp.diag(
-        [
-            mp.mpf(0),
-            density(observer.acceleration_noise) * period_s,
-            density(observer.disturbance_noise) * period_s,
-        ]
-    )
-    noise = mp.diag(
-        [density(observer.position_noise) / period_s, density(observer.velocity_noise) / period_s]
-    )
-    spread = solve_riccati(transition.T, measured.T, process, noise)
-    gain = spread * measured.T * mp.inverse((measured * spread * measured.T) + noise)
-    return np.array(
-        [[float(gain[row, column] * period_s ** (row - column)) for column in range(2)] for row in range(3)]
-    )
+        return solve_observer(period_s, noise)
+
+    return np.array(keep("observer", (period_s, noise), solve))

@@ -15,7 +15,7 @@ LONGEST_DELAY_S = 0.2
 class VehicleSection(BaseModel):
     """The rules of all sections: read-only, no unknown keys, no conversion of types, finite numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
 
 Mass = Annotated[float, Field(ge=0.001, le=100)]

@@ -49,7 +49,7 @@ _LONGEST_LIST: Final = 10
 class FileSection(BaseModel):
     """A frozen section of a file that rejects unknown keys, conversions of type, infinity and NaN."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True)
 
 
 File = TypeVar("File", bound=FileSection)

@@ -11,12 +11,11 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from typing import Any, Final
 
-import cffi
-
 from mambo_codegen.bundle.flags import COMPILE_FLAGS
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
+from mambo_sil.flight.controllers import controller_interface
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 
 DECLARATIONS: Final = """
@@ -33,11 +32,11 @@ DECLARATIONS: Final = """
 """
 """The functions that Python calls in a library: those of the glue, and one step of the self-test.
 
-nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost.
+nmpc_host_set_weights is there with a 1-norm, nmpc_host_set_command with a quadratic cost. `ffi` is made from
+them.
 """
 
-ffi: Final = cffi.FFI()
-ffi.cdef(DECLARATIONS)
+ffi: Final[Any] = controller_interface.ffi
 
 _FLAGS: Final = (*COMPILE_FLAGS, "-Iinclude", "-Isrc")
 

@@ -1,17 +1,18 @@
 """Build the engine with the host's compiler, once per machine, and load it."""
 
+import hashlib
 import os
 from functools import lru_cache
 from importlib import resources
 from typing import Any, Final
 
-import cffi
 import numpy as np
 
 from mambo_codegen.settings.key import spell
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.drone.plant import elementary
 from mambo_sil.errors import FlightError
+from mambo_sil.flight.engine import engine_interface
 from mambo_sil.flight.names import ENGINE_NAMES, EngineName
 from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 
@@ -42,9 +43,13 @@ LANES: Final = {1: (), 2: ("-DLANES=2",), 4: ("-DLANES=4", "-mavx2")}
 LIBRARIES: Final = ("-lm",)
 VARIABLE: Final = "MAMBO_NMPC_ENGINE"
 
-ffi: Final = cffi.FFI()
-ffi.cdef("typedef double real_t; typedef int64_t whole_t;")
-ffi.cdef(resources.files("mambo_sil.flight.engine").joinpath("records.h").read_text("utf-8"))
+ffi: Final[Any] = engine_interface.ffi
+
+
+def declarations() -> str:
+    """Return what Python knows of the engine: records.h with one lane. `ffi` is made from it."""
+    records = resources.files("mambo_sil.flight.engine").joinpath("records.h").read_text("utf-8")
+    return f"typedef double real_t; typedef int64_t whole_t;\n{records}"
 
 
 def texts() -> dict[str, str]:
@@ -85,6 +90,8 @@ def load(toolchain: Toolchain, lanes: int = 1) -> Any:
 
     Raises BuildError and CacheError.
     """
+    known = engine_interface.DECLARATIONS_SHA256
+    assert known == hashlib.sha256(declarations().encode()).hexdigest(), "records.h: run `make generated`"
     files = texts()
     return load_shared_library(
         LibrarySource("engine", files, lambda: files, (*FLAGS, *LANES[lanes]), ffi, LIBRARIES), toolchain
