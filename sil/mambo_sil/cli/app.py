@@ -11,6 +11,7 @@ from mambo_sil.cli.command import Command, examples, root
 from mambo_sil.cli.evidence import VERIFY_EXIT_CODES, regress, report, table2, verify
 from mambo_sil.cli.fly.commands import campaign, faults, fly, replay
 from mambo_sil.cli.generate import generate, identify_binary
+from mambo_sil.cli.margins import margins
 from mambo_sil.cli.settings import design, diff, identify, list_presets, schema, tune, vehicles
 from mambo_sil.cli.start import doctor, init, playground
 
@@ -24,6 +25,7 @@ PANELS: Final[dict[str, dict[str, Callable[..., None]]]] = {
         "design": design,
         "tune": tune,
         "diff": diff,
+        "margins": margins,
     },
     "Generate": {"generate": generate, "identify-binary": identify_binary},
     "Fly": {"fly": fly, "campaign": campaign, "faults": faults, "replay": replay},
@@ -94,6 +96,10 @@ mambo-nmpc replay flight/trace.csv
 mambo-nmpc replay flight.csv controller.toml -o replayed
 mambo-nmpc diff mambo controller.toml
 mambo-nmpc diff controller-old controller-new --vehicle crazyflie -o diff
+mambo-nmpc margins
+mambo-nmpc margins controller.toml --vehicle crazyflie --sensors mocap -o margins
+mambo-nmpc margins --campaign default --drones 300
+mambo-nmpc margins controller.toml --vehicle identified/vehicle.toml --uncertainty
 mambo-nmpc identify-binary firmware.elf
 mambo-nmpc identify-binary firmware.hex controller.toml controller-old
 mambo-nmpc playground -o play.html

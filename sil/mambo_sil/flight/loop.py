@@ -189,7 +189,7 @@ def fly(
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
     drone, step_s = vehicle.drone, vehicle.drone.step_s
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
-    suite = _suite(flight, seeds, truth(state))
+    suite = suite_of(flight, seeds, truth(state))
     wire = Wire(flight.link, flight.flights)
     caller = _Caller(
         controller,
@@ -219,7 +219,7 @@ def fly(
     return caller.trace
 
 
-def _suite(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
+def suite_of(flight: Flight, seeds: Sequence[int], start: Seen) -> Suite | MocapSuite | None:
     """Return the sensors of n flights; None: the true state."""
     match flight.sensors:
         case MotionCapture() as capture:

@@ -15,6 +15,7 @@ from mambo_sil.board.pil.pil_report import BoardFlightSummary
 from mambo_sil.errors import ResultsError
 from mambo_sil.experiment.campaign.campaign_report import CampaignSummary, UnfinishedCampaign
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
+from mambo_sil.experiment.margins.margins_record import MarginsSummary
 from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedSummary
 from mambo_sil.experiment.table2.table2 import Table2Summary
@@ -40,6 +41,7 @@ RESULTS: Final[tuple[type[ReportedSummary], ...]] = (
     CampaignSummary,
     IdentifySummary,
     LogReplaySummary,
+    MarginsSummary,
 )
 """The summaries that a result folder may have; its key "command" says which."""
 

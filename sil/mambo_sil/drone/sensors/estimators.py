@@ -80,7 +80,12 @@ class Attitude:
     def __init__(self, euler_rad: FloatArray) -> None:
         self.euler_rad = euler_rad.copy()
         self.sines, self.cosines = sine_cosine(self.euler_rad)
+        self._gate_m_s2 = TILT_GATE * GRAVITY_M_S2
         self._forces: list[FloatArray] = []
+
+    def shut_gate(self) -> None:
+        """Correct the angles no more by the accelerometer, as noise does for most of a flight."""
+        self._gate_m_s2 = 0.0
 
     def update(self, imu: FloatArray) -> None:
         """Advance the angles by one tick with specific force and rates (6, n)."""
@@ -91,7 +96,7 @@ class Attitude:
         roll = roll + STEP_S * (p + sin_pitch * yaw_rate)
         pitch = pitch + STEP_S * (cos_roll * q - sin_roll * r)
         x, y, z = self._smooth(imu[:3])
-        trusted = np.abs(np.sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < TILT_GATE * GRAVITY_M_S2
+        trusted = np.abs(np.sqrt(x * x + y * y + z * z) - GRAVITY_M_S2) < self._gate_m_s2
         if trusted.any():
             force_roll = arc_tangent(y / z)
             force_pitch = arc_sine(np.clip(x / GRAVITY_M_S2, -1.0, 1.0))
@@ -198,6 +203,10 @@ class Suite:
         velocity_m_s = to_body(start.euler_rad, start.velocity_m_s)[:2]
         self._velocity = Velocity(velocity_m_s, derotated=sensors.derotated)
         self._position_m = start.position_m[:2].copy()
+
+    def shut_gate(self) -> None:
+        """Correct roll and pitch no more by the accelerometer, as noise does for most of a flight."""
+        self._attitude.shut_gate()
 
     def estimate(self, true: Seen) -> Seen:
         """Return the estimate that the controllers receive at this tick; call it once per tick of 5 ms."""

@@ -1,0 +1,124 @@
+"""The command margins: how far a controller on a drone is from instability."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_sil.cli.options import AsJson, OptionalResults, OtherDrone, Source, load, show
+from mambo_sil.flight.names import SensorsName
+
+if TYPE_CHECKING:
+    from mambo_sil.experiment.campaign.campaign_file import Campaign
+    from mambo_sil.experiment.margins.margins_record import MarginsSummary
+    from mambo_sil.experiment.margins.margins_run import Many, MarginSubject
+
+_DEFAULT: Final = "default"
+"""Names the default campaign."""
+
+
+def margins(
+    source: Source = "mambo",
+    *,
+    vehicle: OtherDrone = None,
+    sensors: Annotated[
+        SensorsName | None,
+        typer.Option(
+            help="State that controller and inner loops get, as of `fly`; by default the true one, with "
+            "--campaign that of the campaign."
+        ),
+    ] = None,
+    campaign: Annotated[
+        str | None,
+        typer.Option(
+            help="Also the drones that a campaign draws: a campaign.toml, or `default`.", metavar="FILE"
+        ),
+    ] = None,
+    uncertainty: Annotated[
+        bool,
+        typer.Option(
+            "--uncertainty",
+            help="Also the drones at the ends of the intervals in [uncertainty] of the vehicle.toml.",
+            metavar="",
+        ),
+    ] = False,
+    drones: Annotated[int, typer.Option(help="Number of drones with --campaign.", min=1, max=100_000)] = 100,
+    output: OptionalResults = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure gain, phase and delay margins of a controller on a drone at hover; exit 1 if it is unstable."""
+    from mambo_sil.drone.vehicles import vehicle_toml
+    from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPONSES
+    from mambo_sil.experiment.margins.margins_report import margins_text
+    from mambo_sil.experiment.margins.margins_run import MarginSubject, measure
+    from mambo_sil.results.folders import SUMMARY
+
+    if campaign is not None and uncertainty:
+        raise typer.BadParameter("leave out one of the two", param_hint="--campaign, --uncertainty")
+    settings = load(source, None)
+    if campaign is None:
+        drone = vehicle_toml.load(vehicle or vehicle_toml.DEFAULT)
+        subject = MarginSubject(source, settings, drone, sensors or "none")
+        summary = measure(subject, _corners(subject) if uncertainty else None, output)
+    else:
+        drawing = _campaign(campaign, vehicle, sensors)
+        subject = MarginSubject(source, settings, drawing.drone, drawing.file.flight.sensors or "none")
+        summary = _measure_drawn(subject, campaign, drawing, drones, output)
+    show(summary, margins_text(summary), as_json=as_json)
+    if output is not None:
+        drawn = (*PICTURES, RESPONSES) if summary.axes else ()
+        written = (*drawn, *((DRONES,) if summary.many else ()), SUMMARY)
+        typer.echo(f"{echo(str(output))}: {', '.join(written)}", err=True)
+    if not summary.stable:
+        raise typer.Exit(1)
+
+
+def _corners(subject: "MarginSubject") -> "Many":
+    """Return the drones at the ends of the intervals that a log has shown."""
+    from mambo_sil.experiment.margins.many_drones import corner_drones
+    from mambo_sil.experiment.margins.margins_run import Many
+
+    period_s = subject.settings.horizon.update_period_s
+    return Many(
+        "at the ends of the intervals in [uncertainty]",
+        lambda controller: corner_drones(controller, subject.drone, subject.sensors, period_s),
+    )
+
+
+def _measure_drawn(
+    subject: "MarginSubject", named: str, drawing: "Campaign", drones: int, output: Path | None
+) -> "MarginsSummary":
+    """Measure the first drones of a campaign, too; show the progress."""
+    from mambo_sil.cli.progress import counting_bar
+    from mambo_sil.experiment.campaign.campaign_file import demand_flyable
+    from mambo_sil.experiment.margins.many_drones import campaign_drones
+    from mambo_sil.experiment.margins.margins_run import Many, measure
+
+    demand_flyable(subject.settings, drawing.flight, drawing.draw(0), echo(subject.source))
+    period_s = subject.settings.horizon.update_period_s
+    with counting_bar("measuring", "drones", drones) as bar:
+        many = Many(
+            f"the first that campaign {echo(named)} draws",
+            lambda controller: campaign_drones(controller, drawing, drones, period_s, bar),
+        )
+        return measure(subject, many, output)
+
+
+def _campaign(named: str, vehicle: str | None, sensors: SensorsName | None) -> "Campaign":
+    """Load a campaign, and replace its sensors if others are given; raises InvalidSettingsError."""
+    from mambo_sil.errors import FlightError
+    from mambo_sil.experiment.campaign import campaign_file
+    from mambo_sil.flight.scenario import choose_sensors
+
+    default = named == _DEFAULT
+    drawing = campaign_file.default(vehicle) if default else campaign_file.read(Path(named), vehicle)
+    if sensors is None:
+        return drawing
+    try:
+        choose_sensors(sensors, drawing.drone)
+    except FlightError as error:
+        raise InvalidSettingsError((f"--sensors: {error}",)) from None
+    flight = drawing.file.flight.model_copy(update={"sensors": sensors})
+    return replace(drawing, file=drawing.file.model_copy(update={"flight": flight}))

@@ -1,0 +1,162 @@
+"""One axis of a controller on a drone: margins, poles, gains from gust and noise."""
+
+import math
+from typing import Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
+
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.experiment.margins.hover_loop import (
+    AT_COMMAND,
+    AT_MOTORS,
+    BY_NOISE,
+    BY_PUSH,
+    BY_SEEN,
+    PLACE,
+    SENT,
+    TURNING,
+    PeriodicLoop,
+    choose,
+)
+from mambo_sil.experiment.margins.loop_margins import LoopMargins, measure_loop
+from mambo_sil.results.summary import Number
+
+AxisName = Literal["roll", "pitch"]
+AXES: Final[tuple[AxisName, AxisName]] = ("roll", "pitch")
+PlaceName = Literal["command", "motors"]
+PLACES: Final[dict[PlaceName, str]] = {"command": "the command", "motors": "the motors' torque"}
+"""Where a loop is broken, in words."""
+SLOWEST_RAD_S: Final = 0.02
+"""Least frequency at which a loop is looked at."""
+GROWTH_1_S: Final = 1e-3
+"""A pole that grows more slowly counts as one of a drift, as that of an estimated position."""
+_LEAST_SHARE: Final = 1e-3
+"""A pole with a smaller share of the largest residue is left out."""
+_DEAD: Final = 1e-9
+
+
+class Poles(BaseModel):
+    """The closed loop's poles that matter: those that a command or a torque moves and shows."""
+
+    model_config = ConfigDict(frozen=True)
+
+    least_damping: Number
+    least_damped_rad_s: Number
+    """Natural frequency of the least damped pole."""
+    slowest_s: Number
+    """Time constant of the slowest pole."""
+    growth_1_s: Number
+    """Largest real part: positive if the loop is unstable."""
+
+
+class NoiseGain(BaseModel):
+    """What white noise on one quantity that the controller sees does: rms over rms, in SI units."""
+
+    model_config = ConfigDict(frozen=True)
+
+    to_place: Number
+    to_command: Number
+
+
+class AxisMargins(BaseModel):
+    """One axis; without margins if its loop is unstable, and without `motors` on a drone that has none."""
+
+    model_config = ConfigDict(frozen=True)
+
+    axis: AxisName
+    stable: bool
+    command: LoopMargins | None
+    """Broken at the command of the position controller."""
+    motors: LoopMargins | None
+    """Broken at the torque that the attitude loop demands of the motors."""
+    poles: Poles
+    gust_to_place_s2: Number
+    """Largest displacement over the amplitude of an acceleration that is a sine."""
+    gust_to_command_rad_s2_m: Number
+    """Largest command over it."""
+    noise: dict[Literal["position", "velocity", "angle"], NoiseGain]
+    sensed_variation_rad: Number | None
+    """Rms of the change of the command, from update to update, by the noise of the sensors; None without."""
+
+    @property
+    def loops(self) -> dict[str, LoopMargins]:
+        """The margins by the place where the loop is broken."""
+        found = {"command": self.command, "motors": self.motors}
+        return {name: one for name, one in found.items() if one is not None}
+
+
+def frequencies(loop: PeriodicLoop, update_period_s: float, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies up to those of half an update's rate, and of half a tick's."""
+    limits = math.pi / update_period_s, math.pi / loop.step_s
+    updates, ticks = (np.geomspace(SLOWEST_RAD_S, limit, count) for limit in limits)
+    return updates, ticks
+
+
+def measure_axis(
+    loop: PeriodicLoop, axis: int, update_period_s: float, *, motors: bool, count: int = 400
+) -> AxisMargins:
+    """Return the figures of a loop of `axis_loop`; `count` is the number of frequencies."""
+    updates, ticks = frequencies(loop, update_period_s, count)
+    poles = measure_poles(choose(loop, [AT_COMMAND, AT_MOTORS], [SENT, TURNING]))
+    stable = poles.growth_1_s < GROWTH_1_S
+    answer = loop.response(ticks)
+    magnitude = np.abs(answer)
+    slow = ticks <= updates[-1]
+    at_update = loop.response(updates)[:, [PLACE, SENT], BY_SEEN]
+    rms = _rms(at_update, updates * update_period_s)
+    variation_rad = None
+    if answer.shape[2] > BY_NOISE:
+        change = 1.0 - np.exp(-1j * ticks[:, np.newaxis] * update_period_s)
+        by_noise_rad = _rms(answer[:, SENT, BY_NOISE:] * change, ticks * loop.step_s)
+        variation_rad = float(np.linalg.norm(by_noise_rad)) if stable else math.inf
+    at_command, at_motors = choose(loop, [AT_COMMAND], [SENT]), choose(loop, [AT_MOTORS], [TURNING])
+    return AxisMargins(
+        axis=AXES[axis],
+        stable=stable,
+        command=measure_loop(at_command, updates, update_period_s) if stable else None,
+        motors=measure_loop(at_motors, ticks, update_period_s) if stable and motors else None,
+        poles=poles,
+        gust_to_place_s2=float(magnitude[slow, PLACE, BY_PUSH].max()) if stable else math.inf,
+        gust_to_command_rad_s2_m=float(magnitude[slow, SENT, BY_PUSH].max()) if stable else math.inf,
+        noise={
+            name: NoiseGain(
+                to_place=rms[0, column] if stable else math.inf,
+                to_command=rms[1, column] if stable else math.inf,
+            )
+            for column, name in enumerate(("position", "velocity", "angle"))
+        },
+        sensed_variation_rad=variation_rad,
+    )
+
+
+def _rms(answer: NDArray[np.complex128], theta: FloatArray) -> FloatArray:
+    """Return the rms of answers (f, ...) to white noise of rms 1, at angles (f,) up to pi in a sample."""
+    power = np.abs(answer) ** 2
+    theta = np.concatenate([[0.0], theta])
+    power = np.concatenate([power[:1], power])
+    return np.asarray(np.sqrt(np.trapezoid(power, theta, axis=0) / math.pi))
+
+
+def measure_poles(loop: PeriodicLoop) -> Poles:
+    """Return the poles of a loop that have a share in its answers."""
+    poles, vectors = np.linalg.eig(loop.monodromy())
+    forced = np.zeros((len(vectors), loop.inputs.shape[2]))
+    for transition, inputs in zip(loop.transition, loop.inputs, strict=True):
+        forced = transition @ forced + inputs
+    shown = loop.outputs.sum(axis=0) @ vectors
+    moved: Any = np.linalg.lstsq(vectors, forced, rcond=None)[0]
+    shares = np.einsum("ok,ki->koi", np.abs(shown), np.abs(moved))
+    shares = (shares / np.maximum(shares.max(axis=0), 1e-300)).max(axis=(1, 2))
+    alive = (np.abs(poles) > _DEAD) & (shares > _LEAST_SHARE)
+    roots = np.log(poles[alive].astype(np.complex128)) / loop.period_s
+    roots = roots[np.abs(roots) > GROWTH_1_S]
+    damping = -roots.real / np.abs(roots)
+    least, slowest = int(np.argmin(damping)), int(np.argmax(roots.real))
+    return Poles(
+        least_damping=damping[least],
+        least_damped_rad_s=abs(roots[least]),
+        slowest_s=-1.0 / roots[slowest].real,
+        growth_1_s=roots[slowest].real,
+    )

@@ -1,0 +1,225 @@
+"""Simulated drones as linear systems: every number of their state changed, one tick simulated.
+
+A drone is that of a flight: stock loops, motors and, if the flight has sensors, instruments and estimators.
+"""
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_sil.drone.plant.airframe import Airframe, airframe_of
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.first_order import FirstOrderDrone
+from mambo_sil.drone.plant.loops import Demand, altitude_thrust
+from mambo_sil.drone.plant.rotors import WRENCH_SIGNS
+from mambo_sil.drone.plant.vehicle import Moment, Vehicle, VehicleState, truth
+from mambo_sil.drone.sensors import instruments, mocap
+from mambo_sil.drone.sensors.estimators import Suite
+from mambo_sil.drone.sensors.instruments import FLOW_IMAGES_PER_TICKS, Sensors
+from mambo_sil.drone.sensors.mocap import MotionCapture, sampling
+from mambo_sil.experiment.margins.rebuild import GivenDraws, rebuild
+from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight, suite_of
+
+SETTLE_S: Final = 0.3
+"""Time in which the estimators come to rest before the drone is linearised."""
+_CHANGE: Final = 1e-5
+"""Change of a number, relative to it if it is larger than 1: errors grow with its square, rounding falls."""
+
+_ROUNDING: Final = 1e-8
+"""Slopes below it, between numbers scaled as above, are 0: they are differences of rounding errors."""
+
+COMMAND, MOTOR, PUSH, NOISE = slice(0, 2), slice(2, 4), slice(4, 6), 6
+"""Columns of the inputs: command of roll and pitch; additions to the motor commands that turn about x and y,
+per command of hover; acceleration along y and x of the world; standard normal noise from column 6 on."""
+SEEN, DEMAND, TRUE = slice(0, 7), slice(7, 9), slice(9, 11)
+"""Rows of the outputs: the seen state; the share of the motor commands that turns about x and y, per command
+of hover; true y and x."""
+_TURNING: Final = WRENCH_SIGNS[1:3]
+_ROTORS: Final = 4
+
+
+@dataclass(frozen=True, eq=False)
+class DroneJacobians:
+    """D drones over the ticks after which their sensors repeat, each array (D, ticks, rows, columns).
+
+    state' = transition state + inputs input, output = outputs state + feed input.
+    """
+
+    transition: FloatArray
+    inputs: FloatArray
+    outputs: FloatArray
+    feed: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Moving:
+    """What a simulation keeps from tick to tick: the drones, and their sensors or None."""
+
+    state: VehicleState
+    suite: Any
+
+
+def repeating_ticks(flight: Flight) -> int:
+    """Return the number of ticks after which controller and sensors are called in the same order again."""
+    match flight.sensors:
+        case Sensors():
+            period = FLOW_IMAGES_PER_TICKS[1]
+        case MotionCapture() as capture:
+            period = sampling(capture.figures, flight.vehicle.drone.step_s).period_ticks
+        case None:
+            period = 1
+    return math.lcm(flight.ticks_per_update, period)
+
+
+def drone_jacobians(flight: Flight) -> DroneJacobians:
+    """Return the drones of a flight at hover, linearised in each of `repeating_ticks`."""
+    n, vehicle, ticks = flight.flights, flight.vehicle, repeating_ticks(flight)
+    state = _hovering(vehicle, n)
+    moving = _Moving(state, _still_sensors(flight, state))
+    inputs = np.zeros((NOISE + _noises(flight), n))
+    settling = -(-round(SETTLE_S / vehicle.drone.step_s) // ticks) * ticks
+    for _ in range(settling):
+        moving, _ = _tick(vehicle, moving, inputs)
+    found = []
+    for _ in range(ticks):
+        found.append(_differentiate(vehicle, moving, inputs))
+        moving, _ = _tick(vehicle, moving, inputs)
+    return DroneJacobians(*(np.stack(parts, axis=1) for parts in zip(*found, strict=True)))
+
+
+def _hovering(vehicle: Vehicle, n: int) -> VehicleState:
+    """Return n drones at rest where their altitude loop demands the thrust that carries their weight."""
+    drone, nominal = vehicle.drone, airframe_of(vehicle.drone)
+    share = vehicle.airframe.thrust_factor_n_s2 / nominal.thrust_factor_n_s2
+    demand_n = vehicle.airframe.mass_kg * GRAVITY_M_S2 / share
+    position_m = np.zeros((3, n))
+    position_m[2] = HEIGHT_REFERENCE_M - (drone.weight_n - demand_n) / max(drone.altitude.p_n_m, 1e-9)
+    return vehicle.at_rest(position_m, 0.0, demand_n / (4.0 * nominal.thrust_per_command_n))
+
+
+def _still_sensors(flight: Flight, state: VehicleState) -> Any:
+    """Return the sensors of a flight without noise, or None.
+
+    The accelerometer does not correct the tilt: in flight noise does not let it. Smoothed, that of the Mambo
+    has 18 times the width of the gate.
+    """
+    given = flight.sensors
+    if given is None:
+        return None
+    if isinstance(given, Sensors):
+        unbiased = (0.0, 0.0, 0.0)
+        given = replace(given, accelerometer_bias_m_s2=unbiased, gyro_bias_rad_s=unbiased)
+    suite = suite_of(replace(flight, sensors=given), (0,) * flight.flights, truth(state))
+    suite = rebuild(suite, flight.flights, np.copy, GivenDraws(np.zeros((_noises(flight), flight.flights))))
+    if isinstance(suite, Suite):
+        suite.shut_gate()
+    return suite
+
+
+def _noises(flight: Flight) -> int:
+    """Return how many random numbers the sensors of one drone use in a tick."""
+    match flight.sensors:
+        case Sensors():
+            return instruments.NOISES
+        case MotionCapture():
+            return mocap.NOISES
+        case None:
+            return 0
+
+
+def _tick(vehicle: Vehicle, moving: _Moving, inputs: FloatArray) -> tuple[_Moving, FloatArray]:
+    """Return n drones one tick later, and the outputs (11, n) at this tick, for inputs (6 + noises, n)."""
+    state, suite = moving.state, moving.suite
+    true = seen = truth(state)
+    if suite is not None:
+        suite = rebuild(suite, inputs.shape[1], np.copy, GivenDraws(inputs[NOISE:]))
+        seen = suite.estimate(true)
+    thrust_n = altitude_thrust(vehicle.drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
+    moment = Moment(push_m_s2=(inputs[PUSH][1], inputs[PUSH][0]))
+    demand = np.zeros((2, inputs.shape[1]))
+    if isinstance(vehicle.loop, FirstOrderDrone):
+        state = vehicle.step(state, inputs[COMMAND], thrust_n, 0.0, seen=seen, moment=moment)
+    else:
+        asked = Demand(inputs[COMMAND], 0.0, thrust_n, seen.euler_rad, seen.rates_rad_s)
+        motor_command, memory = vehicle.loop.command_motors(asked, state.memory)
+        hover = airframe_of(vehicle.drone).hover_command
+        demand = _TURNING @ motor_command / (_ROTORS * hover)
+        motor_command = motor_command + hover * (_TURNING.T @ inputs[MOTOR])
+        state = VehicleState(*vehicle.integrate(state, motor_command, moment), memory)
+    outputs = [seen.position_m[:2], seen.velocity_m_s[:2], seen.euler_rad, demand, true.position_m[1::-1]]
+    return _Moving(state, suite), np.concatenate(outputs)
+
+
+def _differentiate(
+    vehicle: Vehicle, moving: _Moving, inputs: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return transition, inputs, outputs and feed of D drones in one tick, each (D, rows, columns)."""
+    base = _numbers(moving)
+    rows, n = base.shape
+    changed = rows + len(inputs)
+    change = _CHANGE * np.maximum(1.0, np.abs(np.concatenate([base, inputs])))
+    signs = np.array([1.0, -1.0])
+    changes = np.einsum("rn,rc,s->rncs", change, np.eye(changed), signs).reshape(changed, -1)
+    many = np.repeat(np.concatenate([base, inputs]), 2 * changed, axis=1) + changes
+    after, outputs = _tick(_repeat(vehicle, 2 * changed), _with_numbers(moving, many[:rows]), many[rows:])
+    both = np.concatenate([_numbers(after), outputs]).reshape(-1, n, changed, 2)
+    slopes = (both[..., 0] - both[..., 1]) / (2.0 * change.T)
+    scale = np.ones((len(slopes), n))
+    scale[:rows] = change[:rows] / _CHANGE
+    size = np.abs(slopes) * (change / _CHANGE).T / scale[:, :, np.newaxis]
+    slopes = np.where(size > _ROUNDING, slopes, 0.0).swapaxes(0, 1)
+    return (
+        slopes[:, :rows, :rows],
+        slopes[:, :rows, rows:],
+        slopes[:, rows:, :rows],
+        slopes[:, rows:, rows:],
+    )
+
+
+def _numbers(moving: _Moving) -> FloatArray:
+    """Return all numbers (rows, n) that a simulation keeps.
+
+    In place of four speeds of rotors, what they share: so roll and pitch do not depend on the same number.
+    """
+    state, n = moving.state, moving.state.body.shape[1]
+    shared_rad_s = WRENCH_SIGNS @ state.rotor_speed_rad_s / _ROTORS
+    found = [state.body, shared_rad_s, state.memory]
+
+    def note(array: FloatArray) -> FloatArray:
+        found.append(array.reshape(-1, n))
+        return array
+
+    rebuild(moving.suite, n, note, GivenDraws(np.zeros(0)))
+    return np.concatenate(found)
+
+
+def _with_numbers(moving: _Moving, numbers: FloatArray) -> _Moving:
+    """Return a simulation of m drones with numbers (rows, m), which lie as those of `_numbers`."""
+    first, n = 0, moving.state.body.shape[1]
+
+    def take(array: FloatArray) -> FloatArray:
+        nonlocal first
+        count = int(np.prod(array.shape[:-1]))
+        first += count
+        return numbers[first - count : first].reshape(*array.shape[:-1], -1)
+
+    state = moving.state
+    body, shared_rad_s = take(state.body), take(state.rotor_speed_rad_s)
+    given = VehicleState(body, WRENCH_SIGNS.T @ shared_rad_s, take(state.memory))
+    return _Moving(given, rebuild(moving.suite, n, take, GivenDraws(np.zeros(0))))
+
+
+def _repeat(vehicle: Vehicle, times: int) -> Vehicle:
+    """Return each of n drones `times` times, one after the other."""
+
+    def each(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(each, value))
+        return np.repeat(value, times) if np.ndim(value) else value
+
+    airframe = Airframe(*(each(getattr(vehicle.airframe, one.name)) for one in fields(Airframe)))
+    lag_s, drag_1_s = each(vehicle.motor_lag_s), each(vehicle.drag_1_s)
+    return replace(vehicle, airframe=airframe, motor_lag_s=lag_s, drag_1_s=drag_1_s)

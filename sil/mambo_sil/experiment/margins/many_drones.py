@@ -1,0 +1,211 @@
+"""The margins of a controller on many drones: those of a campaign, or of the intervals of a log."""
+
+import csv
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from mambo_codegen.errors import InvalidSettingsError, echo
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
+from mambo_sil.experiment.margins.axis_margins import AXES, AxisMargins, PlaceName
+from mambo_sil.experiment.margins.controller_jacobian import LinearController
+from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
+from mambo_sil.experiment.margins.margins_record import ManyDrones, MarginSpread
+from mambo_sil.flight.loop import Flight
+from mambo_sil.flight.names import SensorsName
+from mambo_sil.flight.scenario import choose_sensors, flight_of
+from mambo_sil.flight.trajectories import Hover
+
+FREQUENCIES: Final = 150
+_BATCH: Final = 10
+_LARGER_IS_WORSE: Final = ("largest sensitivity",)
+
+Pair = tuple[AxisMargins, AxisMargins]
+
+
+@dataclass(frozen=True)
+class MeasuredDrone:
+    """The margins of one of many drones, and what distinguishes it."""
+
+    values: dict[str, float | str]
+    axes: Pair
+
+
+def hovering_flight(drone: VehicleFile, sensors: SensorsName, update_period_s: float) -> Flight:
+    """Return a flight in which a drone hovers; raises FlightError if it has not these sensors."""
+    return Flight(
+        Hover(),
+        vehicle=Vehicle.of(drone),
+        update_period_s=update_period_s,
+        sensors=choose_sensors(sensors, drone),
+    )
+
+
+def campaign_drones(
+    controller: LinearController,
+    campaign: Campaign,
+    drones: int,
+    update_period_s: float,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Iterator[MeasuredDrone]:
+    """Yield the first drones that a campaign draws; call `progress` with how many are done.
+
+    What moves a drone, such as wind, has no part in its margins; neither have dropped updates and biases.
+    """
+    for first in range(0, drones, _BATCH):
+        drawn = [campaign.draw(number) for number in range(first, min(first + _BATCH, drones))]
+        flight = flight_of([scenario(campaign.flight, one) for one in drawn], update_period_s)
+        for values, loops in zip(drawn, hover_loops(controller, flight), strict=True):
+            yield MeasuredDrone(_of_a_drone(values), measure_loops(loops, flight, count=FREQUENCIES))
+        progress(first + len(drawn))
+
+
+def _of_a_drone(drawn: dict[str, Any]) -> dict[str, float | str]:
+    """Return the draws that margins depend on."""
+    names = ("mass_kg", "inertia_scale_x", "inertia_scale_y", "thrust_scale", "motor_lag_s", "drag_1_s")
+    return {name: drawn[name] for name in (*names, "command_delay_ticks", "noise_scale")}
+
+
+def corner_drones(
+    controller: LinearController, drone: VehicleFile, sensors: SensorsName, update_period_s: float
+) -> Iterator[MeasuredDrone]:
+    """Yield a drone at every corner of the intervals in its section [uncertainty].
+
+    Roll and pitch go to the same end of their intervals, because their loops do not depend on each other.
+    Raises InvalidSettingsError for a drone without that section.
+    """
+    for values, corner in _corners(drone):
+        flight = hovering_flight(corner, sensors, update_period_s)
+        (loops,) = hover_loops(controller, flight)
+        yield MeasuredDrone(values, measure_loops(loops, flight, count=FREQUENCIES))
+
+
+_INTERVALS: Final = {
+    "drag_1_s": ("body.drag_1_s",),
+    "gain": ("attitude.roll.gain", "attitude.pitch.gain"),
+    "lag_s": ("attitude.roll.lag_s", "attitude.pitch.lag_s"),
+    "dead_time_s": ("attitude.roll.dead_time_s", "attitude.pitch.dead_time_s"),
+    "acceleration_per_tilt_g": ("attitude.acceleration_per_tilt_g",),
+}
+"""Keys of a vehicle.toml that a margin depends on, by the name of what they have in common."""
+
+
+def _corners(drone: VehicleFile) -> Iterator[tuple[dict[str, float | str], VehicleFile]]:
+    """Yield the ends of the intervals in all combinations, in words, and the drone that has them."""
+    if drone.uncertainty is None:
+        raise InvalidSettingsError(
+            (f"vehicle {echo(drone.name)}: has no section [uncertainty]; `identify` writes it from a log",)
+        )
+    widths = drone.uncertainty.model_dump(exclude_none=True)
+    known = {
+        name: [(key, widths[_width_of(key)]) for key in keys if widths.get(_width_of(key))]
+        for name, keys in _INTERVALS.items()
+    }
+    known = {name: keys for name, keys in known.items() if keys}
+    for ends in itertools.product((-1, 1), repeat=len(known)):
+        document = drone.model_dump(exclude_none=True)
+        for end, keys in zip(ends, known.values(), strict=True):
+            for key, width in keys:
+                *path, last = key.split(".")
+                section = document
+                for name in path:
+                    section = section[name]
+                section[last] = _within(last, section[last] + end * width)
+        words: dict[str, float | str] = {
+            name: ("low", "high")[end > 0] for name, end in zip(known, ends, strict=True)
+        }
+        yield words, VehicleFile.model_validate(document)
+
+
+def _width_of(key: str) -> str:
+    """Return the key in [uncertainty] of a key of the file."""
+    return key.removeprefix("body.").removeprefix("attitude.").replace(".", "_")
+
+
+def _within(name: str, value: float) -> float:
+    """Return a value within the range that a vehicle.toml allows."""
+    low, high = {"lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2), "drag_1_s": (0.0, 100.0)}.get(
+        name, (0.1, 3.0)
+    )
+    return min(max(value, low), high)
+
+
+def summarise_drones(drones: Sequence[MeasuredDrone], origin: str) -> ManyDrones:
+    """Return worst and median of every margin of many drones."""
+    found = []
+    for axis, name in enumerate(AXES):
+        for figure, place, value_of in _FIGURES:
+            values = np.array([_value(drone.axes[axis], figure, place, value_of) for drone in drones])
+            if np.isnan(values).all():
+                continue
+            worst = int(np.nanargmax(values) if figure in _LARGER_IS_WORSE else np.nanargmin(values))
+            found.append(
+                MarginSpread(
+                    axis=name,
+                    place=place,
+                    figure=figure,
+                    worst=values[worst],
+                    median=float(np.nanmedian(values)),
+                    drone=worst,
+                )
+            )
+    worst = int(np.argmax([max(map(_sensitivity, drone.axes)) for drone in drones]))
+    return ManyDrones(
+        origin=origin,
+        drones=len(drones),
+        unstable=sum(not all(axis.stable for axis in drone.axes) for drone in drones),
+        spreads=found,
+        worst_drone=worst,
+        worst_values=drones[worst].values,
+    )
+
+
+_FIGURES: Final[tuple[tuple[str, PlaceName | None, str], ...]] = (
+    *(
+        (figure, place, key)
+        for place in ("command", "motors")
+        for figure, key in (
+            ("gain margin", "gain_up"),
+            ("phase margin", "phase_deg"),
+            ("delay margin", "delay_s"),
+            ("largest sensitivity", "sensitivity"),
+        )
+    ),
+    ("least damping", None, "least_damping"),
+)
+
+
+def _value(axis: AxisMargins, figure: str, place: PlaceName | None, key: str) -> float:
+    """Return a figure of an axis; NaN if its drone has no such place, the worst value if it is unstable."""
+    if place is None:
+        return float(getattr(axis.poles, key))
+    if not axis.stable:
+        return math.inf if figure in _LARGER_IS_WORSE else 0.0
+    loop = axis.loops.get(place)
+    return math.nan if loop is None else float(getattr(loop, key))
+
+
+def _sensitivity(axis: AxisMargins) -> float:
+    """Return the largest sensitivity of an axis, wherever its loop is broken; infinity if it is unstable."""
+    return max((loop.sensitivity for loop in axis.loops.values()), default=math.inf)
+
+
+def write_drones(drones: Sequence[MeasuredDrone], path: Path) -> None:
+    """Write a CSV file with one row for each drone: what distinguishes it, and its margins."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        keys = [f"{axis}_{place or 'pole'}_{key}" for axis in AXES for _, place, key in _FIGURES]
+        writer.writerow(["drone", *drones[0].values, *(f"{axis}_stable" for axis in AXES), *keys])
+        for number, drone in enumerate(drones):
+            stable = [int(axis.stable) for axis in drone.axes]
+            values = [
+                _value(axis, figure, place, key) for axis in drone.axes for figure, place, key in _FIGURES
+            ]
+            writer.writerow([number, *drone.values.values(), *stable, *(f"{value:.6g}" for value in values)])

@@ -1,0 +1,76 @@
+"""The figures of an axis in words: verdict, names, units, and formatted values."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from mambo_sil.experiment.margins.axis_margins import PLACES, AxisMargins
+from mambo_sil.experiment.margins.loop_margins import LoopMargins
+from mambo_sil.results.number_format import three_digits, three_digits_or_dash
+
+_INFINITE: Final = "\N{INFINITY}"
+_DASH: Final = "\N{EN DASH}"
+
+Row = tuple[str, float, str]
+"""Name, value and unit of a figure."""
+
+
+def number(value: float) -> str:
+    """Format a figure: infinity as its sign, and a dash for what is not there."""
+    if math.isnan(value):
+        return _DASH
+    return three_digits(value) if math.isfinite(value) else _INFINITE
+
+
+def figure_table(axes: Sequence[AxisMargins]) -> list[tuple[str, list[str], str]]:
+    """Return name, formatted value of each axis, and unit of every figure that one of the axes has."""
+    columns = [list(figure_rows(axis)) for axis in axes]
+    known = [{(name, unit): value for name, value, unit in rows} for rows in columns]
+    return [
+        (name, [number(one.get((name, unit), math.nan)) for one in known], unit)
+        for name, _, unit in max(columns, key=len, default=[])
+    ]
+
+
+def verdict(axis: AxisMargins) -> str:
+    """Return in words how far an axis is from instability."""
+    if not axis.stable:
+        return f"{axis.axis}: UNSTABLE, grows e-fold in {three_digits_or_dash(1.0 / axis.poles.growth_1_s)} s"
+    parts = []
+    for place, loop in axis.loops.items():
+        gain = "any gain" if math.isinf(loop.gain_up) else f"{loop.gain_up:.2g} times the gain"
+        delay = "any delay" if math.isinf(loop.delay_s) else f"{1e3 * loop.delay_s:.0f} ms of delay"
+        where = "" if place == "command" else f" at {PLACES['motors']}"
+        parts.append(f"{gain}, {delay}{where}")
+    return f"{axis.axis}: stands {'; '.join(parts)}"
+
+
+def figure_rows(axis: AxisMargins) -> Iterator[Row]:
+    """Yield the figures of an axis."""
+    for place, loop in axis.loops.items():
+        where = "command" if place == "command" else "motors"
+        yield from ((f"{where}: {name}", value, unit) for name, value, unit in _loop_rows(loop))
+    poles = axis.poles
+    yield "least damped pole: damping", poles.least_damping, ""
+    yield "least damped pole: frequency", poles.least_damped_rad_s, "rad/s"
+    yield "slowest pole: time constant", poles.slowest_s, "s"
+    yield "gust to position", axis.gust_to_place_s2, "m per m/s^2"
+    yield "gust to command", axis.gust_to_command_rad_s2_m, "rad per m/s^2"
+    for (name, noise), unit in zip(axis.noise.items(), ("m", "m/s", "rad"), strict=True):
+        yield f"noise of {name} to position", noise.to_place, f"m per {unit}"
+        yield f"noise of {name} to command", noise.to_command, f"rad per {unit}"
+    if axis.sensed_variation_rad is not None:
+        yield "sensors' noise to change of command", axis.sensed_variation_rad, "rad"
+
+
+def _loop_rows(loop: LoopMargins) -> Iterator[Row]:
+    yield "gain margin up", loop.gain_up, "times"
+    yield "gain margin down", loop.gain_down, "times"
+    yield "phase margin", loop.phase_deg, "degrees"
+    yield "its crossover", loop.crossover_rad_s, "rad/s"
+    yield "delay margin", 1e3 * loop.delay_s, "ms"
+    yield "delay margin", loop.delay_updates, "update periods"
+    yield "largest sensitivity", loop.sensitivity, ""
+    yield "its frequency", loop.sensitivity_rad_s, "rad/s"
+    yield "largest complementary sensitivity", loop.complementary, ""
+    yield "bandwidth", loop.bandwidth_rad_s, "rad/s"

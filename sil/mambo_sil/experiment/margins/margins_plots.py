@@ -1,0 +1,109 @@
+"""The pictures of a controller's loops: Bode, Nyquist with the circle of Ms = 2, |S| and |T|."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from mambo_sil.experiment.margins.axis_margins import AXES, PLACES, PlaceName
+from mambo_sil.experiment.margins.loop_margins import open_loop
+from mambo_sil.experiment.margins.response_file import Curve
+from mambo_sil.results.pictures import PlainLogFormatter, inline, save
+from mambo_sil.results.style import BLUE, COLUMN_INCHES, ORANGE, QUIET, THIN, style
+
+_ASKED: Final = 2.0
+"""The largest sensitivity that textbooks ask for at most."""
+_LOOKS: Final[dict[PlaceName, dict[str, Any]]] = {
+    "command": {"color": BLUE, "linestyle": "solid"},
+    "motors": {"color": ORANGE, "linestyle": (0, (4, 1.5))},
+}
+
+
+def draw_margins(curves: list[Curve], folder: Path) -> None:
+    """Write bode, nyquist and sensitivity as PNG and SVG: roll on the left, pitch on the right."""
+    with style():
+        for name in _PANELS:
+            save(_figure(curves, name), folder / name)
+
+
+def margin_panels(curves: list[Curve]) -> list[Markup]:
+    """Return the same pictures for a page."""
+    with style():
+        return [inline(_figure(curves, name), f"{name} of roll and pitch") for name in _PANELS]
+
+
+def _figure(curves: list[Curve], name: str) -> Figure:
+    draw, rows, height = _PANELS[name]
+    figure = Figure(figsize=(2.2 * COLUMN_INCHES, height), layout="constrained")
+    panels = figure.subplots(rows, 2, sharex=True, sharey="row", squeeze=False)
+    for axis, column in zip(AXES, panels.T, strict=True):
+        column[0].set_title(axis, loc="left")
+        for curve in curves:
+            if curve.axis == axis:
+                draw(column, curve, _LOOKS[curve.place] | {"label": f"broken at {PLACES[curve.place]}"})
+    panels[0, 1].legend(loc="best")
+    return figure
+
+
+def _bode(panels: Any, curve: Curve, look: dict[str, Any]) -> None:
+    rad_s, s = curve.rad_s, curve.sensitivity
+    loop = open_loop(s)
+    magnitude, phase = panels
+    magnitude.loglog(rad_s, np.abs(loop), **look)
+    magnitude.axhline(1.0, color=QUIET, linewidth=THIN)
+    magnitude.set_ylim(1e-2, 1e3)
+    angle = np.degrees(np.unwrap(np.angle(loop)))
+    crossing = int(np.argmin(np.abs(np.log(np.abs(loop)))))
+    angle -= 360.0 * np.round((angle[crossing] + 180.0) / 360.0)
+    phase.semilogx(rad_s, angle, **look)
+    phase.axhline(-180.0, color=QUIET, linewidth=THIN)
+    phase.set_ylim(-400.0, 40.0)
+    phase.set_yticks(np.arange(-360.0, 1.0, 90.0))
+    _label(panels, "|L|", "phase of L, degrees")
+
+
+def _nyquist(panels: Any, curve: Curve, look: dict[str, Any]) -> None:
+    (panel,) = panels
+    loop = open_loop(curve.sensitivity)
+    panel.plot(loop.real, loop.imag, **look)
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    panel.plot(np.cos(turn) / _ASKED - 1.0, np.sin(turn) / _ASKED, color=QUIET, linewidth=THIN)
+    panel.plot([-1.0], [0.0], color=QUIET, marker="+", markersize=6)
+    panel.set_aspect("equal")
+    panel.set_xlim(-3.0, 1.0)
+    panel.set_ylim(-2.5, 1.5)
+    panel.set_xlabel("real part of L; circle: |S| = 2")
+    if panel.get_subplotspec().is_first_col():
+        panel.set_ylabel("imaginary part of L")
+
+
+def _sensitivities(panels: Any, curve: Curve, look: dict[str, Any]) -> None:
+    rad_s, s = curve.rad_s, curve.sensitivity
+    for panel, values in zip(panels, (s, 1.0 - s), strict=True):
+        panel.loglog(rad_s, np.abs(values), **look)
+        panel.axhline(1.0, color=QUIET, linewidth=THIN)
+        panel.axhline(_ASKED, color=QUIET, linewidth=THIN, linestyle=(0, (1, 2)))
+        panel.set_ylim(0.02, 10.0)
+    _label(panels, "|S|", "|T|")
+
+
+def _label(panels: Any, *names: str) -> None:
+    """Name the axes of a column of panels."""
+    first: Axes = panels[0]
+    if first.get_subplotspec().is_first_col():  # type: ignore[union-attr] # panels of a grid have one
+        for panel, name in zip(panels, names, strict=True):
+            panel.set_ylabel(name)
+    panels[-1].set_xlabel("frequency, rad/s")
+    panels[-1].xaxis.set_major_formatter(PlainLogFormatter())
+
+
+_PANELS: Final[dict[str, tuple[Callable[[Any, Curve, dict[str, Any]], None], int, float]]] = {
+    "bode": (_bode, 2, 4.2),
+    "nyquist": (_nyquist, 1, 3.4),
+    "sensitivity": (_sensitivities, 2, 4.2),
+}
+"""Of each picture: what draws a curve into a column, the rows, and the height in inches."""

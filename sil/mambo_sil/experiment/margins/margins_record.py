@@ -1,0 +1,115 @@
+"""The record of the command `margins`."""
+
+from pathlib import Path
+from typing import Final
+
+from pydantic import BaseModel, ConfigDict
+
+from mambo_sil.experiment.margins.axis_margins import PLACES, AxisMargins, AxisName, PlaceName
+from mambo_sil.experiment.margins.margin_figures import figure_table, number, verdict
+from mambo_sil.flight.names import SensorsName
+from mambo_sil.results.summary import Number, ReportedSummary, Section
+
+PICTURES: Final = tuple(
+    f"{name}.{kind}" for name in ("bode", "nyquist", "sensitivity") for kind in ("png", "svg")
+)
+RESPONSES: Final = "response.csv"
+DRONES: Final = "drones.csv"
+
+
+class MarginSpread(BaseModel):
+    """One figure over many drones; the worst is the least of a margin, the largest of a sensitivity."""
+
+    model_config = ConfigDict(frozen=True)
+
+    axis: AxisName
+    place: PlaceName | None
+    """None for a figure of the whole axis."""
+    figure: str
+    worst: Number
+    median: Number
+    drone: int
+    """Number of the drone with the worst."""
+
+
+class ManyDrones(BaseModel):
+    """The margins of many drones; an unstable one counts as the worst."""
+
+    model_config = ConfigDict(frozen=True)
+
+    origin: str
+    """Where the drones come from, in words."""
+    drones: int
+    unstable: int
+    spreads: list[MarginSpread]
+    worst_drone: int
+    """One with the largest sensitivity of all places and axes; the first of the unstable ones, if any."""
+    worst_values: dict[str, float | str]
+    """What was drawn or changed for it."""
+
+    @property
+    def table(self) -> list[tuple[str, str, str, str]]:
+        """Return name, worst, median and the worst drone of every figure."""
+        rows = []
+        for one in self.spreads:
+            where = "" if one.place is None else f" at {PLACES[one.place]}"
+            scale, unit = (1e3, ", ms") if one.figure == "delay margin" else (1.0, "")
+            worst, median = (number(scale * value) for value in (one.worst, one.median))
+            rows.append((f"{one.axis}: {one.figure}{where}{unit}", worst, median, str(one.drone)))
+        return rows
+
+
+class MarginsSummary(ReportedSummary):
+    """Margins of a controller on a drone; without axes, but with a reason, if no linear margin applies."""
+
+    command = "margins"
+
+    source: str
+    settings: str
+    """Digest of the settings."""
+    vehicle: str
+    sensors: SensorsName
+    update_period_s: float
+    reason: str | None = None
+    axes: list[AxisMargins] | None = None
+    many: ManyDrones | None = None
+
+    @property
+    def stable(self) -> bool:
+        """Whether no loop of the drone itself is unstable."""
+        return all(axis.stable for axis in self.axes or ())
+
+    @property
+    def verdicts(self) -> list[str]:
+        """One line for each axis, in words; the reason if there are no margins."""
+        if self.axes is None:
+            return [self.reason or ""]
+        return [verdict(axis) for axis in self.axes]
+
+    def section(self, folder: Path, /) -> Section:
+        """Return the section of the report on these margins."""
+        missing, pictures = [], []
+        if self.axes is not None and (folder / RESPONSES).is_file():
+            from mambo_sil.experiment.margins.margins_plots import margin_panels  # noqa: PLC0415 - slow to load
+            from mambo_sil.experiment.margins.response_file import read_responses  # noqa: PLC0415
+
+            pictures = margin_panels(read_responses(folder / RESPONSES))
+        elif self.axes is not None:
+            missing = [RESPONSES]
+        content = {
+            "verdicts": self.verdicts,
+            "pictures": pictures,
+            "axes": [axis.axis for axis in self.axes or ()],
+            "rows": figure_table(self.axes or []),
+            "many": self.many,
+            "spreads": self.many.table if self.many else [],
+        }
+        state = "the true state" if self.sensors == "none" else f"sensors {self.sensors}"
+        return Section(
+            template="margins",
+            title=f"Margins of {self.source} on {self.vehicle}, {state}",
+            good=None if self.axes is None else self.stable,
+            finding="; ".join(self.verdicts),
+            content=content,
+            missing=missing,
+        )

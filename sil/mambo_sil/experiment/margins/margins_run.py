@@ -1,0 +1,99 @@
+"""Measure the margins of a controller on one drone, on many besides, and write the results."""
+
+import contextlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.plant.first_order import FirstOrderDrone
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.experiment.margins.axis_margins import AxisMargins
+from mambo_sil.experiment.margins.controller_jacobian import LinearController, linear_controller
+from mambo_sil.experiment.margins.hover_margins import NOT_SMOOTH, hover_loops, measure_loops
+from mambo_sil.experiment.margins.many_drones import (
+    MeasuredDrone,
+    hovering_flight,
+    summarise_drones,
+    write_drones,
+)
+from mambo_sil.experiment.margins.margins_record import DRONES, PICTURES, RESPONSES, MarginsSummary
+from mambo_sil.experiment.margins.response_file import responses, write_responses
+from mambo_sil.flight.names import SensorsName
+from mambo_sil.results.folders import new_results
+
+
+@dataclass(frozen=True)
+class MarginSubject:
+    """A controller, the name of its source, and the drone that it flies."""
+
+    source: str
+    settings: Settings
+    drone: VehicleFile
+    sensors: SensorsName = "none"
+
+
+@dataclass(frozen=True)
+class Many:
+    """Many drones to measure, and where they come from, in words."""
+
+    origin: str
+    measure: Callable[[LinearController], Iterable[MeasuredDrone]]
+
+
+def axes_on(subject: MarginSubject) -> list[AxisMargins] | None:
+    """Return the margins of roll and pitch; None if no linear margin applies.
+
+    Raises FlightError, and the errors of building the C.
+    """
+    period_s = subject.settings.horizon.update_period_s
+    flight = hovering_flight(subject.drone, subject.sensors, period_s)
+    controller = linear_controller(subject.settings)
+    if controller is None:
+        return None
+    (loops,) = hover_loops(controller, flight)
+    return list(measure_loops(loops, flight))
+
+
+def measure(subject: MarginSubject, many: Many | None, folder: Path | None) -> MarginsSummary:
+    """Return the margins of a controller; write them and their pictures to `folder`.
+
+    Raises as `axes_on`, and the errors of writing.
+    """
+    period_s = subject.settings.horizon.update_period_s
+    summary = MarginsSummary(
+        source=subject.source,
+        settings=subject.settings.digest,
+        vehicle=subject.drone.name,
+        sensors=subject.sensors,
+        update_period_s=period_s,
+        reason=NOT_SMOOTH,
+    )
+    flight = hovering_flight(subject.drone, subject.sensors, period_s)
+    with contextlib.ExitStack() as stack:
+        place = folder and stack.enter_context(
+            new_results(folder, MarginsSummary.command, (*PICTURES, RESPONSES, DRONES))
+        )
+        controller = linear_controller(subject.settings)
+        if controller is not None:
+            (loops,) = hover_loops(controller, flight)
+            found: Sequence[MeasuredDrone] = list(many.measure(controller)) if many else []
+            summary = summary.model_copy(
+                update={
+                    "axes": list(measure_loops(loops, flight)),
+                    "reason": None,
+                    "many": summarise_drones(found, many.origin) if many else None,
+                }
+            )
+            if place is not None:
+                from mambo_sil.experiment.margins.margins_plots import draw_margins  # noqa: PLC0415 - slow
+
+                motors = not isinstance(flight.vehicle.loop, FirstOrderDrone)
+                curves = responses(loops, period_s, motors=motors)
+                write_responses(curves, place / RESPONSES)
+                draw_margins(curves, place)
+                if found:
+                    write_drones(found, place / DRONES)
+        if place is not None:
+            summary.write(place)
+    return summary

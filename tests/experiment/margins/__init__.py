@@ -1,0 +1,1 @@
+"""Margins of a controller on a drone."""

@@ -1,0 +1,129 @@
+"""The command `margins`, run as a person would type it."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mambo_codegen.settings.controller_toml import to_toml, with_option
+from mambo_codegen.settings.presets import preset
+from mambo_sil.drone.vehicles import VEHICLES
+from mambo_sil.experiment.margins.margins_record import PICTURES, RESPONSES
+from tests.support.command import run
+
+pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
+
+
+def measured(*arguments: str, code: int = 0) -> dict[str, Any]:
+    """Return the summary that `margins` prints."""
+    summary: dict[str, Any] = json.loads(run("margins", *arguments, "--json", code=code)[0])
+    return summary
+
+
+def test_the_default_has_the_margins_of_the_manual() -> None:
+    """Preset mambo on the Mambo, true state: another linearisation found the same figures."""
+    roll, pitch = (axis["command"] for axis in measured()["axes"])
+    for loop, gain, phase_deg, delay_s, largest in (
+        (roll, 2.08, 31.0, 0.137, 2.39),
+        (pitch, 2.52, 44.0, 0.193, 1.88),
+    ):
+        assert loop["gain_up"] == pytest.approx(gain, abs=0.01)
+        assert loop["phase_deg"] == pytest.approx(phase_deg, abs=0.5)
+        assert loop["delay_s"] == pytest.approx(delay_s, abs=0.001)
+        assert loop["delay_updates"] == pytest.approx(100.0 * loop["delay_s"])
+        assert loop["sensitivity"] == pytest.approx(largest, abs=0.01)
+
+
+def test_it_says_in_words_how_far_the_edge_is() -> None:
+    """The last lines are the verdicts; the table names both places."""
+    said, _ = run("margins", "crazyflie", "--vehicle", "crazyflie")
+    assert "roll: stands 2.6 times the gain, 166 ms of delay; " in said
+    assert "at the motors' torque\n" in said
+    assert "command: gain margin up" in said
+    assert "motors: delay margin" in said
+
+
+def test_a_drone_without_motors_is_broken_at_the_command_only() -> None:
+    """The file of such a drone has no torque."""
+    summary = measured("crazyflie", "--vehicle", "generic")
+    assert [axis["motors"] for axis in summary["axes"]] == [None, None]
+    assert summary["axes"][0]["command"]["gain_up"] == pytest.approx(2.22, abs=0.01)
+
+
+def test_a_1_norm_gets_a_reason_and_no_figure() -> None:
+    """It is no smooth law."""
+    summary = measured("mambo-1norm")
+    assert summary["axes"] is None
+    assert "describing function" in summary["reason"]
+    assert "describing" in run("margins", "table1")[0]
+
+
+def test_an_unstable_loop_exits_1() -> None:
+    """The older estimators of the Mambo leave the camera's rotation in the optical flow."""
+    said, _ = run("margins", "--sensors", "mambo", code=1)
+    assert "roll: UNSTABLE, grows e-fold in " in said
+
+
+def test_results_are_pictures_and_files_that_report_shows() -> None:
+    """The folder has three pictures, responses, the drawn drones and a summary; a page shows them."""
+    _, written = run("margins", "--campaign", "default", "--drones", "3", "-o", "out")
+    files = {*PICTURES, RESPONSES, "drones.csv", "summary.json"}
+    assert {path.name for path in Path("out").iterdir()} == files
+    assert all(name in written for name in files)
+    rows = list(csv.DictReader(Path("out/drones.csv").read_text("utf-8").splitlines()))
+    assert [row["drone"] for row in rows] == ["0", "1", "2"]
+    assert len({row["mass_kg"] for row in rows}) == 3
+    many = json.loads(Path("out/summary.json").read_text("utf-8"))["many"]
+    spread = next(one for one in many["spreads"] if one["figure"] == "gain margin")
+    gains = [float(row["roll_command_gain_up"]) for row in rows]
+    assert (spread["worst"], spread["median"]) == pytest.approx((min(gains), sorted(gains)[1]), rel=1e-5)
+    run("report", "out")
+    assert "stands" in Path("report.html").read_text("utf-8")
+
+
+@pytest.mark.long
+def test_draws_do_not_depend_on_how_many_there_are() -> None:
+    """Drone 2 of three is drone 2 of eleven; its sensors are those of the campaign, or given."""
+    run("margins", "--campaign", "default", "--drones", "3", "-o", "few")
+    run("margins", "--campaign", "default", "--drones", "11", "-o", "many")
+    few, many = (Path(name, "drones.csv").read_text("utf-8").splitlines() for name in ("few", "many"))
+    assert few == many[:4]
+    run("margins", "--campaign", "default", "--drones", "3", "--sensors", "none", "-o", "true")
+    assert Path("true/drones.csv").read_text("utf-8").splitlines()[1] != few[1]
+
+
+def test_uncertainty_takes_the_ends_of_the_intervals() -> None:
+    """Two intervals make four drones; one of those with more dead time has the least delay margin."""
+    text = VEHICLES.text("crazyflie-flown") + "\n[uncertainty]\nroll_lag_s = 0.03\nroll_dead_time_s = 0.02\n"
+    Path("mine.toml").write_text(text, "utf-8")
+    summary = measured("crazyflie", "--vehicle", "mine.toml", "--uncertainty")
+    many = summary["many"]
+    assert many["drones"] == 4
+    assert set(many["worst_values"]) == {"lag_s", "dead_time_s"}
+    delay = next(one for one in many["spreads"] if one["figure"] == "delay margin" and one["axis"] == "roll")
+    assert delay["drone"] in (1, 3)  # the ends of dead_time_s alternate
+    assert delay["worst"] < summary["axes"][0]["command"]["delay_s"] - 0.015
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--uncertainty",), "vehicle mambo: has no section [uncertainty]"),
+        (("--campaign", "default", "--uncertainty"), "leave out one of the two"),
+        (("--campaign", "missing.toml"), "missing.toml"),
+        (("--campaign", "default", "--sensors", "mocap"), "--sensors: sensors = "),
+        (("--sensors", "mocap"), "vehicle mambo has sensors.kind"),
+        (("--vehicle", ""), "must not be empty"),
+        (("--drones", "0"), "greater than or equal to 1"),
+        (("missing.toml",), "missing.toml"),
+        (("slow.toml", "--vehicle", "crazyflie"), "update_period_s"),
+    ],
+)
+def test_bad_input_is_an_error_that_names_it(arguments: tuple[str, ...], said: str) -> None:
+    """Exit 2 with a message, without a traceback."""
+    slow = with_option(preset("mambo"), "horizon.update_period_s", 0.025)
+    Path("slow.toml").write_text(to_toml(with_option(slow, "horizon.update_period_s", 0.0125)), "utf-8")
+    out, error = run("margins", *arguments, code=2)
+    assert said in out + error

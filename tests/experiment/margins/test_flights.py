@@ -1,0 +1,59 @@
+"""Margins against simulated flights: what stands less is stable, what stands more is not."""
+
+import dataclasses
+import math
+from typing import Any
+
+import pytest
+
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.presets import preset
+from mambo_sil.drone.plant.vehicle import Vehicle
+from tests.support.hover import grows, margins_of
+
+PAIRS = [("mambo", "mambo"), ("crazyflie", "crazyflie"), ("mambo", "crazyflie"), ("crazyflie", "generic")]
+
+
+def in_float64(name: str) -> Any:
+    """Return a preset with a scalar type whose rounding does not disturb a drone at hover."""
+    return with_option(preset(name), "code.scalar", "float64")
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
+@pytest.mark.parametrize(("name", "drone"), PAIRS)
+def test_delay_margin_decides_about_a_flight(name: str, drone: str, axis: int) -> None:
+    """A disturbance of 1 mm decays with 5 % less delay than the margin, and grows with 10 % more."""
+    settings, vehicle = in_float64(name), Vehicle.from_preset(drone)
+    delay_s = margins_of(settings, vehicle)[axis].command.delay_s
+    less, more = (factor * delay_s / vehicle.drone.step_s for factor in (0.95, 1.1))
+    assert not grows(settings, vehicle, axis, delay_ticks=math.floor(less))
+    assert grows(settings, vehicle, axis, delay_ticks=math.ceil(more))
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
+@pytest.mark.parametrize(("name", "drone"), PAIRS)
+def test_gain_margin_decides_about_a_flight(name: str, drone: str, axis: int) -> None:
+    """A disturbance of 1 mm decays with 5 % less gain than the margin, and grows with 10 % more."""
+    settings, vehicle = in_float64(name), Vehicle.from_preset(drone)
+    gain = margins_of(settings, vehicle)[axis].command.gain_up
+    assert not grows(settings, vehicle, axis, gain=0.95 * gain)
+    assert grows(settings, vehicle, axis, gain=1.1 * gain)
+
+
+def test_gain_margin_at_the_motors_is_one_of_the_inertia() -> None:
+    """A drone that is harder to turn than the margin at the torque allows oscillates."""
+    settings, drone = in_float64("mambo"), Vehicle.from_preset("mambo")
+    margin = margins_of(settings, drone)[0].motors.gain_down
+    assert 0.05 < margin < 0.5
+
+    def with_gain(factor: float) -> Vehicle:
+        x, y, z = drone.airframe.inertia_kg_m2
+        airframe = dataclasses.replace(drone.airframe, inertia_kg_m2=(x / factor, y, z))
+        return dataclasses.replace(drone, airframe=airframe)
+
+    assert not grows(settings, with_gain(1.05 * margin), 0)
+    assert grows(settings, with_gain(0.9 * margin), 0)
+    assert margins_of(settings, with_gain(1.01 * margin))[0].stable
+    assert not margins_of(settings, with_gain(0.99 * margin))[0].stable
