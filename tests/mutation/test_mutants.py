@@ -56,6 +56,8 @@ ONE_NORM_FAULTS = {
     "bad input gets a level command": (STEP, "    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
 }  # fmt: skip
 """The one place in a file that reads so, and what it reads instead."""
+QUICK = 3
+"""So many faults of each method are tried in the default run, all of them in the long one."""
 QUADRATIC_FAULTS = {
     "x and y change places": ("src/nmpc.c", "*right = (y * self->attitude.cosine) - (x", "*right = (x * self->attitude.cosine) - (y"),
     "no velocity of the target": ("src/nmpc.c", "- (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis])", "- (nmpc_real_t)0"),
@@ -117,7 +119,11 @@ def test_the_generated_code_passes(method: str, benches: dict[str, Bench]) -> No
 
 @pytest.mark.parametrize(
     ("method", "fault"),
-    [("one_norm", fault) for fault in ONE_NORM_FAULTS] + [("quadratic", fault) for fault in QUADRATIC_FAULTS],
+    [
+        pytest.param(method, fault, marks=[pytest.mark.long] * (index >= QUICK))
+        for method, faults in (("one_norm", ONE_NORM_FAULTS), ("quadratic", QUADRATIC_FAULTS))
+        for index, fault in enumerate(faults)
+    ],
 )
 def test_a_fault_is_caught(method: str, fault: str, benches: dict[str, Bench]) -> None:
     """The faulty C compiles, and some bit differs."""

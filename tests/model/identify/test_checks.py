@@ -251,6 +251,7 @@ def test_a_bad_log_of_a_pool_is_left_out_with_its_reason() -> None:
     assert [fault.split(":")[0] for fault in raised.value.faults] == ["tumble.csv", "negated.csv"]
 
 
+@pytest.mark.long
 def test_a_tone_does_not_show_a_sign() -> None:
     """Commands of 1.6 Hz: a delay of half a period more looks like the other sign."""
     time_s = FLOWN["time_s"]
@@ -273,6 +274,7 @@ def test_a_unit_that_the_columns_name_is_not_asked_for() -> None:
         identify([replace(log, signals=signals)])
 
 
+@pytest.mark.long
 def test_logs_of_two_drones_are_said_to_be_of_two_drones() -> None:
     """Other gains, or another lag: nothing is said of clocks; a log of the same drone is not doubted."""
     for other in (Truth(gain=(1.0, 1.0)), Truth(lag_s=(0.12, 0.12), delay_s=(0.02, 0.02))):

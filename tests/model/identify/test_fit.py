@@ -148,6 +148,7 @@ def test_a_filtered_velocity_does_not_hide_the_drag(drag_1_s: float, rate_rad_s:
         assert abs(motion.velocity_lag_s.value - 0.03) < motion.velocity_lag_s.within + 0.01
 
 
+@pytest.mark.long
 def test_many_logs_do_not_remove_the_bias_of_gusts() -> None:
     """A controller tilts against gusts: the interval of acceleration per tilt holds what that hides."""
     motion = found(*fly(TRUTH, Flown(size_m=0.5, gusts_m_s2=0.2), 6, 7)).motion
