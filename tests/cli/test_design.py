@@ -1,6 +1,7 @@
 """`design`: from a drone, or from a log of one, to a controller.toml that flies it."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,10 @@ def test_it_writes_a_file_that_flies() -> None:
     """And says what to do next, and for which drone the settings are."""
     Path("mine.toml").write_text(DRONE, "utf-8")
     _, said = run("design", "mine.toml")
-    assert said == "wrote controller.toml; next: mambo-nmpc fly controller.toml --vehicle mine.toml\n"
+    wrote, roll, pitch = said.splitlines()
+    assert wrote == "wrote controller.toml; next: mambo-nmpc fly controller.toml --vehicle mine.toml"
+    assert re.fullmatch(r"roll: stands [\d.]+ times the gain, \d+ ms of delay \(true state\)", roll)
+    assert pitch == roll.replace("roll", "pitch")
     assert Path("controller.toml").read_text("utf-8").startswith("# For vehicle mine.toml, derived")
     run("fly", "controller.toml", "--vehicle", "mine.toml", "--no-pictures", "--duration-s", "20")
     assert json.loads(Path("flight/summary.json").read_text("utf-8"))["metrics"]["max_error_m"] < 0.2
@@ -49,6 +53,29 @@ def test_a_log_gives_settings_with_two_commands() -> None:
     assert errors["controller.toml"] < 0.6 * min(errors["mambo"], errors["crazyflie"])
 
 
+def test_it_warns_of_a_drone_that_a_log_has_hardly_shown() -> None:
+    """At the worst ends of the intervals a loop stands too little, and the widest interval is in the way."""
+    Path("mine.toml").write_text(DRONE, "utf-8")
+    _, certain = run("design", "mine.toml")
+    wide = "\n[uncertainty]\nroll_dead_time_s = 0.08\nroll_gain = 0.01\n"
+    Path("mine.toml").write_text(DRONE + wide, "utf-8")
+    _, said = run("design", "mine.toml", "--force")
+    assert "warning" not in certain
+    assert "(true state, at the worst of the intervals in [uncertainty])" in said
+    assert "most in the way is the interval of attitude.roll.dead_time_s +- 0.08: " in said
+
+
+def test_it_warns_of_slow_motors() -> None:
+    """A Mambo with motors of 0.12 s is unstable through its sensors, and they are named."""
+    text = run("vehicles", "mambo")[0]
+    Path("slow.toml").write_text(re.sub(r"(?m)^lag_s = .*", "lag_s = 0.12", text), "utf-8")
+    _, said = run("design", "slow.toml")
+    assert "UNSTABLE" in said
+    assert (
+        "warning: a loop stands less than 1.5 times the gain or 30 ms of delay; most in the way is " in said
+    )
+
+
 def test_tune_starts_from_it() -> None:
     """The tune.toml in docs/how-to/design.md holds the values that are derived for its drone."""
     text = (Path(__file__).parents[2] / "docs" / "how-to" / "design.md").read_text("utf-8")
@@ -61,7 +88,7 @@ def test_tune_starts_from_it() -> None:
 def test_to_stdout_it_prints_the_file_alone() -> None:
     """Which is that of -o."""
     text, said = run("design", "generic", "-o", "-")
-    assert said == ""
+    assert [line.partition(":")[0] for line in said.splitlines()] == ["roll", "pitch"]
     run("design", "generic", "-o", "made/generic.toml")
     assert Path("made/generic.toml").read_text("utf-8") == text
     assert controller_toml.parse(text, "stdout") == load("made/generic.toml")

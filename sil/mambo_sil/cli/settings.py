@@ -26,7 +26,9 @@ from mambo_sil.cli.options import (
 if TYPE_CHECKING:
     from optuna import Study
 
+    from mambo_codegen.settings.model import Settings
     from mambo_sil.cli.progress import Bar
+    from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
     from mambo_sil.model.tune.tuning_file import Tuning
     from mambo_sil.model.tune.tuning_report import TuneSummary
 
@@ -166,12 +168,26 @@ def design(
     from mambo_sil.drone.vehicles import vehicle_toml
     from mambo_sil.model.derive.derived_settings import controller_text
 
-    source = echo(vehicle)
-    text = controller_text(vehicle_toml.load(vehicle), source)
-    controller_toml.parse(text, f"settings for vehicle {source}")
+    source, drone = echo(vehicle), vehicle_toml.load(vehicle)
+    text = controller_text(drone, source)
+    settings = controller_toml.parse(text, f"settings for vehicle {source}")
     if write_file(text, output, force=force):
         name = echo(str(output))
         typer.echo(f"wrote {name}; next: mambo-nmpc fly {name} --vehicle {source}", err=True)
+    _print_margins(settings, drone)
+
+
+def _print_margins(settings: "Settings", drone: "VehicleFile") -> None:
+    """Print how far derived settings are from instability on their drone; without a compiler say so."""
+    from mambo_codegen.errors import BuildError
+    from mambo_sil.model.derive.derived_margins import judge_margins
+
+    try:
+        said = judge_margins(settings, drone).lines()
+    except BuildError as error:
+        said = [f"no margins: {error}"]
+    for line in said:
+        typer.echo(line, err=True)
 
 
 def tune(

@@ -46,6 +46,9 @@ def test_a_slower_controller_is_told_in_control_terms() -> None:
         assert fast["position_gain_rad_m"] > 2.0 * slow["position_gain_rad_m"] > 0.0
         assert fast["dominant_rad_s"] > slow["dominant_rad_s"]
         assert a["step"][axis]["settling_s"] < b["step"][axis]["settling_s"]
+        quick, late = a["margins"][axis]["command"], b["margins"][axis]["command"]
+        assert quick["delay_s"] < late["delay_s"]
+    assert "roll: delay margin at the motors" in said
     assert a["observer"] == b["observer"]
     assert a["instance_bytes"] == b["instance_bytes"] == 108
 

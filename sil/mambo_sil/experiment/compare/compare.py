@@ -42,7 +42,7 @@ def compare(
             first = _answers(a, drone)
             progress(0.5)
             second = _answers(b, drone)
-            found = {"figures_a": figures(a[1], first), "figures_b": figures(b[1], second)}
+            found = {"figures_a": figures(a[1], drone, first), "figures_b": figures(b[1], drone, second)}
             summary = summary.model_copy(update=found)
             if place is not None:
                 draw_steps(first.steps, second.steps, (echo(a[0]), echo(b[0])), place / "step")

@@ -10,6 +10,8 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.compare.compared_flights import Answers, EightAnswer, StepAnswer
 from mambo_sil.experiment.compare.control_terms import AxisLaw, ObserverGains, axis_laws, observer_gains
+from mambo_sil.experiment.margins.axis_margins import AxisMargins
+from mambo_sil.experiment.margins.margins_run import MarginSubject, axes_on
 from mambo_sil.results.summary import Summary
 
 PICTURES: Final = ("step.png", "step.svg")
@@ -27,13 +29,15 @@ class SettingDifference(BaseModel):
 
 
 class ControllerFigures(BaseModel):
-    """One controller; what is by axis has roll and pitch. A 1-norm has no law and no observer."""
+    """One controller; what is by axis has roll and pitch. A 1-norm has no law, no observer, no margins."""
 
     model_config = ConfigDict(frozen=True)
 
     instance_bytes: int
     law: tuple[AxisLaw, AxisLaw] | None
     observer: ObserverGains | None
+    margins: list[AxisMargins] | None
+    """With the true state; None if no linear margin applies."""
     step: tuple[StepAnswer, StepAnswer]
     eight: EightAnswer
 
@@ -68,12 +72,13 @@ def differences(a: Settings, b: Settings) -> list[SettingDifference]:
     ]
 
 
-def figures(settings: Settings, flown: Answers) -> ControllerFigures:
-    """Return the figures of one controller."""
+def figures(settings: Settings, drone: VehicleFile, flown: Answers) -> ControllerFigures:
+    """Return the figures of one controller on a drone."""
     return ControllerFigures(
         instance_bytes=method_of(settings).instance_bytes,
         law=axis_laws(settings),
         observer=observer_gains(settings),
+        margins=axes_on(MarginSubject("", settings, drone)),
         step=flown.step,
         eight=flown.eight,
     )

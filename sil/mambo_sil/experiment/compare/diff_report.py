@@ -9,6 +9,7 @@ from mambo_codegen.settings.key import spell
 from mambo_sil.experiment.compare.compared_flights import SETTLED_SHARE, STEP_M
 from mambo_sil.experiment.compare.control_terms import AXES
 from mambo_sil.experiment.compare.diff_record import ControllerFigures, DiffSummary, SettingDifference
+from mambo_sil.experiment.margins.axis_margins import AxisMargins
 from mambo_sil.results.number_format import three_digits_or_dash
 
 _WIDE = 34
@@ -75,6 +76,8 @@ def figure_rows(one: ControllerFigures) -> Iterator[Row]:
         ):
             for source, gain, unit in zip(("position", "velocity"), pair, units, strict=True):
                 yield f"observer: {name} by {source}", gain, unit
+    for margins in one.margins or ():
+        yield from _margin_rows(margins)
     for axis, step in zip(AXES, one.step, strict=True):
         yield f"{axis}: {STEP_M:g} m step settles to {100 * SETTLED_SHARE:g} %", step.settling_s, "s"
         yield f"{axis}: overshoot", 100.0 * step.overshoot, "%"
@@ -83,6 +86,16 @@ def figure_rows(one: ControllerFigures) -> Iterator[Row]:
     yield "eight: largest error", one.eight.max_error_m, "m"
     yield "eight: command variation", one.eight.command_variation_rad, "rad"
     yield "size of nmpc_t", one.instance_bytes, "bytes"
+
+
+def _margin_rows(axis: AxisMargins) -> Iterator[Row]:
+    """Yield the margins of an axis, broken at the command and, if it has motors, at their torque."""
+    for place, loop in axis.loops.items():
+        where = "" if place == "command" else " at the motors"
+        yield f"{axis.axis}: gain margin{where}", loop.gain_up, "times"
+        yield f"{axis.axis}: phase margin{where}", loop.phase_deg, "degrees"
+        yield f"{axis.axis}: delay margin{where}", 1e3 * loop.delay_s, "ms"
+        yield f"{axis.axis}: sensitivity{where}", loop.sensitivity, ""
 
 
 def _line(name: str, a: str, b: str, note: str) -> str:

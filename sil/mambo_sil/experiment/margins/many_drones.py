@@ -1,7 +1,6 @@
 """The margins of a controller on many drones: those of a campaign, or of the intervals of a log."""
 
 import csv
-import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -10,12 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from mambo_codegen.errors import InvalidSettingsError, echo
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import Campaign, scenario
 from mambo_sil.experiment.margins.axis_margins import AXES, AxisMargins, PlaceName
 from mambo_sil.experiment.margins.controller_jacobian import LinearController
+from mambo_sil.experiment.margins.corners import at_ends, corners, in_words
 from mambo_sil.experiment.margins.hover_margins import hover_loops, measure_loops
 from mambo_sil.experiment.margins.margins_record import ManyDrones, MarginSpread
 from mambo_sil.flight.loop import Flight
@@ -78,63 +77,20 @@ def corner_drones(
 ) -> Iterator[MeasuredDrone]:
     """Yield a drone at every corner of the intervals in its section [uncertainty].
 
-    Roll and pitch go to the same end of their intervals, because their loops do not depend on each other.
     Raises InvalidSettingsError for a drone without that section.
     """
-    for values, corner in _corners(drone):
-        flight = hovering_flight(corner, sensors, update_period_s)
-        (loops,) = hover_loops(controller, flight)
-        yield MeasuredDrone(values, measure_loops(loops, flight, count=FREQUENCIES))
+    for ends in corners(drone):
+        measured = measure_drone(controller, at_ends(drone, ends), sensors, update_period_s)
+        yield MeasuredDrone(in_words(ends), measured)
 
 
-_INTERVALS: Final = {
-    "drag_1_s": ("body.drag_1_s",),
-    "gain": ("attitude.roll.gain", "attitude.pitch.gain"),
-    "lag_s": ("attitude.roll.lag_s", "attitude.pitch.lag_s"),
-    "dead_time_s": ("attitude.roll.dead_time_s", "attitude.pitch.dead_time_s"),
-    "acceleration_per_tilt_g": ("attitude.acceleration_per_tilt_g",),
-}
-"""Keys of a vehicle.toml that a margin depends on, by the name of what they have in common."""
-
-
-def _corners(drone: VehicleFile) -> Iterator[tuple[dict[str, float | str], VehicleFile]]:
-    """Yield the ends of the intervals in all combinations, in words, and the drone that has them."""
-    if drone.uncertainty is None:
-        raise InvalidSettingsError(
-            (f"vehicle {echo(drone.name)}: has no section [uncertainty]; `identify` writes it from a log",)
-        )
-    widths = drone.uncertainty.model_dump(exclude_none=True)
-    known = {
-        name: [(key, widths[_width_of(key)]) for key in keys if widths.get(_width_of(key))]
-        for name, keys in _INTERVALS.items()
-    }
-    known = {name: keys for name, keys in known.items() if keys}
-    for ends in itertools.product((-1, 1), repeat=len(known)):
-        document = drone.model_dump(exclude_none=True)
-        for end, keys in zip(ends, known.values(), strict=True):
-            for key, width in keys:
-                *path, last = key.split(".")
-                section = document
-                for name in path:
-                    section = section[name]
-                section[last] = _within(last, section[last] + end * width)
-        words: dict[str, float | str] = {
-            name: ("low", "high")[end > 0] for name, end in zip(known, ends, strict=True)
-        }
-        yield words, VehicleFile.model_validate(document)
-
-
-def _width_of(key: str) -> str:
-    """Return the key in [uncertainty] of a key of the file."""
-    return key.removeprefix("body.").removeprefix("attitude.").replace(".", "_")
-
-
-def _within(name: str, value: float) -> float:
-    """Return a value within the range that a vehicle.toml allows."""
-    low, high = {"lag_s": (0.001, 2.0), "dead_time_s": (0.0, 0.2), "drag_1_s": (0.0, 100.0)}.get(
-        name, (0.1, 3.0)
-    )
-    return min(max(value, low), high)
+def measure_drone(
+    controller: LinearController, drone: VehicleFile, sensors: SensorsName, update_period_s: float
+) -> Pair:
+    """Return the margins of roll and pitch of a controller on one drone."""
+    flight = hovering_flight(drone, sensors, update_period_s)
+    (loops,) = hover_loops(controller, flight)
+    return measure_loops(loops, flight, count=FREQUENCIES)
 
 
 def summarise_drones(drones: Sequence[MeasuredDrone], origin: str) -> ManyDrones:

@@ -1,0 +1,122 @@
+"""The margins of derived settings on their drone, and which of its properties is in the way of more."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from mambo_codegen.settings import controller_toml
+from mambo_codegen.settings.key import spell
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
+from mambo_sil.experiment.margins.axis_margins import AxisMargins
+from mambo_sil.experiment.margins.controller_jacobian import linear_controller
+from mambo_sil.experiment.margins.corners import Ends, at_ends, corners, intervals
+from mambo_sil.experiment.margins.many_drones import measure_drone
+from mambo_sil.experiment.margins.margin_figures import verdict
+from mambo_sil.flight.names import SENSORS_OF, SensorsName
+from mambo_sil.model.derive.derived_settings import controller_text
+
+LEAST_GAIN: Final = 1.5
+"""A loop that stands less of its gain is warned of, wherever it is broken."""
+LEAST_DELAY_S: Final = 0.03
+"""The same for the delay at the command."""
+
+Axes = Sequence[AxisMargins]
+
+
+@dataclass(frozen=True)
+class JudgedMargins:
+    """The margins of settings on a drone, at the worst ends of its intervals, with a warning or None."""
+
+    where: str
+    axes: Axes
+    warning: str | None
+
+    def lines(self) -> list[str]:
+        """Return what `design` prints."""
+        said = [f"{verdict(axis)} ({self.where})" for axis in self.axes]
+        return [*said, *([] if self.warning is None else [f"warning: {self.warning}"])]
+
+
+def judge_margins(settings: Settings, drone: VehicleFile) -> JudgedMargins:
+    """Return the margins of derived settings on their drone, through its own sensors.
+
+    Of a drone with intervals, which `identify` writes, each axis is that of the worst of their ends.
+    Raises BuildError, CacheError.
+    """
+    sensors = SENSORS_OF[drone.sensors.kind][-1]
+    where = "true state" if sensors == "none" else f"through sensors {sensors}"
+    if drone.uncertainty is not None:
+        where = f"{where}, at the worst of the intervals in [uncertainty]"
+    given = list(corners(drone)) if drone.uncertainty else [{}]
+    found = [(ends, _measure(settings, _at(drone, ends), sensors)) for ends in given]
+    axes = [min((pair[axis] for _, pair in found), key=_reserve) for axis in (0, 1)]
+    if min(map(_reserve, axes)) >= 1.0:
+        return JudgedMargins(where, axes, None)
+    worst, _ = min(found, key=lambda one: _reserve_of(one[1]))
+    short = f"a loop stands less than {LEAST_GAIN:g} times the gain or {1e3 * LEAST_DELAY_S:.0f} ms of delay"
+    return JudgedMargins(where, axes, f"{short}; {_in_the_way(settings, drone, worst, sensors)}")
+
+
+def _at(drone: VehicleFile, ends: Ends) -> VehicleFile:
+    return at_ends(drone, ends) if ends else drone
+
+
+def _measure(settings: Settings, drone: VehicleFile, sensors: SensorsName) -> Axes:
+    controller = linear_controller(settings)
+    if controller is None:
+        raise ValueError("derived settings have a linear law")
+    return measure_drone(controller, drone, sensors, settings.horizon.update_period_s)
+
+
+def _reserve(axis: AxisMargins) -> float:
+    """Return the least margin of an axis over the least that is not warned of; 0 if it is unstable."""
+    gains = [loop.gain_up / LEAST_GAIN for loop in axis.loops.values()]
+    delay = math.inf if axis.command is None else axis.command.delay_s / LEAST_DELAY_S
+    return float(min((*gains, delay))) if axis.stable else -axis.poles.growth_1_s
+
+
+def _reserve_of(axes: Axes) -> float:
+    return min(map(_reserve, axes))
+
+
+def _in_the_way(settings: Settings, drone: VehicleFile, worst: Ends, sensors: SensorsName) -> str:
+    """Return in words which property of a drone costs its loops most, at the worst ends of its intervals.
+
+    Settings do not depend on an interval; without another property they are derived again.
+    """
+    found = []
+    for name, keys in (intervals(drone) if worst else {}).items():
+        words = ", ".join(f"{key} +- {spell(width)}" for key, width in keys if width)
+        certain = _at(drone, {**worst, name: 0})
+        found.append((_reserve_of(_measure(settings, certain, sensors)), f"the interval of {words}"))
+    for words, other in _without(drone):
+        seen: SensorsName = sensors if other.sensors.kind == drone.sensors.kind else "none"
+        derived = controller_toml.parse(controller_text(other, drone.name), drone.name)
+        found.append((_reserve_of(_measure(derived, _at(other, worst), seen)), words))
+    if not found:
+        return "no single property is in the way"
+    reserve, words = max(found)
+    enough = "enough" if reserve >= 1.0 else "too little, too"
+    return f"most in the way is {words}: without it the loops stand {enough}"
+
+
+def _without(drone: VehicleFile) -> Iterator[tuple[str, VehicleFile]]:
+    """Yield properties in words, and the drone without each."""
+    document: dict[str, Any] = drone.model_dump(exclude_none=True)
+    if isinstance(drone.attitude, FirstOrderAttitude):
+        attitude = document["attitude"]
+        quick = {axis: attitude[axis] | {"dead_time_s": 0.0} for axis in ("roll", "pitch")}
+        if quick["roll"] != attitude["roll"] or quick["pitch"] != attitude["pitch"]:
+            times = " and ".join(spell(attitude[axis]["dead_time_s"]) for axis in ("roll", "pitch"))
+            other = VehicleFile.model_validate(document | {"attitude": attitude | quick})
+            yield f"dead_time_s of roll and pitch, {times}", other
+    if drone.rotors is not None and drone.rotors.lag_s:
+        rotors = document["rotors"] | {"lag_s": 0.0}
+        other = VehicleFile.model_validate(document | {"rotors": rotors})
+        yield f"rotors.lag_s = {spell(drone.rotors.lag_s)}", other
+    if drone.sensors.kind != "none":
+        other = VehicleFile.model_validate(document | {"sensors": {"kind": "none"}})
+        yield f"sensors.kind = {spell(drone.sensors.kind)}", other
