@@ -70,7 +70,7 @@ def host_toolchain(optimisation: str | None = None) -> Toolchain:
         path = str(Path(program).absolute()) if os.sep in program else program
         return Toolchain((path, *arguments), optimisation)
     for name in ("cc", "gcc", "clang"):
-        if shutil.which(name):
+        if _is_installed(name, os.environ.get("PATH")):
             return Toolchain((name,), optimisation)
     raise BuildError("no C compiler found (cc, gcc, clang); install one (Debian: gcc), or set CC")
 
@@ -87,6 +87,12 @@ def refuse_lack_of_space(tool: str, output: str, folder: Path) -> None:
             if temporary not in line:
                 advice += f"; or free some in {folder}"
             raise UnwritableError(f"{tool} cannot write its files: {line.strip()}; {advice}")
+
+
+@lru_cache
+def _is_installed(name: str, path: str | None) -> bool:
+    """Return whether there is a program of this name on the PATH; campaigns ask for every few flights."""
+    return shutil.which(name, path=path) is not None
 
 
 @lru_cache

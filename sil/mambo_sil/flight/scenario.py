@@ -170,10 +170,14 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         """Return the fields that a record has in common with a scenario."""
         return {field.name: each(field.name) for field in fields(kind) if field.name in Scenario.model_fields}
 
+    curves = {
+        (s.trajectory, repr(s.size_m), repr(s.rate_rad_s)): CURVES[s.trajectory](s.size_m, s.rate_rad_s)
+        for s in scenarios
+    }
     n, drone = len(scenarios), first.vehicle
     delays = np.array([scenario.command_delay_ticks for scenario in scenarios], np.int64)
     return Flight(
-        Trajectories(tuple(CURVES[s.trajectory](s.size_m, s.rate_rad_s) for s in scenarios)),
+        Trajectories(tuple(curves[s.trajectory, repr(s.size_m), repr(s.rate_rad_s)] for s in scenarios)),
         duration_s=first.duration_s,
         flights=n,
         start=first.start,

@@ -70,7 +70,7 @@ class Trace:
         hasher = hashlib.sha256(self.time_s.tobytes())
         for column in fields(self):
             if column.name != "time_s":
-                hasher.update(getattr(self, column.name)[:, flight].tobytes())
+                hasher.update(np.ascontiguousarray(getattr(self, column.name)[:, flight]).data)
         return hasher.hexdigest()
 
     @property

@@ -20,6 +20,7 @@ from mambo_codegen.errors import INTERRUPTED, TERMINATED, ForeignFilesError, Unw
 from mambo_sil.errors import BusyError, FlightError, WorkerError
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_flights import fly_batch
+from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.experiment.campaign.campaign_run import fly_missing, open_campaign, table_columns
 from mambo_sil.experiment.campaign.executors import Pool, cluster, processes, report_share
 from mambo_sil.experiment.campaign.store import DATABASE
@@ -59,6 +60,11 @@ def finished(folder: Path) -> set[int]:
         return {flight for (flight,) in database.execute("SELECT flight FROM flights")}
 
 
+def worst_records(folder: Path, name: str) -> set[str]:
+    """Return the records of the worst flights of a controller, as the summary names them."""
+    return {one["record"] for one in json.loads((folder / "summary.json").read_text())["worst"][name]}
+
+
 def fly_on_threads(
     source: Path,
     folder: Path,
@@ -85,22 +91,70 @@ def test_the_table_depends_neither_on_batches_nor_on_workers(
 
 
 def test_a_folder_has_table_summary_records_and_pictures(source: Path, whole: Path) -> None:
-    """The table has draws and results of each flight, and there is a record per flight and controller."""
+    """The table has draws and results of each flight; the worst flights have records."""
     names = set(contents(whole))
-    records = {f"flights/{flight:06}-{name}.json" for flight in range(FLIGHTS) for name in ("pd", "mambo")}
+    records = {*worst_records(whole, "pd"), *worst_records(whole, "mambo")}
     files = {"campaign.json", DATABASE, "flights.csv", "summary.json", "campaign.png", "campaign.svg"}
     assert names == files | records
     rows = list(csv.DictReader((whole / "flights.csv").read_text().splitlines()))
     assert [int(row["flight"]) for row in rows] == list(range(FLIGHTS))
     assert tuple(rows[0])[1:-1] == table_columns(campaign_file.read(source))
     assert 0.063 <= float(rows[0]["mass_kg"]) <= 0.08
-    record = read_record(whole / "flights" / "000002-mambo.json")
-    assert record.scenario.mass_kg == float(rows[2]["mass_kg"])
-    assert record.trace_sha256 == rows[2]["mambo_trace_sha256"]
     summary = json.loads((whole / "summary.json").read_text())
     assert summary["flights"] == FLIGHTS
     assert summary["controllers"]["mambo"]["crashed"]["count"] == 0
     assert len(summary["worst"]["pd"]) == 5
+
+
+def test_every_flight_has_a_record(whole: Path, tmp_path: Path) -> None:
+    """A file, or made from the database with the same content."""
+    rows = list(csv.DictReader((whole / "flights.csv").read_text().splitlines()))
+    shutil.copytree(whole, tmp_path / "out")
+    shutil.rmtree(tmp_path / "out" / "flights")
+    for flight, row in enumerate(rows):
+        for name in ("pd", "mambo"):
+            path = Path("flights") / f"{flight:06}-{name}.json"
+            record = campaign_record(tmp_path / "out" / path)
+            assert record is not None
+            assert record.controller == ("pd" if name == "pd" else "nmpc")
+            assert record.scenario.mass_kg == float(row["mass_kg"])
+            assert record.trace_sha256 == row[f"{name}_trace_sha256"]
+            if (whole / path).exists():
+                assert record == read_record(whole / path)
+
+
+def test_a_flight_without_a_file_repeats_bit_for_bit(whole: Path, tmp_path: Path) -> None:
+    """Its record comes from the database."""
+    (left,) = {f"flights/{flight:06}-pd.json" for flight in range(FLIGHTS)} - worst_records(whole, "pd")
+    options = "--json", "--no-pictures", "-o", str(tmp_path)
+    assert json.loads(run("fly", "--repeat", str(whole / left), *options)[0])["same_bits_as_recorded"] is True
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "flights/000006-pd.json",
+        "flights/000001-no.json",
+        "flights/1-pd.json",
+        "000001-pd.json",
+        "a/flights/000001-pd.json",
+    ],
+)
+def test_a_record_of_no_flight_cannot_be_read(path: str, whole: Path, tmp_path: Path) -> None:
+    """No such flight, controller, file or campaign."""
+    assert campaign_record(whole / path) is None
+    assert run("fly", "--repeat", str(whole / path), "-o", str(tmp_path), code=2)[1].endswith(
+        "cannot be read: No such file or directory\n"
+    )
+
+
+def test_a_record_of_another_version_cannot_be_read(whole: Path, tmp_path: Path) -> None:
+    """That version flew it."""
+    folder = tmp_path / "out"
+    shutil.copytree(whole, folder)
+    identity = json.loads((folder / "campaign.json").read_text()) | {"generator": "mambo-nmpc 0.0"}
+    (folder / "campaign.json").write_text(json.dumps(identity))
+    assert campaign_record(folder / "flights" / "000001-pd.json") is None
 
 
 @pytest.mark.long
@@ -190,15 +244,16 @@ def test_a_finished_campaign_needs_no_worker_and_keeps_its_records(
     """With nothing to fly no scheduler is asked, and only a record that is missing or damaged is written."""
     folder = tmp_path / "out"
     shutil.copytree(whole, folder)
-    (folder / "flights" / "000001-pd.json").unlink()
-    (folder / "flights" / "000002-pd.json").write_text("{")
-    kept = folder / "flights" / "000003-pd.json"
+    missing, damaged, name, *_ = sorted(worst_records(whole, "pd"))
+    (folder / missing).unlink()
+    (folder / damaged).write_text("{")
+    kept = folder / name
     kept.write_text("{ " + kept.read_text().removeprefix("{"))
     edited = kept.read_bytes()
     options = ("--flights", str(FLIGHTS), "--scheduler", "tcp://127.0.0.1:1", "-o", str(folder), "--json")
     assert run("campaign", str(source), *options)[0] == (folder / "summary.json").read_text()
     assert kept.read_bytes() == edited
-    kept.write_bytes((whole / "flights" / "000003-pd.json").read_bytes())
+    kept.write_bytes((whole / name).read_bytes())
     assert contents(folder) == contents(whole)
 
 

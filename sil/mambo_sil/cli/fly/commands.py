@@ -76,7 +76,8 @@ def campaign(
 
     with counting_bar("starting", "flights", flights) as bar:
         summary = _fly_campaign(source, vehicle, output, flights, bar, workers=workers, scheduler=scheduler)
-    from mambo_sil.experiment.campaign.campaign_report import PICTURE, RECORDS, campaign_text
+    from mambo_sil.experiment.campaign.campaign_records import RECORDS
+    from mambo_sil.experiment.campaign.campaign_report import PICTURE, campaign_text
     from mambo_sil.experiment.campaign.store import TABLE
     from mambo_sil.results.folders import SUMMARY
 

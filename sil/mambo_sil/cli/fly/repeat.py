@@ -10,6 +10,7 @@ from mambo_sil.cli.fly.fly_options import Output
 from mambo_sil.cli.fly.one_flight import FLIGHT_FILES, TRACE_FILES, draw_flight, finish, write_trace
 from mambo_sil.cli.progress import progress_bar
 from mambo_sil.errors import FlightError
+from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
@@ -25,7 +26,7 @@ ALLOWED = frozenset({"repeat", "output", "pictures", "as_json"})
 
 
 def fly_again(file: Path, output: Output, context: typer.Context) -> None:
-    """Repeat the flight recorded in `file`, with the reference instead of the C.
+    """Repeat the flight recorded in `file`, or in the database of its campaign, with the reference.
 
     Exits 1 if the drone crashes or is lost, or if a bit differs from the recorded flight.
 
@@ -36,7 +37,7 @@ def fly_again(file: Path, output: Output, context: typer.Context) -> None:
         if given is not None and given.name == "COMMANDLINE":
             option = "the settings" if name == "source" else f"--{name.replace('_', '-')}"
             raise FlightError(f"--repeat {echo(str(file))} contains the whole flight: leave out {option}")
-    record = read_record(file)
+    record = (None if file.exists() else campaign_record(file)) or read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
     watched, controller = _controllers(record, flight)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)

@@ -6,7 +6,7 @@ Arguments and results are plain values, which can be sent to other processes and
 import threading
 from collections.abc import Sequence
 from dataclasses import fields
-from functools import cache, partial
+from functools import partial
 from typing import Any, Final
 
 from mambo_codegen import __version__
@@ -19,7 +19,7 @@ from mambo_sil.experiment.campaign.parameters import Draw
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
-from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.engine.simulate import fly_groups
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import Metrics
 from mambo_sil.flight.scenario import Scenario, flight_of
@@ -75,22 +75,26 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     that cannot be simulated together.
     """
     rows: list[Row] = [{} for _ in scenarios]
-    flight_at = cache(partial(flight_of, scenarios))
-    for number, entrant in enumerate(entrants):
-        flight = flight_at(entrant.settings.horizon.update_period_s)
-        report = partial(_report_part, number, len(entrants))
-        trace = fly(flight, _controller(entrant, flight), report)
-        limit_rad = method_of(entrant.settings).tilt_limit_rad
-        for key, values in _evaluate(trace, limit_rad, scenarios[0].vehicle).items():
-            for row, value in zip(rows, values, strict=True):
-                row[f"{entrant.name}_{key}"] = value
+    periods = dict.fromkeys(entrant.settings.horizon.update_period_s for entrant in entrants)
+    flown = 0
+    for period_s in periods:
+        flight = flight_of(scenarios, period_s)
+        these = [one for one in entrants if one.settings.horizon.update_period_s == period_s]
+        report = partial(_report_part, flown, len(these), len(entrants))
+        for group in fly_groups(flight, [_controller(one, flight) for one in these], report):
+            entrant, last = these[group.controller], group.first + group.trace.flights
+            results = _evaluate(group.trace, method_of(entrant.settings).tilt_limit_rad, scenarios[0].vehicle)
+            for key, values in results.items():
+                for row, value in zip(rows[group.first : last], values, strict=True):
+                    row[f"{entrant.name}_{key}"] = value
+        flown += len(these)
     report_share(0.0)
     return rows
 
 
-def _report_part(number: int, parts: int, share: float) -> None:
-    """Report the share of one of several equal parts."""
-    report_share((number + share) / parts)
+def _report_part(before: int, parts: int, total: int, share: float) -> None:
+    """Report the share of the next `parts` of `total` equal parts, `before` of which are done."""
+    report_share((before + parts * share) / total)
 
 
 def _controller(entrant: Entrant, flight: Flight) -> PositionController:

@@ -1,4 +1,4 @@
-"""Results of a campaign: summary, text, section of the report, and records to repeat flights."""
+"""Results of a campaign: summary, text, and section of the report."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,8 +10,9 @@ from pydantic import BaseModel
 from mambo_codegen.atomic import put
 from mambo_codegen.errors import echo
 from mambo_sil.errors import ResultsError
-from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection, scenario
-from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST
+from mambo_sil.experiment.campaign.campaign_file import Campaign, FlightSection
+from mambo_sil.experiment.campaign.campaign_flights import CRASHED
+from mambo_sil.experiment.campaign.campaign_records import record_name, write_records
 from mambo_sil.experiment.campaign.statistics import (
     Distributions,
     Improvement,
@@ -25,12 +26,10 @@ from mambo_sil.experiment.campaign.statistics import (
 from mambo_sil.experiment.campaign.store import DATABASE, FLIGHT, TABLE, FlightStore, convert_os_errors
 from mambo_sil.flight.flight_report import named
 from mambo_sil.flight.names import PD_TITLES
-from mambo_sil.flight.scenario import Record, write_record
 from mambo_sil.results.folders import SUMMARY
 from mambo_sil.results.number_format import digits
 from mambo_sil.results.summary import Number, ReportedSummary, Section
 
-RECORDS: Final = "flights"
 PICTURE: Final = "campaign"
 _SHOWN: Final = {"0.05": "5 %", "0.5": "median", "0.95": "95 %", "1": "worst"}
 
@@ -156,54 +155,22 @@ def _worst(table: Table, name: str, row: int) -> WorstFlight:
         crashed=bool(table[f"{name}_{CRASHED}"][row]),
         iae_m_s=float(table[f"{name}_iae_m_s"][row]),
         max_error_m=float(table[f"{name}_max_error_m"][row]),
-        record=_record_name(flight, name),
+        record=record_name(flight, name),
     )
 
 
-def _record_name(flight: int, name: str) -> str:
-    return f"{RECORDS}/{flight:06}-{name}.json"
-
-
-def write_records(campaign: Campaign, store: FlightStore) -> None:
-    """Write the missing records of all flights for `fly --repeat`; raises UnwritableError."""
-    section = campaign.flight
-    with convert_os_errors(store.folder):
-        (store.folder / RECORDS).mkdir(exist_ok=True)
-        for cells in store.rows():
-            flight = int(cells[FLIGHT])
-            for entrant in campaign.entrants:
-                digest = str(cells[f"{entrant.name}_{DIGEST}"])
-                path = store.folder / _record_name(flight, entrant.name)
-                if not _is_written(path, digest):
-                    flown = scenario(section, campaign.draw(flight))
-                    record = Record(
-                        scenario=flown,
-                        controller=entrant.kind,
-                        settings=entrant.settings,
-                        trace_sha256=digest,
-                    )
-                    write_record(record, path)
-
-
-def _is_written(path: Path, digest: str) -> bool:
-    """Return whether the record at `path` is whole and that of the trace with this digest."""
-    try:
-        return path.read_bytes().endswith(f'"trace_sha256": "{digest}"\n}}\n'.encode())
-    except FileNotFoundError:
-        return False
-
-
 def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None]) -> CampaignSummary:
-    """Write the CSV, records, pictures and, last, the summary; raises UnwritableError.
+    """Write the CSV, records of the worst flights, pictures and, last, the summary; raises UnwritableError.
 
     Calls `stage` with the name of each step before it.
     """
-    stage("writing records")
+    stage("writing the table")
     store.export()
-    write_records(campaign, store)
     stage("computing statistics")
     table = read_table(store.folder / DATABASE)
     summary = summarise(campaign, table)
+    worst = {name: [one.flight for one in flights] for name, flights in summary.worst.items()}
+    write_records(campaign, store, worst)
     stage("drawing pictures")
     from mambo_sil.experiment.campaign.campaign_plots import draw_campaign  # noqa: PLC0415 - loaded when drawing
 

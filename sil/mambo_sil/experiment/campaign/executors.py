@@ -5,6 +5,7 @@ Both have the interface of `concurrent.futures.Executor`; the rest of the campai
 
 import asyncio
 import contextlib
+import gc
 import logging
 import os
 import shlex
@@ -94,7 +95,7 @@ def processes(count: int) -> Iterator[Pool]:
 
     spawn = get_context("spawn")
     shares, started = spawn.Array("d", count), spawn.Value("i", 0)
-    with ProcessPoolExecutor(count, spawn, _start_worker, (shares, started)) as executor:
+    with ProcessPoolExecutor(count, spawn, _start_worker, (shares, started, gc.get_threshold())) as executor:
         try:
             yield Pool(executor, count, trouble, lambda: sum(shares[:]))
         except BaseException:
@@ -114,8 +115,12 @@ _slot: tuple[Any, int] | None = None
 """In a worker process of this machine: the shares of all workers, and the number of this one."""
 
 
-def _start_worker(shares: Any, started: Any) -> None:
-    """Take the next place in `shares`, an array in the memory of all workers, and follow the parent."""
+def _start_worker(shares: Any, started: Any, collection: tuple[int, int, int]) -> None:
+    """Take the next place in `shares`, an array in the memory of all workers, and follow the parent.
+
+    Look for garbage as often as the parent does.
+    """
+    gc.set_threshold(*collection)
     global _slot  # noqa: PLW0603 - set once in a process
     with started.get_lock():
         _slot = shares, started.value

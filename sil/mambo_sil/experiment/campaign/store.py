@@ -78,6 +78,10 @@ class FlightStore:
         """Yield the cells of each flight by column, in the order of the flights."""
         return read_rows(self._database)
 
+    def row(self, flight: int) -> dict[str, Value]:
+        """Return the cells of a finished flight by column."""
+        return _one(self._database, flight)
+
     def _open(self) -> set[int]:
         """Create the table if it is missing, and return the numbers of the flights in it.
 
@@ -102,12 +106,25 @@ class FlightStore:
         )
 
 
-def read_rows(database: sqlite3.Connection) -> Iterator[dict[str, Value]]:
+def read_rows(database: sqlite3.Connection, which: str = "") -> Iterator[dict[str, Value]]:
     """Yield the cells of each flight by column, in the order of the flights; SQLite stores NaN as NULL."""
-    found = database.execute(f"SELECT * FROM flights ORDER BY {FLIGHT}")
+    found = database.execute(f"SELECT * FROM flights {which} ORDER BY {FLIGHT}")
     titles = [column[0] for column in found.description]
     for row in found:
         yield {title: math.nan if cell is None else cell for title, cell in zip(titles, row, strict=True)}
+
+
+def read_flight(path: Path, flight: int) -> dict[str, Value]:
+    """Return the cells of a flight in the database at `path`; raises KeyError or sqlite3.Error."""
+    with contextlib.closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+        return _one(database, flight)
+
+
+def _one(database: sqlite3.Connection, flight: int) -> dict[str, Value]:
+    """Return the cells of a flight; raises KeyError if there is none."""
+    for row in read_rows(database, f"WHERE {FLIGHT} = {flight}"):
+        return row
+    raise KeyError(flight)
 
 
 def _refuse_special_file(path: Path) -> None:

@@ -1,7 +1,9 @@
 """Fly simulations in the engine where controller and flight allow it, else in NumPy, with the same bits."""
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +15,7 @@ from mambo_sil.drone.sensors import instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.flight import loop
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
-from mambo_sil.flight.engine.native import is_native, native
+from mambo_sil.flight.engine.native import Native, is_native, native
 from mambo_sil.flight.engine.records import flight_records, in_lanes, simulation_record
 from mambo_sil.flight.loop import Flight, PositionController, allocate_trace
 from mambo_sil.flight.traces import Trace
@@ -22,6 +24,20 @@ DELAY_TICKS_MAX: Final = 200
 """Longest delay of a command that the engine can hold."""
 
 Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class GroupTrace:
+    """The trace of some flights of a simulation with one of its controllers.
+
+    controller: number of the controller.
+    first:      number of the first flight.
+    trace:      valid until the next group is flown, which overwrites its memory.
+    """
+
+    controller: int
+    first: int
+    trace: Trace
 
 
 def fly(
@@ -35,48 +51,121 @@ def fly(
     machine without a compiler it warns and uses NumPy. Raises FlightError as `loop.fly`, and CacheError and
     UnwritableError if the engine cannot be built for want of a folder or space.
     """
-    delay_ticks = int(np.max(flight.link.delay_ticks))
-    if chosen_engine() == "c" and is_native(controller) and delay_ticks <= DELAY_TICKS_MAX:
-        try:
-            toolchain = host_toolchain()
-            compiled = load(toolchain, lanes_for(flight.flights, toolchain))
-        except BuildError as error:
-            warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=2)
-        else:
-            return fly_compiled(compiled, flight, controller, progress)
-    return loop.fly(flight, controller, progress)
+    engine = _engine(flight, [controller])
+    if engine is None:
+        return loop.fly(flight, controller, progress)
+    return fly_compiled(engine, flight, controller, progress)
+
+
+def fly_groups(
+    flight: Flight, controllers: Sequence[PositionController], progress: Progress | None = None
+) -> Iterator[GroupTrace]:
+    """Simulate the flights with each controller and yield their traces, group after group.
+
+    The random numbers of a group are drawn once for all controllers, and its traces have the same memory,
+    which stays in the processor's cache. Engine, `progress` and errors as in `fly`; in NumPy all flights are
+    one group.
+    """
+    engine = _engine(flight, controllers)
+    if engine is not None:
+        yield from _fly_groups(engine, flight, controllers, progress)
+        return
+    for number, controller in enumerate(controllers):
+        report = None if progress is None else partial(_report_part, progress, number, len(controllers))
+        yield GroupTrace(number, 0, loop.fly(flight, controller, report))
 
 
 def fly_compiled(
     engine: Any, flight: Flight, controller: PositionController, progress: Progress | None = None
 ) -> Trace:
     """Simulate flights in a library of `engine_library.load`, group after group, with a controller in C."""
-    lanes = int(engine.engine_lanes())
-    times_s, targets = flight.times_s(), flight.given_targets
-    simulation = simulation_record(flight, times_s)
-    groups = in_lanes(flight_records(flight, targets[0]), lanes)
-    trace = allocate_trace(times_s, targets[..., :4], sensed=flight.sensors is not None)
-    ticks = len(times_s) * flight.ticks_per_update
-    draws = _Buffers(flight, lanes, len(times_s), ticks)
-    called = native(engine, controller)
-    record = trace_record(trace)
-    seeds = flight.seeds or (0,) * flight.flights
-    for index, group in zip(range(0, flight.flights, lanes), groups, strict=True):
-        engine.engine_fly(
-            pointer("engine_simulation_t *", simulation),
-            pointer("engine_flight_t *", group),
-            index,
-            pointer("double *", times_s),
-            pointer("double *", _by_flight(targets)),
-            draws.draw(seeds[index : index + lanes]),
+    simulation = _Simulation(engine, flight)
+    trace = simulation.allocate(flight.flights)
+    called, record = native(engine, controller), trace_record(trace)
+    for first in simulation.firsts:
+        simulation.draw(first)
+        simulation.fly(first, called, record, first)
+        if progress is not None:
+            progress(min(first + simulation.lanes, flight.flights) / flight.flights)
+    return trace
+
+
+def _fly_groups(
+    engine: Any, flight: Flight, controllers: Sequence[PositionController], progress: Progress | None
+) -> Iterator[GroupTrace]:
+    simulation = _Simulation(engine, flight)
+    called = [native(engine, controller) for controller in controllers]
+    traces = cache(simulation.allocate)
+    done = 0
+    for first in simulation.firsts:
+        size = min(simulation.lanes, flight.flights - first)
+        trace = replace(traces(size), target=flight.given_targets[:, first : first + size, :4])
+        record = trace_record(trace)
+        simulation.draw(first)
+        for number, one in enumerate(called):
+            simulation.fly(first, one, record, 0)
+            yield GroupTrace(number, first, trace)
+            done += size
+            if progress is not None:
+                progress(done / (len(controllers) * flight.flights))
+
+
+def _engine(flight: Flight, controllers: Sequence[PositionController]) -> Any:
+    """Return the engine's library with the lanes that are fastest; None if NumPy must simulate."""
+    delay_ticks = int(np.max(flight.link.delay_ticks))
+    if chosen_engine() != "c" or delay_ticks > DELAY_TICKS_MAX or not all(map(is_native, controllers)):
+        return None
+    try:
+        toolchain = host_toolchain()
+        return load(toolchain, lanes_for(flight.flights, toolchain))
+    except BuildError as error:
+        warnings.warn(f"{error}; the simulation runs in NumPy, which is slower", stacklevel=3)
+        return None
+
+
+def _report_part(progress: Progress, number: int, parts: int, share: float) -> None:
+    """Report the share of one of several equal parts."""
+    progress((number + share) / parts)
+
+
+class _Simulation:
+    """A simulation in the engine, group after group of as many flights as it has lanes."""
+
+    def __init__(self, engine: Any, flight: Flight) -> None:
+        self._engine, self._flight = engine, flight
+        self.lanes = int(engine.engine_lanes())
+        self.firsts = range(0, flight.flights, self.lanes)
+        self._times_s, self._targets = flight.times_s(), flight.given_targets
+        self._record = simulation_record(flight, self._times_s)
+        self._groups = in_lanes(flight_records(flight, self._targets[0]), self.lanes)
+        updates = len(self._times_s)
+        self._buffers = _Buffers(flight, self.lanes, updates, updates * flight.ticks_per_update)
+        self._seeds = flight.seeds or (0,) * flight.flights
+
+    def allocate(self, flights: int) -> Trace:
+        """Return a trace with the times, and the targets of the first flights."""
+        targets = self._targets[:, :flights, :4]
+        return allocate_trace(self._times_s, targets, sensed=self._flight.sensors is not None)
+
+    def draw(self, first: int) -> None:
+        """Draw the random numbers of the group that begins with flight `first`."""
+        self._draws = self._buffers.draw(self._seeds[first : first + self.lanes])
+
+    def fly(self, first: int, called: Native, record: Any, place: int) -> None:
+        """Fly the group that begins with flight `first`, and write its trace to `record` from `place` on."""
+        self._record["flights"] = place + min(self.lanes, self._flight.flights - first)
+        self._engine.engine_fly(
+            pointer("engine_simulation_t *", self._record),
+            pointer("engine_flight_t *", self._groups[first // self.lanes]),
+            place,
+            pointer("double *", self._times_s),
+            pointer("double *", _by_flight(self._targets)[first - place :]),
+            self._draws,
             called.step,
-            called.instance(index),
+            called.instance(first),
             called.stride,
             record,
         )
-        if progress is not None:
-            progress(min(index + lanes, flight.flights) / flight.flights)
-    return trace
 
 
 def trace_record(trace: Trace) -> Any:
