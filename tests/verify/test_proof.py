@@ -1,6 +1,5 @@
 """The proof: no alarm whatever the settings, an alarm for every fault that it is there to exclude."""
 
-import itertools
 import subprocess
 from pathlib import Path
 
@@ -137,15 +136,16 @@ def of_scalar(name: str, scalar: str) -> Settings:
     ("name", "scalar"),
     [
         *((name, "float32") for name in presets.names()),
-        *itertools.product(("mambo", "mambo-1norm"), ("float64", "fixed")),
+        *((name, "float64") for name in ("mambo", "mambo-1norm")),
+        *((name, "fixed") for name in presets.names() if name != "table1-printed"),
     ],
 )
 def test_a_preset_is_proven(name: str, scalar: str, tmp_path: Path) -> None:
     """Every promise of the driver holds, and what Frama-C said stays as evidence.
 
-    With float32, and one preset of each method in the other types: between presets of a method only numbers
-    change, as they do in the settings of every kind below and in `test_quadratic`. One is checked as a user
-    does it; of the others all but `tests.support.headings` leaves out.
+    With float64, whose C is that of float32 with another type, one preset of each method; in fixed point not
+    that which differs from another by two signs. One is checked as a user does it; of the others all but
+    `tests.support.headings` leaves out.
     """
     its = subject(of_scalar(name, scalar), tmp_path)
     whole = (name, scalar) == ("mambo", "float32")

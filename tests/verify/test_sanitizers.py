@@ -14,9 +14,8 @@ from tests.support.subjects import subject
 from tests.support.tools import require
 
 SETTINGS = {name: presets.load(name) for name in presets.names()} | {
-    f"case {index} {scalar}": settings_case(index, scalar)
+    f"case {index}": settings_case(index, ("float32", "float64")[index % 2])
     for index in range(len(CORNER_HORIZONS))
-    for scalar in ("float32", "float64")
 }
 FAULTS = {
     "a move too many": (
@@ -46,7 +45,7 @@ def test_nothing_undefined_happens(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", SETTINGS)
 def test_nothing_undefined_happens_whatever_the_settings(name: str, tmp_path: Path) -> None:
-    """Every preset, and the corners of the horizon in both scalar types."""
+    """Every preset, and the corners of the horizon with float32 and float64 by turns."""
     result = sanitizers.check(subject(SETTINGS[name], tmp_path))
     assert result.outcome is CheckOutcome.PASSED, result.evidence
 
