@@ -6,6 +6,7 @@ import os
 import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import BinaryIO
 
 from mambo_codegen.plain_file import find_obstacle
 
@@ -24,6 +25,29 @@ def put(place: Path, content: bytes) -> None:
 
 
 @contextlib.contextmanager
+def put_stream(place: Path) -> Iterator[BinaryIO]:
+    """Yield a new file that replaces the one at `place` when the block ends; for what is too large for `put`.
+
+    Raises OSError as `put`. If the block raises, the old file stays.
+    """
+    if obstacle := find_obstacle(place):
+        raise OSError(errno.EINVAL, f"it is {obstacle}; name a plain file", str(place))
+    new = _new_path(place)
+    try:
+        with new.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(place)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            new.unlink()
+        if isinstance(error, OSError):
+            error.filename = str(place)
+        raise
+
+
+@contextlib.contextmanager
 def stage(files: Mapping[Path, bytes | None]) -> Iterator[None]:
     """Write new files next to their destinations; when the block ends, rename them in the order of `files`.
 
@@ -31,7 +55,7 @@ def stage(files: Mapping[Path, bytes | None]) -> Iterator[None]:
     rename leaves every destination as it was. Raises OSError with the destination as its file name.
     """
     missing = {folder for place in files for folder in place.parents if not folder.exists()}
-    new = {place: place.with_name(f".{place.name}.{os.getpid()}{_NEW}") for place in files}
+    new = {place: _new_path(place) for place in files}
     try:
         for place, content in files.items():
             if content is not None:
@@ -52,6 +76,11 @@ def stage(files: Mapping[Path, bytes | None]) -> Iterator[None]:
             with contextlib.suppress(OSError):
                 folder.rmdir()
         raise
+
+
+def _new_path(place: Path) -> Path:
+    """Return where the new file for `place` is written."""
+    return place.with_name(f".{place.name}.{os.getpid()}{_NEW}")
 
 
 def is_left_over(path: str) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen import boards
-from mambo_codegen.atomic import put
+from mambo_codegen.atomic import put, put_stream
 from mambo_codegen.errors import MamboNmpcError
 from mambo_codegen.plain_file import find_obstacle, read_plain_file
 from mambo_codegen.settings import presets
@@ -84,3 +84,35 @@ def test_a_device_and_a_folder_are_refused(tmp_path: Path) -> None:
         read_plain_file(Path("/dev/zero"), 10)
     with pytest.raises(IsADirectoryError):
         read_plain_file(tmp_path, 10)
+
+
+def write_lines(path: Path, *, fail: bool = False) -> None:
+    """Write two lines to a stream; with `fail` raise between them."""
+    with put_stream(path) as file:
+        file.write(b"one\n")
+        if fail:
+            raise KeyboardInterrupt
+        file.write(b"two\n")
+
+
+def test_a_stream_replaces_a_file_whole_or_not_at_all(tmp_path: Path) -> None:
+    """What is interrupted leaves the old file, or none, and nothing else."""
+    path = tmp_path / "table.csv"
+    with pytest.raises(KeyboardInterrupt):
+        write_lines(path, fail=True)
+    assert not list(tmp_path.iterdir())
+    write_lines(path)
+    assert path.read_bytes() == b"one\ntwo\n"
+    with pytest.raises(KeyboardInterrupt):
+        write_lines(path, fail=True)
+    assert [one.read_bytes() for one in tmp_path.iterdir()] == [b"one\ntwo\n"]
+
+
+def test_a_stream_replaces_no_folder(tmp_path: Path) -> None:
+    """Nor a pipe; the error names the place."""
+    with pytest.raises(OSError, match="name a plain file") as raised:
+        write_lines(tmp_path)
+    assert raised.value.filename == str(tmp_path)
+    with pytest.raises(FileNotFoundError) as missing:
+        write_lines(tmp_path / "no" / "table.csv")
+    assert missing.value.filename == str(tmp_path / "no" / "table.csv")

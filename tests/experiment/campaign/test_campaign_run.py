@@ -21,7 +21,13 @@ from mambo_sil.errors import BusyError, FlightError, WorkerError
 from mambo_sil.experiment.campaign import campaign_file
 from mambo_sil.experiment.campaign.campaign_flights import fly_batch
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
-from mambo_sil.experiment.campaign.campaign_run import fly_missing, open_campaign, table_columns
+from mambo_sil.experiment.campaign.campaign_run import (
+    LARGEST_BATCH,
+    batch_sizes,
+    fly_missing,
+    open_campaign,
+    table_columns,
+)
 from mambo_sil.experiment.campaign.executors import Pool, cluster, processes, report_share
 from mambo_sil.experiment.campaign.store import DATABASE
 from mambo_sil.flight.scenario import read_record
@@ -255,6 +261,26 @@ def test_a_finished_campaign_needs_no_worker_and_keeps_its_records(
     assert kept.read_bytes() == edited
     kept.write_bytes((whole / name).read_bytes())
     assert contents(folder) == contents(whole)
+
+
+@pytest.mark.parametrize(
+    ("flights", "workers", "first"), [(1, 8, 20), (6, 2, 20), (1000, 2, 20), (50_000, 64, 20), (7, 2, 1)]
+)
+def test_batches_grow_and_hold_every_flight(flights: int, workers: int, first: int) -> None:
+    """No worker is without one in the beginning, and the last ones are small."""
+    sizes = list(batch_sizes(flights, workers, first))
+    assert sum(sizes) == flights
+    assert min(sizes) > 0
+    assert len(sizes) >= min(workers, flights)
+    assert max(sizes[: 4 * workers]) <= first
+    assert max(sizes[-workers:]) <= max(first, flights // workers)
+
+
+def test_a_million_flights_are_few_tasks() -> None:
+    """Their number is what a scheduler must bear."""
+    sizes = list(batch_sizes(1_000_000, 16, 20))
+    assert max(sizes) == LARGEST_BATCH
+    assert len(sizes) < 4000
 
 
 def test_unfinished_flights_are_counted(source: Path, tmp_path: Path) -> None:

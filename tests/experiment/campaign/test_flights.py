@@ -13,7 +13,15 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.experiment.campaign.campaign_file import Entrant, default, scenario
-from mambo_sil.experiment.campaign.campaign_flights import _evaluate, columns, fly_batch
+from mambo_sil.experiment.campaign.campaign_flights import (
+    MOST_TOGETHER,
+    _evaluate,
+    columns,
+    fly_batch,
+    fly_packed,
+    pack_rows,
+    unpack_rows,
+)
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, draw
 from mambo_sil.flight.controllers.pd import PdController, pd_controller
 from mambo_sil.flight.crashes import detect_crashes
@@ -101,6 +109,20 @@ def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -
         assert row == {f"{pd}_crashed": 0, f"{pd}_refused_updates": 0} | expected_row(alone, pd)
         titles = {*columns([pd], sensed=sensors != "none"), f"{pd}_saturated_share"}
         assert set(row) == titles
+
+
+def test_packed_rows_are_those_of_a_batch() -> None:
+    """In every bit, NaN included, and in the types; more flights than one simulation takes."""
+    flight = default().flight | {"duration_s": 1.0}
+    drawn = [draw(3, number, PARAMETERS) for number in range(MOST_TOGETHER + 1)]
+    arguments = __version__, [Entrant("pd", "pd", Settings()).document()], flight, drawn
+    keys = columns(["pd"], sensed=True)
+    rows = unpack_rows(fly_packed(*arguments, keys), keys)
+    expected = [{key: row[key] for key in keys} for row in fly_batch(*arguments)]
+    assert repr(rows) == repr(expected)
+    rows[1]["pd_iae_m_s"] = math.nan
+    assert repr(unpack_rows(pack_rows(rows, keys), keys)) == repr(rows)
+    assert unpack_rows(pack_rows([], keys), keys) == []
 
 
 def test_the_table_has_crashes_and_counts_before_metrics_and_digest() -> None:

@@ -61,7 +61,7 @@ def campaign(
         output_option("Folder for the results; a campaign started there is continued."),
     ] = Path("campaign"),
     vehicle: OtherDrone = None,
-    flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=100_000)] = 1000,
+    flights: Annotated[int, typer.Option(help="Total number of flights.", min=1, max=1_000_000)] = 1000,
     workers: Workers = None,
     scheduler: Annotated[
         str | None,

@@ -4,10 +4,12 @@ Arguments and results are plain values, which can be sent to other processes and
 """
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 from typing import Any, Final
+
+import numpy as np
 
 from mambo_codegen import __version__
 from mambo_codegen.methods import method_of
@@ -36,6 +38,13 @@ CRASHED, REFUSED, DIGEST = "crashed", "refused_updates", "trace_sha256"
 SATURATED: Final = "saturated_share"
 """Share of the commands with roll or pitch at the tilt limit of the settings; not a column of a campaign."""
 
+_DIGEST_BYTES: Final = 32
+
+MOST_TOGETHER: Final = 20
+"""Flights that one simulation flies: more are hardly faster, and take more memory for their targets."""
+
+Report = Callable[[float], None]
+
 Row = dict[str, float | str]
 """Results of one flight by `<controller>_<index>`."""
 
@@ -54,6 +63,7 @@ def fly_batch(
     entrants: Sequence[dict[str, Any]],
     flight: dict[str, Any],
     drawn: Sequence[Draw],
+    report: Report = report_share,
 ) -> list[Row]:
     """Fly the flights `drawn` with every controller; return one row per flight, in order.
 
@@ -65,14 +75,64 @@ def fly_batch(
             f"a worker has mambo-nmpc {__version__}, the campaign {version}; install the same on both"
         )
     scenarios = [scenario(flight, one) for one in drawn]
-    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios)
+    return fly_scenarios([Entrant.from_document(document) for document in entrants], scenarios, report)
 
 
-def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) -> list[Row]:
+def fly_packed(
+    version: str,
+    entrants: Sequence[dict[str, Any]],
+    flight: dict[str, Any],
+    drawn: Sequence[Draw],
+    keys: Sequence[str],
+) -> bytes:
+    """Fly as `fly_batch`, `MOST_TOGETHER` flights at a time; return the rows as `pack_rows` packs them."""
+    rows: list[Row] = []
+    for first in range(0, len(drawn), MOST_TOGETHER):
+        part = drawn[first : first + MOST_TOGETHER]
+        report = partial(_report_part, report_share, first, len(part), len(drawn))
+        rows += fly_batch(version, entrants, flight, part, report)
+    report_share(0.0)
+    return pack_rows(rows, keys)
+
+
+def pack_rows(rows: Sequence[Row], keys: Sequence[str]) -> bytes:
+    """Return the values that rows have for `keys`: numbers as float64, then digests as 32 bytes each."""
+    numbers = [key for key in keys if not key.endswith(DIGEST)]
+    digests = [key for key in keys if key.endswith(DIGEST)]
+    return b"".join(
+        (
+            np.array([[row[key] for key in numbers] for row in rows], "<f8").tobytes(),
+            *(bytes.fromhex(str(row[key])) for row in rows for key in digests),
+        )
+    )
+
+
+def unpack_rows(content: bytes, keys: Sequence[str]) -> list[Row]:
+    """Return the rows that `pack_rows` packed for the same `keys`."""
+    numbers = [key for key in keys if not key.endswith(DIGEST)]
+    digests = [key for key in keys if key.endswith(DIGEST)]
+    count = len(content) // (8 * len(numbers) + _DIGEST_BYTES * len(digests))
+    values = np.frombuffer(content, "<f8", count * len(numbers)).reshape(count, len(numbers)).tolist()
+    texts = content[8 * count * len(numbers) :].hex()
+    rows: list[Row] = []
+    for number, cells in enumerate(values):
+        row: Row = {
+            key: int(cell) if key.endswith((CRASHED, REFUSED)) else cell
+            for key, cell in zip(numbers, cells, strict=True)
+        }
+        for place, key in enumerate(digests, number * len(digests)):
+            row[key] = texts[2 * _DIGEST_BYTES * place : 2 * _DIGEST_BYTES * (place + 1)]
+        rows.append(row)
+    return rows
+
+
+def fly_scenarios(
+    entrants: Sequence[Entrant], scenarios: Sequence[Scenario], report: Report = report_share
+) -> list[Row]:
     """Fly flights together with every controller; return one row per flight, in order.
 
-    Tells the worker's pool how far it is. Raises BuildError if there is no compiler, FlightError for flights
-    that cannot be simulated together.
+    Calls `report`, by default the worker's pool's, with the share done. Raises BuildError if there is no
+    compiler, FlightError for flights that cannot be simulated together.
     """
     rows: list[Row] = [{} for _ in scenarios]
     periods = dict.fromkeys(entrant.settings.horizon.update_period_s for entrant in entrants)
@@ -80,21 +140,21 @@ def fly_scenarios(entrants: Sequence[Entrant], scenarios: Sequence[Scenario]) ->
     for period_s in periods:
         flight = flight_of(scenarios, period_s)
         these = [one for one in entrants if one.settings.horizon.update_period_s == period_s]
-        report = partial(_report_part, flown, len(these), len(entrants))
-        for group in fly_groups(flight, [_controller(one, flight) for one in these], report):
+        share = partial(_report_part, report, flown, len(these), len(entrants))
+        for group in fly_groups(flight, [_controller(one, flight) for one in these], share):
             entrant, last = these[group.controller], group.first + group.trace.flights
             results = _evaluate(group.trace, method_of(entrant.settings).tilt_limit_rad, scenarios[0].vehicle)
             for key, values in results.items():
                 for row, value in zip(rows[group.first : last], values, strict=True):
                     row[f"{entrant.name}_{key}"] = value
         flown += len(these)
-    report_share(0.0)
+    report(0.0)
     return rows
 
 
-def _report_part(before: int, parts: int, total: int, share: float) -> None:
+def _report_part(report: Report, before: int, parts: int, total: int, share: float) -> None:
     """Report the share of the next `parts` of `total` equal parts, `before` of which are done."""
-    report_share((before + parts * share) / total)
+    report((before + parts * share) / total)
 
 
 def _controller(entrant: Entrant, flight: Flight) -> PositionController:

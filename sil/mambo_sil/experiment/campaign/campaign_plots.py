@@ -26,6 +26,9 @@ _SHOWN: Final = {
 }
 """Indices that a page compares controllers by, with labels."""
 
+_MOST_POINTS: Final = 20_000
+"""Flights that a curve shows, more than an axis has points; of a million it shows every fiftieth."""
+
 
 def draw_campaign(table: Table, names: Sequence[str], stem: Path) -> tuple[Path, Path]:
     """Draw cumulative distributions of each index and of its ratio to the first controller's.
@@ -89,7 +92,9 @@ def _draw_shares(axes: Axes, values: FloatArray, look: Look, name: str, whole: f
     counted = values[~np.isnan(values)]
     shares = whole * np.arange(1, len(counted) + 1) / max(len(counted), 1)
     ordered = np.sort(counted)
-    shown = np.isfinite(ordered)
+    shown = np.flatnonzero(np.isfinite(ordered))
+    if len(shown) > _MOST_POINTS:
+        shown = shown[np.linspace(0, len(shown) - 1, _MOST_POINTS).astype(np.int64)]
     axes.step(ordered[shown], shares[shown], where="post", label=name, **look.line)
 
 

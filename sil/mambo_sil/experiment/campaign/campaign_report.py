@@ -167,7 +167,7 @@ def finish(campaign: Campaign, store: FlightStore, stage: Callable[[str], None])
     stage("writing the table")
     store.export()
     stage("computing statistics")
-    table = read_table(store.folder / DATABASE)
+    table = read_table(store.folder / DATABASE, [entrant.name for entrant in campaign.entrants])
     summary = summarise(campaign, table)
     worst = {name: [one.flight for one in flights] for name, flights in summary.worst.items()}
     write_records(campaign, store, worst)

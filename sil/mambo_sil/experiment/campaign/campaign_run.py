@@ -2,26 +2,37 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
 from mambo_codegen import __version__
 from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.campaign_file import Campaign
-from mambo_sil.experiment.campaign.campaign_flights import columns, fly_batch
+from mambo_sil.experiment.campaign.campaign_flights import columns, fly_packed, unpack_rows
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.campaign.parameters import PARAMETERS, Draw
 from mambo_sil.experiment.campaign.store import FlightStore, open_store
 
-MOST_IN_A_BATCH: Final = 20
-"""Flights in one task: about a second with two controllers, and larger batches are hardly faster."""
+FIRST_BATCH: Final = 20
+"""Flights in one of the first tasks: half a second with three controllers."""
+
+LARGEST_BATCH: Final = 320
+"""Flights in a task of a long campaign: some 8 s. A task costs a scheduler about a millisecond."""
+
+_TASKS_PER_SIZE: Final = 4
+"""Tasks of each worker after which they double, and in how many the flights that are left shall fit."""
 
 
 def table_columns(campaign: Campaign) -> tuple[str, ...]:
     """Return the columns of the table after the flight's number: seed, draws, results."""
+    return ("seed", *PARAMETERS, *result_columns(campaign))
+
+
+def result_columns(campaign: Campaign) -> tuple[str, ...]:
+    """Return the columns of the results."""
     names = [entrant.name for entrant in campaign.entrants]
-    sensed = campaign.file.flight.sensors != "none"
-    return ("seed", *PARAMETERS, *columns(names, sensed=sensed))
+    return columns(names, sensed=campaign.file.flight.sensors != "none")
 
 
 def open_campaign(campaign: Campaign, folder: Path) -> AbstractContextManager[FlightStore]:
@@ -43,6 +54,18 @@ def missing_flights(store: FlightStore, flights: int) -> list[int]:
     return [flight for flight in range(flights) if flight not in store.finished]
 
 
+def batch_sizes(flights: int, workers: int, first: int) -> Iterator[int]:
+    """Yield the flights of each task: `first` in the beginning, then more, and fewer towards the end."""
+    number, least = 0, min(first, -(-flights // workers))
+    while flights > 0:
+        grown = min(first << min(number // (_TASKS_PER_SIZE * workers), 20), max(LARGEST_BATCH, first))
+        share = -(-flights // (_TASKS_PER_SIZE * workers))
+        size = min(max(min(grown, share), least), flights)
+        yield size
+        flights -= size
+        number += 1
+
+
 def fly_missing(
     campaign: Campaign,
     store: FlightStore,
@@ -51,26 +74,31 @@ def fly_missing(
     progress: Callable[[int], None],
     *,
     running: Callable[[float], None] = lambda _: None,
-    batch: int = MOST_IN_A_BATCH,
+    batch: int = FIRST_BATCH,
 ) -> None:
     """Fly the missing flights and store them.
 
     Calls `progress` with the number of finished flights, `running` with what the unfinished amount to.
     """
     left = missing_flights(store, flights)
-    size = max(1, min(batch, -(-len(left) // pool.workers)))
-    batches = [left[first : first + size] for first in range(0, len(left), size)]
+    sizes = list(batch_sizes(len(left), pool.workers, batch))
+    batches = iter(left)
+    keys = result_columns(campaign)
     entrants = [entrant.document() for entrant in campaign.entrants]
     section = campaign.flight
-    drawn: dict[int, list[Draw]] = {}
+    drawn: dict[int, dict[int, Draw]] = {}
 
     def tasks() -> Iterator[tuple[Any, ...]]:
-        for number, flown in enumerate(batches):
-            drawn[number] = [campaign.draw(flight) for flight in flown]
-            yield __version__, entrants, section, drawn[number]
+        for number, size in enumerate(sizes):
+            drawn[number] = {flight: campaign.draw(flight) for flight in islice(batches, size)}
+            yield __version__, entrants, section, list(drawn[number].values()), keys
+
+    def report(shares: float) -> None:
+        if drawn:
+            running(shares * sum(map(len, drawn.values())) / len(drawn))
 
     progress(len(store.finished))
-    for number, rows in pool.run(fly_batch, tasks(), lambda shares: running(shares * size)):
-        flown = zip(batches[number], drawn.pop(number), rows, strict=True)
-        store.add({flight: draws | row for flight, draws, row in flown})
+    for number, content in pool.run(fly_packed, tasks(), report):
+        flown = zip(drawn.pop(number).items(), unpack_rows(content, keys), strict=True)
+        store.add({flight: draws | row for (flight, draws), row in flown})
         progress(len(store.finished))

@@ -6,7 +6,6 @@ flight; the rows of a batch are one transaction. `flights.csv` is exported from 
 
 import contextlib
 import hashlib
-import io
 import json
 import math
 import sqlite3
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from mambo_codegen import __version__
-from mambo_codegen.atomic import put
+from mambo_codegen.atomic import put, put_stream
 from mambo_codegen.errors import ForeignFilesError, UnwritableError, echo
 from mambo_sil.errors import WorkerError
 from mambo_sil.results.folders import GENERATOR, create_folder, lock
@@ -65,14 +64,12 @@ class FlightStore:
 
     def export(self) -> None:
         """Write the CSV, atomically: number, seed, draws, results and digest of the line of each flight."""
-        content = io.BytesIO()  # one copy of a table that has tens of MB
-        content.write(",".join((*self._titles, LINE_DIGEST)).encode() + b"\n")
-        with convert_os_errors(self.folder):
+        with convert_os_errors(self.folder), put_stream(self.folder / TABLE) as file:
+            file.write(",".join((*self._titles, LINE_DIGEST)).encode() + b"\n")
             for row in self.rows():
                 start = ",".join(map(str, row.values()))
                 digest = hashlib.sha256(f"{self._key},{start}".encode()).hexdigest()[:_DIGITS]
-                content.write(f"{start},{digest}\n".encode())
-            put(self.folder / TABLE, content.getvalue())
+                file.write(f"{start},{digest}\n".encode())
 
     def rows(self) -> Iterator[dict[str, Value]]:
         """Yield the cells of each flight by column, in the order of the flights."""

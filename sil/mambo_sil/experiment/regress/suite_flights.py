@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterator
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_sil.errors import FlightError, WorkerError
 from mambo_sil.experiment.campaign.campaign_file import Entrant
-from mambo_sil.experiment.campaign.campaign_flights import Row, fly_scenarios
-from mambo_sil.experiment.campaign.campaign_run import MOST_IN_A_BATCH
+from mambo_sil.experiment.campaign.campaign_flights import MOST_TOGETHER, Row, fly_scenarios
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import SHARED_KEYS, flight_of
@@ -60,5 +59,5 @@ def _batches(suite: FlightSuite, workers: int) -> Iterator[list[int]]:
         alike.setdefault(shared, []).append(number)
     for numbers in alike.values():
         longest = int(_LONGEST_BATCH_S / suite.flights[numbers[0]].scenario.duration_s)
-        size = min(MOST_IN_A_BATCH, -(-len(numbers) // workers), longest)
+        size = min(MOST_TOGETHER, -(-len(numbers) // workers), longest)
         yield from (numbers[first : first + size] for first in range(0, len(numbers), size))
