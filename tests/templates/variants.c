@@ -21,9 +21,21 @@ static float real_of(unsigned int bits)
     return view.real;
 }
 
+static const float limits[] = {NMPC_TILT_LIMIT_RAD, 3.4028235e38F};
+
+static unsigned int bits_of(float real)
+{
+    union {
+        float real;
+        unsigned int bits;
+    } view;
+
+    view.real = real;
+    return view.bits;
+}
+
 static int differ_for(unsigned int bits)
 {
-    static const float limits[] = {NMPC_TILT_LIMIT_RAD, 3.4028235e38F};
     const float value = real_of(bits);
     const int is_nan = (value != value);
     unsigned int i;
@@ -40,7 +52,8 @@ static int differ_for(unsigned int bits)
 
 int main(void)
 {
-    unsigned int bits = 0U;
+    unsigned int bits;
+    unsigned int i;
     nmpc_steps_t word;
 
     for (word = 1U; word < ((nmpc_steps_t)1 << NMPC_LAST_STEP); word++) {
@@ -49,6 +62,13 @@ int main(void)
             return 1;
         }
     }
+    for (i = 0U; i < (sizeof limits / sizeof limits[0]); i++) { /* found early: a fault at a limit alone */
+        if ((differ_for(bits_of(limits[i])) != 0) || (differ_for(bits_of(-limits[i])) != 0)) {
+            printf("they differ for the float with the bits %08x or its negative\n", bits_of(limits[i]));
+            return 1;
+        }
+    }
+    bits = 0U;
     do {
         if (differ_for(bits) != 0) {
             printf("they differ for the float with the bits %08x\n", bits);
