@@ -22,7 +22,7 @@ FEW_SETTINGS = [
     for index in range(len(CORNER_HORIZONS) + 1)
     for scalar in SCALARS
 ] + [
-    pytest.param("quadratic", index, scalar)
+    pytest.param("quadratic", index, scalar, marks=[] if index in {1, 2} else pytest.mark.long)
     for index in range(len(CORNER_SETTINGS) + 2)
     for scalar in ("float32", "float64")
 ]

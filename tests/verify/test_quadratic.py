@@ -210,10 +210,8 @@ def test_a_fault_raises_an_alarm(names: tuple[str, ...], tmp_path: Path) -> None
     assert unnoticed(quadratic_settings(), tmp_path, {name: UNPROVEN[name] for name in names}) == []
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [pytest.param(name, marks=[] if name == "another bit" else [pytest.mark.long]) for name in FAULTS],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("fault", FAULTS)
 def test_a_check_finds_a_fault(fault: str, tmp_path: Path) -> None:
     """The check that is there for it fails."""
     require("clang", "clang")
