@@ -27,6 +27,7 @@ from benchmarks.evidence.campaign_tables import (
 )
 from benchmarks.evidence.first_picture import draw_first_picture, first_commands, first_table, read_distances
 from benchmarks.evidence.item import RESULTS, Figures, Item
+from benchmarks.evidence.margin_tables import PRESETS, margin_commands, presets_on_drones, read_margins
 from benchmarks.evidence.pictures import draw_envelope
 from benchmarks.evidence.tables import (
     CONTROLLERS,
@@ -130,6 +131,14 @@ ITEMS: Final = (
         paths=(*_FLIGHT, f"{_EXPERIMENT}/regress", f"{_HERE}/vehicles.toml"),
         read=read_suite(_ON_EACH),
         tables={"vehicles": vehicles},
+    ),
+    Item(
+        name="margins",
+        commands=margin_commands(),
+        controllers=PRESETS,
+        paths=(*_FLIGHT, f"{_EXPERIMENT}/margins", f"{_HERE}/margin_tables.py"),
+        read=read_margins,
+        tables={"margins": presets_on_drones},
     ),
     Item(
         name="spread",
