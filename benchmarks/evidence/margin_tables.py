@@ -19,7 +19,7 @@ _ALIKE: Final = 5e-3
 
 def _cases() -> list[tuple[str, str, str]]:
     """Return preset, drone and sensors of each command: the true state, and the sensors of a campaign."""
-    found = []
+    found: list[tuple[str, str, str]] = []
     for drone in vehicle_toml.names():
         sensors = SENSORS_OF[vehicle_toml.preset(drone).sensors.kind][-1]
         found += [(preset, drone, seen) for preset in PRESETS for seen in dict.fromkeys(("none", sensors))]
