@@ -82,7 +82,7 @@ class CampaignSummary(ReportedSummary):
         """Return the section of the report; raises ResultsError for flights that cannot be read."""
         found = self.controllers
         content = {
-            **_content(folder, self.campaign, _flights(folder)),
+            **_content(folder, self.campaign, _flights(folder, self.campaign)),
             "summary": self,
             "indices": {
                 name: [(*named(index), values) for index, values in one.quantiles.items()]
@@ -103,7 +103,7 @@ class UnfinishedCampaign(Drawn, ReportedSummary):
 
     def section(self, folder: Path) -> Section:
         """Return the section of the report; raises ResultsError for flights that cannot be read."""
-        flights = _flights(folder)
+        flights = _flights(folder, self)
         so_far = len(next(iter(flights.values()), ()))
         finding = f"not finished, {so_far} flights so far; the same command resumes it"
         nothing: dict[str, Any] = {"summary": None, "indices": {}, "improvements": []}
@@ -115,10 +115,10 @@ def _missing(folder: Path) -> list[str]:
     return [] if (folder / DATABASE).is_file() else [DATABASE]
 
 
-def _flights(folder: Path) -> Table:
+def _flights(folder: Path, drawn: Drawn) -> Table:
     """Read the flights in `folder`, none if there is no database; raises ResultsError."""
     if not _missing(folder):
-        return read_table(folder / DATABASE)
+        return read_table(folder / DATABASE, [controller.name for controller in drawn.controllers])
     if (folder / TABLE).is_file():
         raise ResultsError(
             f"{echo(str(folder))}: has {TABLE} without {DATABASE}, as mambo-nmpc 0.1 wrote it; "
