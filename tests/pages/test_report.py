@@ -61,6 +61,14 @@ SEEN = {
         "is refused: too calm",
         "<svg role",
     ),
+    "margins": (
+        "roll: stands 2.1 times the gain, 138 ms of delay",
+        "pitch: UNSTABLE, grows e-fold in 2.00 s",
+        "2 drones, drawn by",
+        "roll: delay margin at the command, ms",
+        ">125<",
+        "<svg role",
+    ),
     "campaign": ("crashed: 0 with pd, 1 with mambo", "3 of 4 flights, 75.0 %", "fly --repeat", "IAE, m s"),
 }
 

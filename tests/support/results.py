@@ -23,6 +23,15 @@ from mambo_sil.experiment.campaign.statistics import Distributions, Improvement,
 from mambo_sil.experiment.campaign.store import FlightStore
 from mambo_sil.experiment.faults.fault_flights import End, Verdict
 from mambo_sil.experiment.faults.faults_report import FaultsSummary
+from mambo_sil.experiment.margins.axis_margins import AXES, AxisMargins, AxisName, NoiseGain, Poles
+from mambo_sil.experiment.margins.loop_margins import LoopMargins
+from mambo_sil.experiment.margins.margins_record import (
+    RESPONSES,
+    ManyDrones,
+    MarginSpread,
+    MarginsSummary,
+)
+from mambo_sil.experiment.margins.response_file import Curve, write_responses
 from mambo_sil.experiment.regress.flight_limits import Check, FlightResult
 from mambo_sil.experiment.regress.regress_report import RegressSummary
 from mambo_sil.experiment.table2.sensed import SensedRow, SensedSummary
@@ -273,6 +282,61 @@ def identify_folder(folder: Path) -> None:
     ).write(folder)
 
 
+def margins_folder(folder: Path) -> None:
+    """Write margins of a drone that is unstable in pitch, and of two drones."""
+    loop = LoopMargins(
+        gain_up=2.125,
+        gain_down=0.0,
+        phase_deg=31.0,
+        crossover_rad_s=3.9,
+        delay_s=0.1375,
+        delay_updates=13.75,
+        sensitivity=2.39,
+        sensitivity_rad_s=5.9,
+        complementary=1.9,
+        bandwidth_rad_s=np.nan,
+    )
+
+    def axis(name: AxisName, growth_1_s: float) -> AxisMargins:
+        stable = growth_1_s < 0.0
+        return AxisMargins(
+            axis=name,
+            stable=stable,
+            command=loop if stable else None,
+            motors=None,
+            poles=Poles(
+                least_damping=0.5, least_damped_rad_s=6.0, slowest_s=-1.0 / growth_1_s, growth_1_s=growth_1_s
+            ),
+            gust_to_place_s2=0.25 if stable else np.inf,
+            gust_to_command_rad_s2_m=0.25,
+            noise={"position": NoiseGain(to_place=0.1, to_command=0.5)},
+            sensed_variation_rad=None,
+        )
+
+    spread = MarginSpread(
+        axis="roll", place="command", figure="delay margin", worst=0.1, median=0.125, drone=1
+    )
+    rad_s = np.geomspace(0.1, 300.0, 50)
+    curves = [Curve(name, "command", rad_s, 1j * rad_s / (1.0 + 1j * rad_s)) for name in AXES]
+    write_responses(curves, folder / RESPONSES)
+    MarginsSummary(
+        source=HOSTILE,
+        settings=Settings().digest,
+        vehicle=HOSTILE,
+        sensors="none",
+        update_period_s=0.01,
+        axes=[axis("roll", -1.0), axis("pitch", 0.5)],
+        many=ManyDrones(
+            origin=f"drawn by {HOSTILE}",
+            drones=2,
+            unstable=1,
+            spreads=[spread],
+            worst_drone=1,
+            worst_values={"mass_kg": 0.07},
+        ),
+    ).write(folder)
+
+
 FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "fly": fly_folder,
     "repeat": repeat_folder,
@@ -285,5 +349,6 @@ FOLDERS: Final[dict[str, Callable[[Path], None]]] = {
     "campaign": campaign_folder,
     "regress": regress_folder,
     "identify": identify_folder,
+    "margins": margins_folder,
 }
 """A folder of every command."""

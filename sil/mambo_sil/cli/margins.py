@@ -40,7 +40,7 @@ def margins(
         bool,
         typer.Option(
             "--uncertainty",
-            help="Also the drones at the ends of the intervals in [uncertainty] of the vehicle.toml.",
+            help="Also the drones at the ends of the intervals in the vehicle.toml, section uncertainty.",
             metavar="",
         ),
     ] = False,
