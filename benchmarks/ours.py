@@ -41,8 +41,8 @@ def bundle(name: str, title: str, settings: Settings) -> Ours:
         title=title,
         cost="1-norm",
         scalar=settings.code.scalar,
-        sources=("src/*.c",),
-        includes=("include", "src"),
+        sources=("nmpc*.c",),
+        includes=(".",),
         glue="glue/ours.c",
         settings=settings,
     )

@@ -46,8 +46,8 @@ OURS: Final = Ours(
     title="mambo-nmpc, preset mambo",
     cost="quadratic",
     scalar="float32",
-    sources=("src/nmpc_optimizer.c", "src/nmpc_math.c"),
-    includes=("include", "src"),
+    sources=(),
+    includes=(".",),
     glue="glue/quadratic_ours.c",
     settings=SETTINGS,
 )

@@ -1,6 +1,6 @@
 /* The controller as a plain roll-out: every iteration predicts the states step by step (eqs 8-11), sums the cost
  * (eq 12), and computes the gradient by a backward pass. No tables, no input check; the C library's sine and
- * cosine. The settings are in the bundle's nmpc_config.h; the compiler's command line defines:
+ * cosine. The settings are in the bundle's nmpc.h; the compiler's command line defines:
  *
  *   ROLLOUT_HAS_LAG      1 if the prediction models the attitude lag
  *   ROLLOUT_KEEPS_PLAN   1 if the search starts from the last plan, 0 from the last command
@@ -10,7 +10,7 @@
  */
 #include <math.h>
 
-#include "nmpc_config.h"
+#include "nmpc.h"
 #include "run.h"
 
 #define STEP_S NMPC_PREDICTION_STEP_S

@@ -133,7 +133,7 @@ def test_every_command_works_beside_folders_of_our_names(tmp_path: Path) -> None
     lines = [f"{command} --help" for command in commands]
     lines += ["presets", "init", "generate controller.toml -o c", "fly --duration-s 1 -o flight", "doctor"]
     run(sys.executable, "-c", MANY_COMMANDS, folder=tmp_path, stdin="\n".join(lines), PYTHONPATH=path)
-    assert (tmp_path / "c" / "src" / "nmpc.c").is_file()
+    assert (tmp_path / "c" / "nmpc.c").is_file()
     assert (tmp_path / "flight" / "trace.csv").is_file()
 
 
@@ -141,11 +141,11 @@ def test_a_missing_template_is_a_bug_with_a_traceback(tmp_path: Path) -> None:
     """It is a broken installation, not a file that the user could provide."""
     templates = tmp_path / "mambo_templates"
     shutil.copytree(ROOT / "templates" / "mambo_templates", templates)
-    (templates / "quadratic" / "nmpc_observer.c.j2").unlink()
+    (templates / "quadratic" / "observer.c.j2").unlink()
     command = [sys.executable, "-m", "mambo_nmpc", "generate", "-o", "c"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr.startswith("Traceback")
     assert "TemplatesNotFound: " in done.stderr.splitlines()[-1]
-    assert "nmpc_observer.c.j2" in done.stderr.splitlines()[-1]
+    assert "observer.c.j2" in done.stderr.splitlines()[-1]
     assert not (tmp_path / "c").exists()

@@ -95,4 +95,4 @@ class DriftError(MamboNmpcError):
 
 
 class LayoutError(MamboNmpcError):
-    """A bundle in folders would become an amalgamated one, or vice versa, and --force is not given."""
+    """A bundle of another target lies in the folder, and --force is not given."""

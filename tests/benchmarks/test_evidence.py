@@ -144,7 +144,7 @@ def test_figures_depend_on_the_generated_c_and_not_on_its_names(tmp_path: Path) 
     assert now == generated(str(same))
     assert now != generated(str(other))
     assert ONE_NORM.short_digest not in now
-    assert "nmpc_optimizer_minimize" in now
+    assert "optimizer_minimize" in now
     assert generated("mambo") != generated("mambo --scalar fixed")
 
 

@@ -53,7 +53,7 @@ def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) ->
     assert "&lt;img src=x onerror=" in page
     assert "src=" not in page.replace("img src=x", "")
     assert "href=" not in page
-    for word in ("Bitcraze Crazyflie 2.1", "nmpc_cost_evaluate", str(values["flash"]), summary["digest"]):
+    for word in ("Bitcraze Crazyflie 2.1", "nmpc_step", str(values["flash"]), summary["digest"]):
         assert word in page
 
 

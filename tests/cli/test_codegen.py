@@ -117,7 +117,7 @@ def test_schema_prints_the_json_schema() -> None:
 def test_generate_reports_what_it_did() -> None:
     """The first run creates; a second, from the bundle's own controller.toml, finds nothing to do."""
     created, talk = run("generate", "-o", "out")
-    assert "created src/nmpc.c\n" in created
+    assert "created nmpc.c\n" in created
     assert talk == f"out: written, settings {presets.preset('mambo').short_digest}\n"
     assert {line.split()[1] for line in created.splitlines()} == {
         path.relative_to("out").as_posix() for path in Path("out").rglob("*") if path.is_file()
@@ -145,14 +145,14 @@ def test_check_passes_on_an_up_to_date_folder() -> None:
 def test_check_shows_drift_and_exits_1() -> None:
     """A changed file is shown as a diff, to machines as JSON, and stays as it is."""
     run("generate", "-o", "out")
-    source = Path("out/src/nmpc.c")
+    source = Path("out/nmpc.c")
     source.write_text(source.read_text(encoding="utf-8") + "/* by hand */\n", encoding="utf-8")
     diff, talk = run("generate", "-o", "out", "--check", code=1)
-    assert "--- src/nmpc.c (on disk)\n+++ src/nmpc.c (generated)\n" in diff
+    assert "--- nmpc.c (on disk)\n+++ nmpc.c (generated)\n" in diff
     assert "\n-/* by hand */\n" in diff
     assert talk.startswith("out: not up to date")
     (drift,) = json.loads(run("generate", "-o", "out", "--check", "--json", code=1)[0])["drifts"]
-    assert (drift["path"], drift["kind"]) == ("src/nmpc.c", "changed")
+    assert (drift["path"], drift["kind"]) == ("nmpc.c", "changed")
     assert "by hand" in source.read_text(encoding="utf-8")
 
 
@@ -197,17 +197,24 @@ def test_options_override_the_settings_and_the_bundle_remembers(prefix: str) -> 
     written = presets.load("out/controller.toml")
     assert (written.code.prefix, written.code.scalar) == (prefix, "float64")
     assert written.cost == presets.preset("mambo").cost
-    assert Path(f"out/include/{prefix}.h").is_file()
+    assert Path(f"out/{prefix}.h").is_file()
     run("generate", "out/controller.toml", "-o", "out", "--check")
 
 
-def test_amalgamated_bundle_is_one_header_and_one_source() -> None:
-    """--amalgamate puts the library into two files, and replaces a bundle of many only by force."""
+def test_a_folder_of_an_earlier_bundle_keeps_what_was_edited() -> None:
+    """Sources that the bundle no longer has are removed; those that the user edited stay and are named."""
     run("generate", "-o", "out")
-    assert "leave out --amalgamate" in run("generate", "-o", "out", "--amalgamate", code=2)[1]
-    run("generate", "-o", "out", "--amalgamate", "--force")
-    assert sorted(path.name for path in Path("out").glob("*.[ch]")) == ["nmpc.c", "nmpc.h"]
-    assert not Path("out/src").exists()
+    manifest = Path("out/manifest.json")
+    listed = json.loads(manifest.read_text("utf-8"))
+    for name, text in (("nmpc_math.c", "old"), ("nmpc_cost.c", "edited")):
+        Path("out/src").mkdir(exist_ok=True)
+        Path("out/src", name).write_text(text, "utf-8")
+        listed["files"][f"src/{name}"] = hashlib.sha256(b"old").hexdigest()
+    manifest.write_text(json.dumps(listed), "utf-8")
+    said = run("generate", "-o", "out")[0]
+    assert "removed src/nmpc_math.c" in said
+    assert "kept src/nmpc_cost.c: edited by hand, and no longer part of the bundle" in said
+    assert [path.name for path in Path("out/src").iterdir()] == ["nmpc_cost.c"]
 
 
 @pytest.mark.parametrize(

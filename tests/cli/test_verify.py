@@ -42,7 +42,7 @@ def test_evidence_is_complete_and_its_digests_hold(tmp_path: Path) -> None:
     assert files == {*summary["files"], "summary.json"}
     for path, digest in summary["files"].items():
         assert sha256((evidence / path).read_bytes()).hexdigest() == digest
-    for path in ("controller/controller.toml", "controller/src/drone.c", "checks/rules/cppcheck.txt"):
+    for path in ("controller/controller.toml", "controller/drone.c", "checks/rules/cppcheck.txt"):
         assert path in files
     assert 'scalar = "float64"' in (evidence / "controller" / "controller.toml").read_text("utf-8")
 
@@ -64,7 +64,7 @@ def test_without_tools_the_verdict_is_incomplete(tmp_path: Path) -> None:
     for package in ("gcc", "g++", "clang", "cppcheck", "frama-c-base"):
         assert f"(Debian: {package})" in said
     assert lines[-1].startswith("verdict: incomplete (6 incomplete)")
-    assert (tmp_path / "verification" / "controller" / "src" / "nmpc.c").is_file()
+    assert (tmp_path / "verification" / "controller" / "nmpc.c").is_file()
 
 
 @pytest.mark.usefixtures("_no_tool")

@@ -9,7 +9,7 @@ import pytest
 
 from mambo_codegen.bundle import bundle
 from mambo_codegen.bundle.bundle import Changes, Drift
-from mambo_codegen.errors import ForeignFilesError, LayoutError, UnwritableError
+from mambo_codegen.errors import ForeignFilesError, UnwritableError
 from tests.support.bundles import FILES, NEXT, content, expected
 
 
@@ -260,15 +260,15 @@ def test_replaced_file_keeps_its_owner(folder: Path) -> None:
     assert (found.st_uid, found.st_gid) == (1234, 5678)
 
 
-def test_other_layout_is_refused_without_force(folder: Path) -> None:
-    """A bundle of folders becomes an amalgamated one, or the other way round, only on purpose."""
-    one = {"README.md": "one", "nmpc.h": "one", "nmpc.c": "one"}
-    with pytest.raises(LayoutError, match="is a bundle of folders; leave out --amalgamate"):
-        bundle.write(one, folder)
-    bundle.write(one, folder, force=True)
-    assert content(folder) == expected(one)
-    with pytest.raises(LayoutError, match="is amalgamated; add --amalgamate"):
-        bundle.write(FILES, folder, dry_run=True)
+def test_files_that_a_bundle_no_longer_has_go_and_edited_ones_stay(folder: Path) -> None:
+    """A folder of version 0.1 loses its own sources in src/ and include/, and keeps what was edited."""
+    (folder / "src" / "a.c").write_text("mine", "utf-8")
+    new = {"README.md": "one", "nmpc.h": "one", "nmpc.c": "one"}
+    changes = bundle.write(new, folder)
+    assert changes.removed == ("include/nmpc.h", "src/nmpc.c")
+    assert changes.edited == ("src/a.c",)
+    assert content(folder) == expected(new) | {"src/a.c": b"mine"}
+    assert bundle.write(new, folder).edited == ()
 
 
 def test_dry_run_tells_and_touches_nothing(folder: Path) -> None:

@@ -187,11 +187,11 @@ def test_numbers_mean_what_was_given() -> None:
 
 
 def test_floats_and_constants_in_c_convert_like_the_reference(tmp_path: Path) -> None:
-    """nmpc_float.h and the macros of nmpc_config.h: statuses, commands and costs of the nearest numbers."""
+    """Interface with floats, macros of nmpc.h: statuses, commands and costs of the nearest numbers."""
     gcc = require("gcc", "gcc")
     bundle = subject(MAMBO, tmp_path).bundle
-    sources = [*(bundle / "src").glob("*.c"), CONVERSIONS]
-    flags = [*COMPILE_FLAGS, "-Wall", "-Wextra", "-Werror", f"-I{bundle / 'include'}"]
+    sources = [*bundle.glob("*.c"), CONVERSIONS]
+    flags = [*COMPILE_FLAGS, "-Wall", "-Wextra", "-Werror", f"-I{bundle}"]
     subprocess.run([gcc, *flags, *sources, "-o", "convert"], cwd=tmp_path, check=True)
     rng = np.random.default_rng(0)
     rows = rng.normal(0, 1, (500, 12)).astype(np.float32)

@@ -96,12 +96,12 @@ except UnwritableError as error:
 
 @cache
 def generation(name: str) -> dict[str, str]:
-    """Render the bundle of a preset, as in "mambo fixed" or "table1 amalgamated"; "" is no bundle."""
+    """Render the bundle of a preset, as in "mambo fixed"; "" is no bundle."""
     if not name:
         return {}
     preset, *options = name.split()
     settings = with_option(presets.load(preset), "code.scalar", "fixed" if "fixed" in options else "float32")
-    return rendering.render(settings, amalgamate="amalgamated" in options, with_digest=False)
+    return rendering.render(settings, with_digest=False)
 
 
 def c_files(files: dict[str, bytes]) -> dict[str, bytes]:
@@ -113,7 +113,7 @@ def refusal(folder: Path, *files: str) -> str:
     """Compile `files`, or every source in `folder`; return what the compiler said, nothing if all is well."""
     require("gcc", "gcc")
     sources = files or sorted(str(path.relative_to(folder)) for path in folder.rglob("*.c"))
-    flags = ["-fsyntax-only", "-Iinclude", "-Isrc", "-I.", "-DNMPC_SELF_TEST_DIGEST=0UL", "-x", "c"]
+    flags = ["-fsyntax-only", "-I.", "-DNMPC_SELF_TEST_DIGEST=0UL", "-x", "c"]
     done = subprocess.run(["gcc", *flags, *sources], cwd=folder, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == (done.stderr == "")
     return done.stderr
@@ -126,15 +126,14 @@ def run_in_a_process(script: str, files: dict[str, str], *arguments: str | Path)
     return done.stdout + done.stderr
 
 
-@pytest.mark.parametrize(("layout", "count"), [("", 16), ("amalgamated", 5)])
-def test_one_file_of_another_generation_stops_the_compiler(layout: str, count: int, tmp_path: Path) -> None:
+def test_one_file_of_another_generation_stops_the_compiler(tmp_path: Path) -> None:
     """Every C file of the bundle in turn comes from other settings; the compiler reads that file alone."""
-    ours, others = (generation(f"{preset} {layout}") for preset in ("table1-printed", "table1"))
+    ours, others = (generation(preset) for preset in ("table1-printed", "table1"))
     place(ours, tmp_path)
     assert refusal(tmp_path) == ""
     changed = [path for path in ours if path.endswith((".c", ".h"))]
-    assert len(changed) == count
-    sources = {"include/nmpc_config.h": "src/nmpc.c", "nmpc.h": "nmpc.c"}  # these two state the number
+    assert len(changed) == 7
+    sources = {"nmpc.h": "nmpc.c"}  # it states the number
     for path in changed:
         place({path: others[path]}, tmp_path)
         assert AGAIN in refusal(tmp_path, sources.get(path, path)), path
@@ -146,14 +145,14 @@ def test_files_of_another_version_stop_the_compiler(tmp_path: Path, monkeypatch:
     place(generation("table1"), tmp_path)
     monkeypatch.setattr(rendering, "__version__", "99.0")
     newer = rendering.render(presets.load("table1"), with_digest=False)
-    place({"src/nmpc_math.c": newer["src/nmpc_math.c"]}, tmp_path)
-    assert AGAIN in refusal(tmp_path, "src/nmpc_math.c")
+    place({"nmpc.c": newer["nmpc.c"]}, tmp_path)
+    assert AGAIN in refusal(tmp_path, "nmpc.c")
 
 
 def test_the_check_carries_the_prefix() -> None:
     """Two controllers in one image have a number each."""
     files = rendering.render(with_option(ONE_NORM, "code.prefix", "roll"), with_digest=False)
-    header = files["include/roll.h"]
+    header = files["roll_self_test.h"]
     assert "#if !defined(ROLL_SETTINGS_ID) || (ROLL_SETTINGS_ID != 0x" in header
     assert f'#error "{AGAIN}"' in header
     assert "NMPC_SETTINGS_ID" not in "".join(files.values())
@@ -175,10 +174,10 @@ def test_any_mixture_stops_the_compiler(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "force"),
     [
-        pytest.param("", "mambo amalgamated", False, marks=pytest.mark.long),
-        ("table1 amalgamated", "mambo amalgamated", False),
+        pytest.param("", "mambo", False, marks=pytest.mark.long),
+        ("table1", "mambo", False),
         pytest.param("mambo", "mambo fixed", False, marks=pytest.mark.long),
-        pytest.param("mambo fixed", "table1 amalgamated", True, marks=pytest.mark.long),
+        pytest.param("mambo fixed", "table1", True, marks=pytest.mark.long),
     ],
 )
 def test_run_stopped_anywhere_leaves_no_mixture_that_compiles(
@@ -217,7 +216,7 @@ def test_run_stopped_anywhere_leaves_no_mixture_that_compiles(
 def test_file_edited_during_the_run_is_not_lost(folder: Path) -> None:
     """The run stops before it replaces anything."""
     said = run_in_a_process(EDITED_MEANWHILE, NEXT, folder)
-    assert "include/nmpc.h (edited by hand)" in said
+    assert "nmpc.h (edited by hand)" in said
     assert content(folder) == expected(FILES) | {"include/nmpc.h": b"mine"}
 
 

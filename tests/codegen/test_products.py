@@ -13,7 +13,7 @@ def test_a_product_is_infix_in_floating_point_and_a_call_in_fixed_point() -> Non
     assert FLOAT["tilt_product"]("GAIN", "roll_rad - TRIM") == "GAIN * (roll_rad - TRIM)"
     nested = [("rest", write["sine_product"]("square", "sine")) for write in (FLOAT, FIXED)]
     assert FLOAT["sine_product"](*nested[0]) == "rest * (square * sine)"
-    assert FIXED["sine_product"](*nested[1]) == "nmpc_sine_product(rest, nmpc_sine_product(square, sine))"
+    assert FIXED["sine_product"](*nested[1]) == "sine_product(rest, sine_product(square, sine))"
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def test_a_product_is_infix_in_floating_point_and_a_call_in_fixed_point() -> Non
         (FLOAT["gain_product"]("a", "b"), "(a * b)"),
         (FLOAT["sine_sum"]("a", "b", "c", "d"), "((a * b) + (c * d))"),
         (FLOAT["row_sum"]("sum"), "sum"),
-        (FIXED["gain_product"]("a", "b"), "nmpc_gain_product(a, b)"),
+        (FIXED["gain_product"]("a", "b"), "gain_product(a, b)"),
     ],
 )
 def test_an_operand_has_brackets_only_if_it_is_infix(product: str, operand: str) -> None:

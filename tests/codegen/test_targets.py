@@ -29,13 +29,13 @@ def test_a_folder_is_made_of_the_preset_of_its_target_and_kept(name: str, tmp_pa
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("name", TARGETS)
-def test_the_library_is_the_amalgamated_one_with_every_prefix(name: str) -> None:
+def test_the_library_is_that_of_a_bundle_with_every_prefix(name: str) -> None:
     """What a target compiles is what the other tests prove; its own files carry the prefix too."""
     target = TARGETS[name]
     settings = presets.preset(target.preset)
     files, library = (
         render_target(settings, target, with_digest=False),
-        render(settings, amalgamate=True, with_digest=False),
+        render(settings, with_digest=False),
     )
     assert files[f"{target.source_folder}nmpc.h"] == library["nmpc.h"]
     assert files[f"{target.source_folder}nmpc.c"] == target.opening + library["nmpc.c"]
@@ -101,7 +101,4 @@ def test_unknown_targets_and_contradictions_are_refused(tmp_path: Path) -> None:
     said = run("generate", "--for", "espid", "-o", str(tmp_path), code=2)[1]
     assert said.startswith("--for espid is not a target (did you mean espidf?); targets are ")
     assert all(name in said for name in TARGETS)
-    assert (
-        "--amalgamate" in run("generate", "--for", "espidf", "--amalgamate", "-o", str(tmp_path), code=2)[1]
-    )
     assert not list(tmp_path.iterdir())

@@ -10,7 +10,7 @@ _SELF_TEST: Final = (
 _STATUS_AND_ROLL: Final = (
     "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)"
 )
-_FILE: Final = "src/nmpc_self_test.c"
+_FILE: Final = "nmpc_self_test.c"
 
 REASONS: Final[tuple[Reason, ...]] = (
     *reasons(_FILE, _STATUS_AND_ROLL, _SELF_TEST, "branch 1 never taken", "branch 3 never taken"),
@@ -26,13 +26,13 @@ REASONS: Final[tuple[Reason, ...]] = (
         )
     ),
     *reasons(
-        "src/nmpc_cost.c",
+        "nmpc.c",
         "for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {",
         "the counter bounds the loop for static analysis; the sign changes run out first",
         "branch 3 never taken",
     ),
     *reasons(
-        "src/nmpc_predictor.h",
+        "nmpc.c",
         "const nmpc_real_t *previous_rad = "
         "(i > 0) ? &moves_rad[NMPC_ANGLES * (i - 1)] : prediction->tilt_rad;",
         "with one move in the control horizon none follows another",

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from mambo_codegen.errors import BuildError
-from mambo_codegen.methods.one_norm.method import OneNorm
 from mambo_codegen.toolchain import Toolchain
 from mambo_sil.verify import tape_replay
 from mambo_sil.verify.calls import outcome_type
@@ -18,13 +17,8 @@ from mambo_sil.verify.check import Subject
 from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.schemata import ORIGINAL, can_share, refused_numbers, with_mutants
 
-FILES: Final = (
-    "include/nmpc_config.h",
-    *(f"src/{block}.{end}" for block in OneNorm.sub_blocks for end in "hc"),
-    "src/nmpc.c",
-    "src/nmpc_float.c",
-)
-"""What is mutated; a bundle without one of them has no mutants of it."""
+FILES: Final = ("nmpc.h", "nmpc.c")
+"""What is mutated."""
 
 LIMIT_S: Final = 5
 """Processor time of a mutant, in seconds; the generated C takes a tenth of one."""
@@ -34,14 +28,14 @@ SHARED_LIMIT_S: Final = 1
 
 _PROGRAM: Final = Path(__file__).with_name("schemata.c")
 _SHARED: Final = "shared"
-_LIBRARY: Final = "all.c"
+_LIBRARY: Final = "nmpc.c"
 _OTHERS: Final = {
-    "fuzz/replay.c": ("include/nmpc_config.h",),
-    "src/nmpc_self_test.c": ("include/nmpc_config.h", "src/nmpc_math.h"),
+    "fuzz/replay.c": ("nmpc.h",),
+    "nmpc_self_test.c": ("nmpc.h",),
 }
 """What is linked with the library, and the files with mutants that it includes."""
 
-_FLAGS: Final = (*tape_replay.FLAGS, "-Werror=return-type", "-Iinclude", "-Isrc", "-I.")
+_FLAGS: Final = (*tape_replay.FLAGS, "-Werror=return-type", "-I.")
 _FAST: Final[tuple[str, ...]] = ("-O1",)
 _SANITIZED: Final[tuple[str, ...]] = (
     "-O1",
@@ -66,8 +60,6 @@ class Bench:
     def __init__(self, subject: Subject) -> None:
         self.settings = subject.settings
         self._folder = subject.bundle
-        units = [path for path in FILES if path.endswith(".c") and (self._folder / path).is_file()]
-        (self._folder / _LIBRARY).write_text("".join(f'#include "{unit}"\n' for unit in units))
         tape_replay.write_program("nmpc", self._folder / "fuzz")
         self._tapes, self._expected = cases(subject.settings)
         self._tapes_file = subject.folder / "tapes.bin"
@@ -133,7 +125,7 @@ class Bench:
             own = {number: one for number, one in numbered.items() if one.file == path}
             (self._folder / path).write_text(with_mutants(text, own), "utf-8")
         size = f"-DOUTCOME_BYTES={outcome_type(self.settings).itemsize}U"
-        units = (_LIBRARY, "src/nmpc_self_test.c", str(_PROGRAM))
+        units = (_LIBRARY, "nmpc_self_test.c", str(_PROGRAM))
         done = subprocess.run(
             ["gcc", *_FLAGS, *_FAST, size, *units, "-o", _SHARED],
             cwd=self._folder,

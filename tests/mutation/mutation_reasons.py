@@ -67,7 +67,7 @@ def _does_not_show(of: str, change: int) -> Callable[[Settings], bool]:
     return holds
 
 
-_CONFIG: Final = "include/nmpc_config.h"
+_CONFIG: Final = "nmpc.h"
 _MOST_WALKED: Final = 8
 """Iterations up to which every path of step sizes is walked: three ways on from each."""
 
@@ -103,28 +103,26 @@ _STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
 _NEAREST: Final = ("one more", "one less")
 
 REASONS: Final[tuple[Reason, ...]] = (
-    *reasons("src/nmpc_cost.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
+    *reasons("nmpc.c", _CHANGES, _PARTS, "1 -> 0", "1 -> 2", "< -> <=", "++ -> --"),
     *reasons(
-        "src/nmpc_math.h",
+        "nmpc.c",
         "clamped = (value < (nmpc_real_t)0) ? -limit : limit;",
         "a value beyond a limit is not 0",
         "< -> <=",
         holds=lambda settings: not _is_fixed(settings),
     ),
-    *reasons("src/nmpc_math.h", _SIGN, _FAINT, "0 -> 1", "0 -> (-1) #1", holds=_is_fixed),
-    *reasons(
-        "src/nmpc_math.h", _SIGN, "only the sign of a slope or direction is read", "1 -> 2", "1 -> 2 #1"
-    ),
+    *reasons("nmpc.c", _SIGN, _FAINT, "0 -> 1", "0 -> (-1) #1", holds=_is_fixed),
+    *reasons("nmpc.c", _SIGN, "only the sign of a slope or direction is read", "1 -> 2", "1 -> 2 #1"),
     *(
         Reason(
-            "src/nmpc_predictor.c",
+            "nmpc.c",
             f"rollout->{axis}_deficit_m_step2 = (nmpc_real_t)0;",
             "left out",
             "nmpc_init() has written the same, and nothing else is ever written there",
         )
         for axis in ("roll", "pitch")
     ),
-    *reasons("src/nmpc_optimizer.c", "rprop[k].previous_rad = self->plan_rad[k];", _PROVEN, "left out"),
+    *reasons("nmpc.c", "rprop[k].previous_rad = self->plan_rad[k];", _PROVEN, "left out"),
     *reasons(_CONFIG, _STEP_MAX.format("real"), _STEPS, "next number", holds=_steps_stay_short),
     *reasons(_CONFIG, _STEP_MIN.format("real"), _STEPS, "next number", "negative", holds=_steps_stay_long),
     *reasons(_CONFIG, _STEP_MAX.format("number"), _STEPS, *_NEAREST, holds=_steps_stay_short),
@@ -141,63 +139,63 @@ REASONS: Final[tuple[Reason, ...]] = (
         for what, change in (("one more", 1), ("one less", -1))
     ),
     *reasons(
-        "src/nmpc_math.h",
+        "nmpc.c",
         _ABSOLUTE,
         "a cost that falls by one number has converged either way",
         "0 -> (-1)",
         holds=_tolerates_one,
     ),
-    *reasons("src/nmpc_math.h", _ABSOLUTE, "zero negated is zero", "< -> <=", holds=_is_fixed),
-    *reasons("src/nmpc_float.c", "nmpc_real_t number = <number>;", _REFUSED, *_NEAREST),
+    *reasons("nmpc.c", _ABSOLUTE, "zero negated is zero", "< -> <=", holds=_is_fixed),
+    *reasons("nmpc.c", "nmpc_real_t number = <number>;", _REFUSED, *_NEAREST),
     *reasons(
-        "src/nmpc_float.c",
+        "nmpc.c",
         "if ((scaled > -NMPC_NUMBERS_END) && (scaled < NMPC_NUMBERS_END)) {",
         _REFUSED,
         "> -> >=",
     ),
     *reasons(
-        "src/nmpc_float.c",
+        "nmpc.c",
         "status = nmpc_step(self, NULL, NULL, 0, &fixed_command);",
         "null pointers are refused before the thrust is read",
         "0 -> 1",
         "0 -> (-1)",
     ),
-    *reasons("src/nmpc_math.h", "return (a < b) ? a : b;", _EQUAL, "< -> <="),
-    *reasons("src/nmpc_math.h", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
+    *reasons("nmpc.c", "return (a < b) ? a : b;", _EQUAL, "< -> <="),
+    *reasons("nmpc.c", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
     *(
-        Reason("src/nmpc_math.c", f"#define NMPC_{series}_TERMS {terms}", f"{terms} -> {terms + 1}", _TERMS)
+        Reason("nmpc.c", f"#define NMPC_{series}_TERMS {terms}", f"{terms} -> {terms + 1}", _TERMS)
         for series, terms in (("SINE", 4), ("COSINE", 5), ("SINE", 8), ("COSINE", 8))
     ),
     *reasons(
-        "src/nmpc_math.c",
+        "nmpc.c",
         "const int quadrant = (int)(quarter_turns + ((quarter_turns < (nmpc_real_t)0) ? -half : half));",
         "with quarter_turns = 0 the quadrant is 0, half added or subtracted",
         "< -> <=",
     ),
     *reasons(
-        "src/nmpc_math.c",
+        "nmpc.c",
         "<real>, <real>, <real>",
         _THIRD,
         "negative #2",
         "a thousandth more #2",
         holds=_is_float64,
     ),
-    *reasons("src/nmpc_math.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
+    *reasons("nmpc.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
     *reasons(
-        "src/nmpc_predictor.h",
+        "nmpc.c",
         "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_ANGLES_PER_RESPONSE)",
         "a wider table, whose further columns nobody reads",
         "/ -> *",
         holds=_axes_alike,
     ),
-    *reasons("src/nmpc_tracker.c", "self->has_target = 1U;", "only 0 means none", "1U -> 2U"),
+    *reasons("nmpc.c", "self->has_target = 1U;", "only 0 means none", "1U -> 2U"),
     *(
-        Reason("src/nmpc_tracker.h", f"#define NMPC_{line}", "one less", _FINER, _is_fixed)
+        Reason("nmpc.c", f"#define NMPC_{line}", "one less", _FINER, _is_fixed)
         for line in (
             "STEP_SQUARED_PER_UPDATE_S <number> /* tau^2/T_s */",
             "TRACKER_GAIN <number> /* alpha */",
             "TRACKER_JERK_GAIN <number> /* beta */",
         )
     ),
-    *reasons("src/nmpc_math.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32),
+    *reasons("nmpc.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32),
 )

@@ -77,7 +77,7 @@ def test_a_dead_line_and_its_branch_are_gaps(tmp_path: Path) -> None:
     """A condition that no input meets, and what it guards."""
     guard = "    if (!(is_good"
     dead = f"    if (status == NMPC_BAD_THRUST) {{\n        return NMPC_BAD_COMMAND;\n    }}\n{guard}"
-    found = {(line, what) for _, line, what in gaps(subject(MAMBO, tmp_path, ("src/nmpc.c", guard, dead)))}
+    found = {(line, what) for _, line, what in gaps(subject(MAMBO, tmp_path, ("nmpc.c", guard, dead)))}
     assert ("return NMPC_BAD_COMMAND;", "never run") in found
     assert any(line == "if (status == NMPC_BAD_THRUST) {" for line, _ in found)
 

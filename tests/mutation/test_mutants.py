@@ -27,65 +27,63 @@ BACKTRACKING = Settings.model_validate(
         "target": {"acceleration": "tracked"},
     }
 )
-PREDICTOR, PREDICTOR_H, COST = "src/nmpc_predictor.c", "src/nmpc_predictor.h", "src/nmpc_cost.c"
-TRACKER, TRACKER_H = "src/nmpc_tracker.c", "src/nmpc_tracker.h"
-OPTIMIZER, STEP, HELPERS = "src/nmpc_optimizer.c", "src/nmpc.c", "src/nmpc_math.h"
+CONTROLLER = "nmpc.c"
 ONE_NORM_FAULTS = {
-    "roll accelerates x the other way": (PREDICTOR, "gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
-    "the sign of zero is one": (HELPERS, "(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
-    "one predicted step too few": (COST, "i < NMPC_HORIZON_PREDICTION; i++)", "i < NMPC_HORIZON_PREDICTION - 1; i++)"),
-    "one iteration too many": (OPTIMIZER, "iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
-    "pitch takes roll's response": (COST, "subgradient_x[response]", "subgradient_x[response - angle]"),
-    "roll and pitch change places": (STEP, "command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),
-    "effort weighs like tracking in the cost": (COST, "weight.effort * variation_rad", "weight.tracking * variation_rad"),
-    "a constant an ulp off": (PREDICTOR_H, "NMPC_ROLL_DEFICIT_DECAY 0.8309504f", "NMPC_ROLL_DEFICIT_DECAY 0.83095044f"),
-    "sine multiplied out": ("src/nmpc_math.c", "rest + (rest * (square * sine_rest))", "rest * ((nmpc_real_t)1 + (square * sine_rest))"),
-    "no lower clamp of a move": (OPTIMIZER, "nmpc_larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD)", "move_rad - rprop->step_rad"),
-    "no backtracking": (OPTIMIZER, "        next_rad = rprop->previous_rad;\n", ""),
-    "no first command": (STEP, "        self->command_rad[k] = (nmpc_real_t)0;\n", ""),
-    "the target accelerates the other way": (PREDICTOR, "rollout->acceleration_m_step2 - target_acceleration_m_step2", "rollout->acceleration_m_step2 + target_acceleration_m_step2"),
-    "x takes the target's acceleration along y": (PREDICTOR, "&prediction->x, target_acceleration_m_step2[0]", "&prediction->x, target_acceleration_m_step2[1]"),
-    "the acceleration does not displace the target": (PREDICTOR, "        - (NMPC_DISPLACEMENT_SHARE * target_acceleration_m_step2);", "        - (nmpc_real_t)0;"),
-    "the first velocity is an acceleration": (TRACKER, "(self->has_target != 0U) && ", ""),
-    "a jump is an acceleration": (TRACKER, "&& (is_steady != 0)", ""),
-    "a jump keeps the jerk": (TRACKER, "tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;\n        }", "}"),
-    "the jerk is not predicted": (TRACKER, "tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis]", "tracker->acceleration_m_step2[axis]"),
-    "the gains change places": (TRACKER, "(NMPC_TRACKER_JERK_GAIN * ", "(NMPC_TRACKER_GAIN * "),
-    "another gain": (TRACKER_H, "NMPC_TRACKER_GAIN 0.3f", "NMPC_TRACKER_GAIN 0.30000004f"),
-    "a reset remembers the target": (STEP, "    set_plan(self);\n    nmpc_tracker_clear(self);", "    set_plan(self);"),
-    "bad input gets a level command": (STEP, "    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
+    "roll accelerates x the other way": ("gain_x_m_step2_rad[NMPC_ROLL] = -sine", "gain_x_m_step2_rad[NMPC_ROLL] = sine"),
+    "the sign of zero is one": ("(value > (nmpc_sum_t)0) ? 1", "(value >= (nmpc_sum_t)0) ? 1"),
+    "one predicted step too few": ("i < NMPC_HORIZON_PREDICTION; i++)", "i < NMPC_HORIZON_PREDICTION - 1; i++)"),
+    "one iteration too many": ("iteration < NMPC_ITERATIONS", "iteration <= NMPC_ITERATIONS"),
+    "pitch takes roll's response": ("subgradient_x[response]", "subgradient_x[response - angle]"),
+    "roll and pitch change places": ("command->roll_rad = self->command_rad[0]", "command->roll_rad = self->command_rad[1]"),
+    "effort weighs like tracking in the cost": ("weight.effort * variation_rad", "weight.tracking * variation_rad"),
+    "a constant an ulp off": ("NMPC_ROLL_DEFICIT_DECAY 0.8309504f", "NMPC_ROLL_DEFICIT_DECAY 0.83095044f"),
+    "sine multiplied out": ("rest + (rest * (square * sine_rest))", "rest * ((nmpc_real_t)1 + (square * sine_rest))"),
+    "no lower clamp of a move": ("larger(move_rad - rprop->step_rad, -NMPC_TILT_LIMIT_RAD)", "move_rad - rprop->step_rad"),
+    "no backtracking": ("        next_rad = rprop->previous_rad;\n", ""),
+    "no first command": ("        self->command_rad[k] = (nmpc_real_t)0;\n", ""),
+    "the target accelerates the other way": ("rollout->acceleration_m_step2 - target_acceleration_m_step2", "rollout->acceleration_m_step2 + target_acceleration_m_step2"),
+    "x takes the target's acceleration along y": ("&prediction->x, target_acceleration_m_step2[0]", "&prediction->x, target_acceleration_m_step2[1]"),
+    "the acceleration does not displace the target": ("        - (NMPC_DISPLACEMENT_SHARE * target_acceleration_m_step2);", "        - (nmpc_real_t)0;"),
+    "the first velocity is an acceleration": ("(self->has_target != 0U) && ", ""),
+    "a jump is an acceleration": ("&& (is_steady != 0)", ""),
+    "a jump keeps the jerk": ("tracker->jerk_m_step2_update[axis] = (nmpc_real_t)0;\n        }", "}"),
+    "the jerk is not predicted": ("tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis]", "tracker->acceleration_m_step2[axis]"),
+    "the gains change places": ("(NMPC_TRACKER_JERK_GAIN * ", "(NMPC_TRACKER_GAIN * "),
+    "another gain": ("NMPC_TRACKER_GAIN 0.3f", "NMPC_TRACKER_GAIN 0.30000004f"),
+    "a reset remembers the target": ("    set_plan(self);\n    tracker_clear(self);", "    set_plan(self);"),
+    "bad input gets a level command": ("    command->roll_rad = self->command_rad[0];", "    command->roll_rad = (status == NMPC_OK) ? self->command_rad[0] : (nmpc_real_t)0;"),
 }  # fmt: skip
-"""The one place in a file that reads so, and what it reads instead."""
+"""The one place in nmpc.c that reads so, and what it reads instead."""
 QUICK = 3
 """So many faults of each method are tried in the default run, all of them in the long one."""
 QUADRATIC_FAULTS = {
-    "x and y change places": ("src/nmpc.c", "*right = (y * self->attitude.cosine) - (x", "*right = (x * self->attitude.cosine) - (y"),
-    "no velocity of the target": ("src/nmpc.c", "- (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis])", "- (nmpc_real_t)0"),
-    "the target accelerates the other way": ("src/nmpc.c", "nmpc_observer_disturbance(self, axis) - self->tracker", "nmpc_observer_disturbance(self, axis) + self->tracker"),
-    "the limits change places": ("src/nmpc.c", "state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2", "state[NMPC_RIGHT], NMPC_FORWARD_LIMIT_M_STEP2"),
-    "one step less of outage": ("src/nmpc.c", "#define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)", "#define NMPC_NO_ESTIMATE NMPC_OUTAGE_STEPS"),
-    "rates over a gap": ("src/nmpc.c", "if (self->missed == 0U) {", "if (self->missed != NMPC_NO_ESTIMATE) {"),
-    "no turn of the model": ("src/nmpc.c", "        nmpc_attitude_turn(self, sine, cosine);\n", "        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n"),
-    "a turn of the model after an outage": ("src/nmpc.c", "        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n", "        nmpc_attitude_turn(self, sine, cosine);\n"),
-    "measured attitude": ("src/nmpc.c", "minimize(self, target, self->attitude.tilt_m_step2);", "minimize(self, target, tilt_m_step2);"),
-    "no prediction in an outage": ("src/nmpc.c", "    nmpc_observer_predict(self, world_m_step2);\n", "    if (state != NULL) { nmpc_observer_predict(self, world_m_step2); }\n"),
-    "a bad thrust allows a command": ("src/nmpc.c", "((has_target != 0) && (has_thrust != 0))", "(has_target != 0)"),
-    "a command of others leaves the model": ("src/nmpc.c", "    nmpc_attitude_set_command(self, self->command_rad[0], self->command_rad[1]);\n", ""),
-    "a reset keeps the estimate": ("src/nmpc.c", "    self->missed = NMPC_NO_ESTIMATE;\n", ""),
-    "a reset keeps the target": ("src/nmpc.c", "    nmpc_tracker_clear(self);\n", ""),
-    "no clamp of feedback": ("src/nmpc.c", "nmpc_clamp(nmpc_attitude_pitch(self) + feedback_rad[1], NMPC_TILT_LIMIT_RAD)", "(nmpc_attitude_pitch(self) + feedback_rad[1])"),
-    "saturated only in roll": ("src/nmpc.c", "(nmpc_reaches(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2) != 0)", "0"),
-    "drag the other way": ("src/nmpc_observer.h", "           - (NMPC_DRAG_1_STEP", "           + (NMPC_DRAG_1_STEP"),
-    "no age of the velocity": ("src/nmpc_observer.c", "+ (NMPC_AGE_STEPS * acceleration_m_step2)", "+ (nmpc_real_t)0"),
-    "a start forgets the disturbance": ("src/nmpc_observer.c", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n    }", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n        self->observer.disturbance_m_step2[axis] = (nmpc_real_t)0;\n    }"),
-    "no limit of the disturbance": ("src/nmpc_observer.c", "                       NMPC_DISTURBANCE_LIMIT_M_STEP2);", "                       (nmpc_real_t)1000);"),
-    "pitch the same way as roll": ("src/nmpc_attitude.c", "-(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD))", "NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD)"),
-    "no trim of roll": ("src/nmpc_attitude.c", "state->roll_rad - NMPC_ROLL_TRIM_RAD", "state->roll_rad"),
-    "rows of the other axis": ("src/nmpc_attitude.c", "next(tilt_rows[axis], state)", "next(tilt_rows[1 - axis], state)"),
-    "the tilt stays": ("src/nmpc_attitude.c", "    turn(attitude->tilt_m_step2, sine_change, cosine_change);\n", ""),
-    "the first move alone": ("src/nmpc_optimizer.c", "first - (ratios[axis] * second_change)", "first"),
-    "the ratio of the other axis": ("src/nmpc_optimizer.c", "(ratios[axis] * second_change)", "(ratios[1 - axis] * second_change)"),
-    "the second move has no limit": ("src/nmpc_optimizer.c", "nmpc_clamp(second, limit_m_step2) - second", "second - second"),
+    "x and y change places": ("*right = (y * self->attitude.cosine) - (x", "*right = (x * self->attitude.cosine) - (y"),
+    "no velocity of the target": ("- (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis])", "- (nmpc_real_t)0"),
+    "the target accelerates the other way": ("observer_disturbance(&self->observer, axis) - self->tracker", "observer_disturbance(&self->observer, axis) + self->tracker"),
+    "the limits change places": ("state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2", "state[NMPC_RIGHT], NMPC_FORWARD_LIMIT_M_STEP2"),
+    "one step less of outage": ("#define NMPC_NO_ESTIMATE (NMPC_OUTAGE_STEPS + 1U)", "#define NMPC_NO_ESTIMATE NMPC_OUTAGE_STEPS"),
+    "rates over a gap": ("if (self->missed == 0U) {", "if (self->missed != NMPC_NO_ESTIMATE) {"),
+    "no turn of the model": ("        attitude_turn(&self->attitude, sine, cosine);\n", "        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n"),
+    "a turn of the model after an outage": ("        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n", "        attitude_turn(&self->attitude, sine, cosine);\n"),
+    "measured attitude": ("minimize(self, target, self->attitude.tilt_m_step2);", "minimize(self, target, tilt_m_step2);"),
+    "no prediction in an outage": ("    observer_predict(&self->observer, world_m_step2);\n", "    if (state != NULL) { observer_predict(&self->observer, world_m_step2); }\n"),
+    "a bad thrust allows a command": ("((has_target != 0) && (has_thrust != 0))", "(has_target != 0)"),
+    "a command of others leaves the model": ("    attitude_set_command(&self->attitude, self->command_rad[0], self->command_rad[1]);\n", ""),
+    "a reset keeps the estimate": ("    self->missed = NMPC_NO_ESTIMATE;\n", ""),
+    "a reset keeps the target": ("    tracker_clear(self);\n", ""),
+    "no clamp of feedback": ("clamp(attitude_pitch(&self->attitude) + feedback_rad[1], NMPC_TILT_LIMIT_RAD)", "(attitude_pitch(&self->attitude) + feedback_rad[1])"),
+    "saturated only in roll": ("(reaches(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2) != 0)", "0"),
+    "drag the other way": ("           - (NMPC_DRAG_1_STEP", "           + (NMPC_DRAG_1_STEP"),
+    "no age of the velocity": ("+ (NMPC_AGE_STEPS * acceleration_m_step2)", "+ (nmpc_real_t)0"),
+    "a start forgets the disturbance": ("NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n    }", "NMPC_UPDATE_STEP_S * state->velocity_m_s[axis];\n        observer->disturbance_m_step2[axis] = (nmpc_real_t)0;\n    }"),
+    "no limit of the disturbance": ("                  NMPC_DISTURBANCE_LIMIT_M_STEP2);", "                  (nmpc_real_t)1000);"),
+    "pitch the same way as roll": ("-(NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD))", "NMPC_PITCH_GAIN_M_STEP2_RAD * (pitch_rad - NMPC_PITCH_TRIM_COMMAND_RAD)"),
+    "no trim of roll": ("state->roll_rad - NMPC_ROLL_TRIM_RAD", "state->roll_rad"),
+    "rows of the other axis": ("next(tilt_rows[axis], state)", "next(tilt_rows[1 - axis], state)"),
+    "the tilt stays": ("    attitude_turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);\n", ""),
+    "the first move alone": ("first - (move_ratios[axis] * second_change)", "first"),
+    "the ratio of the other axis": ("(move_ratios[axis] * second_change)", "(move_ratios[1 - axis] * second_change)"),
+    "the second move has no limit": ("clamp(second, limit_m_step2) - second", "second - second"),
 }  # fmt: skip
 
 
@@ -128,6 +126,6 @@ def test_the_generated_code_passes(method: str, benches: dict[str, Bench]) -> No
 def test_a_fault_is_caught(method: str, fault: str, benches: dict[str, Bench]) -> None:
     """The faulty C compiles, and some bit differs."""
     bench, faults = benches[method], {"one_norm": ONE_NORM_FAULTS, "quadratic": QUADRATIC_FAULTS}[method]
-    path, right, wrong = faults[fault]
-    assert bench.files[path].count(right) == 1, "the template has changed: adapt the fault"
-    assert bench.differences({path: bench.files[path].replace(right, wrong)}) != {}
+    right, wrong = faults[fault]
+    assert bench.files[CONTROLLER].count(right) == 1, "the template has changed: adapt the fault"
+    assert bench.differences({CONTROLLER: bench.files[CONTROLLER].replace(right, wrong)}) != {}

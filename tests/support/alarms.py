@@ -12,15 +12,21 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.verify.proof import Report, prove
 from tests.support.subjects import Harm, subject
 
-_STEP, _MATH = "src/nmpc.c", "src/nmpc_math.h"
+_CONTROLLER = "nmpc.c"
 NAN_PASSES = Harm(
-    _MATH, r"\(value >= minimum\);\n(.*)\(value <= maximum\)", r"!(value < minimum);\n\1!(value > maximum)"
+    _CONTROLLER,
+    r"\(value >= minimum\);\n(.*)\(value <= maximum\)",
+    r"!(value < minimum);\n\1!(value > maximum)",
 )
-INFINITY_PASSES = Harm(_MATH, r"\(value <= maximum\)", "1")
-UNCHECKED_HEADING = Harm(_STEP, r"nmpc_within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1")
-NULL_FOLLOWED = Harm(_STEP, r"\(state != NULL\) && ", "")
-UNSET_COMMAND = Harm(_STEP, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", "")
-UNLIMITED_CLAMP = Harm(_MATH, r"\(value < \(nmpc_real_t\)0\) \? -limit", "(value < (nmpc_real_t)0) ? value")
+INFINITY_PASSES = Harm(_CONTROLLER, r"\(value <= maximum\)", "1")
+UNCHECKED_HEADING = Harm(_CONTROLLER, r"within\(state->yaw_rad, NMPC_YAW_RANGE_RAD\)", "1")
+NULL_FOLLOWED = Harm(_CONTROLLER, r"\(state != NULL\) && ", "")
+UNSET_COMMAND = Harm(
+    _CONTROLLER, r"(?s)    command->roll_rad = self->command_rad\[0\];\n(?=.*return status)", ""
+)
+UNLIMITED_CLAMP = Harm(
+    _CONTROLLER, r"\(value < \(nmpc_real_t\)0\) \? -limit", "(value < (nmpc_real_t)0) ? value"
+)
 """Faults that the C of both norms can have."""
 
 

@@ -11,8 +11,6 @@ from mambo_sil.results.shared_library import LibrarySource, load_shared_library
 from tests.support.tools import toolchain
 
 BUILDS: Final = (("gcc", "-O0"), ("gcc", "-O2"), ("gcc", "-O3"), ("gcc", "-Os"), ("clang", "-O2"))
-_NOT_CALLED: Final = ("src/nmpc_self_test.c", "src/nmpc_float.c")
-
 
 _WHOLE: Final = 10
 """So many of the settings of a parity test, the corners among them, run in every build, with all cases."""
@@ -31,14 +29,11 @@ def share_of(index: int) -> tuple[tuple[tuple[str, str], ...], int]:
 def libraries(settings: Settings, builds: Sequence[tuple[str, str]] = BUILDS) -> dict[str, Any]:
     """Build the C of a controller in each of `builds`; returns the libraries by compiler and optimisation.
 
-    The sources are joined as in an amalgamated bundle, so that each optimisation sees all of them at once.
-    Self-test and interface of floats, which no step calls, are left out.
+    The self-test, which no step calls, is left out.
     """
     files = render(with_default_prefix(settings), with_digest=False)
-    sources = sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
-    joined = [*(files[path] for path in sources if path not in _NOT_CALLED), *glue().values()]
-    unit = {path: text for path, text in files.items() if path.endswith(".h")} | {"all.c": "\n".join(joined)}
-    source = LibrarySource("nmpc_all", unit, lambda: unit, (*COMPILE_FLAGS, "-Iinclude", "-Isrc"), ffi)
+    unit = {"nmpc.h": files["nmpc.h"], "all.c": "\n".join([files["nmpc.c"], *glue().values()])}
+    source = LibrarySource("nmpc_all", unit, lambda: unit, COMPILE_FLAGS, ffi)
     return {
         f"{compiler} {level}": load_shared_library(source, toolchain(compiler, level))
         for compiler, level in builds

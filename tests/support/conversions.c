@@ -1,7 +1,7 @@
 /* Reads floats from standard input and writes the numbers and floats that a fixed point controller makes of them. */
 #include <stdio.h>
 
-#include "nmpc_float.h"
+#include "nmpc.h"
 
 int main(void)
 {

@@ -1,12 +1,12 @@
 """Build a bundle as a Python extension, so that tests reach its sub-blocks and the members of its structs.
 
-In cffi's API mode the C compiler checks the declarations below against the bundle's headers.
+The extension is the bundle's C with cffi's wrappers behind it, in one unit, since the sub-blocks are static.
+In cffi's API mode the compiler checks the declarations below against that C.
 """
 
 import hashlib
 import importlib.machinery
 import importlib.util
-import re
 import sys
 import sysconfig
 from functools import cache
@@ -41,7 +41,7 @@ nmpc_status_t nmpc_step(nmpc_t *, const nmpc_state_t *, const nmpc_target_t *, n
 const char *nmpc_version(void);
 int nmpc_self_test(nmpc_t *);
 unsigned long nmpc_self_test_episode(nmpc_t *, int, unsigned long);
-void nmpc_sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
+void sine_cosine(nmpc_real_t, nmpc_real_t *, nmpc_real_t *);
 TRACKER_FUNCTIONS
 """
 _ONE_NORM: Final = """
@@ -61,12 +61,12 @@ typedef struct {
     ...;
 } nmpc_t;
 nmpc_status_t nmpc_set_weights(nmpc_t *, const nmpc_weights_t *);
-void nmpc_predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, TRACKER_ARGUMENT nmpc_real_t,
+void predictor_prepare(const nmpc_state_t *, const nmpc_target_t *, TRACKER_ARGUMENT nmpc_real_t,
                             nmpc_prediction_t *);
-void nmpc_predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
+void predictor_apply_moves(const nmpc_prediction_t *, const nmpc_real_t *, int, nmpc_rollout_t *,
                                 nmpc_rollout_t *);
-void nmpc_predictor_step(nmpc_rollout_t *);
-nmpc_sum_t nmpc_cost_evaluate(nmpc_t *);
+void predictor_step(nmpc_rollout_t *);
+nmpc_sum_t cost_evaluate(nmpc_t *);
 """
 _QUADRATIC: Final = """
 typedef struct { nmpc_real_t position_m[2], velocity_m_step[2], disturbance_m_step2[2]; } nmpc_observer_t;
@@ -88,33 +88,28 @@ typedef struct {
 nmpc_status_t nmpc_set_command(nmpc_t *, const nmpc_command_t *);
 int nmpc_is_saturated(const nmpc_t *);
 nmpc_status_t nmpc_last_estimate(const nmpc_t *, nmpc_estimate_t *);
-void nmpc_observer_clear(nmpc_t *);
-void nmpc_observer_start(nmpc_t *, const nmpc_state_t *);
-void nmpc_observer_correct(nmpc_t *, const nmpc_state_t * AGE_ARGUMENT);
-void nmpc_observer_predict(nmpc_t *, const nmpc_real_t *);
-nmpc_real_t nmpc_observer_disturbance(const nmpc_t *, int);
-void nmpc_attitude_set_command(nmpc_t *, nmpc_real_t, nmpc_real_t);
-void nmpc_attitude_reset(nmpc_t *, nmpc_real_t, nmpc_real_t);
-nmpc_real_t nmpc_attitude_roll(const nmpc_t *);
-nmpc_real_t nmpc_attitude_pitch(const nmpc_t *);
-void nmpc_attitude_measure(const nmpc_state_t *, nmpc_real_t *);
-void nmpc_attitude_advance(nmpc_t *);
-void nmpc_attitude_turn(nmpc_t *, nmpc_real_t, nmpc_real_t);
-nmpc_real_t nmpc_optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
+void observer_clear(nmpc_observer_t *);
+void observer_start(nmpc_observer_t *, const nmpc_state_t *);
+void observer_correct(nmpc_observer_t *, const nmpc_state_t * AGE_ARGUMENT);
+void observer_predict(nmpc_observer_t *, const nmpc_real_t *);
+nmpc_real_t observer_disturbance(const nmpc_observer_t *, int);
+void attitude_set_command(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
+void attitude_reset(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
+nmpc_real_t attitude_roll(const nmpc_attitude_t *);
+nmpc_real_t attitude_pitch(const nmpc_attitude_t *);
+void attitude_measure(const nmpc_state_t *, nmpc_real_t *);
+void attitude_advance(nmpc_attitude_t *);
+void attitude_turn(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
+nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
 """
 _TRACKER: Final = {
     "TRACKER_TYPE": "typedef struct { TARGET_VELOCITY nmpc_real_t acceleration_m_step2[2], "
     "jerk_m_step2_update[2]; } nmpc_tracker_t;",
     "TRACKER_MEMBERS": "nmpc_tracker_t tracker; unsigned char has_target;",
     "TRACKER_ARGUMENT": "const nmpc_real_t *,",
-    "TRACKER_FUNCTIONS": "void nmpc_tracker_clear(nmpc_t *);\n"
-    "void nmpc_tracker_update(nmpc_t *, const nmpc_real_t *);",
+    "TRACKER_FUNCTIONS": "void tracker_clear(nmpc_t *);\nvoid tracker_update(nmpc_t *, const nmpc_real_t *);",
 }
 """What the declarations of a bundle with a tracker have besides."""
-_HEADERS: Final = {
-    "1-norm": ("cost", "math", "predictor", "self_test"),
-    "quadratic": ("attitude", "math", "observer", "optimizer", "self_test"),
-}
 
 
 @cache
@@ -125,17 +120,17 @@ def build_extension(settings: Settings) -> ModuleType:
 
 def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
     """Return the extension of a bundle with prefix nmpc; builds it with gcc unless it is cached."""
-    tracked = "src/nmpc_tracker.h" in files
-    norm = "quadratic" if "src/nmpc_observer.h" in files else "1-norm"
-    headers = (*_HEADERS[norm], "tracker") if tracked else _HEADERS[norm]
-    includes = "".join(f'#include "nmpc_{name}.h"\n' for name in headers)
+    library = files["nmpc.c"]
+    tracked = "Target tracker" in library
+    norm = "quadratic" if "nmpc_observer_t" in library else "1-norm"
+    includes = '#include "nmpc.c"\n#include "nmpc_self_test.c"\n'
     declarations = _TYPES + {"1-norm": _ONE_NORM, "quadratic": _QUADRATIC}[norm] + _FUNCTIONS
     declarations = declarations.replace("REAL", C_TYPES[scalar]).replace("SUM", SUM_TYPES[scalar])
-    aged = norm == "quadratic" and "NMPC_AGE_STEPS" in files["src/nmpc_observer.h"]
+    aged = "NMPC_AGE_STEPS" in library
     declarations = declarations.replace("AGE_ARGUMENT", ", const nmpc_real_t *" if aged else "")
     for place_holder, text in _TRACKER.items():
         declarations = declarations.replace(place_holder, text if tracked else "")
-    given = "NMPC_HAS_TARGET_ACCELERATION" in files["include/nmpc_config.h"]
+    given = "NMPC_HAS_TARGET_ACCELERATION" in files["nmpc.h"]
     declarations = declarations.replace("TARGET_VELOCITY", "" if given else "nmpc_real_t velocity_m_s[2];")
     declarations = declarations.replace(
         "TARGET_ACCELERATION", "nmpc_real_t acceleration_m_s2[2];" if given else ""
@@ -150,13 +145,9 @@ def load_extension(files: dict[str, str], scalar: str) -> ModuleType:
             ffi.cdef(declarations)
             ffi.set_source(name, includes, compiler_verbose=0)
             ffi.emit_c_code(str(folder / "extension.c"))
-            sources = sorted(path for path in files if re.fullmatch(r"src/.*\.c", path))
-            (folder / "library.c").write_text("\n".join(files[path] for path in sources), "utf-8")
             python = require_file(Path(sysconfig.get_paths()["include"], "Python.h"), "python3-dev").parent
-            flags = [*COMPILE_FLAGS, "-fPIC", "-Iinclude", "-Isrc", f"-I{python}"]
-            gcc = toolchain("gcc")
-            gcc.run([*flags, "-O0", "-c", "extension.c"], folder)  # cffi's wrappers, large and not under test
-            gcc.run([*flags, "-shared", "library.c", "extension.o", "-o", "extension.so"], folder)
+            flags = [*COMPILE_FLAGS, "-O1", "-fPIC", "-shared", "-I.", f"-I{python}"]
+            toolchain("gcc").run([*flags, "extension.c", "-o", "extension.so"], folder)
             return folder / "extension.so"
 
         path = build_cached(f"{name}{sysconfig.get_config_var('EXT_SUFFIX')}", build)

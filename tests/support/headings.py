@@ -40,9 +40,10 @@ def check(its: Subject) -> Result:
 
 def reached(its: Subject) -> str:
     """Return all definitions and contracts that `turn_everywhere` reaches, after the preprocessor."""
-    texts = (_open_contracts((its.bundle / path).read_text("utf-8")) for path in (_DRIVER, "src/nmpc_math.c"))
-    (its.folder / "joined.c").write_text("\n".join(texts), "utf-8")
-    include = [f"-I{its.bundle.resolve() / part}" for part in ("include", "src")]
+    texts = {path: _open_contracts((its.bundle / path).read_text("utf-8")) for path in (_DRIVER, "nmpc.c")}
+    joined = texts[_DRIVER].replace('#include "nmpc.c"\n', texts["nmpc.c"])
+    (its.folder / "joined.c").write_text(joined, "utf-8")
+    include = [f"-I{its.bundle.resolve()}"]
     Toolchain((require("gcc", "gcc"),)).run(
         ["-E", "-P", *PROOF_PREPROCESSING, *include, "joined.c", "-o", "joined.i"], its.folder
     )

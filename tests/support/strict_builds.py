@@ -1,4 +1,4 @@
-"""Build a bundle with every warning fatal, under its own prefix and layout, and load it."""
+"""Build a bundle with every warning fatal, under its own prefix, and load it."""
 
 import re
 import subprocess
@@ -19,21 +19,21 @@ _DECLARATIONS: Final = f"{DECLARATIONS} int nmpc_self_test(void *);"
 _QUIET: Final = '#pragma GCC diagnostic ignored "-Wmissing-prototypes"\n'
 
 
-def built(settings: Settings, folder: Path, compiler: str, *, amalgamate: bool) -> SimpleNamespace:
+def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     """Build the bundle of `settings`, and load it; returns the functions of the library and of the self-test.
 
     Their names have the prefix nmpc, whatever the prefix of the settings. A word of the compiler is a failed
     assertion.
     """
     prefix, scalar = settings.code.prefix, settings.code.scalar
-    files = render(settings, amalgamate=amalgamate, with_digest=False)
+    files = render(settings, with_digest=False)
     files |= {name: with_prefix(_QUIET + text, prefix) for name, text in glue().items()}
     place(files, folder)
     suffixes = ["-Wunsuffixed-float-constants"] if (compiler, scalar) == ("gcc", "float32") else []
     flags = [*COMPILE_FLAGS, *WARNING_FLAGS, *suffixes, "-Werror", "-fPIC", "-shared"]
-    sources = sorted(path for path in files if re.fullmatch(r"(src/)?[^/]*\.c", path))
+    sources = sorted(path for path in files if re.fullmatch(r"[^/]*\.c", path))
     done = subprocess.run(
-        [require(compiler, compiler), *flags, "-Iinclude", "-Isrc", "-I.", *sources, "-o", "bundle.so"],
+        [require(compiler, compiler), *flags, "-I.", *sources, "-o", "bundle.so"],
         cwd=folder,
         capture_output=True,
         text=True,

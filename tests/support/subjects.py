@@ -23,17 +23,14 @@ class Harm(NamedTuple):
     wrong: str
 
 
-def subject(
-    settings: Settings, folder: Path, *harms: Harm | tuple[str, str, str], amalgamate: bool = False
-) -> Subject:
+def subject(settings: Settings, folder: Path, *harms: Harm | tuple[str, str, str]) -> Subject:
     """Write the bundle of `settings` below `folder`, with `harms` done to it; an empty folder for evidence.
 
     A plain tuple is a harm too, but names what is right as it stands.
     """
-    files = render(settings, amalgamate=amalgamate)
+    files = render(settings)
     for harm in harms:
         path, right, wrong = harm
-        path = "nmpc.c" if amalgamate else path
         if not isinstance(harm, Harm):
             right, wrong = re.escape(right), wrong.replace("\\", r"\\")
         files[path], count = re.subn(right, wrong, files[path], count=1)

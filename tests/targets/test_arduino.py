@@ -41,6 +41,11 @@ def folder_of(settings: Settings, folder: Path) -> Path:
     return place(render_target(settings, TARGETS["arduino"], with_digest=False), folder)
 
 
+def library(folder: Path) -> list[Path]:
+    """Return the sources that the builder compiles: all in src."""
+    return sorted((folder / "src").glob("*.c"))
+
+
 def sketch(folder: Path) -> Path:
     """Return the example as the builder passes it to the compiler: with the core's header."""
     text = (folder / "examples" / "Hover" / "Hover.ino").read_text("utf-8")
@@ -53,11 +58,11 @@ def sketch(folder: Path) -> Path:
 def test_the_example_reaches_its_target_on_this_machine(name: str, tmp_path: Path) -> None:
     """The self-test passes, no input is refused, and the drone stands within a centimetre of its target."""
     folder = folder_of(SUBJECTS[name], tmp_path)
-    shell(require("gcc", "gcc"), "-std=gnu11", *STRICT, "-c", folder / "src/nmpc.c", "-o", folder / "nmpc.o")
-    shell(
-        *(require("g++", "g++"), "-std=gnu++11", *STRICT, f"-I{STUBS}", f"-I{folder}/src"),
-        *(sketch(folder), STUBS / "main.cpp", folder / "nmpc.o", "-o", folder / "hover"),
-    )
+    for source in library(folder):
+        shell(require("gcc", "gcc"), "-std=gnu11", *STRICT, "-c", source, "-o", folder / f"{source.stem}.o")
+    flags = ("-std=gnu++11", *STRICT, f"-I{STUBS}", f"-I{folder}/src")
+    sources = (sketch(folder), STUBS / "main.cpp", *sorted(folder.glob("*.o")))
+    shell(require("g++", "g++"), *flags, *sources, "-o", folder / "hover")
     version, self_test, *lines = shell(folder / "hover").splitlines()
     assert version.startswith("mambo-nmpc ")
     assert self_test == "self-test: all steps equal the reference"
@@ -76,7 +81,8 @@ def test_the_core_of_debian_builds_and_links_the_example_for_the_mega(name: str,
     folder = folder_of(SUBJECTS[name], tmp_path)
     headers = (f"-I{core}", f"-I{CORE / 'variants/mega'}", f"-I{folder / 'src'}")
     modern = ("-std=gnu++11", "-fno-exceptions", "-fno-threadsafe-statics")
-    shell(c, *MEGA, "-std=gnu11", *STRICT, "-c", folder / "src/nmpc.c", "-o", folder / "nmpc.o")
+    for source in library(folder):
+        shell(c, *MEGA, "-std=gnu11", *STRICT, "-c", source, "-o", folder / f"{source.stem}.o")
     shell(cxx, *MEGA, *modern, *STRICT, *headers, "-c", sketch(folder), "-o", folder / "sketch.o")
     needed = ("main", "HardwareSerial", "HardwareSerial0", "Print", "Stream", "abi", "new")
     for stem in needed:
@@ -104,10 +110,11 @@ def test_without_a_flag_the_bits_are_kept(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", SUBJECTS)
 def test_keywords_are_the_names_of_the_header(name: str, tmp_path: Path) -> None:
-    """All its functions, types and statuses, and no others; a tab separates name and kind."""
+    """All functions, types and statuses of both headers, and no others; a tab separates name and kind."""
     folder = folder_of(SUBJECTS[name], tmp_path)
     listed = dict(line.split("\t") for line in (folder / "keywords.txt").read_text("utf-8").splitlines())
-    header = re.sub(r"/\*.*?\*/", "", (folder / "src/nmpc.h").read_text("utf-8"), flags=re.DOTALL)
+    headers = "".join(path.read_text("utf-8") for path in sorted((folder / "src").glob("*.h")))
+    header = re.sub(r"/\*.*?\*/", "", headers, flags=re.DOTALL)
     functions = set(re.findall(r"^[a-z][\w ]*[ *](nmpc_\w+)\(", header, re.MULTILINE))
     assert {word for word, kind in listed.items() if kind == "KEYWORD2"} == functions
     statuses = set(re.findall(r"\bNMPC_(?:OK|NULL_POINTER|BAD_\w+)(?= =)", header))

@@ -32,6 +32,7 @@ from tests.support.tools import require
 
 SETTINGS = presets.preset("crazyflie")
 APP = "src/nmpc_app.c"
+LIBRARY = ("nmpc", "nmpc_self_test")
 ARM = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fconserve-stack")
 LARGEST_STACK_BYTES = 400
 
@@ -96,8 +97,11 @@ def linked(source: Path, objects: tuple[Path, ...]) -> Any:
 
 def build(folder: Path) -> Built:
     """Compile the target in `folder`."""
-    library = compile_host(folder / "src" / "nmpc.c", folder / "nmpc.o", "-ffp-contract=off")
-    objects = (library, compile_host(STUBS / "host.c", folder / "host.o"))
+    library = [
+        compile_host(folder / "src" / f"{name}.c", folder / f"{name}.o", "-ffp-contract=off")
+        for name in LIBRARY
+    ]
+    objects = (*library, compile_host(STUBS / "host.c", folder / "host.o"))
     return Built(folder, objects, linked(folder / APP, objects))
 
 
@@ -396,7 +400,9 @@ def short(title: str) -> str:
 def test_kbuild_lists_every_source_with_the_flag(built: Built) -> None:
     """A source that is not listed is not linked; without the flag the Cortex-M4F's bits differ."""
     text = (built.folder / "src" / "Kbuild").read_text("utf-8")
-    for name in ("nmpc", "nmpc_app"):
+    listed = [path.stem for path in (built.folder / "src").glob("nmpc*.c") if " " not in path.stem]
+    assert {*LIBRARY, "nmpc_app"} <= {*listed}
+    for name in (*LIBRARY, "nmpc_app"):
         assert f"obj-y += {name}.o\n" in text
         assert f"CFLAGS_{name}.o += -ffp-contract=off\n" in text
     assert "CONFIG_CONTROLLER_OOT=y\n" in (built.folder / "app-config").read_text("utf-8")

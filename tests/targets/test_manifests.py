@@ -43,9 +43,8 @@ def fused(folder: Path, *flags: str) -> int:
     """Compile the library for a Cortex-M4F with `flags`, and count its fused multiply-adds."""
     require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
     core = boards.load("crazyflie").compiler.flags
-    shell(
-        "arm-none-eabi-gcc", *core, *ARDUINO_FLAGS, *flags, "-c", "src/nmpc.c", "-o", "nmpc.o", folder=folder
-    )
+    source = folder / "src" / "nmpc.c"
+    shell("arm-none-eabi-gcc", *core, *ARDUINO_FLAGS, *flags, "-c", source, "-o", "nmpc.o", folder=folder)
     code = shell(require("arm-none-eabi-objdump", "binutils-arm-none-eabi"), "-d", "nmpc.o", folder=folder)
     return code.count("\tvfma") + code.count("\tvfms")
 
@@ -79,8 +78,9 @@ def test_the_component_is_compiled_by_its_cmakelists(tmp_path: Path) -> None:
         folder=tmp_path,
     )
     shell("cmake", "--build", "build", folder=tmp_path)
-    (line,) = json.loads((tmp_path / "build" / "compile_commands.json").read_text("utf-8"))
-    assert "-ffp-contract=off" in line["command"].split()
+    lines = json.loads((tmp_path / "build" / "compile_commands.json").read_text("utf-8"))
+    assert {Path(line["file"]).name for line in lines} == {"nmpc.c", "nmpc_self_test.c"}
+    assert all("-ffp-contract=off" in line["command"].split() for line in lines)
     assert (tmp_path / "build" / "component" / "libcomponent.a").is_file()
 
 

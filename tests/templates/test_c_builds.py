@@ -31,7 +31,9 @@ SETTINGS = {name: presets.load(name) for name in presets.names()} | {
     f"case {index}": settings_case(index, "float32") for index in (0, 3, 9)
 }
 SETTINGS |= {f"fixed case {index}": settings_case(index, "fixed") for index in (0, 3, 9)} | {
-    "fixed mambo": with_option(SETTINGS["mambo"], "code.scalar", "fixed", "test")
+    f"{scalar} {name}": with_option(presets.load(name), "code.scalar", scalar, "test")
+    for name in presets.names()
+    for scalar in ("fixed", "float64")
 }
 SYSTEM_HEADERS = """
     assert complex ctype dirent dlfcn errno fcntl fenv float fmtmsg glob iconv inttypes limits locale
@@ -50,9 +52,9 @@ def by_default(*names: str, of: Iterable[str] = SETTINGS) -> list[Any]:
 COMPILER_HELPERS = {"memcpy", "memset"}
 
 
-def placed(settings: Settings, folder: Path, *, amalgamate: bool = False) -> Path:
+def placed(settings: Settings, folder: Path) -> Path:
     """Write the bundle of `settings` into `folder`, and return it."""
-    return place(render(settings, amalgamate=amalgamate), folder)
+    return place(render(settings), folder)
 
 
 def named(prefix: str, preset: str = "mambo") -> Settings:
@@ -91,16 +93,7 @@ def test_every_dialect_builds_without_a_word(name: str, dialect: str, tmp_path: 
     chosen = DIALECTS[dialect]
     require(chosen.compiler, chosen.package)
     sources = sorted(placed(SETTINGS[name], tmp_path).rglob("*.c"))
-    shell(*chosen.command(SETTINGS[name]), "-Iinclude", "-c", *sources, folder=tmp_path)
-
-
-@pytest.mark.parametrize("amalgamate", [pytest.param(False, marks=pytest.mark.long), True])
-def test_float64_builds_without_a_word(tmp_path: Path, *, amalgamate: bool) -> None:
-    """The same for double, without gcc's warning of a missing suffix: C has none for double."""
-    require("gcc", "gcc")
-    placed(with_option(ONE_NORM, "code.scalar", "float64"), tmp_path, amalgamate=amalgamate)
-    sources = sorted(str(path) for path in tmp_path.rglob("*.c"))
-    shell("gcc", "-std=c99", *STRICT, "-O2", "-Iinclude", "-I.", "-c", *sources, folder=tmp_path)
+    shell(*chosen.command(SETTINGS[name]), "-I.", "-c", *sources, folder=tmp_path)
 
 
 @pytest.mark.parametrize("name", by_default("mambo", "fixed mambo"))
@@ -108,7 +101,7 @@ def test_the_objects_need_nothing_from_outside(name: str, tmp_path: Path) -> Non
     """Every undefined symbol is defined by another object of the bundle, or is a helper of the compiler."""
     require("nm", "binutils")
     placed(SETTINGS[name], tmp_path)
-    shell("gcc", "-std=c99", "-O2", "-Iinclude", "-c", *sorted(tmp_path.glob("src/*.c")), folder=tmp_path)
+    shell("gcc", "-std=c99", "-O2", "-c", *sorted(tmp_path.glob("*.c")), folder=tmp_path)
     objects = sorted(tmp_path.glob("*.o"))
     undefined = set(re.findall(r" U (\w+)", shell("nm", *objects, folder=tmp_path)))
     defined = set(re.findall(r" [TRD] (\w+)", shell("nm", *objects, folder=tmp_path)))
@@ -127,8 +120,8 @@ def test_two_prefixes_live_in_one_image(tmp_path: Path) -> None:
         "static left_t one;\nstatic right_wing_t two;\n"
         "int main(void)\n{\n    return left_self_test(&one) + right_wing_self_test(&two);\n}\n"
     )
-    includes = ["-Ileft/include", "-Iright_wing/include"]
-    sources = sorted(tmp_path.glob("*/src/*.c"))
+    includes = ["-Ileft", "-Iright_wing"]
+    sources = sorted(tmp_path.glob("*/*.c"))
     flags = [*COMPILE_FLAGS, *GCC_STRICT, *includes]
     shell("gcc", *flags, *sources, "main.c", "-o", "image", folder=tmp_path)
     shell("./image", folder=tmp_path)
@@ -159,11 +152,10 @@ def test_no_prefix_that_is_admitted_takes_a_name_of_the_system(tmp_path: Path) -
     assert admitted == []
 
 
-@pytest.mark.parametrize("amalgamate", [False, True])
-def test_the_bundle_builds_and_runs_its_example(tmp_path: Path, *, amalgamate: bool) -> None:
+def test_the_bundle_builds_and_runs_its_example(tmp_path: Path) -> None:
     """`make run`: the self-test passes and the point mass closes in on its target."""
     require("make", "make")
-    placed(named("drone"), tmp_path, amalgamate=amalgamate)
+    placed(named("drone"), tmp_path)
     printed = shell("make", "-s", "run", folder=tmp_path)
     assert "self-test: all steps equal the reference" in printed
     digest = self_test_digest(method_of(presets.load("mambo")), 1000)
@@ -190,8 +182,8 @@ def test_what_compilers_other_than_gcc_and_clang_get_has_the_same_bits(
 ) -> None:
     """They lack operations that gcc and clang have, and loops written out."""
     require("gcc", "gcc")
-    sources = sorted(placed(settings, tmp_path).glob("src/*.c"))
-    gcc = ("gcc", *COMPILE_FLAGS, "-Iinclude")
+    sources = sorted(placed(settings, tmp_path).glob("*.c"))
+    gcc = ("gcc", *COMPILE_FLAGS, "-I.")
     shell(*gcc, "-U__GNUC__", "-c", *sources, folder=tmp_path)
     objects = sorted(tmp_path.glob("*.o"))
     assert len(objects) == len(sources)
@@ -206,14 +198,14 @@ VARIANTS = Path(__file__).parent / "variants.c"
 def variants_differ(folder: Path, right: str = "", wrong: str = "") -> str:
     """Return where the functions for gcc, with a fault, differ from those for other compilers."""
     require("gcc", "gcc")
-    header = placed(ONE_NORM, folder) / "src" / "nmpc_math.h"
-    text = header.read_text("utf-8")
-    plain = re.sub(r"\bnmpc_(?!config|real_t|sum_t|bits_t|steps_t)", "plain_", text)
-    plain = plain.replace("NMPC_MATH_H", "PLAIN_MATH_H").replace("NMPC_UNROLL", "PLAIN_UNROLL")
-    (header.parent / "plain_math.h").write_text(plain.replace("__GNUC__", "OTHER_COMPILER"), "utf-8")
+    source = (placed(ONE_NORM, folder) / "nmpc.c").read_text("utf-8")
+    text = source[source.index("/* ---- Numbers") : source.index("/* ---- Inputs")]
+    functions = re.findall(r"^NMPC_INLINE \w+(?: \w+)* (\w+)\(", text, re.MULTILINE)
+    assert {"within", "reaches", "absolute", "lowest_set_bit"} <= {*functions}
+    plain = re.sub(rf"\b({'|'.join(functions)})\(", r"plain_\1(", text)
+    (folder / "plain.h").write_text(plain.replace("__GNUC__", "OTHER_COMPILER"), "utf-8")
     assert right in text
-    header.write_text(text.replace(right, wrong), "utf-8")
-    includes = ("-Iinclude", "-Isrc")
+    (folder / "functions.h").write_text(text.replace(right, wrong), "utf-8")
     shell(
         "gcc",
         "-std=c11",
@@ -221,7 +213,7 @@ def variants_differ(folder: Path, right: str = "", wrong: str = "") -> str:
         "-funroll-loops",
         "-Wall",
         "-Werror",
-        *includes,
+        "-I.",
         VARIANTS,
         "-o",
         "variants",
@@ -240,8 +232,8 @@ def test_the_functions_that_the_proof_reads_equal_those_that_gcc_compiles(tmp_pa
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("MAGNITUDE_BITS) <= nmpc_bits", "MAGNITUDE_BITS) < nmpc_bits"),
-        ("MAGNITUDE_BITS) >= nmpc_bits", "MAGNITUDE_BITS) > nmpc_bits"),
+        ("MAGNITUDE_BITS) <= bits_of", "MAGNITUDE_BITS) < bits_of"),
+        ("MAGNITUDE_BITS) >= bits_of", "MAGNITUDE_BITS) > bits_of"),
         ("0x7FFFFFFFUL", "0x7FFFFFFEUL"),
         ("return __builtin_fabsf(value)", "return value"),
         ("__builtin_ctzl(word)", "__builtin_ctzl(word << 1)"),
@@ -255,7 +247,7 @@ def test_a_fault_in_the_functions_for_gcc_is_found(right: str, wrong: str, tmp_p
 def test_another_digest_than_the_reference_s_fails_the_example(mambo: Path) -> None:
     """The example prints both digests, and stops."""
     require("make", "make")
-    header = mambo / "include" / "nmpc_self_test.h"
+    header = mambo / "nmpc_self_test.h"
     text = header.read_text()
     stated = re.findall(r"#define NMPC_SELF_TEST_DIGEST 0x(\w{8})UL\n", text)
     assert len(stated) == 1
@@ -283,17 +275,16 @@ def test_the_example_runs_whatever_the_ranges(tmp_path: Path) -> None:
     assert "all steps equal the reference" in shell("make", "-s", "run", folder=tmp_path)
 
 
-@pytest.mark.parametrize("amalgamate", [pytest.param(False, marks=pytest.mark.long), True])
-def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path, *, amalgamate: bool) -> None:
+def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path) -> None:
     """The example passes its self-test; `find_package` brings library and headers, under the prefix."""
     require("cmake", "cmake")
-    placed(named("drone"), tmp_path / "drone", amalgamate=amalgamate)
+    placed(named("drone"), tmp_path / "drone")
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.10)\nproject(firmware C)\n"
         "find_package(drone_controller REQUIRED)\nadd_executable(firmware main.c)\n"
         "target_link_libraries(firmware PRIVATE drone_controller)\n"
     )
-    header = "drone.h" if amalgamate else "drone_self_test.h"
+    header = "drone_self_test.h"
     (tmp_path / "main.c").write_text(
         f'#include "{header}"\nint main(void) {{ drone_t one; return drone_self_test(&one); }}\n'
     )
@@ -307,13 +298,12 @@ def test_a_project_finds_the_bundle_that_cmake_built(tmp_path: Path, *, amalgama
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize("amalgamate", [False, True])
-def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path, *, amalgamate: bool) -> None:
+def test_make_builds_each_board_and_each_set_of_flags_by_itself(tmp_path: Path) -> None:
     """Objects of another processor, of other flags, or without -fPIC are never linked."""
     require("make", "make")
     require("readelf", "binutils")
     require("arm-none-eabi-gcc", "gcc-arm-none-eabi")
-    placed(ONE_NORM, tmp_path, amalgamate=amalgamate)
+    placed(ONE_NORM, tmp_path)
 
     def machine(board: str) -> str:
         printed = shell("readelf", "-h", f"build/{board}/libnmpc_controller.a", folder=tmp_path)
@@ -343,8 +333,8 @@ def test_make_lists_the_boards_when_it_knows_none_of_that_name(mambo: Path) -> N
 @pytest.mark.parametrize(("method", "advice"), [(2, "on x86 build with"), (1, "use code.scalar fixed")])
 def test_another_precision_than_the_type_s_is_refused(method: int, advice: str, mambo: Path) -> None:
     """The x87 has a precision of its own (2), some s390x compilers use double (1); one is an x86."""
-    flags = ["-U__FLT_EVAL_METHOD__", f"-D__FLT_EVAL_METHOD__={method}", "-Iinclude", "-fsyntax-only"]
-    said = refused(require("gcc", "gcc"), *flags, "src/nmpc_math.c", folder=mambo).stderr
+    flags = ["-U__FLT_EVAL_METHOD__", f"-D__FLT_EVAL_METHOD__={method}", "-fsyntax-only"]
+    said = refused(require("gcc", "gcc"), *flags, "nmpc.c", folder=mambo).stderr
     assert advice in said
     assert ("x86" in said) == (method == 2)
 
@@ -355,7 +345,7 @@ def test_another_precision_than_the_type_s_is_refused(method: int, advice: str, 
 def test_flags_that_change_the_arithmetic_are_refused(flag: str, mambo: Path) -> None:
     """They would remove the NaN checks or reorder sums: the build stops and says which flag."""
     gcc = require("gcc", "gcc")
-    said = refused(gcc, flag, "-Iinclude", "-fsyntax-only", "src/nmpc.c", folder=mambo).stderr
+    said = refused(gcc, flag, "-fsyntax-only", "nmpc.c", folder=mambo).stderr
     assert "build without -f" in said
 
 
@@ -366,9 +356,9 @@ def test_the_self_test_notices_a_build_that_contracts(name: str, tmp_path: Path)
     if " fma " not in Path("/proc/cpuinfo").read_text():
         pytest.skip("this processor has no fused multiply-add")
     placed(SETTINGS[name], tmp_path)
-    sources = sorted(tmp_path.glob("src/*.c"))
+    sources = sorted(tmp_path.glob("*.c"))
     for contract, message in (("off", "equal the reference"), ("fast", "differs from the reference")):
-        flags = ["-O2", "-mfma", f"-ffp-contract={contract}", "-Iinclude"]
+        flags = ["-O2", "-mfma", f"-ffp-contract={contract}", "-I."]
         shell("gcc", *flags, *sources, "example/main.c", "-o", "example/run", folder=tmp_path)
         done = subprocess.run(["example/run"], cwd=tmp_path, capture_output=True, text=True, check=False)
         assert message in done.stdout

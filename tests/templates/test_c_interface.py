@@ -228,18 +228,18 @@ def test_the_acceleration_is_found_kept_over_a_jump_and_never_beyond_its_limit()
     self, change_m_s, velocity_m_s = ffi.new("nmpc_t *"), 0.02, 0.0
     lib.nmpc_init(self)
     for _ in range(60):
-        lib.nmpc_tracker_update(self, [velocity_m_s, -0.5 * velocity_m_s])
+        lib.tracker_update(self, [velocity_m_s, -0.5 * velocity_m_s])
         velocity_m_s += change_m_s
     found = np.array(list(self.tracker.acceleration_m_step2)) / horizon.prediction_step_s**2
     truth = change_m_s / horizon.update_period_s * np.array([1.0, -0.5])
     assert found == pytest.approx(truth, rel=0.01)
-    lib.nmpc_tracker_update(self, [velocity_m_s + 3.0, 3.0])
+    lib.tracker_update(self, [velocity_m_s + 3.0, 3.0])
     kept = np.array(list(self.tracker.acceleration_m_step2)) / horizon.prediction_step_s**2
     assert np.array_equal(kept, found)
     assert list(self.tracker.jerk_m_step2_update) == [0.0, 0.0]
     for step in range(200):
         fast = 0.999 * constants.input_limit * (abs(step % 60 - 30) - 15)
-        lib.nmpc_tracker_update(self, [fast, -fast])
+        lib.tracker_update(self, [fast, -fast])
         assert max(map(abs, self.tracker.acceleration_m_step2)) <= np.float32(
             constants.acceleration_limit_m_step2
         )
@@ -279,11 +279,11 @@ def test_any_input_at_all_keeps_the_command_within_the_limit(scalar: str, data: 
 def test_the_self_test_passes_and_names_the_first_difference() -> None:
     """Zero for the unharmed code; with an expectation changed, its number."""
     files = render(MAMBO, with_digest=False)
-    vectors = files["src/nmpc_self_test.c"]
+    vectors = files["nmpc_self_test.c"]
     third = vectors.split("NMPC_OK,\n")[2]
     harmed = vectors.replace(third, third.replace("{ ", "{ 0.001f + ", 1))
     for text, expected in ((vectors, 0), (harmed, 2)):
-        extension = load_extension(files | {"src/nmpc_self_test.c": text}, "float32")
+        extension = load_extension(files | {"nmpc_self_test.c": text}, "float32")
         scratch = extension.ffi.new("nmpc_t *")
         assert extension.lib.nmpc_self_test(scratch) == expected
 

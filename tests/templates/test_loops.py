@@ -6,6 +6,8 @@ from graphlib import CycleError, TopologicalSorter
 import pytest
 
 from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
 from tests.support.cases import SCALARS, settings_case
 from tests.support.one_norm import ONE_NORM
 
@@ -16,14 +18,14 @@ STEPS = {"<": rf"\+\+|(?: \+= {NUMBER})", ">=": "--"}
 
 def violations(files: dict[str, str]) -> list[str]:
     """Return what could make the work of the library's C unbounded."""
-    texts = [text for path, text in files.items() if re.fullmatch(r"(include|src)/.*\.[ch]", path)]
+    texts = [text for path, text in files.items() if re.fullmatch(r"[^/]*\.[ch]", path)]
     code = re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", "", "\n".join(texts), flags=re.DOTALL)
     macros = set(re.findall(r"^ *# *define (\w+)\(", code, re.MULTILINE))
     code = re.sub(r"^ *#(?:.*\\\n)*.*$", "", code, flags=re.MULTILINE)
     found = re.findall(r"\b(?:while|do|goto|continue|setjmp)\b", code)
     found += [loop[0] for loop in re.finditer(r"for \(([^{]*)\) \{", code) if not is_bounded(loop, code)]
 
-    functions = re.findall(r"^[a-z].*?\b(\w+)\([^;{}]*\)\n\{\n(.*?)^\}", code, re.MULTILINE | re.DOTALL)
+    functions = re.findall(r"^[A-Za-z].*?\b(\w+)\([^;{}]*\)\n\{\n(.*?)^\}", code, re.MULTILINE | re.DOTALL)
     calls = {name: set(re.findall(r"\b(\w+)\(", body)) - macros for name, body in functions}
     known = calls.keys() | {
         "sizeof",
@@ -62,8 +64,9 @@ def is_bounded(loop: re.Match[str], code: str) -> bool:
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("scalar", SCALARS)
 def test_the_work_of_the_generated_c_is_bounded(scalar: str) -> None:
-    """A preset and corners of the horizon, in every scalar type."""
-    for settings in (ONE_NORM, *(settings_case(index, scalar) for index in (0, 1, 3))):
+    """A preset of each method and corners of the horizon, in every scalar type."""
+    quadratic = with_option(presets.load("mambo"), "code.scalar", scalar)
+    for settings in (ONE_NORM, quadratic, *(settings_case(index, scalar) for index in (0, 1, 3))):
         files = render(settings, with_digest=False)
         assert sum(text.count("for (") for text in files.values()) > 15
         assert violations(files) == []
@@ -82,13 +85,13 @@ ITERATION = "for (iteration = 0; iteration < NMPC_ITERATIONS; iteration++) {"
         f"{ITERATION} if (converged != 0) {{ break; }}",
         f"{ITERATION} if (converged != 0) {{ iteration = NMPC_ITERATIONS; }}",
         f"{ITERATION} while (converged != 0) {{ }}",
-        f"{ITERATION} nmpc_optimizer_minimize(self);",
+        f"{ITERATION} optimizer_minimize(self);",
         f"{ITERATION} usleep(1);",
     ],
 )
 def test_unbounded_work_is_found(wrong: str) -> None:
     """Each fault alone, in the loop of the search."""
     files = render(ONE_NORM, with_digest=False)
-    path = "src/nmpc_optimizer.c"
+    path = "nmpc.c"
     assert files[path].count(ITERATION) == 1, "the template has changed: adapt the faults"
     assert violations(files | {path: files[path].replace(ITERATION, wrong)}) != []

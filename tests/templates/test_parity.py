@@ -75,7 +75,7 @@ def test_sine_and_cosine_equal_the_reference_and_keep_their_error(scalar: str) -
     sine, cosine = blocks.products.sine_cosine(blocks.computed(angles))
     (c_sine, sine_pointer), (c_cosine, cosine_pointer) = blocks.reals(1), blocks.reals(1)
     for angle, expected_sine, expected_cosine in zip(angles, sine, cosine, strict=True):
-        blocks.lib.nmpc_sine_cosine(angle, sine_pointer, cosine_pointer)
+        blocks.lib.sine_cosine(angle, sine_pointer, cosine_pointer)
         assert bits(c_sine) == bits(expected_sine.astype(blocks.scalar))
         assert bits(c_cosine) == bits(expected_cosine.astype(blocks.scalar))
 
@@ -115,7 +115,7 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
         expected = predictor.prepare(
             given[0], given[1], given[2], None if acceleration is None else computed(acceleration)
         )
-        lib.nmpc_predictor_prepare(
+        lib.predictor_prepare(
             blocks.pointer("nmpc_state_t", state),
             blocks.pointer("nmpc_target_t", target),
             *([] if acceleration is None else [blocks.pointer("nmpc_real_t", acceleration)]),
@@ -133,9 +133,9 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
         x, y = ffi.new("nmpc_rollout_t *", prediction.x), ffi.new("nmpc_rollout_t *", prediction.y)
         for i, errors in enumerate(predictor.errors(expected, computed(moves))):
             if i < settings.horizon.control:
-                lib.nmpc_predictor_apply_moves(prediction, blocks.pointer("nmpc_real_t", moves), i, x, y)
+                lib.predictor_apply_moves(prediction, blocks.pointer("nmpc_real_t", moves), i, x, y)
             for rollout in (x, y):
-                lib.nmpc_predictor_step(rollout)
+                lib.predictor_step(rollout)
             assert bits(np.array([x.error_m, y.error_m], blocks.scalar)) == bits(
                 errors[0].astype(blocks.scalar)
             )
@@ -144,7 +144,7 @@ def test_predictor_and_cost_equal_the_reference(index: int, scalar: str) -> None
         controller.weights = blocks.pointer("nmpc_weights_t", weights)[0]
         controller.command_rad = last[0].tolist()
         controller.plan_rad = moves.ravel().tolist()
-        c_cost = lib.nmpc_cost_evaluate(controller)
+        c_cost = lib.cost_evaluate(controller)
         expected_cost, expected_gradient = cost.evaluate(
             predictor, expected, *map(computed, (weights, moves, last))
         )
@@ -174,7 +174,7 @@ def test_tracker_equals_the_reference(index: int, scalar: str, kind: str) -> Non
     assert constants is not None
     tracker, rng = Tracker(constants, blocks.products), np.random.default_rng(index)
     motion = unknown_motion(blocks.computed(np.zeros((1, 2))))
-    blocks.lib.nmpc_tracker_clear(controller)
+    blocks.lib.tracker_clear(controller)
     limits = {
         "acceleration_m_step2": constants.acceleration_limit_m_step2,
         "jerk_m_step2_update": constants.jerk_limit_m_step2_update,
@@ -187,7 +187,7 @@ def test_tracker_equals_the_reference(index: int, scalar: str, kind: str) -> Non
         value = drawn if constants.is_given else value + drawn
         given = blocks.numbers.quantize(value, [constants.input_quantity] * 2)
         motion = tracker.update(motion, blocks.computed(given))
-        blocks.lib.nmpc_tracker_update(controller, blocks.pointer("nmpc_real_t", given))
+        blocks.lib.tracker_update(controller, blocks.pointer("nmpc_real_t", given))
         for name in limits if constants.is_given else ("velocity_m_s", *limits):
             found = blocks.unpack(getattr(controller.tracker, name))
             assert bits(found) == bits(getattr(motion, name)[0].astype(blocks.scalar)), (step, name)

@@ -54,13 +54,12 @@ def test_every_dialect_compiles_without_a_word(dialect: str, scalar: str, tmp_pa
 
 @pytest.mark.first_is_quick
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("amalgamate", [False, True], ids=["folders", "amalgamated"])
 def test_other_prefix_and_layout_pass_the_strictest_build_and_the_self_test(
-    compiler: str, amalgamate: bool, tmp_path: Path
+    compiler: str, tmp_path: Path
 ) -> None:
     """Under a prefix of two words, in one file and in many."""
     settings = with_option(quadratic_case(EVERYTHING, "float32"), "code.prefix", "x_axis")
-    library = built(settings, tmp_path, compiler, amalgamate=amalgamate)
+    library = built(settings, tmp_path, compiler)
     assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
 
 
@@ -69,7 +68,7 @@ def test_two_controllers_with_different_prefixes_link_into_one_program(tmp_path:
     objects = []
     for prefix, index in (("roof", EVERYTHING), ("floor_", TWO)):
         settings = with_option(quadratic_case(index, "float32"), "code.prefix", prefix.strip("_"))
-        files = render(settings, amalgamate=True, with_digest=False)
+        files = render(settings, with_digest=False)
         name = prefix.strip("_")
         folder = place(files, tmp_path / name)
         toolchain("gcc").run([*COMPILE_FLAGS, *WARNING_FLAGS, "-c", f"{name}.c", "-o", f"{name}.o"], folder)

@@ -53,6 +53,10 @@ class SubBlocks:
         values = [member] if isinstance(member, float) else list(member)
         return np.array(values, self.scalar).tobytes()
 
+    def part(self, block: str) -> Any:
+        """Point at a part of the controller."""
+        return self.ffi.addressof(self.controller, block)
+
     def pointer(self, kind: str, values: NDArray[Any]) -> Any:
         """Point at numbers, which the caller keeps."""
         return self.ffi.cast(f"{kind} *", self.ffi.from_buffer(values))
@@ -69,6 +73,7 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
     """Start, correction, prediction and disturbance have the same bits, up to and beyond every limit."""
     blocks = SubBlocks(quadratic_case(index, scalar), index)
     lib, observer = blocks.lib, KalmanObserver(blocks.method, blocks.products)
+    its_observer = blocks.part("observer")
     constants, ranges = blocks.method.observer, blocks.method.settings.ranges
     limits = {
         "position_m": ranges.position_m,
@@ -93,18 +98,16 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
         arguments = start if constants.age_steps else start[:1]
 
         blocks.put("observer", **vars(estimate))
-        found = np.array(
-            [lib.nmpc_observer_disturbance(blocks.controller, axis) for axis in (0, 1)], blocks.scalar
-        )
+        found = np.array([lib.observer_disturbance(its_observer, axis) for axis in (0, 1)], blocks.scalar)
         assert found.tobytes() == observer.disturbance(estimate).tobytes()
-        lib.nmpc_observer_correct(blocks.controller, *arguments)
+        lib.observer_correct(its_observer, *arguments)
         compare(corrected := observer.correct(estimate, state, tilt))
-        lib.nmpc_observer_predict(blocks.controller, start[1])
+        lib.observer_predict(its_observer, start[1])
         compare(observer.predict(corrected, tilt))
-        lib.nmpc_observer_start(blocks.controller, start[0])
+        lib.observer_start(its_observer, start[0])
         compare(observer.start(corrected, state))
     assert at_limit >= set(limits)
-    lib.nmpc_observer_clear(blocks.controller)
+    lib.observer_clear(its_observer)
     compare(Estimate(*[np.zeros((1, 2), blocks.scalar)] * 3))
 
 
@@ -114,7 +117,8 @@ def test_observer_equals_the_reference(index: int, scalar: str) -> None:
 def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
     """Its step, its turns, measurement, commands and reset have the same bits, up to and beyond its limit."""
     blocks = SubBlocks(quadratic_case(index, scalar), index)
-    lib, self, model = blocks.lib, blocks.controller, AttitudeModel(blocks.method, blocks.products)
+    lib, model = blocks.lib, AttitudeModel(blocks.method, blocks.products)
+    its_model = blocks.part("attitude")
     limit, tilt_rad = blocks.method.attitude.limit_m_step2, blocks.method.settings.limits.tilt_rad
     rng = np.random.default_rng(index)
     members = {"tilt": "tilt", "integral": "integral", "lagged": "lagged", "command": "command"}
@@ -127,7 +131,7 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
         for name, member in names.items():
             assert blocks.get("attitude", member) == getattr(attitude, name).tobytes(), name
 
-    lib.nmpc_attitude_reset(self, 0, 0)
+    lib.attitude_reset(its_model, 0, 0)
     compare(model.steady(np.zeros((1, 2), blocks.scalar)))
     for _ in range(CASES):
         yaws = blocks.scalar(
@@ -137,21 +141,21 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
         drawn = {name: blocks.draw(limit) for name in members}
         attitude = AttitudeState(**drawn, sine=sine[:1], cosine=cosine[:1])
         blocks.put("attitude", **{member: getattr(attitude, name) for name, member in names.items()})
-        lib.nmpc_attitude_advance(self)
+        lib.attitude_advance(its_model)
         compare(attitude := model.advance(attitude))
-        lib.nmpc_attitude_turn(self, sine[1], cosine[1])
+        lib.attitude_turn(its_model, sine[1], cosine[1])
         compare(attitude := model.turn(attitude, sine[1:], cosine[1:]))
-        found = np.array([[lib.nmpc_attitude_roll(self), lib.nmpc_attitude_pitch(self)]], blocks.scalar)
+        found = np.array([[lib.attitude_roll(its_model), lib.attitude_pitch(its_model)]], blocks.scalar)
         assert found.tobytes() == model.command_rad(attitude).tobytes()
 
         angles = blocks.draw(tilt_rad)
         state = np.concatenate([blocks.draw(1.0, 4), angles, blocks.draw(1.0, 1)], axis=1)
         measured = np.zeros((1, 2), blocks.scalar)
-        lib.nmpc_attitude_measure(blocks.pointer("nmpc_state_t", state), blocks.reals(measured))
+        lib.attitude_measure(blocks.pointer("nmpc_state_t", state), blocks.reals(measured))
         assert measured.tobytes() == model.measure(angles).tobytes()
-        lib.nmpc_attitude_set_command(self, *angles[0].tolist())
+        lib.attitude_set_command(its_model, *angles[0].tolist())
         compare(model.set_command(attitude, angles))
-        lib.nmpc_attitude_reset(self, *angles[0].tolist())
+        lib.attitude_reset(its_model, *angles[0].tolist())
         compare(model.steady(angles))
 
 
@@ -174,7 +178,7 @@ def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
     for state, moves in zip(states, expected, strict=True):
         for axis in (0, 1):
             numbers = np.ascontiguousarray(state[axis])
-            found = blocks.lib.nmpc_optimizer_minimize(axis, blocks.reals(numbers), limits[axis])
+            found = blocks.lib.optimizer_minimize(axis, blocks.reals(numbers), limits[axis])
             assert blocks.scalar(found).tobytes() == moves[axis].tobytes()
             free = law.rows[axis] @ state[axis]
             kinds.add(tuple((np.sign(free) * (np.abs(free) > limits[axis])).tolist()))

@@ -15,15 +15,9 @@ from tests.support.bundles import place
 from tests.support.one_norm import ONE_NORM
 from tests.support.tools import require
 
-SELF_TEST = "src/nmpc_self_test.c"
-CONTROLLER = (
-    "src/nmpc.c",
-    "src/nmpc_cost.c",
-    "src/nmpc_math.c",
-    "src/nmpc_optimizer.c",
-    "src/nmpc_predictor.c",
-)
-FLAGS = ("-std=c99", "-ffp-contract=off", "-w", "-Iinclude", "-Isrc")
+SELF_TEST = "nmpc_self_test.c"
+CONTROLLER = ("nmpc.c",)
+FLAGS = ("-std=c99", "-ffp-contract=off", "-w", "-I.")
 SANITIZED = ("-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 RENAMED = ("-Dnmpc_step=wrong_step", "-Dnmpc_last_cost=wrong_last_cost")
 OUTPUTS = 6

@@ -28,10 +28,10 @@ USUAL_WORK = 10_000
 """Predicted steps times moves times iterations up to which a hundred controllers step side by side."""
 
 
-def goes_the_whole_way(drawn: Settings, compiler: str, *, amalgamate: bool) -> None:
+def goes_the_whole_way(drawn: Settings, compiler: str) -> None:
     """Generate, compile without a word, run the self-test, and compare some hundred steps bit for bit."""
     with tempfile.TemporaryDirectory() as folder:
-        library = built(drawn, Path(folder), compiler, amalgamate=amalgamate)
+        library = built(drawn, Path(folder), compiler)
     assert library.nmpc_self_test(ffi.new("char[]", library.nmpc_batch_instance_bytes())) == 0
     work = drawn.horizon.prediction * drawn.horizon.control * drawn.optimizer.iterations
     n = 100 if work <= USUAL_WORK else 25
@@ -57,12 +57,12 @@ def is_refused_in_words(broken: Broken, folder: Path) -> None:
 
 
 def over_valid_settings(drawn: st.SearchStrategy[Settings], examples: int) -> Callable[[], None]:
-    """Return the test of `examples` drawn settings, with each compiler and layout."""
+    """Return the test of `examples` drawn settings, with each compiler."""
 
     @settings(max_examples=examples, phases=[Phase.generate])  # to shrink takes minutes of compiling
-    @given(drawn, st.sampled_from(["gcc", "clang"]), st.booleans())
-    def test(drawn: Settings, compiler: str, amalgamate: bool) -> None:
-        goes_the_whole_way(drawn, compiler, amalgamate=amalgamate)
+    @given(drawn, st.sampled_from(["gcc", "clang"]))
+    def test(drawn: Settings, compiler: str) -> None:
+        goes_the_whole_way(drawn, compiler)
 
     return test
 
@@ -93,7 +93,7 @@ def test_some_broken_settings_are_refused_in_words(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("shard", SHARDS)
 def test_two_hundred_settings_go_the_whole_way(shard: int) -> None:
-    """All shards together: 200 different settings, gcc and clang, amalgamated or not."""
+    """All shards together: 200 different settings, gcc and clang."""
     seed(shard)(over_valid_settings(any_settings(), VALID_EACH))()
 
 

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: MIT-0
  *
- * The functions of nmpc_math.h for gcc and clang against those for other compilers (plain_*), for every float and
+ * The functions of nmpc.c for gcc and clang against those for other compilers (plain_*), for every float and
  * every word of signs; returns 0 if they agree, else prints where they do not. */
 #include <stdio.h>
 
-#include "nmpc_math.h"
-#include "plain_math.h"
+#include "nmpc.h"
+
+#define NMPC_INLINE static inline
+#include "functions.h"
+#include "plain.h"
 
 #define INFINITE 0x7F800000U
 #define STRIDE 2654435761U /* odd: each of the 2^32 words has its turn, and a fault is found early */
@@ -39,11 +42,11 @@ static int differ_for(unsigned int bits)
     const float value = real_of(bits);
     const int is_nan = (value != value);
     unsigned int i;
-    int differ = (is_nan == 0) && (nmpc_absolute(value) != plain_absolute(value));
+    int differ = (is_nan == 0) && (absolute(value) != plain_absolute(value));
 
     for (i = 0U; i < (sizeof limits / sizeof limits[0]); i++) {
-        differ |= (nmpc_within(value, limits[i]) != plain_within(value, limits[i]));
-        differ |= (is_nan == 0) && (nmpc_reaches(value, limits[i]) != plain_reaches(value, limits[i]));
+        differ |= (within(value, limits[i]) != plain_within(value, limits[i]));
+        differ |= (is_nan == 0) && (reaches(value, limits[i]) != plain_reaches(value, limits[i]));
     }
     /* What holds for one limit holds for all: the bits of positive floats are ordered as they are. */
     differ |= (bits < INFINITE) && !(value < real_of(bits + 1U));
@@ -57,7 +60,7 @@ int main(void)
     nmpc_steps_t word;
 
     for (word = 1U; word < ((nmpc_steps_t)1 << NMPC_LAST_STEP); word++) {
-        if (nmpc_lowest_set_bit(word) != plain_lowest_set_bit(word)) {
+        if (lowest_set_bit(word) != plain_lowest_set_bit(word)) {
             printf("they differ for the word %lx\n", (unsigned long)word);
             return 1;
         }

@@ -16,12 +16,12 @@ from tests.support.tools import require
 
 MAMBO = ONE_NORM
 WRONG_COMMAND = (
-    "src/nmpc.c",
+    "nmpc.c",
     "self->command_rad[1] = self->plan_rad[1];",
     "self->command_rad[1] = self->plan_rad[0];",
 )
 WRONG_SCALE = (
-    "src/nmpc_float.c",
+    "nmpc.c",
     "quantize(state->yaw_rad, NMPC_YAW_SCALE)",
     "quantize(state->yaw_rad, 1.0f)",
 )

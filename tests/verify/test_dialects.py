@@ -11,10 +11,8 @@ from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
 HARMS = {
-    "a conversion that loses digits": Harm(
-        "src/nmpc_math.c", r"count = \(nmpc_real_t\)quadrant", "count = quadrant"
-    ),
-    "a declaration inside for": Harm("src/nmpc.c", r"    for \(k = 0;", "    for (int k = 0;"),
+    "a conversion that loses digits": Harm("nmpc.c", r"count = \(nmpc_real_t\)quadrant", "count = quadrant"),
+    "a declaration inside for": Harm("nmpc.c", r"    for \(k = 0;", "    for (int k = 0;"),
 }
 
 

@@ -28,39 +28,38 @@ from tests.support.one_norm import ONE_NORM
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
-STEP, OPTIMIZER, COST, MATH = "src/nmpc.c", "src/nmpc_optimizer.c", "src/nmpc_cost.c", "src/nmpc_math.h"
-SINE, PREDICTOR, DRIVER = "src/nmpc_math.c", "src/nmpc_predictor.c", "proof/nmpc_proof.c"
+CONTROLLER, DRIVER = "nmpc.c", "proof/nmpc_proof.c"
 ROLL = Alarm(DRIVER, "roll_is_within_the_limit", "user assertion")
-UNINITIALISED = Harm(STEP, r"    self->cost = \(nmpc_sum_t\)0;\n", "")
-UNLIMITED = Harm(OPTIMIZER, r"nmpc_larger\((move_rad - [^,]*), -NMPC_TILT_LIMIT_RAD\)", r"\1")
+UNINITIALISED = Harm(CONTROLLER, r"    self->cost = \(nmpc_sum_t\)0;\n", "")
+UNLIMITED = Harm(CONTROLLER, r"larger\((move_rad - [^,]*), -NMPC_TILT_LIMIT_RAD\)", r"\1")
 FAULTS = {
     "NaN passes a range check": Fault(
         "refuse_nan",
         NAN_PASSES,
-        Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite"),
+        Alarm(CONTROLLER, "(int)(quarter_turns", "is_nan_or_infinite"),
     ),
     "a refused call writes": Fault(
         "refuse_nan",
-        Harm(STEP, r"    if \(\(state != NULL\)", r"    self->converged = 0U;\n\g<0>"),
-        Alarm(STEP, "self->converged = 0U;", "mem_access"),
+        Harm(CONTROLLER, r"    if \(\(state != NULL\)", r"    self->converged = 0U;\n\g<0>"),
+        Alarm(CONTROLLER, "self->converged = 0U;", "mem_access"),
     ),
     "the heading goes unchecked": Fault(
-        "refuse_nan", UNCHECKED_HEADING, Alarm(SINE, "(int)(quarter_turns", "is_nan_or_infinite")
+        "refuse_nan", UNCHECKED_HEADING, Alarm(CONTROLLER, "(int)(quarter_turns", "is_nan_or_infinite")
     ),
     "a weight goes unchecked": Fault(
         "refuse_nan",
-        Harm(STEP, r"nmpc_between\(weights->effort, [^;]*?LIMIT\)", "1"),
-        Alarm(STEP, "self->weights = *weights;", "mem_access"),
+        Harm(CONTROLLER, r"between\(weights->effort, [^;]*?LIMIT\)", "1"),
+        Alarm(CONTROLLER, "self->weights = *weights;", "mem_access"),
     ),
     "a null pointer is followed": Fault(
         "refuse_nan",
         NULL_FOLLOWED,
-        Alarm(STEP, "nmpc_within(position_m[0]", "mem_access"),
+        Alarm(CONTROLLER, "within(position_m[0]", "mem_access"),
     ),
     "infinity passes a range check": Fault(
         "take_numbers",
         INFINITY_PASSES,
-        Alarm(SINE, "(int)(quarter_turns", "float_to_int"),
+        Alarm(CONTROLLER, "(int)(quarter_turns", "float_to_int"),
     ),
     "a bad input leaves the command unset": Fault(
         "take_numbers",
@@ -74,22 +73,26 @@ FAULTS = {
     ),
     "a reset is not clamped": Fault(
         "take_numbers",
-        Harm(STEP, r"nmpc_clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)", "command->pitch_rad"),
+        Harm(CONTROLLER, r"clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)", "command->pitch_rad"),
         Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
     ),
     "one move too many": Fault(
         "take_numbers",
-        Harm(STEP, r"k < NMPC_MOVES", "k <= NMPC_MOVES"),
-        Alarm(STEP, "self->plan_rad[k] = self->command_rad", "index_bound"),
+        Harm(
+            CONTROLLER,
+            r"k < (NMPC_MOVES; k\+\+\) \{\n        self->plan_rad\[k\] = self->command)",
+            r"k <= \1",
+        ),
+        Alarm(CONTROLLER, "self->plan_rad[k] = self->command_rad", "index_bound"),
     ),
     "a table is read past its end": Fault(
         "take_numbers",
         Harm(
-            COST,
-            r"\(NMPC_LAST_STEP - 1U\) - nmpc_lowest_set_bit",
-            "(NMPC_LAST_STEP + 1U) - nmpc_lowest_set_bit",
+            CONTROLLER,
+            r"\(NMPC_LAST_STEP - 1U\) - lowest_set_bit",
+            "(NMPC_LAST_STEP + 1U) - lowest_set_bit",
         ),
-        Alarm(COST, "nmpc_predictor_response_sum[i][k]", "index_bound"),
+        Alarm(CONTROLLER, "response_sum[i][k]", "index_bound"),
     ),
 }
 AT_ONCE = (
@@ -102,18 +105,18 @@ FIXED_FAULTS = {
     "the heading goes unchecked": Fault(
         "take_numbers",
         UNCHECKED_HEADING,
-        Alarm(PREDICTOR, "nmpc_sine_cosine(", "precondition of nmpc_sine_cosine"),
+        Alarm(CONTROLLER, "sine_cosine(", "precondition of sine_cosine"),
     ),
     "errors have a bit too many": Fault(
         "take_numbers",
-        Harm("include/nmpc_config.h", r"(#define NMPC_ERROR_BITS) \d+", r"\1 NMPC_ACCELERATION_BITS - 1"),
-        Alarm(MATH, "NMPC_ACCELERATION_BITS - NMPC_ERROR_BITS", "shift"),
+        Harm("nmpc.h", r"(#define NMPC_ERROR_BITS) \d+", r"\1 NMPC_ACCELERATION_BITS - 1"),
+        Alarm(CONTROLLER, "NMPC_ACCELERATION_BITS - NMPC_ERROR_BITS", "shift"),
     ),
     "the plan leaves the tilt limit": Fault("take_numbers", UNLIMITED, ROLL),
     "a rest that does not fit": Fault(
         "turn_everywhere",
-        Harm(SINE, r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"),
-        Alarm(SINE, "NMPC_ROUNDED(fine_rad, 8)", "signed_downcast"),
+        Harm(CONTROLLER, r"NMPC_ROUNDED\(fine_rad, 40 - NMPC_SINE_BITS\)", "NMPC_ROUNDED(fine_rad, 8)"),
+        Alarm(CONTROLLER, "NMPC_ROUNDED(fine_rad, 8)", "signed_downcast"),
     ),
 }
 FIXED_AT_ONCE = (("the heading goes unchecked", "errors have a bit too many"),)
@@ -208,7 +211,9 @@ def test_an_alarm_fails_the_check_and_is_named_by_file_and_line(tmp_path: Path) 
 
 def test_code_that_cannot_be_read_fails(tmp_path: Path) -> None:
     """No report is no proof."""
-    result = check(subject(of_few_steps(ONE_NORM), tmp_path, Harm(STEP, r"\bstatic\b", "statik")))
+    result = check(
+        subject(of_few_steps(ONE_NORM), tmp_path, Harm(CONTROLLER, r"\bstatic const\b", "statik const"))
+    )
     assert result.outcome is CheckOutcome.FAILED
     assert "frama-c failed" in result.evidence
 
@@ -229,10 +234,9 @@ def test_promises_that_are_never_reached_fail(right: str, wrong: str, tmp_path: 
 
 @pytest.mark.long
 @pytest.mark.parametrize("harm", [None, UNCHECKED_HEADING], ids=["right", "wrong"])
-@pytest.mark.parametrize("amalgamate", [False, True])
-def test_make_proof_comes_to_the_same_verdict(harm: Harm | None, tmp_path: Path, *, amalgamate: bool) -> None:
-    """The command of the bundle, in both layouts, ends in an error unless everything is proven."""
+def test_make_proof_comes_to_the_same_verdict(harm: Harm | None, tmp_path: Path) -> None:
+    """The command of the bundle ends in an error unless everything is proven."""
     require("make", "make")
-    its = subject(of_few_steps(ONE_NORM), tmp_path, *([harm] if harm else []), amalgamate=amalgamate)
+    its = subject(of_few_steps(ONE_NORM), tmp_path, *([harm] if harm else []))
     done = subprocess.run(["make", "proof"], cwd=its.bundle, capture_output=True, text=True, check=False)
     assert (done.returncode == 0) == (harm is None), done.stdout

@@ -28,15 +28,14 @@ from tests.support.quadratic import quadratic_settings
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
-STEP, MATH, DRIVER = "src/nmpc.c", "src/nmpc_math.h", "proof/nmpc_proof.c"
-ATTITUDE, OBSERVER, OPTIMIZER = "src/nmpc_attitude.c", "src/nmpc_observer.c", "src/nmpc_optimizer.c"
+CONTROLLER, DRIVER = "nmpc.c", "proof/nmpc_proof.c"
 FEW_RUNS = 20_000
 
 UNPROVEN = {
     "NaN passes a range check": Fault(
         "refuse_nan",
         NAN_PASSES,
-        Alarm(STEP, "self->command_rad[0] = roll_rad;", "mem_access"),
+        Alarm(CONTROLLER, "self->command_rad[0] = roll_rad;", "mem_access"),
     ),
     "the heading goes unchecked": Fault(
         "refuse_nan",
@@ -45,27 +44,27 @@ UNPROVEN = {
     ),
     "a refused state is used": Fault(
         "refuse_nan",
-        Harm(STEP, r"\(has_state != 0\) \? state : NULL", "state"),
-        Alarm(STEP, "nmpc_attitude_measure(", "precondition of nmpc_attitude_measure"),
+        Harm(CONTROLLER, r"\(has_state != 0\) \? state : NULL", "state"),
+        Alarm(CONTROLLER, "attitude_measure(", "precondition of attitude_measure"),
     ),
     "a refused target is used": Fault(
         "refuse_nan",
-        Harm(STEP, r"\(\(has_target != 0\) && \(has_thrust != 0\)\) \? target : NULL", "target"),
-        Alarm(STEP, "nmpc_optimizer_minimize(", "precondition of nmpc_optimizer_minimize"),
+        Harm(CONTROLLER, r"\(\(has_target != 0\) && \(has_thrust != 0\)\) \? target : NULL", "target"),
+        Alarm(CONTROLLER, "optimizer_minimize(", "precondition of optimizer_minimize"),
     ),
     "a null pointer is followed": Fault(
         "refuse_nan",
         NULL_FOLLOWED,
-        Alarm(STEP, "nmpc_within(position_m[0]", "mem_access"),
+        Alarm(CONTROLLER, "within(position_m[0]", "mem_access"),
     ),
     "infinity passes a range check": Fault(
         "take_numbers",
         INFINITY_PASSES,
-        Alarm(STEP, "nmpc_sine_cosine(", "precondition of nmpc_sine_cosine"),
+        Alarm(CONTROLLER, "sine_cosine(", "precondition of sine_cosine"),
     ),
     "the command leaves the tilt limit": Fault(
         "take_numbers",
-        Harm(STEP, r"nmpc_clamp\((nmpc_attitude_roll[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"),
+        Harm(CONTROLLER, r"clamp\((attitude_roll[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"),
         Alarm(DRIVER, "roll_is_within_the_limit", "user assertion"),
     ),
     "a clamp that does not limit": Fault(
@@ -74,26 +73,26 @@ UNPROVEN = {
     "a set command is not clamped": Fault(
         "take_numbers",
         Harm(
-            STEP,
-            r"command_rad\[1\] = nmpc_clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)",
+            CONTROLLER,
+            r"command_rad\[1\] = clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)",
             "command_rad[1] = command->pitch_rad",
         ),
         Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
     ),
     "the model has no limit": Fault(
         "take_numbers",
-        Harm(ATTITUDE, r"return nmpc_clamp\(sum, NMPC_ATTITUDE_LIMIT_M_STEP2\)", "return sum"),
-        Alarm(ATTITUDE, "(right * cosine)", "is_nan"),
+        Harm(CONTROLLER, r"return clamp\(sum, NMPC_ATTITUDE_LIMIT_M_STEP2\)", "return sum"),
+        Alarm(CONTROLLER, "(right * cosine)", "is_nan"),
     ),
     "a row is read past its end": Fault(
         "take_numbers",
-        Harm(OPTIMIZER, r"k < NMPC_STATES", "k <= NMPC_STATES"),
-        Alarm(OPTIMIZER, "row[k] * state[k]", "mem_access"),
+        Harm(CONTROLLER, r"k < NMPC_STATES", "k <= NMPC_STATES"),
+        Alarm(CONTROLLER, "row[k] * state[k]", "mem_access"),
     ),
     "the model starts uninitialised": Fault(
         "take_numbers",
-        Harm(ATTITUDE, r"    self->attitude.cosine = NMPC_ONE;\n", ""),
-        Alarm(STEP, "self->attitude.cosine", "initialization"),
+        Harm(CONTROLLER, r"    attitude->cosine = NMPC_ONE;\n", ""),
+        Alarm(CONTROLLER, "self->attitude.cosine", "initialization"),
     ),
     "a bad input leaves the command unset": Fault(
         "take_numbers",
@@ -108,31 +107,34 @@ AT_ONCE = (
 )
 """Faults that one proof shows at once; each of the others has a proof of its own."""
 FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
-    "a warning": (dialects.check, Harm(STEP, r"    int axis;\n", r"    int unused;\n\g<0>")),
+    "a warning": (dialects.check, Harm(CONTROLLER, r"    int axis;\n", r"    int unused;\n\g<0>")),
     "a rule": (
         rules.check,
-        Harm(STEP, r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
+        Harm(CONTROLLER, r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
     ),
-    "another bit": (bits.check, Harm(OBSERVER, r"NMPC_VELOCITY_BY_POSITION", "NMPC_VELOCITY_BY_VELOCITY")),
-    "another state": (bits.check, Harm(OPTIMIZER, r"row\[k\] \* state\[k\]", "row[k] * state[k - 1]")),
-    "a flag that stays": (bits.check, Harm(STEP, r"    self->saturated = 0U;\n", "")),
+    "another bit": (
+        bits.check,
+        Harm(CONTROLLER, r"\(NMPC_VELOCITY_BY_POSITION", "(NMPC_VELOCITY_BY_VELOCITY"),
+    ),
+    "another state": (bits.check, Harm(CONTROLLER, r"row\[k\] \* state\[k\]", "row[k] * state[k - 1]")),
+    "a flag that stays": (bits.check, Harm(CONTROLLER, r"    self->saturated = 0U;\n", "")),
     "an outage a step too long": (
         bits.check,
-        Harm(STEP, r"\(NMPC_OUTAGE_STEPS \+ 1U\)", "(NMPC_OUTAGE_STEPS + 2U)"),
+        Harm(CONTROLLER, r"\(NMPC_OUTAGE_STEPS \+ 1U\)", "(NMPC_OUTAGE_STEPS + 2U)"),
     ),
-    "a state past its end": (sanitizers.check, Harm(OPTIMIZER, r"k < NMPC_STATES", "k <= NMPC_STATES")),
+    "a state past its end": (sanitizers.check, Harm(CONTROLLER, r"k < NMPC_STATES", "k <= NMPC_STATES")),
     "memory read before it is written": (
         sanitizers.check,
-        Harm(ATTITUDE, r"    self->attitude.cosine = NMPC_ONE;\n", ""),
+        Harm(CONTROLLER, r"    attitude->cosine = NMPC_ONE;\n", ""),
     ),
     "a refused state leaves a trace": (
         lambda its: fuzzing.check(its, runs=FEW_RUNS),
-        Harm(STEP, r"\(has_state != 0\) \? state : NULL", "state"),
+        Harm(CONTROLLER, r"\(has_state != 0\) \? state : NULL", "state"),
     ),
     "a refused command is set": (
         lambda its: fuzzing.check(its, runs=FEW_RUNS),
         Harm(
-            STEP,
+            CONTROLLER,
             r"(?s)(nmpc_set_command\(.*?)    if \(!is_good_command\(command\)\) \{\n",
             r"\1    if (0) {\n",
         ),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mambo_codegen.bundle.render import DEVIATIONS, render
+from mambo_codegen.bundle.render import render
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.verify.check import CheckOutcome, Result, Subject
@@ -22,21 +22,17 @@ SETTINGS = (
     | {f"{steps} steps": with_option(ONE_NORM, "horizon.prediction", steps, "test") for steps in (2, 33)}
 )
 HARMS = {
-    "15.1 goto": Harm("src/nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
+    "15.1 goto": Harm("nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
     "17.7 a result thrown away": Harm(
-        "src/nmpc_self_test.c", r"    nmpc_init\(scratch\);\n", "    nmpc_last_cost(scratch);\n"
+        "nmpc_self_test.c", r"    nmpc_init\(scratch\);\n", "    nmpc_last_cost(scratch);\n"
     ),
     "20.7 a parameter without brackets": Harm(
-        "include/nmpc_config.h", r"#define NMPC_ANGLES 2", r"#define NMPC_TWICE(a) (2 * a)\n\g<0>"
+        "nmpc.h", r"#define NMPC_ANGLES 2", r"#define NMPC_TWICE(a) (2 * a)\n\g<0>"
     ),
-    "2.3 in a file that is not listed": Harm(
-        "src/nmpc_optimizer.c", r"\nvoid nmpc", r"\ntypedef int unused_t;\n\g<0>"
-    ),
+    "2.3 in a file that is not listed": Harm("nmpc.h", r"\nvoid nmpc", r"\ntypedef int unused_t;\n\g<0>"),
 }
 FIXED_HARMS = {
-    "10.7 beside a deviation from 10.1": Harm(
-        "src/nmpc_math.h", r"\* \(nmpc_real_t\)\(step_rad", r"* (step_rad"
-    ),
+    "10.7 beside a deviation from 10.1": Harm("nmpc.c", r"\* \(nmpc_real_t\)\(step_rad", r"* (step_rad"),
 }
 
 
@@ -46,9 +42,11 @@ def _cppcheck() -> None:
 
 
 def assert_each_occurs(its: Subject, result: Result) -> None:
-    """Assert that a deviation that never occurs is not listed."""
-    rules = {rule.removeprefix("misra-c2012-") for rule, _ in deviations(its.bundle / DEVIATIONS)}
-    assert result.figures["deviations"].keys() == rules
+    """Assert that a deviation that never occurs in its file is not listed."""
+    listed = {
+        (rule.removeprefix("misra-c2012-"), file) for rule, file in deviations(its.bundle / "deviations.txt")
+    }
+    assert {(rule, file) for rule, files in result.figures["deviations"].items() for file in files} == listed
 
 
 @pytest.mark.long
@@ -107,7 +105,9 @@ def test_every_deviation_is_in_the_manual() -> None:
     fixed = with_option(ONE_NORM, "code.scalar", "fixed", "test")
     bundles = [render(settings) for settings in (ONE_NORM, fixed, presets.load("mambo"))]
     listed = {
-        row for files in bundles for row in re.findall(r"^([\w.-]+):(\S+)$", files[DEVIATIONS], re.MULTILINE)
+        row
+        for files in bundles
+        for row in re.findall(r"^([\w.-]+):(\S+)$", files["deviations.txt"], re.MULTILINE)
     }
     assert documented == listed
 

@@ -19,11 +19,11 @@ SETTINGS = {name: presets.load(name) for name in presets.names()} | {
 }
 FAULTS = {
     "a move too many": (
-        "src/nmpc.c",
+        "nmpc.c",
         "for (k = 0; k < NMPC_MOVES; k++) {\n        self->plan_rad[k] = self->command_rad",
         "for (k = 0; k <= NMPC_MOVES; k++) {\n        self->plan_rad[k] = self->command_rad",
     ),
-    "a wild heading converted": ("src/nmpc.c", "nmpc_within(state->yaw_rad, NMPC_YAW_RANGE_RAD)", "1"),
+    "a wild heading converted": ("nmpc.c", "within(state->yaw_rad, NMPC_YAW_RANGE_RAD)", "1"),
 }
 
 
@@ -62,7 +62,7 @@ def test_what_is_undefined_is_reported(fault: str, tmp_path: Path) -> None:
 @pytest.mark.long
 def test_memory_that_is_read_before_it_is_written_is_reported(tmp_path: Path) -> None:
     """A weight that nmpc_init leaves out."""
-    fault = ("src/nmpc.c", "    self->weights.effort = NMPC_EFFORT_WEIGHT;\n", "")
+    fault = ("nmpc.c", "    self->weights.effort = NMPC_EFFORT_WEIGHT;\n", "")
     result = sanitizers.check(subject(ONE_NORM, tmp_path, fault))
     assert result.outcome is CheckOutcome.FAILED
     assert any("MemorySanitizer" in found for found in result.figures["faults"]), result.evidence

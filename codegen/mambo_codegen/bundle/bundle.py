@@ -25,13 +25,18 @@ GENERATOR = "mambo-nmpc"
 
 @dataclass(frozen=True)
 class Changes:
-    """What `write` changes in a folder, as sorted paths; `kept` are files outside the bundle."""
+    """What `write` changes in a folder, as sorted paths.
+
+    kept:   files outside the bundle.
+    edited: those of them that an earlier bundle wrote and the user has edited since.
+    """
 
     created: tuple[str, ...] = ()
     changed: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     unchanged: tuple[str, ...] = ()
     kept: tuple[str, ...] = ()
+    edited: tuple[str, ...] = ()
 
     @property
     def any(self) -> bool:
@@ -68,7 +73,7 @@ def write(
     All new files are on the disk before the first one is renamed; the manifest is renamed last. A run killed
     between the renames leaves C files of two bundles, which do not compile together; repeating the run
     completes the bundle. With `dry_run` nothing is written. Without `force`, raises ForeignFilesError if it
-    would overwrite the user's work, and LayoutError if the folder holds a bundle of another target or layout.
+    would overwrite the user's work, and LayoutError if the folder holds a bundle of another target.
     Raises UnwritableError if the file system refuses.
     """
     contents = _contents(files, target)
@@ -128,7 +133,7 @@ def _is_safe(path: str) -> bool:
 def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool) -> Changes:
     """Decide what to do with every file of the old and the new bundle.
 
-    Raises ForeignFilesError and LayoutError.
+    Raises ForeignFilesError.
     """
     _refuse_blocked(contents, target, name)
     known = _known(target)
@@ -139,13 +144,15 @@ def _plan(contents: Mapping[str, bytes], target: Path, name: str, *, force: bool
     present = {path for path in contents if os.path.lexists(target / path)}
     changed = tuple(path for path in contents if path in present and found[path] != contents[path])
     if not force:
-        _refuse_other_layout(contents, known, name)
         _refuse_foreign(tuple(path for path in changed if path not in ours), known, name)
     return Changes(
         created=tuple(path for path in contents if path not in present),
         changed=changed,
         removed=tuple(sorted(ours - contents.keys())),
         unchanged=tuple(path for path, content in contents.items() if found[path] == content),
+        edited=tuple(
+            sorted(path for path in known.keys() - contents.keys() - ours if found[path] is not None)
+        ),
     )
 
 
@@ -180,16 +187,6 @@ def _refuse_blocked(contents: Mapping[str, bytes], target: Path, name: str) -> N
             f"{name}: {names} is in the way of a file or folder of the bundle; move it away",
             tuple(sorted(blocked)),
         )
-
-
-def _refuse_other_layout(contents: Iterable[str], known: Iterable[str], name: str) -> None:
-    """Refuse to change the layout, folders or amalgamated: a forgotten option would remove every file."""
-    old, new = ({"/" in path for path in paths if path.endswith(".h")} for paths in (known, contents))
-    if len(old) == len(new) == 1 and old != new:
-        is_now, change = (
-            ("is a bundle of folders", "leave out") if old == {True} else ("is amalgamated", "add")
-        )
-        raise LayoutError(f"{name}: {is_now}; {change} --amalgamate, or change the layout with --force")
 
 
 def _refuse_other_target(target: str | None, place: Path, name: str) -> None:

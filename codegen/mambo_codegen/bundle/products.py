@@ -1,8 +1,8 @@
 """How templates write the products of a control step: `{{ gain_product("gain", "tilt") }}`.
 
 In floating point that is `gain * tilt`, and as an operand, by the filter `term`, `(gain * tilt)`. In fixed
-point it is `nmpc_gain_product(gain, tilt)`: each product is a function, since it rounds and shifts to the
-format of its result (`nmpc_products_fixed.h.j2`).
+point it is `gain_product(gain, tilt)`: each product is a function, since it rounds and shifts to the
+format of its result (`products_fixed.c.j2`).
 """
 
 from collections.abc import Callable
@@ -52,9 +52,12 @@ _FORMS: Final = (
         "half_change": "NMPC_HALF * {}",
         "sine_difference": "({} * {}) - ({} * {})",
         "sine_sum": "({} * {}) + ({} * {})",
+        "position_correction": "({} * {}) + ({} * {})",
+        "velocity_correction": "({} * {}) + ({} * {})",
+        "disturbance_correction": "({} * {}) + ({} * {})",
     }
 )
-"""What each product is in floating point, by the name of its function less `nmpc_`."""
+"""What each product is in floating point, by the name of its function."""
 
 
 class Infix(str):
@@ -67,7 +70,7 @@ def products(*, fixed: bool) -> dict[str, Callable[..., str]]:
     """Return the functions of the templates that write products, by name."""
 
     def call(name: str) -> Callable[..., str]:
-        return lambda *arguments: f"nmpc_{name}({', '.join(arguments)})"
+        return lambda *arguments: f"{name}({', '.join(arguments)})"
 
     def infix(form: str) -> Callable[..., str]:
         return lambda *arguments: Infix(form.format(*map(_factor if "*" in form else str, arguments)))

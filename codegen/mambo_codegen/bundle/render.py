@@ -3,7 +3,7 @@
 import hashlib
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final
 
@@ -33,20 +33,21 @@ from mambo_codegen.settings.controller_toml import to_toml
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 
-PUBLIC_HEADERS: Final = ("nmpc_config.h", "nmpc.h", "nmpc_self_test.h")
+LIBRARY: Final = ("nmpc.h", "nmpc.c", "nmpc_self_test.h", "nmpc_self_test.c")
+"""The controller, two files, and its self-test, two more, in the folder of a bundle."""
+
 PROJECT: Final = {
     "README.md": "README.md",
     "Makefile": "Makefile",
     "CMakeLists.txt": "CMakeLists.txt",
+    "deviations.txt": "deviations.txt",
     "main.c": "example/main.c",
     "nmpc_fuzz.c": "fuzz/nmpc_fuzz.c",
     "nmpc_proof.c": "proof/nmpc_proof.c",
 }
-DEVIATIONS: Final = "deviations.txt"
-"""It names files of the layout in folders, so an amalgamated bundle has none."""
 
 _OWN_NAME = re.compile(r"(?<!mambo-)\b(nmpc|NMPC)(?=[_.])")
-_OWN_INCLUDE = re.compile(r'^#include "(nmpc[a-z_]*\.h)"\n', re.MULTILINE)
+_OWN_INCLUDE = re.compile(r'^#include "nmpc[a-z_]*\.h"\n', re.MULTILINE)
 _REFUSAL: Final = """
 #if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != {})
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
@@ -54,59 +55,33 @@ _REFUSAL: Final = """
 """
 
 
-def render(settings: Settings, *, amalgamate: bool = False, with_digest: bool = True) -> dict[str, str]:
+def render(settings: Settings, *, with_digest: bool = True) -> dict[str, str]:
     """Render the bundle of `settings`: {relative POSIX path: text}.
 
-    With `amalgamate` the library is one header and one source in the bundle's folder. Without `with_digest`
-    the header does not state the self-test digest, which takes a second to compute; flights do not need it.
+    Without `with_digest` the self-test does not state its digest, which takes a second to compute; flights do
+    not need it.
     """
-    method = method_of(settings)
+    context = _context(settings, with_digest=with_digest)
     environment = _environment()
-    public: tuple[str, ...] = PUBLIC_HEADERS
-    blocks = tuple(block for block in method.sub_blocks if method.tracker or block != "nmpc_tracker")
-    code: tuple[str, ...] = (*(f"{block}.c" for block in blocks), "nmpc.c", "nmpc_self_test.c")
-    if method.numbers.formats is not None:
-        public, code = (*public, "nmpc_float.h"), (*code, "nmpc_float.c")
-
-    def template(name: str) -> jinja2.Template:
-        return environment.select_template([f"{method.folder}/{name}.j2", f"common/{name}.j2"])
-
-    headers = {name: template(name) for name in public}
-    privates = {f"{block}.h": template(f"{block}.h") for block in blocks}
-    sources = {name: template(name) for name in code}
-    others = PROJECT if amalgamate else PROJECT | {DEVIATIONS: DEVIATIONS}
-    project = {path: environment.get_template(f"project/{name}.j2") for name, path in others.items()}
-
-    context = _context(settings, with_digest=with_digest) | {"amalgamated": amalgamate}
-    text = {name: template.render(context) for name, template in (headers | privates | sources).items()}
-    if amalgamate:
-        layout = {"header_folder": "", "source_folder": "", "headers": ["nmpc.h"], "sources": ["nmpc.c"]}
-        library = _join([text[name] for name in public], [text[name] for name in (*privates, *code)])
-    else:
-        layout = {
-            "header_folder": "include/",
-            "source_folder": "src/",
-            "headers": [f"include/{name}" for name in public],
-            "sources": [f"src/{name}" for name in code],
-        }
-        library = {
-            f"include/{name}" if name in public else f"src/{name}": content for name, content in text.items()
-        }
-    files = library | {path: template.render(context | layout) for path, template in project.items()}
-    return _finish(files, settings)
+    library = {name: environment.select_template(_places(name, context)).render(context) for name in LIBRARY}
+    project = {
+        path: environment.get_template(f"project/{name}.j2").render(context) for name, path in PROJECT.items()
+    }
+    return _finish(library | project, settings)
 
 
 def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bool = True) -> dict[str, str]:
-    """Render the folder of `target`, {relative POSIX path: text}: the amalgamated library and its templates.
+    """Render the folder of `target`, {relative POSIX path: text}: the library and the target's own templates.
 
     `with_digest` as in `render`. Raises InvalidSettingsError if the firmware cannot keep the update period.
     """
     ticks = target.ticks_per_update(settings.horizon.update_period_s)
-    bundle = render(settings, amalgamate=True, with_digest=with_digest)
-    header, source = (with_prefix(name, settings.code.prefix) for name in ("nmpc.h", "nmpc.c"))
+    bundle = render(settings, with_digest=with_digest)
     library = {
-        f"{target.source_folder}{header}": bundle[header],
-        f"{target.source_folder}{source}": target.opening + bundle[source],
+        f"{target.source_folder}{name}": (target.opening if name.endswith(".c") else "") + bundle[name]
+        for name in (
+            with_prefix(name, settings.code.prefix) for name in LIBRARY[: 4 if target.self_test else 2]
+        )
     }
     environment = _environment()
     context = _context(settings, with_digest=with_digest) | {
@@ -122,6 +97,11 @@ def render_target(settings: Settings, target: FirmwareTarget, *, with_digest: bo
         if path.startswith(own)
     }
     return library | _finish(files, settings)
+
+
+def _places(name: str, context: Mapping[str, object]) -> list[str]:
+    """Return where the template of a file of the library may be: the method's folder, or the common one."""
+    return [f"{context['method_folder']}/{name}.j2", f"common/{name}.j2"]
 
 
 def _finish(files: Mapping[str, str], settings: Settings) -> dict[str, str]:
@@ -178,6 +158,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
         | {
             "settings": settings,
             "method_folder": method.folder,
+            "chapters": method.chapters,
             "spelling": literals.Spelling(scalar, numbers.bits),
             "parameters": [
                 (f"{section}.{key}", value)
@@ -257,12 +238,4 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
         for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance")
         if name in bits
-    }
-
-
-def _join(header: Sequence[str], source: Sequence[str]) -> dict[str, str]:
-    """Join the texts of the library into one header and one source, in order, without its own includes."""
-    return {
-        "nmpc.h": _OWN_INCLUDE.sub("", "\n".join(header)),
-        "nmpc.c": '#include "nmpc.h"\n\n' + _OWN_INCLUDE.sub("", "\n".join(source)),
     }

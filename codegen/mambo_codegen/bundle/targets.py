@@ -20,8 +20,9 @@ class FirmwareTarget:
 
     name: as in `--for`, and of the folder of templates.
     preset: the settings if the user names none.
-    source_folder: of nmpc.h and nmpc.c, the amalgamated library, with a slash at its end.
+    source_folder: of nmpc.h and nmpc.c, with a slash at its end.
     opening: text before that of nmpc.c.
+    self_test: whether the self-test lies beside them.
     tick_s: the period with which the firmware calls, in s; None where the caller chooses it.
     """
 
@@ -29,6 +30,7 @@ class FirmwareTarget:
     preset: str
     source_folder: str
     opening: str = ""
+    self_test: bool = True
     tick_s: float | None = None
 
     def ticks_per_update(self, update_period_s: float) -> int:
@@ -58,8 +60,8 @@ _TARGETS: Final = (
     FirmwareTarget("arduino", "mambo", "src/", opening=_NO_FLAGS),
     FirmwareTarget("crazyflie", "crazyflie", "src/", tick_s=0.001),
     FirmwareTarget("espidf", "mambo", ""),
-    FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS),
-    FirmwareTarget("mambo", "mambo", "src/", tick_s=0.005),
+    FirmwareTarget("fmu", "mambo", "sources/", opening=_NO_FLAGS, self_test=False),
+    FirmwareTarget("mambo", "mambo", "src/", self_test=False, tick_s=0.005),
     FirmwareTarget("pil", "mambo", ""),
     FirmwareTarget("platformio", "mambo", "src/"),
 )

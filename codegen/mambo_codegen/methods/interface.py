@@ -88,7 +88,7 @@ class Method(Constants):
 
     folder:      the folder of its templates.
     step_type:   the class of its steps.
-    sub_blocks:  the sources with a header each, in the order of a control step.
+    sub_blocks:  the chapters of nmpc.c in the order of a control step, with a word on each.
     setter:      the C function, less its prefix, that sets what only this method has, with the quantities of
                  the numbers that it reads.
     digested:    the results of a step that the self-test digest covers, in its order.
@@ -98,13 +98,23 @@ class Method(Constants):
 
     folder: ClassVar[str]
     step_type: ClassVar[type]
-    sub_blocks: ClassVar[tuple[str, ...]]
+    sub_blocks: ClassVar[Mapping[str, str]]
     setter: ClassVar[str]
     setter_quantities: ClassVar[tuple[str, ...]]
     digested: ClassVar[tuple[str, ...]]
     iterates: ClassVar[bool]
     unnamed: ClassVar[tuple[str, ...]]
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]]
+
+    @property
+    def chapters(self) -> tuple[tuple[str, str], ...]:
+        """The chapters of nmpc.c with these settings, and a word on each."""
+        absent = {
+            name
+            for name, needed in (("tracker", self.tracker), ("float", self.numbers.formats))
+            if not needed
+        }
+        return tuple(item for item in self.sub_blocks.items() if item[0] not in absent)
 
     @abstractmethod
     def refusals(self) -> list[Refusal]:

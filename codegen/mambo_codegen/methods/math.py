@@ -1,4 +1,4 @@
-"""Sine, cosine, sign and ordered sums, as in `nmpc_math.h`."""
+"""Sine, cosine, sign and ordered sums, as in nmpc.c."""
 
 from typing import Any
 

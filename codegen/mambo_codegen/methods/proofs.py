@@ -10,7 +10,7 @@ FLOAT_PROOFS: Final = {
         "-eva",
         "-eva-precision 2",
         "-eva-split-return auto",  # analyse accepted and refused inputs apart
-        "-eva-split-return-function nmpc_between:0,nmpc_within:0",  # nmpc_clamp calls them
+        "-eva-split-return-function between:0,within:0",  # clamp calls them
     ),
     # NaN is a legal value. Precision 0, without relations between variables: from a stored comparison
     # Frama-C 25 derives x >= y from !(x < y), which is false for NaN.
@@ -26,7 +26,7 @@ FLOAT_PROOFS: Final = {
 _WHOLE_NUMBERS: Final = (
     "-warn-signed-overflow",
     "-warn-signed-downcast",
-    "-no-warn-right-shift-negative",  # nmpc_math.h asserts that it is arithmetic
+    "-no-warn-right-shift-negative",  # nmpc.c asserts that it is arithmetic
 )
 TURN_EVERYWHERE: Final = (
     "-main turn_everywhere",
@@ -43,7 +43,7 @@ FIXED_PROOFS: Final = {
         "-eva",
         "-eva-precision 2",
         "-eva-split-return auto",
-        "-eva-use-spec nmpc_sine_cosine",
+        "-eva-use-spec sine_cosine",
     ),
     "turn_everywhere": (*_WHOLE_NUMBERS, *TURN_EVERYWHERE),
 }

@@ -1,4 +1,4 @@
-"""Constants of the target tracker: the target's acceleration and its rate, as `nmpc_tracker.h` derives.
+"""Constants of the target tracker: the target's acceleration and its rate, as nmpc.c derives.
 
 All arithmetic is float64 in a fixed order; constants are rounded to the scalar type once.
 """

@@ -26,7 +26,7 @@ _FINE_BITS: Final = 40
 
 @dataclass(frozen=True)
 class Trigonometry:
-    """Constants of `nmpc_sine_cosine`, each exact in the scalar type.
+    """Constants of `sine_cosine`, each exact in the scalar type.
 
     Let r be the angle minus its whole quarter turns, |r| <= pi/4:
     sin r = r + r * r^2 * (sine[0] + r^2 * (sine[1] + ...)), cos r = 1 + r^2 * (cosine[0] + ...).

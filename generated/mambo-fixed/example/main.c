@@ -6,7 +6,6 @@
 #include <stdio.h>
 
 #include "nmpc.h"
-#include "nmpc_float.h"
 #include "nmpc_self_test.h"
 
 #if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x22D24429UL)

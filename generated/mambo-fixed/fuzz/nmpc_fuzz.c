@@ -6,8 +6,7 @@
  *   mkdir -p build/corpus
  *   clang -std=c99 -g -O1 -ffp-contract=off -fno-sanitize-recover=all \
  *       -fsanitize=fuzzer,address,undefined,float-divide-by-zero,implicit-conversion,local-bounds \
- *       -Iinclude/ -o build/fuzz fuzz/nmpc_fuzz.c \
- *       src/nmpc_math.c src/nmpc_tracker.c src/nmpc_attitude.c src/nmpc_observer.c src/nmpc_optimizer.c src/nmpc.c src/nmpc_self_test.c src/nmpc_float.c
+ *       -I. -o build/fuzz fuzz/nmpc_fuzz.c nmpc.c
  *   build/fuzz -seed=1 -runs=1000000 -artifact_prefix=build/ build/corpus
  *
  * It stops at the first broken promise, prints it, and writes the bytes to build/crash-*; `build/fuzz build/crash-*`

@@ -39,20 +39,23 @@ static int nan_at = INPUTS;
     ensures sine_is_small: \is_finite(*sine) && -SINE_LIMIT <= *sine <= SINE_LIMIT;
     ensures cosine_is_small: \is_finite(*cosine) && -SINE_LIMIT <= *cosine <= SINE_LIMIT;
 */
-void nmpc_sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine);
+static void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine);
 
 /* Whatever reads a state also calls this. */
 /*@ requires no_nan_in_the_state: nan_at >= TARGET;
     assigns tilt_m_step2[0 .. 1] \from *state;
     ensures are_set: \initialized(&tilt_m_step2[0 .. 1]);
 */
-void nmpc_attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2]);
+static void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2]);
 
 /* Whatever reads a target also calls this. */
 /*@ requires no_nan_in_the_target: nan_at < TARGET || nan_at == INPUTS;
     assigns \result \from axis, state[0 .. 7], limit_m_step2;
 */
-nmpc_real_t nmpc_optimizer_minimize(int axis, const nmpc_real_t *state, nmpc_real_t limit_m_step2);
+static nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[8], nmpc_real_t limit_m_step2);
+
+/* The functions that have a contract above are static. */
+#include "nmpc.c"
 
 /* Returns any number or infinity. It has no body; Eva uses its contract. */
 /*@ assigns \result \from any_int;
@@ -247,7 +250,7 @@ static void turn(nmpc_real_t first_rad, nmpc_real_t last_rad)
 
     if ((angle_rad >= first_rad) && (angle_rad <= last_rad) && (angle_rad >= -NMPC_YAW_RANGE_RAD)
         && (angle_rad <= NMPC_YAW_RANGE_RAD)) {
-        nmpc_sine_cosine(angle_rad, &sine, &cosine);
+        sine_cosine(angle_rad, &sine, &cosine);
         /*@ assert sine_is_small: \is_finite(sine) && -SINE_LIMIT <= sine <= SINE_LIMIT; */
         /*@ assert cosine_is_small: \is_finite(cosine) && -SINE_LIMIT <= cosine <= SINE_LIMIT; */
     }
@@ -256,10 +259,10 @@ static void turn(nmpc_real_t first_rad, nmpc_real_t last_rad)
 /* Try every heading, by quarters of a turn. */
 void turn_everywhere(void)
 {
-    const nmpc_real_t quarter_turn_rad = 1.5707964f;
+    const nmpc_real_t quarter_rad = 1.5707964f;
     int quarter;
 
     for (quarter = -653; quarter < 653; quarter++) {
-        turn((nmpc_real_t)quarter * quarter_turn_rad, (nmpc_real_t)(quarter + 1) * quarter_turn_rad);
+        turn((nmpc_real_t)quarter * quarter_rad, (nmpc_real_t)(quarter + 1) * quarter_rad);
     }
 }

@@ -45,9 +45,6 @@ def generate(
     ] = False,
     prefix: Annotated[str | None, typer.Option(help="Prefix of public names (code.prefix).")] = None,
     scalar: Scalar = None,
-    amalgamate: Annotated[
-        bool, typer.Option("--amalgamate", help="Join the C into one header and one source.")
-    ] = False,
     force: Annotated[
         bool,
         typer.Option("--force", help="Overwrite files edited by hand; other files in the folder stay."),
@@ -64,15 +61,13 @@ def generate(
 
     if check and (force or dry_run):
         raise typer.BadParameter("it writes nothing: leave out --force and --dry-run", param_hint="--check")
-    if amalgamate and target is not None:
-        raise typer.BadParameter("--for decides the layout: leave one of them out", param_hint="--amalgamate")
     wanted = None if target is None else find_target(target)
     if source is None:
         source = "mambo" if wanted is None else wanted.preset
     settings = load(source, scalar)
     if prefix is not None:
         settings = controller_toml.with_option(settings, "code.prefix", prefix, "--prefix")
-    files = render_target(settings, wanted) if wanted else render(settings, amalgamate=amalgamate)
+    files = render_target(settings, wanted) if wanted else render(settings)
     if check:
         _report_drifts(bundle.check(files, output, target), output, as_json=as_json)
     else:
@@ -90,6 +85,8 @@ def _report_changes(
     for verb in ("created", "changed", "removed"):
         for path in getattr(changes, verb):
             typer.echo(f"{verb} {echo(path)}")
+    for path in changes.edited:
+        typer.echo(f"kept {echo(path)}: edited by hand, and no longer part of the bundle; delete or move it")
     would = "would be " if dry_run else ""
     state = f"{would}written" if changes.any else "unchanged"
     typer.echo(f"{echo(str(output))}: {state}, settings {settings.short_digest}", err=True)

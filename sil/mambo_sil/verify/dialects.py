@@ -41,7 +41,7 @@ DIALECTS: Final = {
 def check(subject: Subject) -> Result:
     """Compile library, self-test, example and proof in every dialect; any warning is a fault."""
     bundle = subject.bundle.resolve()
-    sources = sorted(path for part in ("src", "example", "proof") for path in bundle.glob(f"{part}/*.c"))
+    sources = sorted(path for part in (".", "example", "proof") for path in (bundle / part).glob("*.c"))
     gaps, silent, faults = [], [], []
     log = []
     for name, dialect in DIALECTS.items():
@@ -52,7 +52,7 @@ def check(subject: Subject) -> Result:
         command = dialect.command(subject.settings)
         with scratch_folder() as objects:
             done = run(
-                [*command, f"-I{bundle / 'include'}", "-c", *map(str, sources)],
+                [*command, f"-I{bundle}", "-c", *map(str, sources)],
                 objects,
             )
         said = (done.stdout + done.stderr).replace(f"{bundle}/", "")

@@ -33,11 +33,7 @@ def controller(subject: Subject, n: int) -> CompiledController:
     settings = subject.settings
     if settings.code.prefix != "nmpc":
         return CompiledController(settings, n, build_library(settings, host_toolchain()))
-    files = {
-        path.relative_to(subject.bundle).as_posix(): path.read_text("utf-8")
-        for part in ("include", "src")
-        for path in sorted((subject.bundle / part).glob("*.[ch]"))
-    }
+    files = {path.name: path.read_text("utf-8") for path in sorted(subject.bundle.glob("*.[ch]"))}
     return CompiledController(settings, n, load_library(files, host_toolchain()))
 
 

@@ -78,7 +78,7 @@ def _fuzz(subject: Subject, runs: int) -> "subprocess.CompletedProcess[bytes]":
     harness = bundle / "fuzz" / f"{subject.settings.code.prefix}_fuzz.c"
     units = [str(path.resolve()) for path in (harness, *tape_replay.sources(subject))]
     Toolchain(("clang",)).run(
-        [*tape_replay.FLAGS, *FLAGS, f"-I{bundle / 'include'}", *units, "-o", "fuzz"], subject.folder
+        [*tape_replay.FLAGS, *FLAGS, f"-I{bundle}", *units, "-o", "fuzz"], subject.folder
     )
     longest = LONGEST_TAPE * call_type(subject.settings).itemsize
     return subprocess.run(

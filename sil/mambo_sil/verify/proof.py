@@ -94,15 +94,12 @@ def judge(subject: Subject, reports: Sequence[Report]) -> Result:
 
 def command(subject: Subject, name: str) -> list[str]:
     """Return the command that `make proof` runs in the bundle for the proof `name`, without its report."""
-    sources = sorted(
-        path for path in subject.bundle.glob("src/*.c") if not path.name.endswith("_self_test.c")
-    )
     flags = _proofs(subject)[name]
     return [
         "frama-c",
-        f"-cpp-extra-args={shlex.join(('-Iinclude', *PROOF_PREPROCESSING))}",
+        f"-cpp-extra-args={shlex.join(('-I.', *PROOF_PREPROCESSING))}",
         *shlex.split(with_prefix(" ".join((*PROOF_FLAGS, *flags)), subject.settings.code.prefix)),
-        *(path.relative_to(subject.bundle).as_posix() for path in (_driver(subject), *sources)),
+        _driver(subject).relative_to(subject.bundle).as_posix(),
     ]
 
 
@@ -127,7 +124,7 @@ def read_properties(report: Path) -> list[Property]:
     with report.open(encoding="utf-8", newline="") as file:
         return [
             Property(
-                place=f"{row['directory']}/{row['file']}:{row['line']}",
+                place=(Path(row["directory"]) / f"{row['file']}:{row['line']}").as_posix(),
                 function=row["function"],
                 kind=row["property kind"],
                 status=row["status"],

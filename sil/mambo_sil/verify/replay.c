@@ -10,7 +10,6 @@
 
 #include "nmpc_self_test.h"
 #if defined(NMPC_POSITION_BITS)
-#include "nmpc_float.h"
 #endif
 
 #if defined(__has_feature)

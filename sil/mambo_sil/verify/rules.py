@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Final
 
 from mambo_codegen.bundle.flags import RULE_FLAGS
-from mambo_codegen.bundle.render import DEVIATIONS
 from mambo_sil.results.scratch import scratch_folder
 from mambo_sil.verify.check import Result, Subject, failed, incomplete, passed
 from mambo_sil.verify.tools import TIME_LIMIT_S, missing, run
 
+_DEVIATIONS: Final = "deviations.txt"
 _TEMPLATE: Final = "{file}\t{line}\t{id}\t{message}"
 _MISRA: Final = "misra-c2012-"
 _CHAPTERS: Final = 22
@@ -51,7 +51,7 @@ def check(subject: Subject) -> Result:
     found = violations(done.stderr)
     if done.returncode != 0 or not any(one.rule.startswith(_MISRA) for one in found):
         return incomplete("cppcheck ran without its addon misra.py, which Debian's package cppcheck has")
-    listed = deviations(subject.bundle / DEVIATIONS)
+    listed = deviations(subject.bundle / _DEVIATIONS)
     unlisted = [one for one in found if (one.rule, one.file) not in listed]
     accepted = [(one.rule.removeprefix(_MISRA), one.file) for one in found if (one.rule, one.file) in listed]
     departed: dict[str, dict[str, int]] = {}
@@ -62,7 +62,7 @@ def check(subject: Subject) -> Result:
         rest = [f"{len(unlisted) - _SHOWN} more in cppcheck.txt"] if len(unlisted) > _SHOWN else []
         return failed("; ".join([*map(str, unlisted[:_SHOWN]), *rest]), figures)
     text = ", ".join(f"{rule} ({sum(files.values())})" for rule, files in departed.items())
-    return passed(f"only the deviations listed in {DEVIATIONS}: {text}", figures)
+    return passed(f"only the deviations listed in {_DEVIATIONS}: {text}", figures)
 
 
 def _cppcheck(bundle: Path) -> subprocess.CompletedProcess[str]:
@@ -83,8 +83,8 @@ def _cppcheck(bundle: Path) -> subprocess.CompletedProcess[str]:
         )
         addon = json.dumps({"script": "misra.py", "args": [f'--rule-texts="{texts}"']})
         flags = [flag for flag in RULE_FLAGS if not flag.startswith("--addon=")]
-        line = ["cppcheck", *flags, f"--addon={addon}", f"--template={_TEMPLATE}", "-Iinclude", "src"]
-        return run(line, bundle)
+        sources = sorted(path.name for path in bundle.glob("*.c"))
+        return run(["cppcheck", *flags, f"--addon={addon}", f"--template={_TEMPLATE}", *sources], bundle)
 
 
 def violations(said: str) -> list[RuleViolation]:

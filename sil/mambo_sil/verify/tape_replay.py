@@ -52,11 +52,12 @@ class Difference:
 
 
 def sources(subject: Subject) -> list[Path]:
-    """Return the C sources of a bundle; raises BuildError if it is amalgamated or has no harness."""
-    found = sorted((subject.bundle / "src").glob("*.c"))
-    harness = f"fuzz/{subject.settings.code.prefix}_fuzz.c"
-    if not found or not (subject.bundle / harness).is_file():
-        raise BuildError(f"{subject.bundle}: has no src/*.c or no {harness}; generate the bundle in folders")
+    """Return the C sources of a bundle; raises BuildError if one or the harness is missing."""
+    prefix = subject.settings.code.prefix
+    found = [subject.bundle / f"{prefix}.c", subject.bundle / f"{prefix}_self_test.c"]
+    absent = [path for path in (*found, subject.bundle / f"fuzz/{prefix}_fuzz.c") if not path.is_file()]
+    if absent:
+        raise BuildError(f"{absent[0]} is missing; generate the bundle again")
     return found
 
 
@@ -79,7 +80,7 @@ def missing(tool: str, flags: Sequence[str], folder: Path) -> str | None:
 def build(subject: Subject, tool: str, flags: Sequence[str], folder: Path) -> Path:
     """Compile the program that runs tapes into `folder`, and return its path; raises BuildError."""
     program = write_program(subject.settings.code.prefix, folder)
-    includes = [f"-I{(subject.bundle / part).resolve()}" for part in ("include", "fuzz")]
+    includes = [f"-I{(subject.bundle / part).resolve()}" for part in (".", "fuzz")]
     units = [str(path.resolve()) for path in sources(subject)]
     Toolchain((tool,)).run([*FLAGS, *flags, *includes, program.name, *units, "-o", "replay"], folder)
     return folder / "replay"

@@ -62,8 +62,8 @@ def one(mega: Builder, tmp_path: Path) -> Path:
 def test_the_self_test_detects_a_wrong_controller_on_eight_bits(mega: Builder, tmp_path: Path) -> None:
     """The self-test returns 0; an error of a millimetre in the cost is found in the first step."""
     files = render(presets.load("table1"), with_digest=False)
-    assert files["src/nmpc_cost.c"].count(EFFORT) == 1
-    wrong = files | {"src/nmpc_cost.c": files["src/nmpc_cost.c"].replace(EFFORT, WRONG)}
+    assert files["nmpc.c"].count(EFFORT) == 1
+    wrong = files | {"nmpc.c": files["nmpc.c"].replace(EFFORT, WRONG)}
     for bundle, first_wrong_step in ((files, 0), (wrong, 1)):
         machine = start(mega.guest(bundle, SELF_TEST, ("run",), tmp_path), "avr")
         assert machine.call("run") == first_wrong_step

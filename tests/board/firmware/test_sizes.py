@@ -109,7 +109,7 @@ FORBIDDEN = {
 }
 ALLOWED = (
     *("__mulsf3", "__floatdisf", "__fixunssfdi", "__aeabi_fcmple", "__aeabi_l2f"),
-    *("nmpc_sine_cosine", "freeze", "cosy"),
+    *("sine_cosine", "freeze", "cosy"),
 )
 """Single precision, and names that only begin like a forbidden one."""
 

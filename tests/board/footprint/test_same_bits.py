@@ -45,11 +45,11 @@ At the optimisation that is shipped `test_emulated` compares every scalar type o
 
 FAULTS = {
     "another order": (
-        "src/nmpc_math.c",
+        "nmpc.c",
         "rest + (rest * (square * sine_rest))",
         "rest + ((rest * square) * sine_rest)",
     ),
-    "another sign": ("src/nmpc_cost.c", "effort_gradient = -weight", "effort_gradient = weight"),
+    "another sign": ("nmpc.c", "effort_gradient = -weight", "effort_gradient = weight"),
 }
 """Faults by name: file, the line, what it becomes."""
 
@@ -176,7 +176,7 @@ def test_a_bundle_has_the_digest_in_its_header(preset: str, scalar: str) -> None
     """The generated C computes the digest in its header, over all steps."""
     settings = with_option(presets.load(preset), "code.scalar", scalar)
     files = {path: text for path, text in render(settings).items() if path.endswith((".c", ".h"))}
-    stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["include/nmpc_self_test.h"], re.M)
+    stated = re.search(r"NMPC_SELF_TEST_DIGEST (0x[0-9A-F]{8})UL$", files["nmpc_self_test.h"], re.M)
     assert stated
     library = load_library(files, toolchain(host_toolchain().command[0]))
     assert digest_compiled(library, episode_count(method_of(settings))) == int(stated[1], 16)

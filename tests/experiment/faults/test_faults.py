@@ -307,7 +307,7 @@ def words(text: str) -> list[tuple[str, str, str]]:
 def test_the_check_fails_a_controller_that_accepts_nan(tmp_path: Path) -> None:
     """A controller whose check of the state is removed lets NaN reach the plan, and fails."""
     right = "if (!(is_good_point(state->position_m, state->velocity_m_s)"
-    chosen = subject(MAMBO, tmp_path, ("src/nmpc.c", right, "if (!((state != 0)"))
+    chosen = subject(MAMBO, tmp_path, ("nmpc.c", right, "if (!((state != 0)"))
     assert check(chosen).outcome is CheckOutcome.FAILED
 
 
@@ -318,8 +318,8 @@ def test_the_documented_caller_compiles_and_levels_out(tmp_path: Path) -> None:
     assert lines is not None
     bundle.write(render(MAMBO), tmp_path / "bundle")
     (tmp_path / "caller.c").write_text(CALLER.replace("LINES", lines[1]), "utf-8")
-    sources = sorted(map(str, (tmp_path / "bundle" / "src").glob("*.c")))
-    command = [compiler, *COMPILE_FLAGS, *WARNING_FLAGS, "-Werror", "-Ibundle/include", "caller.c", *sources]
+    sources = sorted(map(str, (tmp_path / "bundle").glob("*.c")))
+    command = [compiler, *COMPILE_FLAGS, *WARNING_FLAGS, "-Werror", "-Ibundle", "caller.c", *sources]
     built = subprocess.run(
         [*command, "-o", "caller"], cwd=tmp_path, capture_output=True, text=True, check=False
     )

@@ -1,6 +1,6 @@
 """Constants of the prediction: eqs 8-11 of the paper, discretised for the steps of the horizon.
 
-Along each axis of the world the predicted error follows a recurrence that `nmpc_predictor.h` derives: a step
+Along each axis of the world the predicted error follows a recurrence that nmpc.c derives: a step
 adds the displacement to the error, and the acceleration, in metres per squared prediction step, to the
 displacement. The acceleration changes only where a move changes the tilt. With attitude lag a correction, the
 deficit, is added to the acceleration; it decays from step to step. So the roll-out takes two additions a

@@ -20,13 +20,19 @@ class OneNorm(OneNormConstants, Method):
 
     folder: ClassVar[str] = "one_norm"
     step_type: ClassVar[type] = OneNormStep
-    sub_blocks: ClassVar[tuple[str, ...]] = (
-        "nmpc_math",
-        "nmpc_tracker",
-        "nmpc_predictor",
-        "nmpc_cost",
-        "nmpc_optimizer",
-    )
+    sub_blocks: ClassVar[Mapping[str, str]] = {
+        "numbers": "comparisons, limits and products",
+        "signs": "signs and magnitudes",
+        "inputs": "the checks of inputs",
+        "trigonometry": "sine and cosine of the heading",
+        "tracker": "acceleration of the target",
+        "predictor": "the errors over the horizon, eqs 8-11",
+        "cost": "their sum and its subgradient, eq 12",
+        "optimizer": "RPROP",
+        "step": "a control step",
+        "interface": "the functions of nmpc.h",
+        "float": "the same functions with floats",
+    }
     setter: ClassVar[str] = "set_weights"
     setter_quantities: ClassVar[tuple[str, ...]] = WEIGHTS
     digested: ClassVar[tuple[str, ...]] = (

@@ -14,8 +14,8 @@ from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 class AttitudeState:
     """The models of n controllers, (n, 2) along right and forward, in m/step^2.
 
-    tilt, integral, lagged and command are a, i, c, u of `nmpc_attitude.h`; sine and cosine (n,) are those of
-    the heading.
+    tilt, integral, lagged and command are a, i, c, u of the attitude model in nmpc.c; sine and cosine (n,)
+    are those of the heading.
     """
 
     tilt: Real

@@ -24,24 +24,29 @@ class Quadratic(QuadraticConstants, Method):
 
     folder: ClassVar[str] = "quadratic"
     step_type: ClassVar[type] = QuadraticStep
-    sub_blocks: ClassVar[tuple[str, ...]] = (
-        "nmpc_math",
-        "nmpc_tracker",
-        "nmpc_attitude",
-        "nmpc_observer",
-        "nmpc_optimizer",
-    )
+    sub_blocks: ClassVar[Mapping[str, str]] = {
+        "numbers": "comparisons, limits and products",
+        "inputs": "the checks of inputs",
+        "trigonometry": "sine and cosine of the heading",
+        "attitude": "how the drone answers the commands",
+        "observer": "position, velocity and disturbance",
+        "tracker": "acceleration of the target",
+        "optimizer": "the minimum of the cost",
+        "step": "a control step",
+        "interface": "the functions of nmpc.h",
+        "float": "the same functions with floats",
+    }
     setter: ClassVar[str] = "set_command"
     setter_quantities: ClassVar[tuple[str, ...]] = COMMAND
     digested: ClassVar[tuple[str, ...]] = ("status", "missed", "saturated", "stored")
     iterates: ClassVar[bool] = False
     unnamed: ClassVar[tuple[str, ...]] = ("target",)
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec nmpc_sine_cosine"),
+        "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec sine_cosine"),
         "refuse_nan": (
             *FLOAT_PROOFS["refuse_nan"],
             # What they require is that they are called without NaN.
-            "-eva-use-spec nmpc_sine_cosine,nmpc_attitude_measure,nmpc_optimizer_minimize",
+            "-eva-use-spec sine_cosine,attitude_measure,optimizer_minimize",
         ),
         "turn_everywhere": ("-warn-special-float nan", *TURN_EVERYWHERE),
     }

@@ -83,17 +83,17 @@ class Builder:
         files = {path: text for path, text in sources.items() if path not in main}
         core, optimisation = self.board.compiler.flags, self.toolchain.optimisation
         flags = [*COMPILE_FLAGS, *core, *([optimisation] if optimisation else []), *_COMPILE, *self.own_flags]
-        chosen = sorted(path for path in files if re.fullmatch(r"(src/)?[^/]*\.c", path))
+        chosen = sorted(path for path in files if re.fullmatch(r"[^/]*\.c", path))
         key = repr((self.toolchain.command, flags, sorted(files.items())))
         bundle = place.parent.resolve() / f"bundle-{hashlib.sha256(key.encode()).hexdigest()[:16]}"
         parts = [bundle / Path(source).with_suffix(".o").name for source in chosen]
         if not all(part.is_file() for part in parts):
             _write(files, bundle)
-            self._run(self.toolchain, [*flags, "-Iinclude", "-c", *chosen], bundle)
+            self._run(self.toolchain, [*flags, "-c", *chosen], bundle)
         _write(main, place)
         self._run(
             self.toolchain,
-            [*flags, *define, *(f"-I{path}" for path in (bundle, bundle / "include")), "-c", *main],
+            [*flags, *define, f"-I{bundle}", "-c", *main],
             place,
         )
         objects = [*(Path(source).with_suffix(".o").name for source in main), *map(str, parts)]

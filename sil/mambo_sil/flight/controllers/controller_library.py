@@ -38,8 +38,6 @@ them.
 
 ffi: Final[Any] = controller_interface.ffi
 
-_FLAGS: Final = (*COMPILE_FLAGS, "-Iinclude", "-Isrc")
-
 
 def with_default_prefix(settings: Settings) -> Settings:
     """Return `settings` with the prefix nmpc, which the Python side expects; no computed value changes."""
@@ -84,10 +82,14 @@ def _load(key: object, generate: Callable[[], Mapping[str, str]], toolchain: Too
     """Return the library of the C that `generate` returns, with the glue; `key` determines that C."""
 
     def files() -> dict[str, str]:
-        library = {path: text for path, text in generate().items() if path.startswith(("include/", "src/"))}
-        return library | glue()
+        return c_files(generate()) | glue()
 
-    return load_shared_library(LibrarySource("nmpc", (key, glue()), files, _FLAGS, ffi), toolchain)
+    return load_shared_library(LibrarySource("nmpc", (key, glue()), files, COMPILE_FLAGS, ffi), toolchain)
+
+
+def c_files(bundle: Mapping[str, str]) -> dict[str, str]:
+    """Return the controller and its self-test of a bundle: the C beside its README."""
+    return {path: text for path, text in bundle.items() if path.endswith((".c", ".h")) and "/" not in path}
 
 
 @lru_cache

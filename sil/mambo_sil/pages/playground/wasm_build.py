@@ -12,7 +12,7 @@ from mambo_codegen.errors import BuildError
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import Toolchain
-from mambo_sil.flight.controllers.controller_library import glue, with_default_prefix
+from mambo_sil.flight.controllers.controller_library import c_files, glue, with_default_prefix
 from mambo_sil.flight.engine.engine_library import texts
 from mambo_sil.flight.engine.native import PD_STEPS
 from mambo_sil.pages.playground.page_controllers import PageController
@@ -30,7 +30,7 @@ CONTROLLER_CALLS: Final = ("nmpc_batch_init", "nmpc_batch_instance_bytes")
 _FLAGS: Final = (*COMPILE_FLAGS, "--target=wasm32", "-ffreestanding", "-nostdlib", "-Wl,--no-entry")
 _UNUSED: Final = ("evaluation.c", "faults.c")
 """No page evaluates flights, or injects faults, whose C wants the standard library."""
-_INCLUDES: Final = ("-I.", "-Iinclude", "-Isrc")
+_INCLUDES: Final = ("-I.",)
 
 
 def module(one: PageController) -> bytes:
@@ -75,7 +75,7 @@ def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
     if not isinstance(controller, Settings):
         return files, ENGINE_CALLS, PD_STEPS[controller]
     bundle = render(with_default_prefix(controller), with_digest=False)
-    files |= {path: text for path, text in bundle.items() if path.startswith(("include/", "src/"))} | glue()
+    files |= c_files(bundle) | glue()
     weights = ("nmpc_host_set_weights",) if method_of(controller).weight_limits else ()
     return files, (*ENGINE_CALLS, *CONTROLLER_CALLS, *weights), "nmpc_host_step"
 
