@@ -36,22 +36,14 @@ typedef char nmpc_assert_instance_fits[(sizeof(nmpc_t) <= NMPC_INSTANCE_BYTES) ?
 typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_STORED_NUMBERS * sizeof(nmpc_real_t)))
                                             ? 1 : -1];
 
-/* A function of a control step. */
-#define NMPC_INLINE static inline
+/* A function of a control step; the compiler decides whether it is inlined. */
+#define NMPC_INLINE static
 
-/* Ask gcc to unroll the next loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
- * compilers decide for themselves. */
+/* Ask gcc to unroll the next loop; other compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
 #else
 #define NMPC_UNROLL
-#endif
-
-/* A function that gcc does not inline: the products of 64 bits around it would lack registers. */
-#if defined(__GNUC__)
-#define NMPC_CALLED static __attribute__((noinline))
-#else
-#define NMPC_CALLED static
 #endif
 
 /* ---- Numbers ------------------------------------------------------------------------------------------------------
@@ -90,11 +82,63 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 /* Shift a sum right by `bits`, rounded to nearest, ties up. */
 #define NMPC_ROUNDED(sum, bits) (((sum) + ((nmpc_sum_t)1 << ((bits) - 1))) >> (bits))
 
+/* The upper word of a sum. AVR shifts bit by bit or byte by byte: there its bytes are taken as they lie in memory. */
+#if defined(__AVR__)
+NMPC_INLINE nmpc_real_t upper_word(nmpc_sum_t sum)
+{
+    union {
+        nmpc_sum_t sum;
+        nmpc_real_t words[2];
+    } view;
+
+    view.sum = sum;
+    return view.words[1];
+}
+#else
+NMPC_INLINE nmpc_real_t upper_word(nmpc_sum_t sum)
+{
+    return (nmpc_real_t)(sum >> 32);
+}
+#endif
+
+/* A sum shifted right by `bits` and rounded as above, if the result is a number: its bits are in the upper word,
+ * shifted to the left if `bits` is from 17 to 31. */
+#define NMPC_NUMBER_BELOW(sum, bits) \
+    upper_word(((sum) + ((nmpc_sum_t)1 << ((bits) - 1))) * ((nmpc_sum_t)1 << (32 - (bits))))
+#define NMPC_NUMBER_ABOVE(sum, bits) (upper_word((sum) + ((nmpc_sum_t)1 << ((bits) - 1))) >> ((bits) - 32))
+
+/* The same for a number, without a wider type. */
+#define NMPC_ROUNDED_NUMBER(number, bits) ((((number) >> ((bits) - 1)) + 1) >> 1)
+
+/* a b, of 64 bits. A Cortex-M0 multiplies to 32 bits only. There the lower word is the product of the words, and the
+ * upper one is the sum of the products of their halves: half the instructions of the compiler's product of two numbers
+ * of 64 bits. No sum of two terms overflows. */
+#if defined(__ARM_ARCH_6M__)
+__attribute__((noinline)) static nmpc_sum_t wide_product(nmpc_real_t a, nmpc_real_t b)
+{
+    const unsigned int a_low = (unsigned int)a & 0xFFFFU;
+    const unsigned int b_low = (unsigned int)b & 0xFFFFU;
+    const nmpc_real_t a_high = a >> 16;
+    const nmpc_real_t b_high = b >> 16;
+    const nmpc_real_t one = ((nmpc_real_t)a_low * b_high) + (nmpc_real_t)((a_low * b_low) >> 16);
+    const nmpc_real_t other = (a_high * (nmpc_real_t)b_low) + (nmpc_real_t)((unsigned int)one & 0xFFFFU);
+    const nmpc_real_t high = ((a_high * b_high) + (one >> 16)) + (other >> 16);
+    const unsigned int low = (unsigned int)a * (unsigned int)b;
+
+    return ((nmpc_sum_t)high * 4294967296) | (nmpc_sum_t)low;
+}
+#else
+NMPC_INLINE nmpc_sum_t wide_product(nmpc_real_t a, nmpc_real_t b)
+{
+    return (nmpc_sum_t)a * b;
+}
+#endif
+
 /* Products, named after their factors or their results: multiplications to 64 bits, and a shift to the format of the
  * result. The formats are chosen such that no product and no sum overflows for inputs within their ranges. */
 NMPC_INLINE nmpc_real_t sine_product(nmpc_real_t value, nmpc_real_t sine)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)value * sine, NMPC_SINE_BITS);
+    return NMPC_NUMBER_BELOW(wide_product(value, sine), NMPC_SINE_BITS);
 }
 
 /* a b - c d and a b + c d of sines and cosines, at most 1. */
@@ -107,115 +151,115 @@ NMPC_INLINE nmpc_real_t unit(nmpc_sum_t product)
 
 NMPC_INLINE nmpc_real_t sine_difference(nmpc_real_t a, nmpc_real_t b, nmpc_real_t c, nmpc_real_t d)
 {
-    return unit(((nmpc_sum_t)a * b) - ((nmpc_sum_t)c * d));
+    return unit(wide_product(a, b) - wide_product(c, d));
 }
 
 NMPC_INLINE nmpc_real_t sine_sum(nmpc_real_t a, nmpc_real_t b, nmpc_real_t c, nmpc_real_t d)
 {
-    return unit(((nmpc_sum_t)a * b) + ((nmpc_sum_t)c * d));
+    return unit(wide_product(a, b) + wide_product(c, d));
 }
 
 NMPC_INLINE nmpc_real_t speed_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 32);
+    return NMPC_NUMBER_ABOVE(wide_product(factor, value), 33);
 }
 
 NMPC_INLINE nmpc_real_t tilt_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 29);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 29);
 }
 
 NMPC_INLINE nmpc_real_t command_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 31);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 31);
 }
 
 NMPC_INLINE nmpc_real_t per_step_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 29);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 28);
 }
 
 NMPC_INLINE nmpc_real_t per_step2_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 24);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 24);
 }
 
 NMPC_INLINE nmpc_real_t drag_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 33);
+    return NMPC_NUMBER_ABOVE(wide_product(factor, value), 32);
 }
 
 NMPC_INLINE nmpc_real_t feedback_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 28);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 28);
 }
 
 NMPC_INLINE nmpc_real_t ratio_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 32);
+    return NMPC_NUMBER_ABOVE(wide_product(factor, value), 32);
 }
 
 NMPC_INLINE nmpc_real_t target_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 24);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 24);
 }
 
 NMPC_INLINE nmpc_real_t tracker_product(nmpc_real_t factor, nmpc_real_t value)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)factor * value, 30);
+    return NMPC_NUMBER_BELOW(wide_product(factor, value), 30);
 }
 
 NMPC_INLINE nmpc_real_t position_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
                                           nmpc_real_t innovation_m_step)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)by_position * innovation_m)
-                                     + ((nmpc_sum_t)by_velocity * innovation_m_step), 35);
+    return NMPC_NUMBER_ABOVE(wide_product(by_position, innovation_m) + wide_product(by_velocity, innovation_m_step),
+                             35);
 }
 
 NMPC_INLINE nmpc_real_t velocity_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
                                           nmpc_real_t innovation_m_step)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)by_position * innovation_m)
-                                     + ((nmpc_sum_t)by_velocity * innovation_m_step), 31);
+    return NMPC_NUMBER_BELOW(wide_product(by_position, innovation_m) + wide_product(by_velocity, innovation_m_step),
+                             31);
 }
 
 NMPC_INLINE nmpc_real_t disturbance_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
                                           nmpc_real_t innovation_m_step)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(((nmpc_sum_t)by_position * innovation_m)
-                                     + ((nmpc_sum_t)by_velocity * innovation_m_step), 30);
+    return NMPC_NUMBER_BELOW(wide_product(by_position, innovation_m) + wide_product(by_velocity, innovation_m_step),
+                             29);
 }
 
 /* Changes of format; an input position has that of the estimates. */
 NMPC_INLINE nmpc_real_t half_change(nmpc_real_t acceleration_m_step2)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)acceleration_m_step2, 9);
+    return NMPC_ROUNDED_NUMBER(acceleration_m_step2, 10);
 }
 
 NMPC_INLINE nmpc_real_t velocity_change(nmpc_real_t acceleration_m_step2)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)acceleration_m_step2, 8);
+    return NMPC_ROUNDED_NUMBER(acceleration_m_step2, 9);
 }
 
 NMPC_INLINE nmpc_real_t position_change(nmpc_real_t velocity_m_step)
 {
-    return (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)velocity_m_step, 9);
+    return NMPC_ROUNDED_NUMBER(velocity_m_step, 9);
 }
 
 NMPC_INLINE nmpc_real_t move_acceleration(nmpc_real_t move_m_step2)
 {
-    return move_m_step2 * ((nmpc_real_t)1 << 9);
+    return move_m_step2 * ((nmpc_real_t)1 << 10);
 }
 
 /* Sums of the products of a row. */
 NMPC_INLINE nmpc_real_t attitude_sum(nmpc_sum_t sum)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(sum, 30);
+    return NMPC_NUMBER_BELOW(sum, 30);
 }
 
 NMPC_INLINE nmpc_real_t row_sum(nmpc_sum_t sum)
 {
-    return (nmpc_real_t)NMPC_ROUNDED(sum, 32);
+    return NMPC_NUMBER_ABOVE(sum, 33);
 }
 
 /* ---- Inputs ---------------------------------------------------------------------------------------------------------
@@ -257,36 +301,39 @@ static int is_good_command(const nmpc_command_t *command)
 
 /* ---- Sine and cosine ------------------------------------------------------------------------------------------------
  *
- * The angle less whole quarter turns in fixed point, r, and for |r| <= pi/4 apart from rounding the Taylor series
+ * The angle less whole quarter turns, r, and for |r| <= pi/4 apart from rounding polynomials
  *
- *     sin r = r + r^3 (-1/3! + r^2/5! - ...),   cos r = 1 + r^2 (-1/2! + r^2/4! - ...).
+ *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
+ * whose largest error is as small as that of any with so many terms.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
- * absolute errors of at most 2e-09.
+ * absolute errors of at most 5e-09.
  */
 
-#define NMPC_SINE_TERMS 5
-#define NMPC_COSINE_TERMS 5
+#define NMPC_SINE_TERMS 3
+#define NMPC_COSINE_TERMS 4
 
 /* 2/pi with 31 fractional bits, pi/2 with 40. */
-static const nmpc_real_t quarter_turns_per_rad = 1367130551;
-static const nmpc_sum_t quarter_turn_rad = 1727108826179LL;
+#define NMPC_QUARTER_TURNS_PER_RAD 1367130551
+#define NMPC_QUARTER_TURN_RAD 1727108826179LL
 
+/* s0, s1, ... and c0, c1, ... */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
-    -178956971, 8947849, -213044, 2959, -27
+    -178956798, 8946391, -209329
 };
 static const nmpc_real_t cosine_terms[NMPC_COSINE_TERMS] = {
-    -536870912, 44739243, -1491308, 26631, -296
+    -536870909, 44739196, -1491079, 26189
 };
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD. */
 NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine)
 {
-    const nmpc_real_t quadrant =
-        (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)angle_rad * quarter_turns_per_rad, 31 + NMPC_YAW_BITS);
+    const nmpc_real_t count =
+        (nmpc_real_t)NMPC_ROUNDED((nmpc_sum_t)angle_rad * NMPC_QUARTER_TURNS_PER_RAD, 31 + NMPC_YAW_BITS);
     const nmpc_sum_t fine_rad = (angle_rad * ((nmpc_sum_t)1 << (40 - NMPC_YAW_BITS)))
-                                - (quadrant * quarter_turn_rad);
+                                - (count * NMPC_QUARTER_TURN_RAD);
     const nmpc_real_t rest = (nmpc_real_t)NMPC_ROUNDED(fine_rad, 40 - NMPC_SINE_BITS);
+    const unsigned int quadrant = (unsigned int)count;
     const nmpc_real_t one = (nmpc_real_t)1 << NMPC_SINE_BITS;
     const nmpc_real_t square = sine_product(rest, rest);
     nmpc_real_t sine_rest = sine_terms[NMPC_SINE_TERMS - 1];
@@ -304,23 +351,14 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
     sine_rest = rest + sine_product(rest, sine_product(square, sine_rest));
     cosine_rest = one + sine_product(square, cosine_rest);
 
-    switch ((unsigned int)quadrant % 4U) {
-    case 0U:
-        *sine = sine_rest;
-        *cosine = cosine_rest;
-        break;
-    case 1U:
-        *sine = cosine_rest;
-        *cosine = -sine_rest;
-        break;
-    case 2U:
-        *sine = -sine_rest;
-        *cosine = -cosine_rest;
-        break;
-    default:
-        *sine = -cosine_rest;
-        *cosine = sine_rest;
-        break;
+    /* The two lowest bits of the quarter turns say which of them is which, and their signs. */
+    *sine = ((quadrant & 1U) == 0U) ? sine_rest : cosine_rest;
+    *cosine = ((quadrant & 1U) == 0U) ? cosine_rest : sine_rest;
+    if ((quadrant & 2U) != 0U) {
+        *sine = -*sine;
+    }
+    if (((quadrant + 1U) & 2U) != 0U) {
+        *cosine = -*cosine;
     }
 }
 
@@ -337,8 +375,8 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
  *     roll                                              0.2300     0.0450      1.0000
  *     pitch                                             0.1540     0.0600      0.7700
  *
- * u is held over a control step; the rows below are the exact solution. Every state is limited, beyond what any
- * command within the limit makes it.
+ * u is held over a control step; the rows below are the exact solution. a, i and u are limited, beyond what any command
+ * within the limit makes them; c is a weighted mean of c and u.
  */
 
 #define NMPC_RIGHT 0
@@ -353,11 +391,11 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
 #define NMPC_PITCH_PER_ACCELERATION 1068884811
 
 /* The largest |u| that a move may have, and the largest |a|, |i| and |c|, and |u| when it turns. */
-#define NMPC_RIGHT_LIMIT_M_STEP2 46084
-#define NMPC_FORWARD_LIMIT_M_STEP2 46084
+#define NMPC_RIGHT_LIMIT_M_STEP2 23041
+#define NMPC_FORWARD_LIMIT_M_STEP2 23041
 #define NMPC_ATTITUDE_LIMIT_M_STEP2 62212207
 
-/* The next a and i of each axis from a, i, c, u; and the share of u - c that c takes in a step. */
+/* The next a and i of each axis from a, i, c, u; and the next c from c, u. */
 static const nmpc_real_t tilt_rows[2][NMPC_ATTITUDE_STATES] = {
     { 1027830970, 45680558, 40928012, 4982843 },
     { 1005976784, 67501993, 62120795, 5644245 }
@@ -366,17 +404,20 @@ static const nmpc_real_t integral_rows[2][NMPC_ATTITUDE_STATES] = {
     { -10506528, 1073501021, -213874, 10720403 },
     { -8004386, 1073468381, -248626, 8253013 }
 };
-static const nmpc_real_t lagged_shares[2] = { 213956584, 164838993 };
+static const nmpc_real_t lagged_rows[2][2] = {
+    { 859785240, 213956584 },
+    { 908902831, 164838993 }
+};
 
 NMPC_INLINE nmpc_real_t attitude_next(const nmpc_real_t row[NMPC_ATTITUDE_STATES],
                                       const nmpc_real_t state[NMPC_ATTITUDE_STATES])
 {
-    nmpc_sum_t sum = (nmpc_sum_t)row[0] * state[0];
+    nmpc_sum_t sum = wide_product(row[0], state[0]);
     int k;
 
     NMPC_UNROLL
     for (k = 1; k < NMPC_ATTITUDE_STATES; k++) {
-        sum = sum + ((nmpc_sum_t)row[k] * state[k]);
+        sum = sum + wide_product(row[k], state[k]);
     }
     return clamp(attitude_sum(sum), NMPC_ATTITUDE_LIMIT_M_STEP2);
 }
@@ -386,6 +427,7 @@ NMPC_INLINE void attitude_advance(nmpc_attitude_t *attitude)
 {
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t state[NMPC_ATTITUDE_STATES] = { attitude->tilt_m_step2[axis],
                                                           attitude->integral_m_step2[axis],
@@ -395,8 +437,7 @@ NMPC_INLINE void attitude_advance(nmpc_attitude_t *attitude)
         attitude->tilt_m_step2[axis] = attitude_next(tilt_rows[axis], state);
         attitude->integral_m_step2[axis] = attitude_next(integral_rows[axis], state);
         attitude->lagged_m_step2[axis] =
-            clamp(state[2] + sine_product(state[3] - state[2], lagged_shares[axis]),
-                  NMPC_ATTITUDE_LIMIT_M_STEP2);
+            attitude_sum(wide_product(lagged_rows[axis][0], state[2]) + wide_product(lagged_rows[axis][1], state[3]));
     }
 }
 
@@ -406,15 +447,13 @@ NMPC_INLINE void attitude_turn_vector(nmpc_real_t vector_m_step2[2], nmpc_real_t
     const nmpc_real_t right = vector_m_step2[NMPC_RIGHT];
     const nmpc_real_t forward = vector_m_step2[NMPC_FORWARD];
 
-    vector_m_step2[NMPC_RIGHT] =
-        clamp(sine_product(right, cosine) - sine_product(forward, sine), NMPC_ATTITUDE_LIMIT_M_STEP2);
-    vector_m_step2[NMPC_FORWARD] =
-        clamp(sine_product(forward, cosine) + sine_product(right, sine), NMPC_ATTITUDE_LIMIT_M_STEP2);
+    vector_m_step2[NMPC_RIGHT] = sine_product(right, cosine) - sine_product(forward, sine);
+    vector_m_step2[NMPC_FORWARD] = sine_product(forward, cosine) + sine_product(right, sine);
 }
 
 /* Turn tilt and command of the model to the heading with this sine and cosine. The integral part and the dead time
  * live in the axes of the body and stay. */
-NMPC_CALLED void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine)
+NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine)
 {
     /* Sine and cosine of the change of the heading. */
     const nmpc_real_t sine_change =
@@ -424,6 +463,9 @@ NMPC_CALLED void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc
 
     attitude_turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);
     attitude_turn_vector(attitude->command_m_step2, sine_change, cosine_change);
+    attitude->command_m_step2[NMPC_RIGHT] = clamp(attitude->command_m_step2[NMPC_RIGHT], NMPC_ATTITUDE_LIMIT_M_STEP2);
+    attitude->command_m_step2[NMPC_FORWARD] =
+        clamp(attitude->command_m_step2[NMPC_FORWARD], NMPC_ATTITUDE_LIMIT_M_STEP2);
     attitude->sine = sine;
     attitude->cosine = cosine;
 }
@@ -435,7 +477,7 @@ NMPC_INLINE void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_
     tilt_m_step2[NMPC_FORWARD] = -tilt_product(NMPC_GAIN_M_STEP2_RAD, state->pitch_rad);
 }
 
-/* The command, in rad, that stands for u; beyond the tilt limit by rounding at most. */
+/* The command, in rad, that stands for u; within the tilt limit for a move within its limit. */
 NMPC_INLINE nmpc_real_t attitude_roll(const nmpc_attitude_t *attitude)
 {
     return command_product(NMPC_ROLL_PER_ACCELERATION, attitude->command_m_step2[NMPC_RIGHT]);
@@ -486,7 +528,7 @@ static void attitude_reset(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc
  *     p(k+1) = p + v + A/2,   v(k+1) = v + A,   d(k+1) = d.
  *
  * The gains L are those of the stationary Kalman filter for the noise densities of the settings. Every estimate is
- * limited, so that it stays finite for any input.
+ * limited, p and v where they are predicted, so that it stays finite for any input.
  */
 
 #define NMPC_POSITION_BY_POSITION 1525991370 /* L11 */
@@ -495,7 +537,7 @@ static void attitude_reset(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc
 #define NMPC_VELOCITY_BY_VELOCITY 127383981 /* L22 */
 #define NMPC_DISTURBANCE_BY_POSITION 1590094610 /* L31 */
 #define NMPC_DISTURBANCE_BY_VELOCITY 145694194 /* L32 */
-#define NMPC_VELOCITY_LIMIT_M_STEP 268435456 /* of v */
+#define NMPC_VELOCITY_LIMIT_M_STEP 134217728 /* of v */
 #define NMPC_DISTURBANCE_LIMIT_M_STEP2 20615843 /* of d */
 #define NMPC_DRAG_1_STEP 1473345581 /* deceleration per velocity */
 
@@ -522,6 +564,7 @@ NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t 
 {
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t position_m = observer->position_m[axis];
         const nmpc_real_t velocity_m_step = observer->velocity_m_step[axis];
@@ -531,11 +574,9 @@ NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t 
         const nmpc_real_t n_m_step = measured_m_step - velocity_m_step;
 
         observer->position_m[axis] =
-            clamp(position_m + position_correction(NMPC_POSITION_BY_POSITION, n_m, NMPC_POSITION_BY_VELOCITY, n_m_step),
-                  NMPC_ESTIMATED_POSITION_LIMIT_M);
+            position_m + position_correction(NMPC_POSITION_BY_POSITION, n_m, NMPC_POSITION_BY_VELOCITY, n_m_step);
         observer->velocity_m_step[axis] =
-            clamp(velocity_m_step + velocity_correction(NMPC_VELOCITY_BY_POSITION, n_m, NMPC_VELOCITY_BY_VELOCITY, n_m_step),
-                  NMPC_VELOCITY_LIMIT_M_STEP);
+            velocity_m_step + velocity_correction(NMPC_VELOCITY_BY_POSITION, n_m, NMPC_VELOCITY_BY_VELOCITY, n_m_step);
         observer->disturbance_m_step2[axis] =
             clamp(observer->disturbance_m_step2[axis]
                       + disturbance_correction(NMPC_DISTURBANCE_BY_POSITION, n_m, NMPC_DISTURBANCE_BY_VELOCITY, n_m_step),
@@ -548,6 +589,7 @@ NMPC_INLINE void observer_predict(nmpc_observer_t *observer, const nmpc_real_t t
 {
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t acceleration_m_step2 = tilt_m_step2[axis] + observer_disturbance(observer, axis);
         const nmpc_real_t velocity_m_step = observer->velocity_m_step[axis];
@@ -579,11 +621,11 @@ static void observer_clear(nmpc_observer_t *observer)
  * every control step the measured acceleration M, the predicted one P and the new estimates are
  *
  *     M = tau^2/T_s (Tv_k - Tv_k-1)          P = A_T(k-1) + J_T(k-1)
- *     A_T(k) = P + alpha (M - P)             J_T(k) = J_T(k-1) + beta (M - P)
+ *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
  * with alpha = 0.5 and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an optimal set of
  * radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an acceleration
- * that rises at a constant rate is estimated without a lag. A_T and J_T are limited.
+ * that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays bounded.
  *
  * A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
  * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are 0.
@@ -591,9 +633,9 @@ static void observer_clear(nmpc_observer_t *observer)
 
 #define NMPC_TARGET_CHANGE_LIMIT_M_S 432034 /* of Tv in T_s: 1.5 g times the tilt limit, or less */
 #define NMPC_STEP_SQUARED_PER_UPDATE_S 1374389535 /* tau^2/T_s */
-#define NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2 35392249 /* of A_T: the largest M */
 #define NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE 3539225 /* of J_T: a tenth of that */
 #define NMPC_TRACKER_GAIN 536870912 /* alpha */
+#define NMPC_TRACKER_REST 536870912 /* 1 - alpha */
 #define NMPC_TRACKER_JERK_GAIN 178956971 /* beta */
 
 /* Forget the target: no velocity, no acceleration, no jerk. */
@@ -615,9 +657,8 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
     const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
     const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
 
-    tracker->acceleration_m_step2[axis] =
-        clamp(predicted_m_step2 + tracker_product(NMPC_TRACKER_GAIN, difference_m_step2),
-                   NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2);
+    tracker->acceleration_m_step2[axis] = tracker_product(NMPC_TRACKER_REST, predicted_m_step2)
+                                          + tracker_product(NMPC_TRACKER_GAIN, measured_m_step2);
     tracker->jerk_m_step2_update[axis] =
         clamp(tracker->jerk_m_step2_update[axis]
                        + tracker_product(NMPC_TRACKER_JERK_GAIN, difference_m_step2),
@@ -630,6 +671,7 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
     nmpc_tracker_t *const tracker = &self->tracker;
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t change_m_s = velocity_m_s[axis] - tracker->velocity_m_s[axis];
         const int is_steady = within(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
@@ -678,12 +720,12 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
 /* U1 and U2 from e, v, w, j, a, i, c, u, for right and forward. */
 static const nmpc_real_t move_rows[2][2][NMPC_STATES] = {
     {
-    { -169881193, -20659517, -2425026, 37249335, -1108732, -1185716, -198544, 7270462 },
-    { -645531653, -119096516, -21898683, 543645545, -6465260, -12167309, -1207633, -5843842 }
+    { -339762385, -41319035, -2425026, 37249335, -1108732, -1185716, -198544, 7270462 },
+    { -1291063305, -238193032, -21898683, 543645545, -6465260, -12167309, -1207633, -5843842 }
     },
     {
-    { -170431038, -19830286, -2219138, 32298837, -810315, -1297120, -280381, 7259827 },
-    { -642891465, -115263620, -20590701, 499474102, -4674244, -13180671, -1710208, -5823726 }
+    { -340862076, -39660571, -2219138, 32298837, -810315, -1297120, -280381, 7259827 },
+    { -1285782930, -230527239, -20590701, 499474102, -4674244, -13180671, -1710208, -5823726 }
     }
 };
 
@@ -692,26 +734,43 @@ static const nmpc_real_t move_ratios[2] = { 1359810574, 1363286600 };
 
 NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
 {
-    nmpc_sum_t sum = (nmpc_sum_t)row[0] * state[0];
+    nmpc_sum_t sum = wide_product(row[0], state[0]);
     int k;
 
     NMPC_UNROLL
     for (k = 1; k < NMPC_STATES; k++) {
-        sum = sum + ((nmpc_sum_t)row[k] * state[k]);
+        sum = sum + wide_product(row[k], state[k]);
     }
     return row_sum(sum);
 }
 
-/* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
- * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`. */
-NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES],
-                                           nmpc_real_t limit_m_step2)
+/* Return `move_m_step2` within +/- `limit_m_step2`; at the limit or beyond it, set `saturated` to 1. */
+NMPC_INLINE nmpc_real_t optimizer_limit(nmpc_real_t move_m_step2, nmpc_real_t limit_m_step2, unsigned char *saturated)
 {
-    const nmpc_real_t first = optimizer_row(move_rows[axis][0], state);
-    const nmpc_real_t second = optimizer_row(move_rows[axis][1], state);
-    const nmpc_real_t second_change = clamp(second, limit_m_step2) - second;
+    nmpc_real_t limited_m_step2 = move_m_step2;
 
-    return clamp(first - ratio_product(move_ratios[axis], second_change), limit_m_step2);
+    if (reaches(move_m_step2, limit_m_step2) != 0) {
+        limited_m_step2 = (move_m_step2 < (nmpc_real_t)0) ? -limit_m_step2 : limit_m_step2;
+        *saturated = 1U;
+    }
+    return limited_m_step2;
+}
+
+/* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
+ * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`; set `saturated` to 1 if it is reached. */
+NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2,
+                                           unsigned char *saturated)
+{
+    nmpc_real_t move_m_step2 = optimizer_row(move_rows[axis][0], state);
+    const nmpc_real_t second_m_step2 = optimizer_row(move_rows[axis][1], state);
+
+    if (within(second_m_step2, limit_m_step2) == 0) {
+        const nmpc_real_t change_m_step2 =
+            ((second_m_step2 < (nmpc_real_t)0) ? -limit_m_step2 : limit_m_step2) - second_m_step2;
+
+        move_m_step2 = move_m_step2 - ratio_product(move_ratios[axis], change_m_step2);
+    }
+    return optimizer_limit(move_m_step2, limit_m_step2, saturated);
 }
 
 /* ---- Step -----------------------------------------------------------------------------------------------------------
@@ -734,120 +793,105 @@ NMPC_INLINE int has_estimate(const nmpc_t *self)
 }
 
 /* Set `right` and `forward` to the components of a vector along x and y. */
-NMPC_INLINE void turn_to_heading(const nmpc_t *self, nmpc_real_t x, nmpc_real_t y, nmpc_real_t *right,
+NMPC_INLINE void turn_to_heading(const nmpc_attitude_t *attitude, nmpc_real_t x, nmpc_real_t y, nmpc_real_t *right,
                                  nmpc_real_t *forward)
 {
-    *right = sine_product(y, self->attitude.cosine) - sine_product(x, self->attitude.sine);
-    *forward = sine_product(x, self->attitude.cosine) + sine_product(y, self->attitude.sine);
+    *right = sine_product(y, attitude->cosine) - sine_product(x, attitude->sine);
+    *forward = sine_product(x, attitude->cosine) + sine_product(y, attitude->sine);
 }
 
-/* The error of the estimated velocity along `axis`. */
-NMPC_INLINE nmpc_real_t velocity_error(const nmpc_t *self, const nmpc_target_t *target, int axis)
+/* Set the next command of the model to the minimum of the cost along both axes; `tilt_m_step2` is the acceleration of
+ * the tilt, right and forward. Set `saturated` to whether a move lies at its limit. */
+NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *observer, const nmpc_tracker_t *tracker,
+                          const nmpc_target_t *target, const nmpc_real_t tilt_m_step2[2], unsigned char *saturated)
 {
-    return self->observer.velocity_m_step[axis] - speed_product(NMPC_UPDATE_STEP_S, target->velocity_m_s[axis]);
-}
-
-/* The disturbance less the target's acceleration along `axis`. */
-NMPC_INLINE nmpc_real_t acceleration_error(const nmpc_t *self, int axis)
-{
-    return observer_disturbance(&self->observer, axis) - self->tracker.acceleration_m_step2[axis];
-}
-
-/* Minimise the cost along both axes, which gives the model's next command; `tilt_m_step2` is the acceleration of the
- * tilt, right and forward. */
-NMPC_INLINE void minimize(nmpc_t *self, const nmpc_target_t *target, const nmpc_real_t tilt_m_step2[2])
-{
-    nmpc_attitude_t *const attitude = &self->attitude;
     nmpc_real_t state[2][NMPC_STATES];
+    nmpc_real_t error[3][2]; /* e, v and w along x and y */
     nmpc_real_t right_m_step2;
     nmpc_real_t forward_m_step2;
     int axis;
 
-    turn_to_heading(self, self->observer.position_m[0] - target->position_m[0],
-                    self->observer.position_m[1] - target->position_m[1], &state[NMPC_RIGHT][0],
-                    &state[NMPC_FORWARD][0]);
-    turn_to_heading(self, velocity_error(self, target, 0), velocity_error(self, target, 1), &state[NMPC_RIGHT][1],
-                    &state[NMPC_FORWARD][1]);
-    turn_to_heading(self, acceleration_error(self, 0), acceleration_error(self, 1), &state[NMPC_RIGHT][2],
-                    &state[NMPC_FORWARD][2]);
-    turn_to_heading(self, self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[1],
-                    &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
+        error[0][axis] = observer->position_m[axis] - target->position_m[axis];
+        error[1][axis] = observer->velocity_m_step[axis]
+                         - speed_product(NMPC_UPDATE_STEP_S, target->velocity_m_s[axis]);
+        error[2][axis] = observer_disturbance(observer, axis) - tracker->acceleration_m_step2[axis];
+        state[axis][3] = (nmpc_real_t)0;
         state[axis][4] = tilt_m_step2[axis];
         state[axis][5] = attitude->integral_m_step2[axis];
         state[axis][6] = attitude->lagged_m_step2[axis];
         state[axis][7] = attitude->command_m_step2[axis];
     }
-    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2);
-    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], NMPC_FORWARD_LIMIT_M_STEP2);
+    NMPC_UNROLL
+    for (axis = 0; axis < 3; axis++) {
+        turn_to_heading(attitude, error[axis][0], error[axis][1], &state[NMPC_RIGHT][axis],
+                        &state[NMPC_FORWARD][axis]);
+    }
+    turn_to_heading(attitude, tracker->jerk_m_step2_update[0], tracker->jerk_m_step2_update[1],
+                    &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
+    *saturated = 0U;
+    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2, saturated);
+    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], NMPC_FORWARD_LIMIT_M_STEP2, saturated);
     attitude->command_m_step2[NMPC_RIGHT] = move_acceleration(right_m_step2);
     attitude->command_m_step2[NMPC_FORWARD] = move_acceleration(forward_m_step2);
-    self->saturated = ((reaches(right_m_step2, NMPC_RIGHT_LIMIT_M_STEP2) != 0)
-                       || (reaches(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2) != 0))
-                          ? 1U
-                          : 0U;
-}
-
-/* Set `tilt_m_step2` to the accelerations, right and forward, of the measured attitude, and `feedback_rad` to what its
- * rates add to the commands. */
-NMPC_INLINE void measure(nmpc_t *self, const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2],
-                         nmpc_real_t feedback_rad[2])
-{
-    nmpc_real_t sine;
-    nmpc_real_t cosine;
-
-    sine_cosine(state->yaw_rad, &sine, &cosine);
-    if (has_estimate(self) == 0) {
-        self->attitude.sine = sine;
-        self->attitude.cosine = cosine;
-    } else {
-        attitude_turn(&self->attitude, sine, cosine);
-    }
-    if (self->missed == 0U) {
-        feedback_rad[0] = feedback_product(NMPC_ROLL_FEEDBACK_STEPS, state->roll_rad - self->tilt_rad[0]);
-        feedback_rad[1] = feedback_product(NMPC_PITCH_FEEDBACK_STEPS, state->pitch_rad - self->tilt_rad[1]);
-    }
-    self->tilt_rad[0] = state->roll_rad;
-    self->tilt_rad[1] = state->pitch_rad;
-    attitude_measure(state, tilt_m_step2);
 }
 
 /* Take a control step. A null `state` stands for one that is not good, a null `target` for inputs that allow no new
  * command. */
 NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target)
 {
+    nmpc_attitude_t *const attitude = &self->attitude;
+    nmpc_observer_t *const observer = &self->observer;
     nmpc_real_t tilt_m_step2[2];
     nmpc_real_t world_m_step2[2];
     nmpc_real_t feedback_rad[2] = { (nmpc_real_t)0, (nmpc_real_t)0 };
+    unsigned int missed = self->missed;
 
-    attitude_advance(&self->attitude);
+    attitude_advance(attitude);
     if (state != NULL) {
-        measure(self, state, tilt_m_step2, feedback_rad);
-    } else {
-        tilt_m_step2[NMPC_RIGHT] = self->attitude.tilt_m_step2[NMPC_RIGHT];
-        tilt_m_step2[NMPC_FORWARD] = self->attitude.tilt_m_step2[NMPC_FORWARD];
-    }
-    world_m_step2[0] = sine_product(tilt_m_step2[NMPC_FORWARD], self->attitude.cosine)
-                       - sine_product(tilt_m_step2[NMPC_RIGHT], self->attitude.sine);
-    world_m_step2[1] = sine_product(tilt_m_step2[NMPC_RIGHT], self->attitude.cosine)
-                       + sine_product(tilt_m_step2[NMPC_FORWARD], self->attitude.sine);
-    if (state == NULL) {
-        self->missed = (unsigned char)((self->missed < NMPC_NO_ESTIMATE) ? (self->missed + 1U) : NMPC_NO_ESTIMATE);
-    } else {
-        if (has_estimate(self) == 0) {
-            observer_start(&self->observer, state);
+        nmpc_real_t sine;
+        nmpc_real_t cosine;
+
+        sine_cosine(state->yaw_rad, &sine, &cosine);
+        if (missed == NMPC_NO_ESTIMATE) {
+            attitude->sine = sine;
+            attitude->cosine = cosine;
         } else {
-            observer_correct(&self->observer, state);
+            attitude_turn(attitude, sine, cosine);
         }
-        self->missed = 0U;
+        attitude_measure(state, tilt_m_step2);
+    } else {
+        tilt_m_step2[NMPC_RIGHT] = attitude->tilt_m_step2[NMPC_RIGHT];
+        tilt_m_step2[NMPC_FORWARD] = attitude->tilt_m_step2[NMPC_FORWARD];
     }
-    if ((target != NULL) && (has_estimate(self) != 0)) {
+    world_m_step2[0] = sine_product(tilt_m_step2[NMPC_FORWARD], attitude->cosine)
+                       - sine_product(tilt_m_step2[NMPC_RIGHT], attitude->sine);
+    world_m_step2[1] = sine_product(tilt_m_step2[NMPC_RIGHT], attitude->cosine)
+                       + sine_product(tilt_m_step2[NMPC_FORWARD], attitude->sine);
+    if (state == NULL) {
+        missed = (missed < NMPC_NO_ESTIMATE) ? (missed + 1U) : NMPC_NO_ESTIMATE;
+    } else {
+        if (missed == NMPC_NO_ESTIMATE) {
+            observer_start(observer, state);
+        } else {
+            observer_correct(observer, state);
+        }
+        if (missed == 0U) {
+            feedback_rad[0] = feedback_product(NMPC_ROLL_FEEDBACK_STEPS, state->roll_rad - self->tilt_rad[0]);
+        }
+        self->tilt_rad[0] = state->roll_rad;
+        self->tilt_rad[1] = state->pitch_rad;
+        missed = 0U;
+    }
+    if ((target != NULL) && (missed != NMPC_NO_ESTIMATE)) {
         tracker_update(self, target->velocity_m_s);
-        minimize(self, target, self->attitude.tilt_m_step2);
-        self->command_rad[0] = clamp(attitude_roll(&self->attitude) + feedback_rad[0], NMPC_TILT_LIMIT_RAD);
-        self->command_rad[1] = clamp(attitude_pitch(&self->attitude) + feedback_rad[1], NMPC_TILT_LIMIT_RAD);
+        minimize(attitude, observer, &self->tracker, target, attitude->tilt_m_step2, &self->saturated);
+        self->command_rad[0] = clamp(attitude_roll(attitude) + feedback_rad[0], NMPC_TILT_LIMIT_RAD);
+        self->command_rad[1] = attitude_pitch(attitude);
     }
-    observer_predict(&self->observer, world_m_step2);
+    observer_predict(observer, world_m_step2);
+    self->missed = (unsigned char)missed;
 }
 
 /* ---- Interface ------------------------------------------------------------------------------------------------------
@@ -921,20 +965,23 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
     }
 
     if ((state != NULL) && (target != NULL)) {
-        const int has_state = is_good_state(state);
-        const int has_target = is_good_target(target);
-        const int has_thrust = is_good_thrust(thrust_acceleration_m_s2);
+        const nmpc_state_t *good_state = state;
+        const nmpc_target_t *good_target = target;
 
-        advance(self, (has_state != 0) ? state : NULL, ((has_target != 0) && (has_thrust != 0)) ? target : NULL);
-        if (has_state == 0) {
-            status = NMPC_BAD_STATE;
-        } else if (has_target == 0) {
-            status = NMPC_BAD_TARGET;
-        } else if (has_thrust == 0) {
+        status = NMPC_OK;
+        if (is_good_thrust(thrust_acceleration_m_s2) == 0) {
             status = NMPC_BAD_THRUST;
-        } else {
-            status = NMPC_OK;
+            good_target = NULL;
         }
+        if (is_good_target(target) == 0) {
+            status = NMPC_BAD_TARGET;
+            good_target = NULL;
+        }
+        if (is_good_state(state) == 0) {
+            status = NMPC_BAD_STATE;
+            good_state = NULL;
+        }
+        advance(self, good_state, good_target);
     }
     command->roll_rad = self->command_rad[0];
     command->pitch_rad = self->command_rad[1];
@@ -975,13 +1022,13 @@ const char *nmpc_version(void)
  */
 
 /* Factors from SI units to numbers, and from numbers to SI units. */
-#define NMPC_POSITION_SCALE 524288.0f
+#define NMPC_POSITION_SCALE 262144.0f
 #define NMPC_VELOCITY_SCALE 8.388608e+06f
 #define NMPC_ANGLE_SCALE 3.3554432e+07f
 #define NMPC_YAW_SCALE 1.048576e+06f
 #define NMPC_THRUST_SCALE 3.3554432e+07f
 #define NMPC_ANGLE_UNIT 2.9802322e-08f
-#define NMPC_POSITION_UNIT 1.9073486e-06f
+#define NMPC_POSITION_UNIT 3.8146973e-06f
 #define NMPC_VELOCITY_UNIT 1.1920929e-07f
 #define NMPC_DISTURBANCE_UNIT 1.8626451e-09f
 

@@ -109,7 +109,7 @@ typedef long long nmpc_sum_t;
 /* An input outside of these ranges is refused: +/- a range, and for the thrust from MIN to MAX. The attitude may
  * be a little more than half a turn: a range that refuses most values in degrees. Up to the range of yaw the
  * reduction of the angle in nmpc.c is accurate. */
-#define NMPC_POSITION_RANGE_M 524288000
+#define NMPC_POSITION_RANGE_M 262144000
 #define NMPC_VELOCITY_RANGE_M_S 838860800
 #define NMPC_ATTITUDE_RANGE_RAD 109051904
 #define NMPC_YAW_RANGE_RAD 1073741824
@@ -117,11 +117,11 @@ typedef long long nmpc_sum_t;
 #define NMPC_THRUST_ACCELERATION_MAX_M_S2 1677721600
 
 /* The estimated position stays within this. */
-#define NMPC_ESTIMATED_POSITION_LIMIT_M 524288000
+#define NMPC_ESTIMATED_POSITION_LIMIT_M 262144000
 
 /* Fractional bits of inputs and outputs: 1.5 m is the number 1.5 * 2^NMPC_POSITION_BITS. Positions, m; velocities,
  * m/s; roll, pitch and command, rad; yaw, rad; thrust acceleration and disturbance, m/s^2. */
-#define NMPC_POSITION_BITS 19
+#define NMPC_POSITION_BITS 18
 #define NMPC_VELOCITY_BITS 23
 #define NMPC_ANGLE_BITS 25
 #define NMPC_YAW_BITS 20

@@ -47,11 +47,15 @@ typedef char nmpc_assert_instance_fits[(sizeof(nmpc_t) <= NMPC_INSTANCE_BYTES) ?
 typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_STORED_NUMBERS * sizeof(nmpc_real_t)))
                                             ? 1 : -1];
 
-/* A function of a control step. */
+/* A function of a control step, inlined in any case: the axis is then a constant, the coefficients are operands of the
+ * instructions, and the states stay in registers. Other compilers than gcc and clang decide for themselves. */
+#if defined(__GNUC__)
+#define NMPC_INLINE static inline __attribute__((always_inline))
+#else
 #define NMPC_INLINE static inline
+#endif
 
-/* Ask gcc to unroll the next loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
- * compilers decide for themselves. */
+/* Ask gcc to unroll the next loop; other compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
 #else
@@ -84,6 +88,29 @@ NMPC_INLINE nmpc_bits_t bits_of(nmpc_real_t value)
     return view.bits;
 }
 
+#if defined(__GNUC__)
+/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
+ * numbers takes the place of two of floats; the shift lets a Cortex-M drop the sign in the comparison itself. */
+#define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)
+
+/* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. `minimum` must be positive. */
+NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
+{
+    return (bits_of(value) >= bits_of(minimum)) && (bits_of(value) <= bits_of(maximum));
+}
+
+/* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
+NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
+{
+    return NMPC_MAGNITUDE_BITS(value) <= NMPC_MAGNITUDE_BITS(limit);
+}
+
+/* 1 if |`value`| >= `limit`, else 0. */
+NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
+{
+    return NMPC_MAGNITUDE_BITS(value) >= NMPC_MAGNITUDE_BITS(limit);
+}
+#else
 /* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
 NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
@@ -94,23 +121,6 @@ NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maxi
     return (is_at_least != 0) && (is_at_most != 0);
 }
 
-#if defined(__GNUC__)
-/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
- * numbers takes the place of two of floats. */
-#define NMPC_MAGNITUDE_BITS ((nmpc_bits_t)0x7FFFFFFFUL)
-
-/* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
-NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
-{
-    return (bits_of(value) & NMPC_MAGNITUDE_BITS) <= bits_of(limit);
-}
-
-/* 1 if |`value`| >= `limit`, else 0. */
-NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
-{
-    return (bits_of(value) & NMPC_MAGNITUDE_BITS) >= bits_of(limit);
-}
-#else
 /* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
 NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
@@ -175,39 +185,40 @@ static int is_good_command(const nmpc_command_t *command)
 
 /* ---- Sine and cosine ------------------------------------------------------------------------------------------------
  *
- * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding the Taylor series
+ * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding polynomials
  *
- *     sin r = r + r^3 (-1/3! + r^2/5! - ...),   cos r = 1 + r^2 (-1/2! + r^2/4! - ...).
+ *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
+ * whose largest error is as small as that of any with so many terms.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
  * absolute errors of at most 1.2e-07.
  */
 
-#define NMPC_SINE_TERMS 4
-#define NMPC_COSINE_TERMS 5
+#define NMPC_SINE_TERMS 3
+#define NMPC_COSINE_TERMS 3
 
-/* 2/pi, and pi/2 as the sum of three parts; the first two have so few bits that quadrant * part is exact. */
-static const nmpc_real_t quarter_turns_per_rad = 0.63661975f;
-static const nmpc_real_t quarter_turn_rad[3] = {
-    1.5707397f, 5.657971e-05f, 9.920936e-10f
-};
+/* 2/pi; 1.5 over the precision: a sum with it is rounded to a whole number, whose lowest bits are those of the sum; and
+ * pi/2 in two parts, of which the first has so few bits that its products with the quarter turns are exact. */
+#define NMPC_QUARTER_TURNS_PER_RAD 0.63661975f
+#define NMPC_ROUNDING 1.2582912e+07f
+#define NMPC_QUARTER_TURN_RAD 1.5707397f
+#define NMPC_QUARTER_TURN_REST_RAD 5.6580702e-05f
 
+/* s0, s1, ... and c0, c1, ... */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
-    -0.16666667f, 0.008333334f, -0.0001984127f, 2.7557319e-06f
+    -0.16666651f, 0.008331976f, -0.00019495294f
 };
 static const nmpc_real_t cosine_terms[NMPC_COSINE_TERMS] = {
-    -0.5f, 0.041666668f, -0.0013888889f, 2.4801588e-05f, -2.755732e-07f
+    -0.49999896f, 0.041656274f, -0.0013597534f
 };
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD. */
 NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine)
 {
-    const nmpc_real_t half = 0.5f;
-    const nmpc_real_t quarter_turns = angle_rad * quarter_turns_per_rad;
-    const int quadrant = (int)(quarter_turns + ((quarter_turns < (nmpc_real_t)0) ? -half : half));
-    const nmpc_real_t count = (nmpc_real_t)quadrant;
-    const nmpc_real_t rest = ((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))
-                             - (count * quarter_turn_rad[2]);
+    const nmpc_real_t sum = (angle_rad * NMPC_QUARTER_TURNS_PER_RAD) + NMPC_ROUNDING;
+    const nmpc_real_t count = sum - NMPC_ROUNDING;
+    const nmpc_real_t rest = (angle_rad - (count * NMPC_QUARTER_TURN_RAD)) - (count * NMPC_QUARTER_TURN_REST_RAD);
+    const nmpc_bits_t quadrant = bits_of(sum);
     const nmpc_real_t one = (nmpc_real_t)1;
     const nmpc_real_t square = rest * rest;
     nmpc_real_t sine_rest = sine_terms[NMPC_SINE_TERMS - 1];
@@ -225,23 +236,14 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
     sine_rest = rest + (rest * (square * sine_rest));
     cosine_rest = one + (square * cosine_rest);
 
-    switch ((unsigned int)quadrant % 4U) {
-    case 0U:
-        *sine = sine_rest;
-        *cosine = cosine_rest;
-        break;
-    case 1U:
-        *sine = cosine_rest;
-        *cosine = -sine_rest;
-        break;
-    case 2U:
-        *sine = -sine_rest;
-        *cosine = -cosine_rest;
-        break;
-    default:
-        *sine = -cosine_rest;
-        *cosine = sine_rest;
-        break;
+    /* The two lowest bits of the quarter turns say which of them is which, and their signs. */
+    *sine = ((quadrant & 1U) == 0U) ? sine_rest : cosine_rest;
+    *cosine = ((quadrant & 1U) == 0U) ? cosine_rest : sine_rest;
+    if ((quadrant & 2U) != 0U) {
+        *sine = -*sine;
+    }
+    if (((quadrant + 1U) & 2U) != 0U) {
+        *cosine = -*cosine;
     }
 }
 
@@ -258,8 +260,8 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
  *     roll                                              0.2300     0.0450      1.0000
  *     pitch                                             0.1540     0.0600      0.7700
  *
- * u is held over a control step; the rows below are the exact solution. Every state is limited, beyond what any
- * command within the limit makes it.
+ * u is held over a control step; the rows below are the exact solution. a, i and u are limited, beyond what any command
+ * within the limit makes them; c is a weighted mean of c and u.
  */
 
 #define NMPC_RIGHT 0
@@ -278,7 +280,7 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
 #define NMPC_FORWARD_LIMIT_M_STEP2 0.00034335f
 #define NMPC_ATTITUDE_LIMIT_M_STEP2 0.0009053068f
 
-/* The next a and i of each axis from a, i, c, u; and the share of u - c that c takes in a step. */
+/* The next a and i of each axis from a, i, c, u; and the next c from c, u. */
 static const nmpc_real_t tilt_rows[2][NMPC_ATTITUDE_STATES] = {
     { 0.9572422f, 0.042543333f, 0.03811718f, 0.0046406337f },
     { 0.9368889f, 0.06286613f, 0.0578545f, 0.0052566133f }
@@ -287,7 +289,10 @@ static const nmpc_real_t integral_rows[2][NMPC_ATTITUDE_STATES] = {
     { -0.009784967f, 0.9997757f, -0.00019918587f, 0.009984153f },
     { -0.007454666f, 0.9997453f, -0.00023155124f, 0.007686217f }
 };
-static const nmpc_real_t lagged_shares[2] = { 0.1992626f, 0.15351827f };
+static const nmpc_real_t lagged_rows[2][2] = {
+    { 0.8007374f, 0.1992626f },
+    { 0.84648174f, 0.15351827f }
+};
 
 NMPC_INLINE nmpc_real_t attitude_next(const nmpc_real_t row[NMPC_ATTITUDE_STATES],
                                       const nmpc_real_t state[NMPC_ATTITUDE_STATES])
@@ -307,6 +312,7 @@ NMPC_INLINE void attitude_advance(nmpc_attitude_t *attitude)
 {
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t state[NMPC_ATTITUDE_STATES] = { attitude->tilt_m_step2[axis],
                                                           attitude->integral_m_step2[axis],
@@ -316,8 +322,7 @@ NMPC_INLINE void attitude_advance(nmpc_attitude_t *attitude)
         attitude->tilt_m_step2[axis] = attitude_next(tilt_rows[axis], state);
         attitude->integral_m_step2[axis] = attitude_next(integral_rows[axis], state);
         attitude->lagged_m_step2[axis] =
-            clamp(state[2] + ((state[3] - state[2]) * lagged_shares[axis]),
-                  NMPC_ATTITUDE_LIMIT_M_STEP2);
+            (lagged_rows[axis][0] * state[2]) + (lagged_rows[axis][1] * state[3]);
     }
 }
 
@@ -327,10 +332,8 @@ NMPC_INLINE void attitude_turn_vector(nmpc_real_t vector_m_step2[2], nmpc_real_t
     const nmpc_real_t right = vector_m_step2[NMPC_RIGHT];
     const nmpc_real_t forward = vector_m_step2[NMPC_FORWARD];
 
-    vector_m_step2[NMPC_RIGHT] =
-        clamp((right * cosine) - (forward * sine), NMPC_ATTITUDE_LIMIT_M_STEP2);
-    vector_m_step2[NMPC_FORWARD] =
-        clamp((forward * cosine) + (right * sine), NMPC_ATTITUDE_LIMIT_M_STEP2);
+    vector_m_step2[NMPC_RIGHT] = (right * cosine) - (forward * sine);
+    vector_m_step2[NMPC_FORWARD] = (forward * cosine) + (right * sine);
 }
 
 /* Turn tilt and command of the model to the heading with this sine and cosine. The integral part and the dead time
@@ -345,6 +348,9 @@ NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc
 
     attitude_turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);
     attitude_turn_vector(attitude->command_m_step2, sine_change, cosine_change);
+    attitude->command_m_step2[NMPC_RIGHT] = clamp(attitude->command_m_step2[NMPC_RIGHT], NMPC_ATTITUDE_LIMIT_M_STEP2);
+    attitude->command_m_step2[NMPC_FORWARD] =
+        clamp(attitude->command_m_step2[NMPC_FORWARD], NMPC_ATTITUDE_LIMIT_M_STEP2);
     attitude->sine = sine;
     attitude->cosine = cosine;
 }
@@ -356,7 +362,7 @@ NMPC_INLINE void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_
     tilt_m_step2[NMPC_FORWARD] = -(NMPC_GAIN_M_STEP2_RAD * state->pitch_rad);
 }
 
-/* The command, in rad, that stands for u; beyond the tilt limit by rounding at most. */
+/* The command, in rad, that stands for u; within the tilt limit for a move within its limit. */
 NMPC_INLINE nmpc_real_t attitude_roll(const nmpc_attitude_t *attitude)
 {
     return NMPC_ROLL_PER_ACCELERATION * attitude->command_m_step2[NMPC_RIGHT];
@@ -407,7 +413,7 @@ static void attitude_reset(nmpc_attitude_t *attitude, nmpc_real_t roll_rad, nmpc
  *     p(k+1) = p + v + A/2,   v(k+1) = v + A,   d(k+1) = d.
  *
  * The gains L are those of the stationary Kalman filter for the noise densities of the settings. Every estimate is
- * limited, so that it stays finite for any input.
+ * limited, p and v where they are predicted, so that it stays finite for any input.
  */
 
 #define NMPC_POSITION_BY_POSITION 0.044412196f /* L11 */
@@ -444,6 +450,7 @@ NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t 
 {
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t position_m = observer->position_m[axis];
         const nmpc_real_t velocity_m_step = observer->velocity_m_step[axis];
@@ -453,11 +460,9 @@ NMPC_INLINE void observer_correct(nmpc_observer_t *observer, const nmpc_state_t 
         const nmpc_real_t n_m_step = measured_m_step - velocity_m_step;
 
         observer->position_m[axis] =
-            clamp(position_m + ((NMPC_POSITION_BY_POSITION * n_m) + (NMPC_POSITION_BY_VELOCITY * n_m_step)),
-                  NMPC_ESTIMATED_POSITION_LIMIT_M);
+            position_m + ((NMPC_POSITION_BY_POSITION * n_m) + (NMPC_POSITION_BY_VELOCITY * n_m_step));
         observer->velocity_m_step[axis] =
-            clamp(velocity_m_step + ((NMPC_VELOCITY_BY_POSITION * n_m) + (NMPC_VELOCITY_BY_VELOCITY * n_m_step)),
-                  NMPC_VELOCITY_LIMIT_M_STEP);
+            velocity_m_step + ((NMPC_VELOCITY_BY_POSITION * n_m) + (NMPC_VELOCITY_BY_VELOCITY * n_m_step));
         observer->disturbance_m_step2[axis] =
             clamp(observer->disturbance_m_step2[axis]
                       + ((NMPC_DISTURBANCE_BY_POSITION * n_m) + (NMPC_DISTURBANCE_BY_VELOCITY * n_m_step)),
@@ -470,6 +475,7 @@ NMPC_INLINE void observer_predict(nmpc_observer_t *observer, const nmpc_real_t t
 {
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t acceleration_m_step2 = tilt_m_step2[axis] + observer_disturbance(observer, axis);
         const nmpc_real_t velocity_m_step = observer->velocity_m_step[axis];
@@ -501,11 +507,11 @@ static void observer_clear(nmpc_observer_t *observer)
  * every control step the measured acceleration M, the predicted one P and the new estimates are
  *
  *     M = tau^2/T_s (Tv_k - Tv_k-1)          P = A_T(k-1) + J_T(k-1)
- *     A_T(k) = P + alpha (M - P)             J_T(k) = J_T(k-1) + beta (M - P)
+ *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
  * with alpha = 0.5 and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an optimal set of
  * radar track-while-scan smoothing equations, IRE Transactions on Automatic Control 7(4), 1962). So an acceleration
- * that rises at a constant rate is estimated without a lag. A_T and J_T are limited.
+ * that rises at a constant rate is estimated without a lag. J_T is limited; so A_T, a weighted mean, stays bounded.
  *
  * A change of velocity of more than 1.5 times what gravity and the tilt limit let the drone follow is a jump: the
  * target was set elsewhere. Then A_T stays and J_T is 0. In the first control step there is no Tv_k-1, and both are 0.
@@ -513,9 +519,9 @@ static void observer_clear(nmpc_observer_t *observer)
 
 #define NMPC_TARGET_CHANGE_LIMIT_M_S 0.0515025f /* of Tv in T_s: 1.5 g times the tilt limit, or less */
 #define NMPC_STEP_SQUARED_PER_UPDATE_S 0.01f /* tau^2/T_s */
-#define NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2 0.000515025f /* of A_T: the largest M */
 #define NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE 5.15025e-05f /* of J_T: a tenth of that */
 #define NMPC_TRACKER_GAIN 0.5f /* alpha */
+#define NMPC_TRACKER_REST 0.5f /* 1 - alpha */
 #define NMPC_TRACKER_JERK_GAIN 0.16666667f /* beta */
 
 /* Forget the target: no velocity, no acceleration, no jerk. */
@@ -537,9 +543,8 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
     const nmpc_real_t predicted_m_step2 = tracker->acceleration_m_step2[axis] + tracker->jerk_m_step2_update[axis];
     const nmpc_real_t difference_m_step2 = measured_m_step2 - predicted_m_step2;
 
-    tracker->acceleration_m_step2[axis] =
-        clamp(predicted_m_step2 + (NMPC_TRACKER_GAIN * difference_m_step2),
-                   NMPC_TARGET_ACCELERATION_LIMIT_M_STEP2);
+    tracker->acceleration_m_step2[axis] = (NMPC_TRACKER_REST * predicted_m_step2)
+                                          + (NMPC_TRACKER_GAIN * measured_m_step2);
     tracker->jerk_m_step2_update[axis] =
         clamp(tracker->jerk_m_step2_update[axis]
                        + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
@@ -552,6 +557,7 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
     nmpc_tracker_t *const tracker = &self->tracker;
     int axis;
 
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
         const nmpc_real_t change_m_s = velocity_m_s[axis] - tracker->velocity_m_s[axis];
         const int is_steady = within(change_m_s, NMPC_TARGET_CHANGE_LIMIT_M_S);
@@ -625,16 +631,33 @@ NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const 
     return sum;
 }
 
-/* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
- * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`. */
-NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES],
-                                           nmpc_real_t limit_m_step2)
+/* Return `move_m_step2` within +/- `limit_m_step2`; at the limit or beyond it, set `saturated` to 1. */
+NMPC_INLINE nmpc_real_t optimizer_limit(nmpc_real_t move_m_step2, nmpc_real_t limit_m_step2, unsigned char *saturated)
 {
-    const nmpc_real_t first = optimizer_row(move_rows[axis][0], state);
-    const nmpc_real_t second = optimizer_row(move_rows[axis][1], state);
-    const nmpc_real_t second_change = clamp(second, limit_m_step2) - second;
+    nmpc_real_t limited_m_step2 = move_m_step2;
 
-    return clamp(first - (move_ratios[axis] * second_change), limit_m_step2);
+    if (reaches(move_m_step2, limit_m_step2) != 0) {
+        limited_m_step2 = (move_m_step2 < (nmpc_real_t)0) ? -limit_m_step2 : limit_m_step2;
+        *saturated = 1U;
+    }
+    return limited_m_step2;
+}
+
+/* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
+ * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`; set `saturated` to 1 if it is reached. */
+NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2,
+                                           unsigned char *saturated)
+{
+    nmpc_real_t move_m_step2 = optimizer_row(move_rows[axis][0], state);
+    const nmpc_real_t second_m_step2 = optimizer_row(move_rows[axis][1], state);
+
+    if (within(second_m_step2, limit_m_step2) == 0) {
+        const nmpc_real_t change_m_step2 =
+            ((second_m_step2 < (nmpc_real_t)0) ? -limit_m_step2 : limit_m_step2) - second_m_step2;
+
+        move_m_step2 = move_m_step2 - (move_ratios[axis] * change_m_step2);
+    }
+    return optimizer_limit(move_m_step2, limit_m_step2, saturated);
 }
 
 /* ---- Step -----------------------------------------------------------------------------------------------------------
@@ -657,120 +680,110 @@ NMPC_INLINE int has_estimate(const nmpc_t *self)
 }
 
 /* Set `right` and `forward` to the components of a vector along x and y. */
-NMPC_INLINE void turn_to_heading(const nmpc_t *self, nmpc_real_t x, nmpc_real_t y, nmpc_real_t *right,
+NMPC_INLINE void turn_to_heading(const nmpc_attitude_t *attitude, nmpc_real_t x, nmpc_real_t y, nmpc_real_t *right,
                                  nmpc_real_t *forward)
 {
-    *right = (y * self->attitude.cosine) - (x * self->attitude.sine);
-    *forward = (x * self->attitude.cosine) + (y * self->attitude.sine);
+    *right = (y * attitude->cosine) - (x * attitude->sine);
+    *forward = (x * attitude->cosine) + (y * attitude->sine);
 }
 
-/* The error of the estimated velocity along `axis`. */
-NMPC_INLINE nmpc_real_t velocity_error(const nmpc_t *self, const nmpc_target_t *target, int axis)
+/* Set the next command of the model to the minimum of the cost along both axes; `tilt_m_step2` is the acceleration of
+ * the tilt, right and forward. Set `saturated` to whether a move lies at its limit. */
+NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *observer, const nmpc_tracker_t *tracker,
+                          const nmpc_target_t *target, const nmpc_real_t tilt_m_step2[2], unsigned char *saturated)
 {
-    return self->observer.velocity_m_step[axis] - (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis]);
-}
-
-/* The disturbance less the target's acceleration along `axis`. */
-NMPC_INLINE nmpc_real_t acceleration_error(const nmpc_t *self, int axis)
-{
-    return observer_disturbance(&self->observer, axis) - self->tracker.acceleration_m_step2[axis];
-}
-
-/* Minimise the cost along both axes, which gives the model's next command; `tilt_m_step2` is the acceleration of the
- * tilt, right and forward. */
-NMPC_INLINE void minimize(nmpc_t *self, const nmpc_target_t *target, const nmpc_real_t tilt_m_step2[2])
-{
-    nmpc_attitude_t *const attitude = &self->attitude;
     nmpc_real_t state[2][NMPC_STATES];
+    nmpc_real_t error[3][2]; /* e, v and w along x and y */
     nmpc_real_t right_m_step2;
     nmpc_real_t forward_m_step2;
     int axis;
 
-    turn_to_heading(self, self->observer.position_m[0] - target->position_m[0],
-                    self->observer.position_m[1] - target->position_m[1], &state[NMPC_RIGHT][0],
-                    &state[NMPC_FORWARD][0]);
-    turn_to_heading(self, velocity_error(self, target, 0), velocity_error(self, target, 1), &state[NMPC_RIGHT][1],
-                    &state[NMPC_FORWARD][1]);
-    turn_to_heading(self, acceleration_error(self, 0), acceleration_error(self, 1), &state[NMPC_RIGHT][2],
-                    &state[NMPC_FORWARD][2]);
-    turn_to_heading(self, self->tracker.jerk_m_step2_update[0], self->tracker.jerk_m_step2_update[1],
-                    &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
+    NMPC_UNROLL
     for (axis = 0; axis < 2; axis++) {
+        error[0][axis] = observer->position_m[axis] - target->position_m[axis];
+        error[1][axis] = observer->velocity_m_step[axis]
+                         - (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis]);
+        error[2][axis] = observer_disturbance(observer, axis) - tracker->acceleration_m_step2[axis];
+        state[axis][3] = (nmpc_real_t)0;
         state[axis][4] = tilt_m_step2[axis];
         state[axis][5] = attitude->integral_m_step2[axis];
         state[axis][6] = attitude->lagged_m_step2[axis];
         state[axis][7] = attitude->command_m_step2[axis];
     }
-    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2);
-    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], NMPC_FORWARD_LIMIT_M_STEP2);
+    NMPC_UNROLL
+    for (axis = 0; axis < 3; axis++) {
+        turn_to_heading(attitude, error[axis][0], error[axis][1], &state[NMPC_RIGHT][axis],
+                        &state[NMPC_FORWARD][axis]);
+    }
+    turn_to_heading(attitude, tracker->jerk_m_step2_update[0], tracker->jerk_m_step2_update[1],
+                    &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
+    *saturated = 0U;
+    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], NMPC_RIGHT_LIMIT_M_STEP2, saturated);
+    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], NMPC_FORWARD_LIMIT_M_STEP2, saturated);
     attitude->command_m_step2[NMPC_RIGHT] = right_m_step2;
     attitude->command_m_step2[NMPC_FORWARD] = forward_m_step2;
-    self->saturated = ((reaches(right_m_step2, NMPC_RIGHT_LIMIT_M_STEP2) != 0)
-                       || (reaches(forward_m_step2, NMPC_FORWARD_LIMIT_M_STEP2) != 0))
-                          ? 1U
-                          : 0U;
-}
-
-/* Set `tilt_m_step2` to the accelerations, right and forward, of the measured attitude, and `feedback_rad` to what its
- * rates add to the commands. */
-NMPC_INLINE void measure(nmpc_t *self, const nmpc_state_t *state, nmpc_real_t tilt_m_step2[2],
-                         nmpc_real_t feedback_rad[2])
-{
-    nmpc_real_t sine;
-    nmpc_real_t cosine;
-
-    sine_cosine(state->yaw_rad, &sine, &cosine);
-    if (has_estimate(self) == 0) {
-        self->attitude.sine = sine;
-        self->attitude.cosine = cosine;
-    } else {
-        attitude_turn(&self->attitude, sine, cosine);
-    }
-    if (self->missed == 0U) {
-        feedback_rad[0] = NMPC_ROLL_FEEDBACK_STEPS * (state->roll_rad - self->tilt_rad[0]);
-        feedback_rad[1] = NMPC_PITCH_FEEDBACK_STEPS * (state->pitch_rad - self->tilt_rad[1]);
-    }
-    self->tilt_rad[0] = state->roll_rad;
-    self->tilt_rad[1] = state->pitch_rad;
-    attitude_measure(state, tilt_m_step2);
 }
 
 /* Take a control step. A null `state` stands for one that is not good, a null `target` for inputs that allow no new
- * command. */
+ * command. The model and the estimates are copied, so that the compiler can keep them
+ * in registers. */
 NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target)
 {
+    nmpc_attitude_t own_attitude = self->attitude;
+    nmpc_observer_t own_observer = self->observer;
+    nmpc_attitude_t *const attitude = &own_attitude;
+    nmpc_observer_t *const observer = &own_observer;
     nmpc_real_t tilt_m_step2[2];
     nmpc_real_t world_m_step2[2];
     nmpc_real_t feedback_rad[2] = { (nmpc_real_t)0, (nmpc_real_t)0 };
+    unsigned int missed = self->missed;
 
-    attitude_advance(&self->attitude);
+    attitude_advance(attitude);
     if (state != NULL) {
-        measure(self, state, tilt_m_step2, feedback_rad);
-    } else {
-        tilt_m_step2[NMPC_RIGHT] = self->attitude.tilt_m_step2[NMPC_RIGHT];
-        tilt_m_step2[NMPC_FORWARD] = self->attitude.tilt_m_step2[NMPC_FORWARD];
-    }
-    world_m_step2[0] = (tilt_m_step2[NMPC_FORWARD] * self->attitude.cosine)
-                       - (tilt_m_step2[NMPC_RIGHT] * self->attitude.sine);
-    world_m_step2[1] = (tilt_m_step2[NMPC_RIGHT] * self->attitude.cosine)
-                       + (tilt_m_step2[NMPC_FORWARD] * self->attitude.sine);
-    if (state == NULL) {
-        self->missed = (unsigned char)((self->missed < NMPC_NO_ESTIMATE) ? (self->missed + 1U) : NMPC_NO_ESTIMATE);
-    } else {
-        if (has_estimate(self) == 0) {
-            observer_start(&self->observer, state);
+        nmpc_real_t sine;
+        nmpc_real_t cosine;
+
+        sine_cosine(state->yaw_rad, &sine, &cosine);
+        if (missed == NMPC_NO_ESTIMATE) {
+            attitude->sine = sine;
+            attitude->cosine = cosine;
         } else {
-            observer_correct(&self->observer, state);
+            attitude_turn(attitude, sine, cosine);
         }
-        self->missed = 0U;
+        attitude_measure(state, tilt_m_step2);
+    } else {
+        tilt_m_step2[NMPC_RIGHT] = attitude->tilt_m_step2[NMPC_RIGHT];
+        tilt_m_step2[NMPC_FORWARD] = attitude->tilt_m_step2[NMPC_FORWARD];
     }
-    if ((target != NULL) && (has_estimate(self) != 0)) {
+    world_m_step2[0] = (tilt_m_step2[NMPC_FORWARD] * attitude->cosine)
+                       - (tilt_m_step2[NMPC_RIGHT] * attitude->sine);
+    world_m_step2[1] = (tilt_m_step2[NMPC_RIGHT] * attitude->cosine)
+                       + (tilt_m_step2[NMPC_FORWARD] * attitude->sine);
+    if (state == NULL) {
+        missed = (missed < NMPC_NO_ESTIMATE) ? (missed + 1U) : NMPC_NO_ESTIMATE;
+    } else {
+        if (missed == NMPC_NO_ESTIMATE) {
+            observer_start(observer, state);
+        } else {
+            observer_correct(observer, state);
+        }
+        if (missed == 0U) {
+            feedback_rad[0] = NMPC_ROLL_FEEDBACK_STEPS * (state->roll_rad - self->tilt_rad[0]);
+        }
+        self->tilt_rad[0] = state->roll_rad;
+        self->tilt_rad[1] = state->pitch_rad;
+        missed = 0U;
+    }
+    if ((target != NULL) && (missed != NMPC_NO_ESTIMATE)) {
         tracker_update(self, target->velocity_m_s);
-        minimize(self, target, self->attitude.tilt_m_step2);
-        self->command_rad[0] = clamp(attitude_roll(&self->attitude) + feedback_rad[0], NMPC_TILT_LIMIT_RAD);
-        self->command_rad[1] = clamp(attitude_pitch(&self->attitude) + feedback_rad[1], NMPC_TILT_LIMIT_RAD);
+        minimize(attitude, observer, &self->tracker, target, attitude->tilt_m_step2, &self->saturated);
+        self->command_rad[0] = clamp(attitude_roll(attitude) + feedback_rad[0], NMPC_TILT_LIMIT_RAD);
+        self->command_rad[1] = attitude_pitch(attitude);
     }
-    observer_predict(&self->observer, world_m_step2);
+    observer_predict(observer, world_m_step2);
+    self->attitude = own_attitude;
+    self->observer = own_observer;
+    self->missed = (unsigned char)missed;
 }
 
 /* ---- Interface ------------------------------------------------------------------------------------------------------
@@ -844,20 +857,23 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
     }
 
     if ((state != NULL) && (target != NULL)) {
-        const int has_state = is_good_state(state);
-        const int has_target = is_good_target(target);
-        const int has_thrust = is_good_thrust(thrust_acceleration_m_s2);
+        const nmpc_state_t *good_state = state;
+        const nmpc_target_t *good_target = target;
 
-        advance(self, (has_state != 0) ? state : NULL, ((has_target != 0) && (has_thrust != 0)) ? target : NULL);
-        if (has_state == 0) {
-            status = NMPC_BAD_STATE;
-        } else if (has_target == 0) {
-            status = NMPC_BAD_TARGET;
-        } else if (has_thrust == 0) {
+        status = NMPC_OK;
+        if (is_good_thrust(thrust_acceleration_m_s2) == 0) {
             status = NMPC_BAD_THRUST;
-        } else {
-            status = NMPC_OK;
+            good_target = NULL;
         }
+        if (is_good_target(target) == 0) {
+            status = NMPC_BAD_TARGET;
+            good_target = NULL;
+        }
+        if (is_good_state(state) == 0) {
+            status = NMPC_BAD_STATE;
+            good_state = NULL;
+        }
+        advance(self, good_state, good_target);
     }
     command->roll_rad = self->command_rad[0];
     command->pitch_rad = self->command_rad[1];

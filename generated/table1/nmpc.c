@@ -49,11 +49,15 @@ typedef char nmpc_assert_horizons[((NMPC_HORIZON_CONTROL >= 1)
                                    && (NMPC_HORIZON_PREDICTION <= 50)
                                    && (NMPC_ITERATIONS <= 100)) ? 1 : -1];
 
-/* A function of a control step. */
+/* A function of a control step, inlined in any case: the axis is then a constant, the coefficients are operands of the
+ * instructions, and the states stay in registers. Other compilers than gcc and clang decide for themselves. */
+#if defined(__GNUC__)
+#define NMPC_INLINE static inline __attribute__((always_inline))
+#else
 #define NMPC_INLINE static inline
+#endif
 
-/* Ask gcc to unroll the next loop: on a Cortex-M4F the arrays of the loop are then kept in registers. Other
- * compilers decide for themselves. */
+/* Ask gcc to unroll the next loop; other compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
 #define NMPC_UNROLL _Pragma("GCC unroll 8")
 #else
@@ -86,6 +90,29 @@ NMPC_INLINE nmpc_bits_t bits_of(nmpc_real_t value)
     return view.bits;
 }
 
+#if defined(__GNUC__)
+/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
+ * numbers takes the place of two of floats; the shift lets a Cortex-M drop the sign in the comparison itself. */
+#define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)
+
+/* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. `minimum` must be positive. */
+NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
+{
+    return (bits_of(value) >= bits_of(minimum)) && (bits_of(value) <= bits_of(maximum));
+}
+
+/* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
+NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
+{
+    return NMPC_MAGNITUDE_BITS(value) <= NMPC_MAGNITUDE_BITS(limit);
+}
+
+/* 1 if |`value`| >= `limit`, else 0. */
+NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
+{
+    return NMPC_MAGNITUDE_BITS(value) >= NMPC_MAGNITUDE_BITS(limit);
+}
+#else
 /* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
 NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
@@ -96,23 +123,6 @@ NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maxi
     return (is_at_least != 0) && (is_at_most != 0);
 }
 
-#if defined(__GNUC__)
-/* The bits of a magnitude are ordered as the magnitudes are, and those of NaN exceed them all. One comparison of whole
- * numbers takes the place of two of floats. */
-#define NMPC_MAGNITUDE_BITS ((nmpc_bits_t)0x7FFFFFFFUL)
-
-/* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
-NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
-{
-    return (bits_of(value) & NMPC_MAGNITUDE_BITS) <= bits_of(limit);
-}
-
-/* 1 if |`value`| >= `limit`, else 0. */
-NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
-{
-    return (bits_of(value) & NMPC_MAGNITUDE_BITS) >= bits_of(limit);
-}
-#else
 /* 1 if |`value`| <= `limit`, else 0; 0 for NaN. */
 NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
@@ -235,39 +245,40 @@ static int is_good_command(const nmpc_command_t *command)
 
 /* ---- Sine and cosine ------------------------------------------------------------------------------------------------
  *
- * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding the Taylor series
+ * The angle less whole quarter turns (Cody and Waite), r, and for |r| <= pi/4 apart from rounding polynomials
  *
- *     sin r = r + r^3 (-1/3! + r^2/5! - ...),   cos r = 1 + r^2 (-1/2! + r^2/4! - ...).
+ *     sin r = r + r^3 (s0 + s1 r^2 + ...),   cos r = 1 + r^2 (c0 + c1 r^2 + ...),
  *
+ * whose largest error is as small as that of any with so many terms.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
  * absolute errors of at most 1.2e-07.
  */
 
-#define NMPC_SINE_TERMS 4
-#define NMPC_COSINE_TERMS 5
+#define NMPC_SINE_TERMS 3
+#define NMPC_COSINE_TERMS 3
 
-/* 2/pi, and pi/2 as the sum of three parts; the first two have so few bits that quadrant * part is exact. */
-static const nmpc_real_t quarter_turns_per_rad = 0.63661975f;
-static const nmpc_real_t quarter_turn_rad[3] = {
-    1.5707397f, 5.657971e-05f, 9.920936e-10f
-};
+/* 2/pi; 1.5 over the precision: a sum with it is rounded to a whole number, whose lowest bits are those of the sum; and
+ * pi/2 in two parts, of which the first has so few bits that its products with the quarter turns are exact. */
+#define NMPC_QUARTER_TURNS_PER_RAD 0.63661975f
+#define NMPC_ROUNDING 1.2582912e+07f
+#define NMPC_QUARTER_TURN_RAD 1.5707397f
+#define NMPC_QUARTER_TURN_REST_RAD 5.6580702e-05f
 
+/* s0, s1, ... and c0, c1, ... */
 static const nmpc_real_t sine_terms[NMPC_SINE_TERMS] = {
-    -0.16666667f, 0.008333334f, -0.0001984127f, 2.7557319e-06f
+    -0.16666651f, 0.008331976f, -0.00019495294f
 };
 static const nmpc_real_t cosine_terms[NMPC_COSINE_TERMS] = {
-    -0.5f, 0.041666668f, -0.0013888889f, 2.4801588e-05f, -2.755732e-07f
+    -0.49999896f, 0.041656274f, -0.0013597534f
 };
 
 /* Sine and cosine for |angle_rad| <= NMPC_YAW_RANGE_RAD. */
 NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real_t *cosine)
 {
-    const nmpc_real_t half = 0.5f;
-    const nmpc_real_t quarter_turns = angle_rad * quarter_turns_per_rad;
-    const int quadrant = (int)(quarter_turns + ((quarter_turns < (nmpc_real_t)0) ? -half : half));
-    const nmpc_real_t count = (nmpc_real_t)quadrant;
-    const nmpc_real_t rest = ((angle_rad - (count * quarter_turn_rad[0])) - (count * quarter_turn_rad[1]))
-                             - (count * quarter_turn_rad[2]);
+    const nmpc_real_t sum = (angle_rad * NMPC_QUARTER_TURNS_PER_RAD) + NMPC_ROUNDING;
+    const nmpc_real_t count = sum - NMPC_ROUNDING;
+    const nmpc_real_t rest = (angle_rad - (count * NMPC_QUARTER_TURN_RAD)) - (count * NMPC_QUARTER_TURN_REST_RAD);
+    const nmpc_bits_t quadrant = bits_of(sum);
     const nmpc_real_t one = (nmpc_real_t)1;
     const nmpc_real_t square = rest * rest;
     nmpc_real_t sine_rest = sine_terms[NMPC_SINE_TERMS - 1];
@@ -285,23 +296,14 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
     sine_rest = rest + (rest * (square * sine_rest));
     cosine_rest = one + (square * cosine_rest);
 
-    switch ((unsigned int)quadrant % 4U) {
-    case 0U:
-        *sine = sine_rest;
-        *cosine = cosine_rest;
-        break;
-    case 1U:
-        *sine = cosine_rest;
-        *cosine = -sine_rest;
-        break;
-    case 2U:
-        *sine = -sine_rest;
-        *cosine = -cosine_rest;
-        break;
-    default:
-        *sine = -cosine_rest;
-        *cosine = sine_rest;
-        break;
+    /* The two lowest bits of the quarter turns say which of them is which, and their signs. */
+    *sine = ((quadrant & 1U) == 0U) ? sine_rest : cosine_rest;
+    *cosine = ((quadrant & 1U) == 0U) ? cosine_rest : sine_rest;
+    if ((quadrant & 2U) != 0U) {
+        *sine = -*sine;
+    }
+    if (((quadrant + 1U) & 2U) != 0U) {
+        *cosine = -*cosine;
     }
 }
 
@@ -723,8 +725,9 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights)
     if ((self == NULL) || (weights == NULL)) {
         return NMPC_NULL_POINTER;
     }
-    if (!(between(weights->tracking, (nmpc_real_t)0, NMPC_TRACKING_WEIGHT_LIMIT)
-          && between(weights->effort, (nmpc_real_t)0, NMPC_EFFORT_WEIGHT_LIMIT))) {
+    if (!(within(weights->tracking, NMPC_TRACKING_WEIGHT_LIMIT)
+          && within(weights->effort, NMPC_EFFORT_WEIGHT_LIMIT)
+          && (weights->tracking >= (nmpc_real_t)0) && (weights->effort >= (nmpc_real_t)0))) {
         return NMPC_BAD_WEIGHT;
     }
 

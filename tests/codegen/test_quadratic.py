@@ -134,14 +134,14 @@ def test_attitude_model_is_the_exact_solution_for_a_held_command(settings: Setti
         assert integral_row[1] == pytest.approx(integral[1], rel=1e-9)
         if share:
             assert tilt_row[1] == pytest.approx(tilt[1] / share, rel=1e-9)
-        assert attitude.lagged_share[index] == pytest.approx(lagged[3], rel=1e-9)
+        assert attitude.lagged_row[index] == pytest.approx(lagged[2:], rel=1e-9)
 
 
 def test_the_limit_bounds_the_model_under_any_commands(settings: Settings) -> None:
     """The worst commands, each with the sign that drives a state furthest, on both axes and turned."""
     attitude = Quadratic(settings).attitude
     for index in range(2):
-        lagged = [0, 0, 1 - attitude.lagged_share[index], attitude.lagged_share[index]]
+        lagged = [0, 0, *attitude.lagged_row[index]]
         rows = np.array([attitude.tilt_row[index], attitude.integral_row[index], lagged])
         sums, response = np.zeros(3), rows[:, 3]
         for _ in range(20_000):

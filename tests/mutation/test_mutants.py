@@ -67,7 +67,10 @@ QUADRATIC_FAULTS = {
     "a turn of the model after an outage": ("        self->attitude.sine = sine;\n        self->attitude.cosine = cosine;\n", "        attitude_turn(&self->attitude, sine, cosine);\n"),
     "measured attitude": ("minimize(self, target, self->attitude.tilt_m_step2);", "minimize(self, target, tilt_m_step2);"),
     "no prediction in an outage": ("    observer_predict(&self->observer, world_m_step2);\n", "    if (state != NULL) { observer_predict(&self->observer, world_m_step2); }\n"),
-    "a bad thrust allows a command": ("((has_target != 0) && (has_thrust != 0))", "(has_target != 0)"),
+    "a bad thrust allows a command": (
+        "status = NMPC_BAD_THRUST;\n            good_target = NULL;",
+        "status = NMPC_BAD_THRUST;",
+    ),
     "a command of others leaves the model": ("    attitude_set_command(&self->attitude, self->command_rad[0], self->command_rad[1]);\n", ""),
     "a reset keeps the estimate": ("    self->missed = NMPC_NO_ESTIMATE;\n", ""),
     "a reset keeps the target": ("    tracker_clear(self);\n", ""),

@@ -100,7 +100,7 @@ nmpc_real_t attitude_pitch(const nmpc_attitude_t *);
 void attitude_measure(const nmpc_state_t *, nmpc_real_t *);
 void attitude_advance(nmpc_attitude_t *);
 void attitude_turn(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
-nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
+nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t, unsigned char *);
 """
 _TRACKER: Final = {
     "TRACKER_TYPE": "typedef struct { TARGET_VELOCITY nmpc_real_t acceleration_m_step2[2], "

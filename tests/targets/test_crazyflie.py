@@ -318,7 +318,7 @@ def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_p
     folder = folder_of(SETTINGS, tmp_path)
     header = folder / "src" / "nmpc.h"
     text = header.read_text("utf-8")
-    wrong = text.replace("define NMPC_TILT_LIMIT_RAD 0.5f", "define NMPC_TILT_LIMIT_RAD 0.4999f")
+    wrong = text.replace("define NMPC_UPDATE_STEP_S 0.01f", "define NMPC_UPDATE_STEP_S 0.0101f")
     assert wrong != text
     header.write_text(wrong, "utf-8")
     broken = build(folder).app()

@@ -232,9 +232,10 @@ def test_the_functions_that_the_proof_reads_equal_those_that_gcc_compiles(tmp_pa
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("MAGNITUDE_BITS) <= bits_of", "MAGNITUDE_BITS) < bits_of"),
-        ("MAGNITUDE_BITS) >= bits_of", "MAGNITUDE_BITS) > bits_of"),
+        ("BITS(value) <= NMPC", "BITS(value) < NMPC"),
+        ("BITS(value) >= NMPC", "BITS(value) > NMPC"),
         ("0x7FFFFFFFUL", "0x7FFFFFFEUL"),
+        ("bits_of(value) <= bits_of(maximum)", "bits_of(value) < bits_of(maximum)"),
         ("return __builtin_fabsf(value)", "return value"),
         ("__builtin_ctzl(word)", "__builtin_ctzl(word << 1)"),
     ],

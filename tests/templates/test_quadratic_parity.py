@@ -178,8 +178,10 @@ def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
     for state, moves in zip(states, expected, strict=True):
         for axis in (0, 1):
             numbers = np.ascontiguousarray(state[axis])
-            found = blocks.lib.optimizer_minimize(axis, blocks.reals(numbers), limits[axis])
+            saturated = blocks.ffi.new("unsigned char *")
+            found = blocks.lib.optimizer_minimize(axis, blocks.reals(numbers), limits[axis], saturated)
             assert blocks.scalar(found).tobytes() == moves[axis].tobytes()
+            assert saturated[0] == (abs(moves[axis]) == limits[axis])
             free = law.rows[axis] @ state[axis]
             kinds.add(tuple((np.sign(free) * (np.abs(free) > limits[axis])).tolist()))
     assert len(kinds) == 3**law.moves

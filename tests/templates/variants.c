@@ -44,6 +44,8 @@ static int differ_for(unsigned int bits)
     unsigned int i;
     int differ = (is_nan == 0) && (absolute(value) != plain_absolute(value));
 
+    differ |= (between(value, NMPC_THRUST_ACCELERATION_MIN_M_S2, NMPC_THRUST_ACCELERATION_MAX_M_S2)
+               != plain_between(value, NMPC_THRUST_ACCELERATION_MIN_M_S2, NMPC_THRUST_ACCELERATION_MAX_M_S2));
     for (i = 0U; i < (sizeof limits / sizeof limits[0]); i++) {
         differ |= (within(value, limits[i]) != plain_within(value, limits[i]));
         differ |= (is_nan == 0) && (reaches(value, limits[i]) != plain_reaches(value, limits[i]));

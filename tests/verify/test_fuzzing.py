@@ -29,8 +29,8 @@ FAULTS = {
     ),
     "NaN passes": (
         "nmpc.c",
-        "(value >= minimum);\n    const int is_at_most = (value <= maximum);",
-        "!(value < minimum);\n    const int is_at_most = !(value > maximum);",
+        "return NMPC_MAGNITUDE_BITS(value) <= NMPC_MAGNITUDE_BITS(limit);",
+        "return !(value < -limit) && !(value > limit);",
     ),
     "a bad weight half taken": (
         "nmpc.c",

@@ -36,7 +36,7 @@ FAULTS = {
     "NaN passes a range check": Fault(
         "refuse_nan",
         NAN_PASSES,
-        Alarm(CONTROLLER, "(int)(quarter_turns", "is_nan_or_infinite"),
+        Alarm(CONTROLLER, "prediction->gain_x_m_step2_rad[NMPC_ROLL] =", "mem_access"),
     ),
     "a refused call writes": Fault(
         "refuse_nan",
@@ -44,11 +44,17 @@ FAULTS = {
         Alarm(CONTROLLER, "self->converged = 0U;", "mem_access"),
     ),
     "the heading goes unchecked": Fault(
-        "refuse_nan", UNCHECKED_HEADING, Alarm(CONTROLLER, "(int)(quarter_turns", "is_nan_or_infinite")
+        "refuse_nan",
+        UNCHECKED_HEADING,
+        Alarm(CONTROLLER, "prediction->gain_x_m_step2_rad[NMPC_ROLL] =", "mem_access"),
     ),
     "a weight goes unchecked": Fault(
         "refuse_nan",
-        Harm(CONTROLLER, r"between\(weights->effort, [^;]*?LIMIT\)", "1"),
+        Harm(
+            CONTROLLER,
+            r"within\(weights->effort,[^;{]*?effort >= \(nmpc_real_t\)0\)",
+            "(weights->tracking >= (nmpc_real_t)0)",
+        ),
         Alarm(CONTROLLER, "self->weights = *weights;", "mem_access"),
     ),
     "a null pointer is followed": Fault(

@@ -44,12 +44,12 @@ UNPROVEN = {
     ),
     "a refused state is used": Fault(
         "refuse_nan",
-        Harm(CONTROLLER, r"\(has_state != 0\) \? state : NULL", "state"),
+        Harm(CONTROLLER, r"            good_state = NULL;\n", ""),
         Alarm(CONTROLLER, "attitude_measure(", "precondition of attitude_measure"),
     ),
     "a refused target is used": Fault(
         "refuse_nan",
-        Harm(CONTROLLER, r"\(\(has_target != 0\) && \(has_thrust != 0\)\) \? target : NULL", "target"),
+        Harm(CONTROLLER, r"(NMPC_BAD_TARGET;\n)            good_target = NULL;\n", r"\1"),
         Alarm(CONTROLLER, "optimizer_minimize(", "precondition of optimizer_minimize"),
     ),
     "a null pointer is followed": Fault(
@@ -129,7 +129,7 @@ FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
     ),
     "a refused state leaves a trace": (
         lambda its: fuzzing.check(its, runs=FEW_RUNS),
-        Harm(CONTROLLER, r"\(has_state != 0\) \? state : NULL", "state"),
+        Harm(CONTROLLER, r"            good_state = NULL;\n", ""),
     ),
     "a refused command is set": (
         lambda its: fuzzing.check(its, runs=FEW_RUNS),

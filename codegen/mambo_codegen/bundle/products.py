@@ -12,6 +12,7 @@ _FORMS: Final = (
     dict.fromkeys(
         (
             "thrust_product",
+            "wide_product",
             "sine_product",
             "velocity_product",
             "gain_product",

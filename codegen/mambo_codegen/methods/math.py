@@ -15,10 +15,10 @@ Real = NDArray[Any]
 def sine_cosine(angle_rad: Real, constants: Trigonometry) -> tuple[Real, Real]:
     """Return sine and cosine of `angle_rad`, of any shape and at most YAW_LIMIT_RAD in size."""
     scalar = angle_rad.dtype.type
-    high, middle, low = (scalar(part) for part in constants.quarter_turn_rad)
-    quarter_turns = angle_rad * scalar(constants.quarter_turns_per_rad)
-    quadrant = np.trunc(quarter_turns + np.where(quarter_turns < 0, scalar(-0.5), scalar(0.5)))
-    rest = ((angle_rad - (quadrant * high)) - (quadrant * middle)) - (quadrant * low)
+    high, low = (scalar(part) for part in constants.quarter_turn_rad)
+    rounding = scalar(constants.rounding)
+    quadrant = ((angle_rad * scalar(constants.quarter_turns_per_rad)) + rounding) - rounding
+    rest = (angle_rad - (quadrant * high)) - (quadrant * low)
     square = rest * rest
     sine = rest + (rest * (square * _polynomial(square, constants.sine)))
     cosine = scalar(1) + (square * _polynomial(square, constants.cosine))

@@ -2,6 +2,10 @@
 
 from typing import Final
 
+_SPLIT: Final = (
+    "-eva-split-return auto",  # analyse accepted and refused inputs apart
+    "-eva-split-return-function between:0,within:0,is_good_point:0,is_good_state:0,is_good_target:0",
+)
 FLOAT_PROOFS: Final = {
     # Every operation that can result in NaN is an alarm.
     "take_numbers": (
@@ -9,8 +13,7 @@ FLOAT_PROOFS: Final = {
         "-main take_numbers",
         "-eva",
         "-eva-precision 2",
-        "-eva-split-return auto",  # analyse accepted and refused inputs apart
-        "-eva-split-return-function between:0,within:0",  # clamp calls them
+        *_SPLIT,
     ),
     # NaN is a legal value. Precision 0, without relations between variables: from a stored comparison
     # Frama-C 25 derives x >= y from !(x < y), which is false for NaN.
@@ -42,7 +45,7 @@ FIXED_PROOFS: Final = {
         "-main take_numbers",
         "-eva",
         "-eva-precision 2",
-        "-eva-split-return auto",
+        *_SPLIT,
         "-eva-use-spec sine_cosine",
     ),
     "turn_everywhere": (*_WHOLE_NUMBERS, *TURN_EVERYWHERE),

@@ -55,9 +55,9 @@ class Tracker:
         """What the tracker reads of a target."""
         self._input_limit = constant(constants.input_limit, constants.input_quantity)
         self._factor = constant(constants.factor, "tracker")
-        self._acceleration_limit = constant(constants.acceleration_limit_m_step2, "acceleration")
         self._jerk_limit = constant(constants.jerk_limit_m_step2_update, "acceleration")
         self._gain = constant(constants.gain, "sine")
+        self._rest = constant(1 - constants.gain, "sine")
         self._jerk_gain = constant(constants.jerk_gain, "sine")
 
     def update(self, motion: TargetMotion, given: Real) -> TargetMotion:
@@ -77,7 +77,7 @@ class Tracker:
             measured = self._arithmetic.target_product(self._factor, change)
         predicted = motion.acceleration_m_step2 + motion.jerk_m_step2_update
         difference = measured - predicted
-        acceleration = clamp(predicted + product(self._gain, difference), self._acceleration_limit)
+        acceleration = product(self._rest, predicted) + product(self._gain, measured)
         jerk = clamp(motion.jerk_m_step2_update + product(self._jerk_gain, difference), self._jerk_limit)
         return TargetMotion(
             velocity_m_s=velocity,

@@ -25,7 +25,7 @@ class TrackerConstants:
     input_limit: largest measured change of the target's velocity in an update period that is no jump, m/s;
         or the limit of a given acceleration, m/s^2.
     factor: makes such an input an acceleration in m/step^2: tau^2/T_s, in s; or tau^2, in s^2.
-    acceleration_limit_m_step2: the acceleration of the largest input.
+    acceleration_limit_m_step2: the acceleration of the largest input, M.
     jerk_limit_m_step2_update: largest jerk, m/step^2 per update.
     gain, jerk_gain: alpha and beta.
     """
@@ -37,6 +37,12 @@ class TrackerConstants:
     jerk_limit_m_step2_update: float
     gain: float
     jerk_gain: float
+
+    @property
+    def acceleration_bound_m_step2(self) -> float:
+        """A bound of the estimated acceleration, for any inputs: A = (1 - alpha) (A + J) + alpha M."""
+        rest = (1 - self.gain) / self.gain * self.jerk_limit_m_step2_update
+        return 1.01 * (self.acceleration_limit_m_step2 + rest)
 
     @property
     def input_quantity(self) -> str:

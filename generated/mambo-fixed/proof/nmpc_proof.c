@@ -128,8 +128,8 @@ void take_numbers(void)
     nmpc_t controller;
 
     nmpc_init(&controller);
-    /* The stored numbers grow from call to call up to their limits; the hints save Eva coarser guesses. */
-    /*@ loop widen_hints "all", -3539225, 3539225, -11744051, 11744051, -20615843, 20615843, -35392249, 35392249, -62212207, 62212207, -268435456, 268435456, -524288000, 524288000; */
+    /* The stored numbers grow from call to call up to their bounds; the hints save Eva coarser guesses. */
+    /*@ loop widen_hints "all", -3539225, 3539225, -11744051, 11744051, -20615843, 20615843, -39320788, 39320788, -62212207, 62212207, -62834329, 62834329, -134217728, 134217728, -262144000, 262144000; */
     while (any_int != 0) {
         nmpc_t *self = (any_int != 0) ? &controller : NULL;
         nmpc_real_t input[INPUTS];

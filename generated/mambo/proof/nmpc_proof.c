@@ -50,9 +50,11 @@ static void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2
 
 /* Whatever reads a target also calls this. */
 /*@ requires no_nan_in_the_target: nan_at < TARGET || nan_at == INPUTS;
-    assigns \result \from axis, state[0 .. 7], limit_m_step2;
+    assigns \result, *saturated \from axis, state[0 .. 7], limit_m_step2, *saturated;
+    ensures is_set: \initialized(saturated);
 */
-static nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[8], nmpc_real_t limit_m_step2);
+static nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[8], nmpc_real_t limit_m_step2,
+                                      unsigned char *saturated);
 
 /* The functions that have a contract above are static. */
 #include "nmpc.c"

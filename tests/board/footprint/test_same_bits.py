@@ -46,8 +46,8 @@ At the optimisation that is shipped `test_emulated` compares every scalar type o
 FAULTS = {
     "another order": (
         "nmpc.c",
-        "rest + (rest * (square * sine_rest))",
-        "rest + ((rest * square) * sine_rest)",
+        "rollout->acceleration_m_step2 + (roll_m_step2 + pitch_m_step2)",
+        "(rollout->acceleration_m_step2 + roll_m_step2) + pitch_m_step2",
     ),
     "another sign": ("nmpc.c", "effort_gradient = -weight", "effort_gradient = weight"),
 }

@@ -79,7 +79,7 @@ class Paper:
             limit = min(1.5 * 9.81 * settings.limits.tilt_rad, 2 * settings.ranges.velocity_m_s / T_s)
         jump = np.abs(measured) > limit
         rest = measured - (Ta + T_s * Tj)
-        acceleration = np.clip(Ta + T_s * Tj + alpha * rest, -limit, limit)
+        acceleration = Ta + T_s * Tj + alpha * rest
         jerk = np.clip(Tj + beta / T_s * rest, -0.1 * limit / T_s, 0.1 * limit / T_s)
         return np.where(jump, Ta, acceleration), np.where(jump, 0.0, jerk)
 

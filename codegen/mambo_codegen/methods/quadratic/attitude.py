@@ -47,14 +47,18 @@ class AttitudeModel:
 
         self._tilt_rows = np.array([both(row, "attitude") for row in attitude.tilt_row])
         self._integral_rows = np.array([both(row, "attitude") for row in attitude.integral_row])
-        self._lagged_shares = both(attitude.lagged_share, "sine")
+        self._lagged_rows = np.array([both(row, "attitude") for row in attitude.lagged_row])
         self._gain = constant(attitude.gain_m_step2_rad, "gain")
         self._command_gain = both(attitude.command_gain_m_step2_rad, "gain")
         self._command_rad = both(attitude.command_rad_step2_m, "command")
         self._trim = both(attitude.trim_rad, "angle")
         self._trim_command = both(attitude.trim_command_rad, "angle")
         self._limit = constant(attitude.limit_m_step2, "acceleration")
-        self.command_limit = both(attitude.command_limit_m_step2, "move")
+        self._numbers = arithmetic.numbers
+        self.command_limit = self._admitted(
+            both(attitude.command_limit_m_step2, "move"), constants.limits.tilt
+        )
+        """The largest moves (2,), right and forward: no command for one exceeds the tilt limit."""
 
     def set_command(self, attitude: AttitudeState, command_rad: Real) -> AttitudeState:
         """Set the last commands to `command_rad` (n, 2), roll and pitch."""
@@ -71,12 +75,12 @@ class AttitudeModel:
     def advance(self, attitude: AttitudeState) -> AttitudeState:
         """Let the model answer the last commands over one control step."""
         state = np.stack([attitude.tilt, attitude.integral, attitude.lagged, attitude.command], axis=2)
-        change = self._products.sine_product(attitude.command - attitude.lagged, self._lagged_shares)
+        lagged = (self._lagged_rows[:, 0] * attitude.lagged) + (self._lagged_rows[:, 1] * attitude.command)
         return replace(
             attitude,
             tilt=self._next(self._tilt_rows, state),
             integral=self._next(self._integral_rows, state),
-            lagged=clamp(attitude.lagged + change, self._limit),
+            lagged=self._products.attitude_sum(lagged),
         )
 
     def turn(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
@@ -85,10 +89,14 @@ class AttitudeModel:
         by_cosine = self._products.sine_sum(cosine, attitude.cosine, sine, attitude.sine)
 
         def turned(vector: Real) -> Real:
-            return clamp(rotate(self._products, vector, by_sine, by_cosine), self._limit)
+            return rotate(self._products, vector, by_sine, by_cosine)
 
         return replace(
-            attitude, tilt=turned(attitude.tilt), command=turned(attitude.command), sine=sine, cosine=cosine
+            attitude,
+            tilt=turned(attitude.tilt),
+            command=clamp(turned(attitude.command), self._limit),
+            sine=sine,
+            cosine=cosine,
         )
 
     def measure(self, tilt_rad: Real) -> Real:
@@ -105,6 +113,18 @@ class AttitudeModel:
         if self._trim_command[1] != 0:
             pitch = self._trim_command[1] - product[:, 1]
         return np.stack([roll, pitch], axis=1)
+
+    def _admitted(self, limit: Real, tilt_limit: Any) -> Real:
+        """Lower move limits (2,) by the last digit until no command exceeds the tilt limit by rounding."""
+        zeros = np.zeros((2, 2), limit.dtype)
+        while True:
+            moves = np.stack([limit, -limit])
+            state = AttitudeState(zeros, zeros, zeros, self._products.move_acceleration(moves), zeros, zeros)
+            beyond = (np.abs(self.command_rad(state)) > tilt_limit).any(axis=0)
+            if not beyond.any():
+                return limit
+            below = limit - 1 if self._numbers.bits else np.nextafter(limit, limit.dtype.type(0))
+            limit = np.where(beyond, below, limit)
 
     def _next(self, rows: Real, state: Real) -> Real:
         """Return the next a or i from states (n, 2, 4)."""

@@ -35,7 +35,7 @@ class AttitudeConstants:
     command_limit_m_step2:    (2,) largest acceleration that commands within the tilt limit give, either way.
     tilt_row:                 (2, 4) the next a from [a, i, c, u].
     integral_row:             (2, 4) the next i from the same.
-    lagged_share:             (2,) share of u - c that c takes in a step.
+    lagged_row:               (2, 2) the next c from [c, u].
     limit_m_step2:            beyond every |a|, |i|, |c|, |u| of all commands within the tilt limit, also if
                               they turn with the heading.
     """
@@ -48,7 +48,7 @@ class AttitudeConstants:
     command_limit_m_step2: NDArray[np.float64]
     tilt_row: NDArray[np.float64]
     integral_row: NDArray[np.float64]
-    lagged_share: NDArray[np.float64]
+    lagged_row: NDArray[np.float64]
     limit_m_step2: float
 
 
@@ -84,7 +84,7 @@ def attitude_constants(settings: Sections) -> AttitudeConstants:
         command_limit_m_step2=gain * (tilt_rad - np.abs(trim_rad)),
         tilt_row=np.array([row[0] for row in rows]),
         integral_row=np.array([row[1] for row in rows]),
-        lagged_share=np.array([row[2][3] for row in rows]),
+        lagged_row=np.array([row[2][2:] for row in rows]),
         limit_m_step2=max(solution["peak"] for solution in solutions) * largest,
     )
 

@@ -29,6 +29,12 @@ from mambo_codegen.settings.sections import Sections
 _TURN: Final = 2.01
 """A component of a vector that turns is at most this times the larger one: |sine|, |cosine| <= 1."""
 
+LAGGED: Final = 1.01
+"""|c| is at most this times the larger |u|: their weighted mean, apart from rounding."""
+
+_ATTITUDE_STATES: Final = ("a", "i", "c", "u")
+"""The states of the attitude model, in the order of its rows."""
+
 _SUM_BITS: Final = 62
 """Most bits of a sum of products without its sign: one less than the type has, as rounding adds to it."""
 
@@ -115,7 +121,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "per_step2": fractional_bits(observer.steps2_per_s2),
     }
     shifts = {
-        "attitude": _attitude_shift(attitude.tilt_row, attitude.integral_row, attitude.limit_m_step2, bits),
+        "attitude": _attitude_shift(attitude.tilt_row, attitude.integral_row, bounds.states, bits),
         "row": _shift(
             np.abs(law.rows), [bounds.states[name] for name in STATES], _inputs(bits), bits["move"]
         ),
@@ -170,41 +176,45 @@ def _bounds(settings: Sections) -> _Bounds:
     attitude, observer = attitude_constants(settings), observer_constants(settings)
     law = law_constants(settings)
     tracker = tracker_constants(settings, settings.horizon.update_period_s)
-    reach_m, speed = settings.ranges.position_m, observer.velocity_limit_m_step
+    reach_m, speed, limit = settings.ranges.position_m, observer.velocity_limit_m_step, attitude.limit_m_step2
     tilted = attitude.gain_m_step2_rad * (ATTITUDE_LIMIT_RAD + float(np.max(np.abs(attitude.trim_rad))))
-    tilted = max(tilted, attitude.limit_m_step2)
-    unexplained = observer.disturbance_limit_m_step2 + (observer.drag_1_step * speed)
-    acceleration = (_TURN * tilted) + unexplained
-    target = tracker.acceleration_limit_m_step2 if tracker else 0.0
+    tilted, turned = max(tilted, limit), _TURN * limit
+    target = tracker.acceleration_bound_m_step2 if tracker else 0.0
     jerk = tracker.jerk_limit_m_step2_update if tracker else 0.0
+    innovation = (2 * reach_m) + (observer.age_steps * speed)
+    explained = (_TURN * tilted) + observer.disturbance_limit_m_step2 + (observer.drag_1_step * speed)
+    innovation_step = (2 * speed) + (observer.age_steps * explained)
+    corrections = np.abs(observer.gain) @ [innovation, innovation_step]
+    corrected_m, corrected = reach_m + corrections[0], speed + corrections[1]
+    unexplained = observer.disturbance_limit_m_step2 + (observer.drag_1_step * corrected)
+    acceleration = (_TURN * tilted) + unexplained
     states = {
-        "e": _TURN * 2 * reach_m,
-        "v": _TURN * 2 * speed,
+        "e": _TURN * (corrected_m + reach_m),
+        "v": _TURN * (corrected + speed),
         "w": _TURN * (unexplained + target),
         "j": _TURN * jerk,
-        "a": tilted,
-        "i": attitude.limit_m_step2,
-        "c": attitude.limit_m_step2,
-        "u": attitude.limit_m_step2,
-        "innovation": (2 * reach_m) + (observer.age_steps * speed),
-        "innovation_step": (2 * speed) + (observer.age_steps * acceleration),
+        "a": max(tilted, turned),
+        "i": limit,
+        "c": LAGGED * limit,
+        "u": limit,
+        "innovation": innovation,
+        "innovation_step": innovation_step,
     }
-    corrections = np.abs(observer.gain) @ [states["innovation"], states["innovation_step"]]
-    rows = max(np.max(np.sum(np.abs(row), axis=-1)) for row in (attitude.tilt_row, attitude.integral_row))
+    rows = np.abs(np.concatenate([attitude.tilt_row, attitude.integral_row]))
     move = float(np.max(np.abs(law.rows) @ [states[name] for name in STATES]))
     if law.moves == 2:
-        limit = float(np.max(attitude.command_limit_m_step2))
-        move += float(np.max(np.abs(law.ratios))) * (move + limit)
+        most = float(np.max(attitude.command_limit_m_step2))
+        move += float(np.max(np.abs(law.ratios))) * (move + most)
     return _Bounds(
         states=states,
-        position=max(states["e"], reach_m + corrections[0], reach_m + speed + acceleration),
-        speed=max(states["v"], speed + corrections[1], speed + acceleration),
+        position=max(states["e"], corrected_m + corrected + acceleration),
+        speed=max(states["v"], corrected + acceleration),
         acceleration=max(
             acceleration,
             states["w"],
             observer.disturbance_limit_m_step2 + corrections[2],
-            float(rows) * attitude.limit_m_step2,
-            _TURN * attitude.limit_m_step2,
+            float(np.max(rows @ [states[name] for name in _ATTITUDE_STATES])),
+            turned,
             (3 * target) + (2 * jerk),
         ),
         move=move,
@@ -214,9 +224,10 @@ def _bounds(settings: Sections) -> _Bounds:
     )
 
 
-def _attitude_shift(tilt: Any, integral: Any, limit: float, bits: Mapping[str, int]) -> int:
+def _attitude_shift(tilt: Any, integral: Any, states: Mapping[str, float], bits: Mapping[str, int]) -> int:
     rows = np.abs(np.concatenate([tilt, integral]))
-    return _shift(rows, [limit] * 4, [bits["acceleration"]] * 4, bits["acceleration"])
+    bounds = [states[name] for name in _ATTITUDE_STATES]
+    return _shift(rows, bounds, [bits["acceleration"]] * 4, bits["acceleration"])
 
 
 def _shift(gains: Any, bounds: Sequence[float], inputs: Sequence[int], result: int) -> int:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from mambo_codegen.methods.interface import LinearLaw, Method, StepResult
 from mambo_codegen.methods.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.quadratic import formats, law
+from mambo_codegen.methods.quadratic.arithmetic import arithmetic
+from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.optimizer import ROW
@@ -116,6 +118,7 @@ class Quadratic(QuadraticConstants, Method):
         return {
             "quadratic": True,
             "attitude": self.attitude,
+            "move_limits": AttitudeModel(self, arithmetic(self)).command_limit.tolist(),
             "observer": self.observer,
             "law": self.law,
             "stored_numbers": len(self.stored),
@@ -125,8 +128,8 @@ class Quadratic(QuadraticConstants, Method):
             "attitude_shares": [
                 period_s / (period_s + lag_s) for lag_s in (model.roll_lag_s, model.pitch_lag_s)
             ],
-            "wide": "(nmpc_sum_t)" if found else "",
-            "shifts": found.shifts if isinstance(found, formats.QuadraticFormats) else None,
+            "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
+            "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
         }
 
@@ -138,22 +141,29 @@ def _without_unread(loop: NDArray[np.float64], integral_1_s: float, delay_s: flo
     return loop[np.ix_(kept, kept)]
 
 
-def _stored_limits(constants: QuadraticConstants) -> list[str]:
-    """Spell the limits of what a controller with a quadratic cost stores, in ascending order."""
-    numbers, tracker = constants.numbers, constants.tracker
-    limits = [
-        numbers.constant(constants.settings.ranges.position_m, "position"),
-        numbers.constant(constants.observer.velocity_limit_m_step, "speed"),
-        numbers.constant(constants.observer.disturbance_limit_m_step2, "acceleration"),
-        numbers.constant(constants.attitude.limit_m_step2, "acceleration"),
-        numbers.constant(constants.settings.limits.tilt_rad, "angle"),
+def _number_macro(shift: int) -> str:
+    """Return the macro of the C that shifts a sum by so many bits to a number."""
+    names = ((32, "NMPC_NUMBER_ABOVE"), (17, "NMPC_NUMBER_BELOW"), (0, "(nmpc_real_t)NMPC_ROUNDED"))
+    return next(name for least, name in names if shift >= least)
+
+
+def _stored_limits(constants: QuadraticConstants) -> list[float]:
+    """Return bounds of what a controller stores, as numbers of the C, in ascending order."""
+    tracker, limit = constants.tracker, constants.attitude.limit_m_step2
+    bounds = [
+        (constants.settings.ranges.position_m, "position"),
+        (constants.observer.velocity_limit_m_step, "speed"),
+        (constants.observer.disturbance_limit_m_step2, "acceleration"),
+        (limit, "acceleration"),
+        (formats.LAGGED * limit, "acceleration"),
+        (constants.settings.limits.tilt_rad, "angle"),
     ]
     if tracker:
-        limits += [
-            numbers.constant(tracker.acceleration_limit_m_step2, "acceleration"),
-            numbers.constant(tracker.jerk_limit_m_step2_update, "acceleration"),
+        bounds += [
+            (tracker.acceleration_bound_m_step2, "acceleration"),
+            (tracker.jerk_limit_m_step2_update, "acceleration"),
         ]
-    return [str(limit) for limit in sorted(limits)]
+    return sorted(constants.numbers.constant(*bound) for bound in bounds)
 
 
 def _plain_products(constants: QuadraticConstants) -> list[str]:

@@ -79,8 +79,8 @@ class KalmanObserver:
             )
         ]
         return Estimate(
-            position_m=clamp(position + corrections[0], self._position_limit),
-            velocity_m_step=clamp(velocity + corrections[1], self._velocity_limit),
+            position_m=position + corrections[0],
+            velocity_m_step=velocity + corrections[1],
             disturbance_m_step2=clamp(estimate.disturbance_m_step2 + corrections[2], self._disturbance_limit),
         )
 

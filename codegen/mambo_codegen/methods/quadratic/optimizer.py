@@ -37,8 +37,9 @@ class QuadraticOptimizer:
         if len(moves) == 1:
             return clamp(moves[0], self._limit)
         first, second = moves
-        second_change = clamp(second, self._limit) - second
-        return clamp(first - self._products.ratio_product(self._ratios, second_change), self._limit)
+        limited = clamp(second, self._limit)
+        best = first - self._products.ratio_product(self._ratios, limited - second)
+        return clamp(np.where(limited == second, first, best), self._limit)
 
     def _row_product(self, rows: Real, state: Real) -> Real:
         total = rows[:, 0] * state[:, :, 0]
