@@ -191,7 +191,7 @@ static int is_good_command(const nmpc_command_t *command)
  *
  * whose largest error is as small as that of any with so many terms.
  * The C libraries of different boards differ in the last bit; this function has the same bits on every board, with
- * absolute errors of at most 1.2e-07.
+ * absolute errors of at most 1.21e-07.
  */
 
 #define NMPC_SINE_TERMS 3
