@@ -31,7 +31,7 @@ def test_no_angle_exceeds_the_stated_error(scalar: str, tmp_path: Path) -> None:
 
 
 def error_of(coefficients: tuple[str, ...], r: Any) -> Any:
-    """Return the error at r of the polynomial behind the first term of sine or, with -1/2 first, of cosine."""
+    """Return the error at r of a polynomial of sine, or of cosine if its first coefficient is near -1/2."""
     terms = [mpmath.mpf(coefficient) for coefficient in coefficients]
     power, exact = (2, mpmath.cos(r) - 1) if terms[0] < -0.4 else (3, mpmath.sin(r) - r)
     return exact - sum(term * r ** (power + (2 * k)) for k, term in enumerate(terms))
@@ -39,7 +39,7 @@ def error_of(coefficients: tuple[str, ...], r: Any) -> Any:
 
 @pytest.mark.parametrize("coefficients", [MINIMAX_SINE, *MINIMAX_COSINE.values()])
 def test_no_other_coefficients_have_a_smaller_error(coefficients: tuple[str, ...]) -> None:
-    """The error has its largest size once more than there are coefficients, with both signs (Chebyshev)."""
+    """The largest error occurs once more than there are coefficients, with both signs (Chebyshev)."""
     with mpmath.workdps(40):
         angles = [1.0005 * mpmath.pi / 4 * step / 2000 for step in range(1, 2001)]
         errors = [error_of(coefficients, r) for r in angles]
