@@ -33,6 +33,7 @@ from benchmarks.evidence.tables import (
     CONTROLLERS,
     conditions,
     envelope,
+    printed,
     read_envelope,
     read_printed,
     read_sensors,
@@ -184,6 +185,15 @@ ITEMS: Final = (
     ),
     _campaign("campaign-older-flow", "--flights 100 ", {"campaign-older-flow": campaign}),
     _campaign("campaign-quick-motors", "--flights 100 ", {"campaign-quick-motors": campaign}),
+    Item(
+        name="limits",
+        commands=(f"python -m benchmarks.limits {RESULTS}/limits/pictures",),
+        controllers=("mambo", "crazyflie", "mambo-1norm", "table1"),
+        paths=(*_FLIGHT, "benchmarks/limits.py", _STYLE),
+        read=read_printed,
+        tables={"limits": printed},
+        pictures={f"limits-{name}.png": f"pictures/limits-{name}.png" for name in ("step", "fence")},
+    ),
     Item(
         name="footprint",
         commands=(

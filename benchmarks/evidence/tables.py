@@ -97,6 +97,11 @@ def read_printed(results: Path) -> Figures:
     return {"rows": [dict(zip(head, row, strict=True)) for row in rows]}
 
 
+def printed(figures: Figures) -> str:
+    """Return a table that was printed."""
+    return table(figures["rows"])
+
+
 def read_sensors(results: Path) -> Figures:
     """Return the rows of `table2 --sensors`."""
     return {"rows": summary(results / "sensors")["rows"]}

@@ -37,26 +37,31 @@ def controller_page() -> str:
     """Return the page of controller.toml: a table for each section."""
     parts = [CONTROLLER]
     for section, description in SECTIONS.items():
-        rows = [_row(section, key) for path, key in KEYS.items() if path.startswith(f"{section}.")]
+        rows = [_row(key) for path, key in KEYS.items() if path.rpartition(".")[0] == section]
         head = ["key", "meaning", "allowed", "default", "`mambo`"]
         parts += [f"\n## [{section}]\n", plain(description) + "\n", table(head, rows)]
     return "\n".join(parts) + "\n"
 
 
-def _row(section: str, key: Key) -> list[str]:
+def _row(key: Key) -> list[str]:
     """Return the cells of a setting; the last is empty where preset mambo does not use it."""
     quadratic, one_norm = presets.preset("mambo"), presets.preset("mambo-1norm")
-    name = key.path.removeprefix(f"{section}.")
     meaning = plain(key.description)
-    if not one_norm.uses(section, name):
+    if not one_norm.uses(key.path):
         meaning = f"Quadratic cost only. {meaning}"
     value = ""
-    if quadratic.uses(section, name):
-        value = spell(getattr(getattr(quadratic, section), name))
+    if quadratic.uses(key.path):
+        value = spell(quadratic.value(key.path))
     else:
         meaning = f"1-norm only. {meaning}"
-    default = spell(getattr(getattr(Settings(), section), name))
-    return [code(name), meaning, f"{_domain(key)} {_unit(key)}".strip(), code(default), code(value)]
+    default = spell(Settings().value(key.path))
+    return [
+        code(key.path.rpartition(".")[2]),
+        meaning,
+        f"{_domain(key)} {_unit(key)}".strip(),
+        code(default),
+        code(value),
+    ]
 
 
 def vehicle_page() -> str:

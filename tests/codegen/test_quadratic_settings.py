@@ -13,7 +13,7 @@ from mambo_codegen.settings.model import Settings
 from tests.support.strategies import LAGS, QUADRATIC, Values, choices_of, nested, quadratic_settings, toml
 
 USED = {
-    norm: [key for key in KEYS.values() if Settings.model_validate(nested(values)).uses(*key.path.split("."))]
+    norm: [key for key in KEYS.values() if Settings.model_validate(nested(values)).uses(key.path)]
     for norm, values in (("1-norm", LAGS), ("quadratic", QUADRATIC))
 }
 
@@ -27,8 +27,7 @@ def faults_of(values: Values) -> list[str]:
 
 def other_value(key: Key) -> str | float:
     """Return a value of a key that is not its default."""
-    section, name = key.path.split(".")
-    default = Settings().model_dump()[section][name]
+    default = Settings().value(key.path)
     if key.kind == "one of":
         return next(choice for choice in choices_of(key) if choice != default)
     return 3 if key.kind == "whole number" else default * 0.9 or 0.1
@@ -56,8 +55,7 @@ def test_a_key_without_effect_is_refused_unless_it_says_the_default(norm: str) -
         spelling = spell(value) if key.low is None else value
         fault = f'{key.path} = {spelling} has no effect with cost.norm = "{norm}"; leave it out'
         assert faults_of({**base, key.path: value}) == [f"slow.toml: {fault}"]
-        section, name = key.path.split(".")
-        default = Settings().model_dump()[section][name]
+        default = Settings().value(key.path)
         settings = controller_toml.parse(toml({**base, key.path: default}), "with the default")
         assert settings == controller_toml.parse(toml(base), "without it")
 

@@ -87,4 +87,23 @@ def _random_settings(
     if 0 < lags[0] < 0.001 + document["damping"]["roll_rate_feedback_s"]:
         document["damping"] = {}
     document["horizon"]["update_period_s"] = float(10.0 ** rng.uniform(-3, 0))
+    if rng.random() < 0.5:
+        document["limits"] |= limits_of(rng, document["limits"]["tilt_rad"], document["ranges"])
     return Settings.model_validate(document)
+
+
+def limits_of(rng: np.random.Generator, tilt_rad: float, ranges: dict[str, Any]) -> dict[str, Any]:
+    """Draw limits of speed, braking and place for [limits], of which one at least is given."""
+    reach_m = min(ranges["position_m"], float(rng.choice([1.0, 3.0, 10000.0])))
+    walls = np.sort(rng.uniform(-reach_m, reach_m, (2, 2)), axis=1) * rng.choice([0.0, 1.0], (2, 1))
+    speed_m_s = min(ranges["velocity_m_s"], float(10.0 ** rng.uniform(-1, 1.5)))
+    braking_m_s2 = float(rng.uniform(0.2, 0.99) * 9.81 * tilt_rad)
+    return {
+        "speed_m_s": float(rng.choice([0.0, speed_m_s])),
+        "braking_m_s2": min(braking_m_s2, 10.0) if braking_m_s2 > 0.1 and rng.random() < 0.5 else 0.0,
+        "fence": {
+            f"{axis}_{end}_m": float(wall)
+            for axis, pair in zip("xy", walls, strict=True)
+            for end, wall in zip(("min", "max"), pair, strict=True)
+        },
+    }

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.cases import random_limits
 from mambo_sil.verify.step_inputs import StepInputs, random_steps
 
 BAD_COMMANDS = (np.nan, np.inf, 4.0, -4.0)
@@ -76,6 +77,7 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
     """Step a fresh controller through `inputs`, bad values among the good.
 
     Halfway it is reset. What else its method sets is set then, if it is weights, or in every seventh step.
+    With limits, they change in every ninth step.
     """
     rng = np.random.default_rng(seed)
     takes_weights = bool(method_of(controller.settings).weight_limits)
@@ -89,6 +91,8 @@ def run(controller: Any, inputs: Sequence[StepInputs], seed: int) -> Run:
                 found.setters.append(controller.set_weights(_weights(rng, len(command))))
         elif index % 7 == 5 and not takes_weights:
             found.setters.append(controller.set_command(command))
+        if index % 9 == 8 and method_of(controller.settings).limiting is not None:
+            found.setters.append(controller.set_limits(random_limits(controller.settings, len(command), rng)))
         found.steps.append(controller.step(case.state, case.target, case.thrust))
     return found
 
@@ -107,6 +111,7 @@ def differences(a: Run, b: Run) -> dict[str, int]:
             [getattr(step, field.name) for step in a.steps], [getattr(step, field.name) for step in b.steps]
         )
         for field in fields(a.steps[0])
+        if not getattr(a.steps[0], field.name) is getattr(b.steps[0], field.name) is None
     }
     counts["setters"] = count_differing(a.setters, b.setters)
     return {name: count for name, count in counts.items() if count}

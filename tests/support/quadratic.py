@@ -12,6 +12,7 @@ from scipy.linalg import expm
 
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.model import Settings
+from tests.support.cases import limits_of
 from tests.support.strategies import Values, nested
 
 Array = NDArray[np.float64]
@@ -184,7 +185,14 @@ CORNER_SETTINGS: Final[tuple[Values, ...]] = (
         "observer.outage_s": 0.0,
         "model.pitch_trim_rad": -0.03,
     },
-    TWO_MOVES | {"target.acceleration": "given", "target.tracker_gain": 0.6},
+    TWO_MOVES
+    | {
+        "target.acceleration": "given",
+        "target.tracker_gain": 0.6,
+        "limits.speed_m_s": 1.5,
+        "limits.fence.x_min_m": -1.5,
+        "limits.fence.x_max_m": 2.0,
+    },
     TWO_MOVES
     | {"observer.disturbance_limit_m_s2": 0.0, "ranges.position_m": 5.0, "ranges.velocity_m_s": 2.0},
 )
@@ -239,6 +247,11 @@ def case_values(index: int) -> Values:
             * min(0.2, 0.9 * gain * tilt_rad)
             * rng.uniform(-1, 1),
         }
+    if rng.random() < 0.5:
+        ranges = {name: values[f"ranges.{name}"] for name in ("position_m", "velocity_m_s")}
+        drawn = limits_of(rng, 0.05 * tilt_rad, ranges)
+        fence = {f"limits.fence.{name}": wall for name, wall in drawn.pop("fence").items()}
+        values |= fence | {f"limits.{name}": value for name, value in drawn.items()}
     return values
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from mambo_codegen.settings.controller_keys import KEYS
+from mambo_codegen.settings.controller_toml import with_value
 from mambo_codegen.settings.key import Key, spell
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.settings.reserved import KEYWORDS, STANDARD_NAMES
@@ -57,6 +58,7 @@ def valid_values(draw: st.DrawFn) -> Values:
     step_min = draw(numbers("optimizer.step_min_rad"))
     initial = draw(numbers("optimizer.initial_step_rad", low=step_min))
     thrust_min = draw(numbers("ranges.thrust_acceleration_min_m_s2"))
+    tilt_rad = draw(numbers("limits.tilt_rad"))
     constrained: Values = {
         "horizon.prediction": prediction,
         "horizon.control": draw(st.integers(1, prediction)),
@@ -70,6 +72,7 @@ def valid_values(draw: st.DrawFn) -> Values:
         "ranges.thrust_acceleration_max_m_s2": draw(
             numbers("ranges.thrust_acceleration_max_m_s2", low=math.nextafter(thrust_min, math.inf))
         ),
+        **draw(limits(tilt_rad, 9.81 * tilt_rad)),
         "code.scalar": draw(st.sampled_from(["float32", "float64"])),
         "code.prefix": draw(prefixes()),
     }
@@ -78,7 +81,7 @@ def valid_values(draw: st.DrawFn) -> Values:
     }
     free = {key.path: draw(numbers(key.path)) for key in NUMBERS if key.path not in constrained}
     drawn = constrained | choices | free | {"cost.norm": "1-norm"}
-    return {path: drawn[path] for path in KEYS if Settings().uses(*path.split("."))}
+    return {path: drawn[path] for path in KEYS if Settings().uses(path)}
 
 
 @st.composite
@@ -115,11 +118,15 @@ def quadratic_values(draw: st.DrawFn) -> Values:
             f"model.{angle}_gain": gain,
             f"model.{angle}_trim_rad": draw(none | st.floats(-largest, largest)),
         }
+    trim_rad = max(abs(values["model.roll_trim_rad"]), abs(values["model.pitch_trim_rad"]))
+    per_tilt = values["model.acceleration_per_tilt"] = draw(numbers("model.acceleration_per_tilt"))
+    tilted_rad = min(values["model.roll_gain"], values["model.pitch_gain"]) * tilt_rad
+    values |= draw(limits(tilt_rad, 9.81 * per_tilt * (tilted_rad - trim_rad)))
     for name in ("model.drag_1_s", "observer.age_s", "cost.velocity_weight_s"):
         values[name] = draw(none | numbers(name))
     settings = Settings.model_validate(nested(QUADRATIC))
     for key in KEYS.values():
-        if key.path not in values and settings.uses(*key.path.split(".")):
+        if key.path not in values and settings.uses(key.path):
             values[key.path] = draw(
                 st.sampled_from(choices_of(key)) if key.low is None else numbers(key.path)
             )
@@ -171,9 +178,49 @@ def quadratic_settings(scalar: str) -> st.SearchStrategy[Settings]:
     return drawn.map(lambda values: Settings.model_validate(nested(values)))
 
 
+WIDE: Values = {"limits.tilt_rad": 1.2, "ranges.position_m": 10000.0, "ranges.velocity_m_s": 1000.0}
+"""Values beside which limits may have any value."""
+
+
+@st.composite
+def limits(draw: st.DrawFn, tilt_rad: float, most_braking_m_s2: float) -> Values:
+    """Draw limits of speed, braking and place that go with a tilt limit and the braking that it gives."""
+    none = st.just(0.0)
+    reach_m, speed_m_s = draw(numbers("ranges.position_m")), draw(numbers("ranges.velocity_m_s"))
+    braking = none
+    if most_braking_m_s2 > 0.1:
+        braking = none | numbers("limits.braking_m_s2", low=0.1, high=0.999 * most_braking_m_s2)
+    fence: Values = {}
+    for axis in draw(st.sampled_from(["", "x", "y", "xy"])):
+        walls = st.lists(st.floats(-reach_m, reach_m), min_size=2, max_size=2, unique=True)
+        low, high = sorted(draw(walls.filter(lambda pair: min(pair) < 9999 and max(pair) > -9999)))
+        fence |= {f"limits.fence.{axis}_min_m": low, f"limits.fence.{axis}_max_m": high}
+    walls_without = {f"limits.fence.{axis}_{end}_m": 0.0 for axis in "xy" for end in ("min", "max")}
+    return (
+        walls_without
+        | fence
+        | {
+            "limits.tilt_rad": tilt_rad,
+            "limits.speed_m_s": draw(none | numbers("limits.speed_m_s", low=0.1, high=speed_m_s)),
+            "limits.braking_m_s2": draw(braking),
+            "ranges.position_m": reach_m,
+            "ranges.velocity_m_s": speed_m_s,
+        }
+    )
+
+
 def base_of(path: str) -> Values:
-    """Return the fewest values beside which a controller uses the key at `path`."""
-    return {} if Settings().uses(*path.split(".")) else QUADRATIC
+    """Return the fewest values beside which a controller uses the key at `path`, whatever its value."""
+    if path.startswith("limits.fence."):
+        walls = {
+            f"limits.fence.{axis}_{end}_m": value
+            for axis in "xy"
+            for end, value in (("min", -10000.0), ("max", 10000.0))
+        }
+        return WIDE | {other: value for other, value in walls.items() if other != path}
+    if path in ("limits.speed_m_s", "limits.braking_m_s2"):
+        return WIDE
+    return {} if Settings().uses(path) else QUADRATIC
 
 
 def choices_of(key: Key) -> list[str]:
@@ -185,8 +232,7 @@ def nested(values: Values) -> dict[str, Values]:
     """Return {section: {key: value}} of {"section.key": value}."""
     document: dict[str, Values] = {}
     for path, value in values.items():
-        section, name = path.split(".")
-        document.setdefault(section, {})[name] = value
+        document = with_value(document, path, value)
     return document
 
 
@@ -292,7 +338,7 @@ def _misspelt(draw: st.DrawFn, values: Values) -> Broken:
 
 def _unknown(draw: st.DrawFn, values: Values) -> Broken:
     """Add a key or a section that does not exist, or a value where a section belongs."""
-    section, name = draw(st.sampled_from(list(KEYS))).split(".")
+    section, _, name = draw(st.sampled_from(list(KEYS))).rpartition(".")
     what = draw(st.sampled_from(["key", "section", "no section"]))
     text = toml(values)
     if what == "no section":

@@ -342,12 +342,34 @@ def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
     assert costs[2] == costs[0]
 
 
+def test_limits_are_parameters(tmp_path: Path) -> None:
+    """A fence in the firmware's frame, with y to the left, acts at the next update; a bad one changes nothing."""
+    limited = build(folder_of(with_option(SETTINGS, "limits.speed_m_s", 2.0), tmp_path))
+    app = limited.app()
+    app.modes("modeAbs")
+    app.aim(np.array([0.0, 1.5, 0.0, 0.0, 0.0, 0.0]))
+    here = np.zeros(7)
+    app.update(here)
+    assert app.logged("limits") & 4 == 0
+    for name, value in (("xMin", -1.0), ("xMax", 1.0), ("yMin", -3.0), ("yMax", 1.0)):
+        app.set_parameter(name, value)
+    app.update(here)
+    assert app.logged("limits") & 4 == 4, "the target is 0.5 m left of the fence"
+    app.set_parameter("yMax", 2.0)
+    app.update(here)
+    assert app.logged("limits") & 4 == 0
+    app.set_parameter("yMax", -4.0)
+    app.update(here)
+    assert app.logged("limits") & 4 == 0, "less than yMin: refused"
+
+
 SUBJECTS = {
     "crazyflie": SETTINGS,
     "float64": with_option(SETTINGS, "code.scalar", "float64"),
     "given": with_option(SETTINGS, "target.acceleration", "given"),
     "fixed": with_option(presets.preset("mambo"), "code.scalar", "fixed"),
     "1-norm": ONE_NORM,
+    "limits": with_option(SETTINGS, "limits.speed_m_s", 2.0),
     "prefix": with_option(presets.preset("mambo-1norm"), "code.prefix", "left"),
 }
 

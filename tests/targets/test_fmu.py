@@ -36,8 +36,9 @@ SUBJECTS = {
     "float64": with_option(presets.preset("mambo"), "code.scalar", "float64"),
     "given": with_option(presets.preset("mambo"), "target.acceleration", "given"),
     "1-norm": presets.preset("mambo-1norm"),
+    "limits": with_option(presets.preset("mambo"), "limits.speed_m_s", 1.0),
 }
-OTHERS = ("float64", "1-norm", "given")
+OTHERS = ("float64", "1-norm", "given", "limits")
 """Subjects whose flights are left to the long tests."""
 
 

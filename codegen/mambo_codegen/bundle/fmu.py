@@ -5,6 +5,7 @@ from typing import Literal
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.numbers.gravity import hover_thrust
+from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.limits import ATTITUDE_LIMIT_RAD, YAW_LIMIT_RAD
 from mambo_codegen.settings.model import Settings
 
@@ -30,7 +31,8 @@ class FmuVariable:
 def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
     """Return the variables in the order of the C: 12 inputs, 2 outputs, then those of some settings.
 
-    A given acceleration of the target has 2 inputs, a 1-norm 2 weights.
+    A given acceleration of the target has 2 inputs, a 1-norm 2 weights; limits of speed, braking and place are
+    6 parameters.
     """
     ranges, tilt_rad = settings.ranges, settings.limits.tilt_rad
 
@@ -75,5 +77,23 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
                 "tracking_weight", "parameter", "1/m", 0.0, most_tracking, tracking, "lambda1, eq 12"
             ),
             FmuVariable("effort_weight", "parameter", "1/rad", 0.0, most_effort, effort, "lambda2, eq 12"),
+        ]
+    if (limiting := method_of(settings).limiting) is not None:
+        reach_m = ranges.position_m
+        speed_m_s, braking_m_s2, *walls, _ = limiting.limits.tolist()
+        most_m_s2 = limiting.tilted.at(tilt_rad)
+        variables += [
+            FmuVariable(
+                "speed_limit", "parameter", "m/s", SMALLEST_LIMIT, ranges.velocity_m_s, speed_m_s, "speed limit"
+            ),
+            FmuVariable(
+                *("braking_limit", "parameter", "m/s2", SMALLEST_LIMIT),
+                *(max(most_m_s2, braking_m_s2), braking_m_s2, "braking limit"),
+            ),
+        ]
+        ends = (("x_min", "least x"), ("y_min", "least y"), ("x_max", "largest x"), ("y_max", "largest y"))
+        variables += [
+            FmuVariable(f"fence_{name}", "parameter", "m", -reach_m, reach_m, wall_m, f"{words} in the fence")
+            for (name, words), wall_m in zip(ends, walls, strict=True)
         ]
     return tuple(variables)

@@ -24,6 +24,7 @@ from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.limits_context import limits_context
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.gravity import hover_thrust
@@ -181,6 +182,8 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "scalar_bytes": numbers.bytes[0],
             "instance_bytes": method.instance_bytes,
             "tracker": method.tracker,
+            "limiting": method.limiting,
+            **limits_context(method),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
             "given": method.tracker is not None and method.tracker.is_given,
@@ -236,6 +239,6 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     bits = numbers.bits or {}
     return {
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
-        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance")
+        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance", "braking")
         if name in bits
     }

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mambo_codegen.methods.limits_constants import LimitsConstants
 from mambo_codegen.methods.rate_feedback import feedback_steps
 from mambo_codegen.methods.tracker_constants import TrackerConstants, tracker_constants
 from mambo_codegen.numbers.fixed_point import Formats
@@ -35,6 +36,11 @@ class Constants(ABC):
     def weight_limits(self) -> tuple[float, ...]:
         """The largest tracking and effort weight, in SI units; none if the C takes no weights."""
         return ()
+
+    @property
+    @abstractmethod
+    def limiting(self) -> LimitsConstants | None:
+        """The constants of the limits of speed, braking and place, in float64; None without any."""
 
     @cached_property
     def tracker(self) -> TrackerConstants | None:

@@ -29,6 +29,7 @@ class Status(IntEnum):
     BAD_THRUST = 4
     BAD_WEIGHT = 5
     BAD_COMMAND = 6
+    BAD_LIMITS = 7
 
 
 class Inputs:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.constants import Constants
 from mambo_codegen.methods.math import Real
-from mambo_codegen.methods.proofs import FIXED_PROOFS
+from mambo_codegen.methods.proofs import FIXED_PROOFS, with_limits
 from mambo_codegen.settings.key import Refusal
 
 
@@ -45,6 +45,10 @@ class ReferenceController(Protocol):
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Forget the past, and hold `command_rad` (n, 2)."""
+
+    @property
+    def stored_limits(self) -> Real:
+        """What follows from the limits (n, k), in the numbers of the C; k is 0 without limits."""
 
     @property
     def outcome(self) -> Mapping[str, NDArray[Any]]:
@@ -109,11 +113,8 @@ class Method(Constants):
     @property
     def chapters(self) -> tuple[tuple[str, str], ...]:
         """The chapters of nmpc.c with these settings, and a word on each."""
-        absent = {
-            name
-            for name, needed in (("tracker", self.tracker), ("float", self.numbers.formats))
-            if not needed
-        }
+        needs = ("tracker", self.tracker), ("limits", self.limiting), ("float", self.numbers.formats)
+        absent = {name for name, needed in needs if not needed}
         return tuple(item for item in self.sub_blocks.items() if item[0] not in absent)
 
     @abstractmethod
@@ -167,7 +168,9 @@ class Method(Constants):
     @property
     def proofs(self) -> Mapping[str, tuple[str, ...]]:
         """Options of Frama-C for each proof of the scalar type, by entry function."""
-        return self.float_proofs if self.numbers.formats is None else FIXED_PROOFS
+        if self.numbers.formats is not None:
+            return FIXED_PROOFS
+        return self.float_proofs if self.limiting is None else with_limits(self.float_proofs)
 
     @property
     def linear_law(self) -> LinearLaw | None:

@@ -73,6 +73,18 @@ def clamp(values: Real, limit: Any) -> Real:
     return clamped
 
 
+def smaller(a: Real, b: Real) -> Real:
+    """Return the smaller numbers, with the comparison of the C."""
+    least: Real = np.where(a < b, a, b)
+    return least
+
+
+def larger(a: Real, b: Real) -> Real:
+    """Return the larger numbers, with the comparison of the C."""
+    most: Real = np.where(a > b, a, b)
+    return most
+
+
 def sign(value: Real) -> Real:
     """Return -1, 0 or 1 in the type of `value`; 0 for +0 and -0 (departure 14, docs/explanation/paper.md)."""
     scalar = value.dtype.type

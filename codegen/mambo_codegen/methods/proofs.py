@@ -1,7 +1,9 @@
 """Options of Frama-C for the proofs that controllers of every method have, by entry function."""
 
+from collections.abc import Mapping
 from typing import Final
 
+_SPEC: Final = "-eva-use-spec "
 _SPLIT: Final = (
     "-eva-split-return auto",  # analyse accepted and refused inputs apart
     "-eva-split-return-function between:0,within:0,is_good_point:0,is_good_state:0,is_good_target:0",
@@ -51,3 +53,18 @@ FIXED_PROOFS: Final = {
     "turn_everywhere": (*_WHOLE_NUMBERS, *TURN_EVERYWHERE),
 }
 """In fixed point, where no NaN exists and signed overflow is an alarm."""
+
+
+def with_limits(proofs: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
+    """Return the options of the proofs of a controller with limits.
+
+    Eva takes inverse square roots by their contract. What reads a target calls limits_are_free(), but
+    optimizer_minimize() runs after an outage without any.
+    """
+    found = {}
+    for name, flags in proofs.items():
+        specs = [flag.removeprefix(_SPEC) for flag in flags if flag.startswith(_SPEC)]
+        used = ",".join(["inverse_root", *specs]).replace("optimizer_minimize", "limits_are_free")
+        others = tuple(flag for flag in flags if not flag.startswith(_SPEC))
+        found[name] = others if name == "turn_everywhere" else (*others, _SPEC + used)
+    return found

@@ -2,18 +2,38 @@
 
 from typing import Final
 
+from pydantic.fields import FieldInfo
+
+from mambo_codegen.settings.fields import SettingsSection
 from mambo_codegen.settings.key import Form, Key, key_of
 from mambo_codegen.settings.model import Settings
 
-SECTIONS: dict[str, str] = {name: field.description or "" for name, field in Settings.model_fields.items()}
+SECTIONS: dict[str, str] = {}
 """The description of each section, in the order of the file."""
 
-KEYS: dict[str, Key] = {
-    f"{section}.{name}": key_of(f"{section}.{name}", schema)
-    for section, field in Settings.model_fields.items()
-    for name, schema in field.default.model_json_schema()["properties"].items()
-}
+KEYS: dict[str, Key] = {}
 """Every setting by its dotted path, in the order of the file."""
+
+
+def _collect(path: str, section: FieldInfo) -> None:
+    """Add the section at `path`, its keys, and then the sections in it."""
+    SECTIONS[path] = section.description or ""
+    model = type(section.default)
+    schemas = model.model_json_schema()["properties"]
+    inner = {
+        name: field
+        for name, field in model.model_fields.items()
+        if isinstance(field.default, SettingsSection)
+    }
+    for name in model.model_fields:
+        if name not in inner:
+            KEYS[f"{path}.{name}"] = key_of(f"{path}.{name}", schemas[name])
+    for name, field in inner.items():
+        _collect(f"{path}.{name}", field)
+
+
+for _name, _field in Settings.model_fields.items():
+    _collect(_name, _field)
 
 SETTINGS: Final = Form(SECTIONS, KEYS)
 """What messages on a controller.toml need."""

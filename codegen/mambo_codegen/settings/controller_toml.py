@@ -3,6 +3,7 @@
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -50,10 +51,13 @@ def with_option(settings: Settings, path: str, value: object, source: str = "set
 
     `source` begins the message, such as the option of the command line. Raises InvalidSettingsError.
     """
-    section, name = path.split(".")
-    document = settings.model_dump()
-    document[section][name] = value
-    return validate(document, source)
+    return validate(with_value(settings.model_dump(), path, value), source)
+
+
+def with_value(document: Mapping[str, Any], path: str, value: object) -> dict[str, Any]:
+    """Return `document` with `value` at the dotted `path`."""
+    name, _, rest = path.partition(".")
+    return {**document, name: with_value(document.get(name, {}), rest, value) if rest else value}
 
 
 def to_toml(settings: Settings, title: str = _TITLE) -> str:

@@ -9,6 +9,9 @@ from pydantic_core import PydanticCustomError
 SHORTEST_LAG_S: Final = 0.001
 """An attitude lag is 0 (none) or at least this; a shorter one is negligible."""
 
+SMALLEST_LIMIT: Final = 0.1
+"""A limit of speed or braking is 0 (none) or at least this, in m/s or m/s^2."""
+
 SHORTEST_RAMP_S: Final = 0.02
 """A ramp is 0 (none) or at least this."""
 
@@ -32,6 +35,13 @@ def _none_or_ramp(value: float) -> float:
     return value
 
 
+def _none_or_limit(value: float) -> float:
+    """Return a limit of speed or braking; refuse one between 0 and SMALLEST_LIMIT."""
+    if 0 < value < SMALLEST_LIMIT:
+        raise PydanticCustomError("limit", f"must be 0 or at least {SMALLEST_LIMIT}; 0 means no limit")
+    return value
+
+
 Number = Annotated[float, AfterValidator(_without_minus_zero)]
 Lag = Annotated[
     float,
@@ -45,6 +55,22 @@ Ramp = Annotated[
         ge=0, le=2, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SHORTEST_RAMP_S}}
     ),
     AfterValidator(_none_or_ramp),
+    AfterValidator(_without_minus_zero),
+]
+SpeedLimit = Annotated[
+    float,
+    Field(
+        ge=0, le=1000, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SMALLEST_LIMIT}}
+    ),
+    AfterValidator(_none_or_limit),
+    AfterValidator(_without_minus_zero),
+]
+BrakingLimit = Annotated[
+    float,
+    Field(
+        ge=0, le=10, json_schema_extra={"not": {"exclusiveMinimum": 0, "exclusiveMaximum": SMALLEST_LIMIT}}
+    ),
+    AfterValidator(_none_or_limit),
     AfterValidator(_without_minus_zero),
 ]
 

@@ -10,7 +10,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.settings.key import Refusal
-from mambo_codegen.settings.sections import Sections
+from mambo_codegen.settings.sections import DEFAULTS, Sections
 
 
 class Settings(Sections):
@@ -25,8 +25,8 @@ class Settings(Sections):
                 [
                     InitErrorDetails(
                         type=PydanticCustomError("joint", "{rule}", {"rule": refusal.rule}),
-                        loc=(refusal.section, refusal.name),
-                        input=getattr(getattr(self, refusal.section), refusal.name),
+                        loc=(*refusal.section.split("."), refusal.name),
+                        input=self.value(f"{refusal.section}.{refusal.name}"),
                     )
                     for refusal in refused
                 ],
@@ -35,10 +35,10 @@ class Settings(Sections):
 
     def _unused(self) -> Iterator[Refusal]:
         """Refuse every value that would have no effect, unless it is the default."""
-        for section, values in self.model_dump().items():
-            defaults = type(self).model_fields[section].default
+        for section, values in self.values.items():
             for name, value in values.items():
-                if not self.uses(section, name) and value != getattr(defaults, name):
+                path = f"{section}.{name}"
+                if not self.uses(path) and value != DEFAULTS.value(path):
                     yield Refusal(
                         section, name, f'has no effect with cost.norm = "{self.cost.norm}"; leave it out'
                     )
@@ -47,16 +47,17 @@ class Settings(Sections):
     def in_use(self) -> dict[str, dict[str, Any]]:
         """The values that the C depends on, by section.
 
-        Without those that a method leaves out if they are the defaults: [target], and with a 1-norm
-        cost.norm, model.thrust and [damping].
+        Without those that a method leaves out if they are the defaults: [target], the limits of speed,
+        braking and place, and with a 1-norm cost.norm, model.thrust and [damping].
         """
         values = self.used_values
         for path in method_of(self).unnamed:
-            section, _, name = path.partition(".")
-            default = type(self).model_fields[section].default
-            if not name and getattr(self, section) == default:
-                del values[section]
-            elif name and getattr(getattr(self, section), name) == getattr(default, name):
+            section, _, name = path.rpartition(".")
+            if self.value(path) != DEFAULTS.value(path):
+                continue
+            if path in values:
+                del values[path]
+            else:
                 del values[section][name]
         return values
 

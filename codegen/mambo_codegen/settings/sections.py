@@ -6,13 +6,23 @@ The descriptions are the comments of controller.toml and part of the JSON schema
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from mambo_codegen.settings import reserved
-from mambo_codegen.settings.fields import ONE_NORM, QUADRATIC, Lag, Number, OnlyFor, Ramp, SettingsSection
+from mambo_codegen.settings.fields import (
+    ONE_NORM,
+    QUADRATIC,
+    BrakingLimit,
+    Lag,
+    Number,
+    OnlyFor,
+    Ramp,
+    SettingsSection,
+    SpeedLimit,
+)
 
 
 class Horizon(SettingsSection):
@@ -346,8 +356,36 @@ class Optimizer(SettingsSection):
         return step_min
 
 
+class Fence(SettingsSection):
+    """A box that the drone stays in, along x and y of the world: north and east."""
+
+    x_min_m: Number = Field(0.0, ge=-10000, le=9999, description="Least x in the fence, in metres.")
+    x_max_m: Number = Field(
+        0.0,
+        ge=-9999,
+        le=10000,
+        description="Largest x in the fence, in metres; more than x_min_m. Both 0 for no walls along x.",
+    )
+    y_min_m: Number = Field(0.0, ge=-10000, le=9999, description="Least y in the fence, in metres.")
+    y_max_m: Number = Field(
+        0.0,
+        ge=-9999,
+        le=10000,
+        description="Largest y in the fence, in metres; more than y_min_m. Both 0 for no walls along y.",
+    )
+
+    @field_validator("x_max_m", "y_max_m")
+    @classmethod
+    def _max_above_min(cls, largest: float, info: ValidationInfo) -> float:
+        other = f"{(info.field_name or '')[0]}_min_m"
+        smallest = info.data.get(other, -math.inf)
+        if largest <= smallest and not largest == smallest == 0:
+            raise PydanticCustomError("fence", f"must be more than {smallest!r} (limits.fence.{other})")
+        return largest
+
+
 class Limits(SettingsSection):
-    """The limits of the commands."""
+    """The limits of commands, speed, braking and place."""
 
     tilt_rad: Number = Field(
         0.35,
@@ -355,6 +393,22 @@ class Limits(SettingsSection):
         le=1.2,
         description="Tilt limit, in radians: each iteration clamps every move of roll and pitch to plus or "
         "minus this value. Not in the paper; without it no bound on the command can be proven.",
+    )
+    speed_m_s: SpeedLimit = Field(
+        0.0,
+        description="Speed limit, in metres per second: the controller aims at no larger horizontal speed, "
+        "however far the target; 0 for none. A target that moves faster is left behind.",
+    )
+    braking_m_s2: BrakingLimit = Field(
+        0.0,
+        description="Braking limit, in metres per second squared: the drone approaches a target or a wall at "
+        "a speed that this deceleration takes away in time. 0 for none, or, with a speed limit or a fence, "
+        "for what the tilt limit leaves.",
+    )
+    fence: Fence = Field(
+        Fence(),
+        description="A box that the drone stays in, by its estimated position: a target outside counts as "
+        "one on the wall, and a drone outside flies back in.",
     )
 
 
@@ -449,23 +503,47 @@ class Sections(SettingsSection):
     optimizer: Annotated[Optimizer, ONE_NORM] = Field(
         Optimizer(), description="The RPROP search for the moves."
     )
-    limits: Limits = Field(Limits(), description="The limits of the commands.")
+    limits: Limits = Field(Limits(), description="The limits of commands, speed, braking and place.")
     ranges: Ranges = Field(
         Ranges(), description="The ranges of the inputs; a step refuses an input out of range with a status."
     )
     code: Code = Field(Code(), description="Types and names of the C.")
 
-    def uses(self, section: str, name: str) -> bool:
-        """Return whether a controller with the norm of these settings uses a key."""
-        whole = type(self).model_fields[section]
-        marks = (*whole.metadata, *type(getattr(self, section)).model_fields[name].metadata)
-        return all(mark.norm == self.cost.norm for mark in marks if isinstance(mark, OnlyFor))
+    def uses(self, path: str) -> bool:
+        """Return whether a controller with the norm of these settings uses the key at a dotted path."""
+        model, metadata = type(self), []
+        for name in path.split("."):
+            field = model.model_fields[name]
+            metadata += field.metadata
+            model = type(field.default)
+        return all(mark.norm == self.cost.norm for mark in metadata if isinstance(mark, OnlyFor))
+
+    def value(self, path: str) -> Any:
+        """Return the value at a dotted path: that of a key, or a section."""
+        found: Any = self
+        for name in path.split("."):
+            found = getattr(found, name)
+        return found
+
+    @property
+    def values(self) -> dict[str, dict[str, Any]]:
+        """All values, by the dotted paths of their sections, in the order of the file."""
+        found: dict[str, dict[str, Any]] = {}
+        for section, values in self.model_dump().items():
+            found[section] = {name: value for name, value in values.items() if not isinstance(value, dict)}
+            inner = {name: value for name, value in values.items() if isinstance(value, dict)}
+            found |= {f"{section}.{name}": value for name, value in inner.items()}
+        return found
 
     @property
     def used_values(self) -> dict[str, dict[str, Any]]:
         """The values of the keys that a controller uses, by section; a section without any is left out."""
         found = {
-            section: {name: value for name, value in values.items() if self.uses(section, name)}
-            for section, values in self.model_dump().items()
+            section: {name: value for name, value in values.items() if self.uses(f"{section}.{name}")}
+            for section, values in self.values.items()
         }
         return {section: values for section, values in found.items() if values}
+
+
+DEFAULTS: Final = Sections()
+"""The settings that a missing key has."""

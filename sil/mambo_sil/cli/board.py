@@ -184,7 +184,7 @@ def _axis(text: str, settings: "Settings") -> "Axis":
     from mambo_sil.board.footprint.sweep import Axis
 
     key, _, span = text.partition("=")
-    free = [path for path, one in KEYS.items() if one.low is not None and settings.uses(*path.split("."))]
+    free = [path for path, one in KEYS.items() if one.low is not None and settings.uses(path)]
     if key not in free:
         near = [path for path in free if path.endswith(f".{key}")]
         near = near or difflib.get_close_matches(key, free, n=1, cutoff=0.0)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.methods import Method, method_of
 from mambo_codegen.methods.inputs import Status, choose
+from mambo_codegen.methods.limits_constants import LIMITS
 from mambo_codegen.numbers.representation import ACCELERATION, COMMAND, STATE, TARGET, THRUST
 from mambo_codegen.settings.model import Settings
 
@@ -34,7 +35,7 @@ NULL_COMMAND: Final = 8
 class ApiFunction(IntEnum):
     """The function of the C interface that a call calls.
 
-    SET_WEIGHTS is there with a 1-norm, SET_COMMAND with a quadratic cost.
+    SET_WEIGHTS is there with a 1-norm, SET_COMMAND with a quadratic cost, SET_LIMITS with limits.
     """
 
     STEP = 0
@@ -42,6 +43,7 @@ class ApiFunction(IntEnum):
     SET_WEIGHTS = 2
     SET_COMMAND = 2
     INIT = 3
+    SET_LIMITS = 4
 
 
 _POINTERS: Final = {
@@ -49,7 +51,11 @@ _POINTERS: Final = {
     ApiFunction.RESET: NULL_SELF | NULL_FIRST,
     ApiFunction.SET_WEIGHTS: NULL_SELF | NULL_FIRST,
     ApiFunction.INIT: NULL_SELF,
+    ApiFunction.SET_LIMITS: NULL_SELF | NULL_FIRST,
 }
+
+_LIMITS_BIT: Final = 64
+"""SET_LIMITS is written as SET_WEIGHTS with this bit."""
 
 
 def step_quantities(method: Method) -> tuple[str, ...]:
@@ -64,6 +70,7 @@ def _quantities(method: Method) -> dict[ApiFunction, tuple[str, ...]]:
         ApiFunction.RESET: COMMAND,
         ApiFunction.SET_WEIGHTS: method.setter_quantities,
         ApiFunction.INIT: COMMAND,
+        ApiFunction.SET_LIMITS: LIMITS,
     }
 
 
@@ -92,7 +99,8 @@ def outcome_type(settings: Settings) -> np.dtype[Any]:
 def calls(settings: Settings, function: ApiFunction, values: NDArray[Any], nulls: int = 0) -> Tape:
     """Return a call of `function` for each row of values (n, k); `nulls` is the mask of null pointers."""
     made = np.zeros(len(values), call_type(settings))
-    made["call"] = function | (nulls << 2)
+    code = ApiFunction.SET_WEIGHTS | _LIMITS_BIT if function == ApiFunction.SET_LIMITS else function
+    made["call"] = code | (nulls << 2)
     method = method_of(settings)
     quantities = _quantities(method)[function][: values.shape[1]]
     made["values"][:, : values.shape[1]] = method.numbers.quantize(values, quantities)
@@ -134,6 +142,9 @@ class _Runs:
         """Make one call (n,) on each controller, and return the outcomes (n,)."""
         controller = self._controller
         function = now["call"] & 3
+        if self._method.limiting is not None:
+            is_limits = (function == ApiFunction.SET_WEIGHTS) & ((now["call"] & _LIMITS_BIT) != 0)
+            function = np.where(is_limits, np.uint8(ApiFunction.SET_LIMITS), function)
         nulls = (now["call"] >> 2) & 15
         null = (nulls & np.array([_POINTERS[f] for f in ApiFunction])[function]) != 0
 
@@ -154,10 +165,13 @@ class _Runs:
         with np.errstate(all="ignore"):
             resets = call(ApiFunction.RESET, controller.reset)
             others = call(ApiFunction.SET_WEIGHTS, set_other)
+            limits = np.zeros_like(others)
+            if self._method.limiting is not None:
+                limits = call(ApiFunction.SET_LIMITS, controller.set_limits)
             steps = call(ApiFunction.STEP, step)
         self._initialise((function == ApiFunction.INIT) & ~null)
 
-        status = np.choose(function, [steps, resets, others, np.zeros_like(steps)])
+        status = np.choose(function, [steps, resets, others, np.zeros_like(steps), limits])
         outcome["status"] = np.where(null & (function != ApiFunction.INIT), Status.NULL_POINTER, status)
         for name, values in controller.outcome.items():
             outcome[name] = values.reshape(outcome[name].shape)

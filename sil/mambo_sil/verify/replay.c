@@ -24,7 +24,7 @@
 
 /* Initialise memory with other content before, so that a member that nmpc_init() does not set shows in the
  * outcome or is reported by the sanitizer. Returns 0 if only padding keeps its content, and with a 1-norm if the weights
- * are those of the settings and everything else is zero. With a quadratic cost each outcome has all numbers. */
+ * are those of the settings and everything else but the bounds is zero. With a quadratic cost each outcome has all numbers. */
 static int nmpc_replay_init(nmpc_t *self)
 {
     int wrong = 0;
@@ -50,6 +50,10 @@ static int nmpc_replay_init(nmpc_t *self)
         wrong = (self->weights.tracking != NMPC_TRACKING_WEIGHT) || (self->weights.effort != NMPC_EFFORT_WEIGHT);
         (void)memset(&one.controller.weights, 0, sizeof(nmpc_weights_t));
         (void)memset(&other.controller.weights, 0, sizeof(nmpc_weights_t));
+#ifdef NMPC_LIMIT_SPEED
+        (void)memset(&one.controller.bounds, 0, sizeof(nmpc_bounds_t));
+        (void)memset(&other.controller.bounds, 0, sizeof(nmpc_bounds_t));
+#endif
 #endif
         for (i = 0; i < sizeof(nmpc_t); i++) {
             if (one.bytes[i] != other.bytes[i]) {
@@ -83,6 +87,13 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
     nmpc_replay_write(numbers, sizeof(numbers));
     nmpc_replay_write(command, sizeof(*command));
     nmpc_replay_write(self, NMPC_STORED_NUMBERS * sizeof(nmpc_real_t));
+#ifdef NMPC_LIMIT_SPEED
+    {
+        const int32_t active = (int32_t)self->limited;
+
+        nmpc_replay_write(&active, sizeof(active));
+    }
+#endif
 }
 #else
 /* Write what a call leaves in the controller and in `command`. */
@@ -97,6 +108,14 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
     nmpc_replay_write(&cost, sizeof(cost));
     nmpc_replay_write(self->gradient, sizeof(self->gradient));
     nmpc_replay_write(self->plan_rad, sizeof(self->plan_rad));
+#ifdef NMPC_LIMIT_SPEED
+    {
+        const int32_t left[2] = { (int32_t)self->missed, (int32_t)self->limited };
+
+        nmpc_replay_write(&self->bounds, sizeof(self->bounds));
+        nmpc_replay_write(left, sizeof(left));
+    }
+#endif
 }
 #endif
 

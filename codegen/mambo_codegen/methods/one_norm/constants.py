@@ -4,6 +4,14 @@ import math
 from functools import cached_property
 
 from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.limits_constants import (
+    ONE_NORM_APPROACH_1_S,
+    ONE_NORM_OUTAGE_S,
+    ONE_NORM_TILT,
+    LimitsConstants,
+    limits_constants,
+    stored_quantities,
+)
 from mambo_codegen.methods.one_norm.formats import OneNormFormats, formats
 from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
 from mambo_codegen.settings.limits import WEIGHT_LIMIT
@@ -21,6 +29,23 @@ class OneNormConstants(Constants):
     def tables(self) -> HorizonTables:
         """The constants of the prediction, in float64."""
         return horizon_tables(self.settings)
+
+    @cached_property
+    def limiting(self) -> LimitsConstants | None:
+        """The constants of the limits of speed, braking and place, in float64; None without any."""
+        return limits_constants(self.settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT)
+
+    @property
+    def limits_stored(self) -> tuple[str, ...]:
+        """The quantity of each number in nmpc_bounds_t, in their order."""
+        given = self.tracker is not None and self.tracker.is_given
+        return stored_quantities(*["velocity"] * (2 if given else 0))
+
+    @property
+    def outage_steps(self) -> int | None:
+        """Control steps without a good state after which the command is level; None without limits."""
+        period_s = self.settings.horizon.update_period_s
+        return min(250, max(1, round(ONE_NORM_OUTAGE_S / period_s))) if self.limiting else None
 
     def choose_formats(self) -> OneNormFormats:
         """Choose the formats of fixed point."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Status, choose
+from mambo_codegen.methods.limits import Limits, LimitsMemory, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
@@ -23,7 +24,8 @@ class OneNormMemory:
     """State of n controllers between two steps.
 
     command_rad, the first moves of the last plan, is (n, 2), plan_rad (n, control, 2), weights (n, 2), cost
-    (n,), gradient (n, control, 2), iterations (n,), converged (n,). Without a tracker `target` stays unknown.
+    (n,), gradient (n, control, 2), iterations (n,), converged (n,). Without a tracker `target` stays unknown,
+    without limits `limits` zeros. missed (n,) counts control steps since the last good state with limits.
     sent_rad (n, 2) are the last commands, tilt_rad (n, 2) the angles of the last good step, has_tilt (n,)
     whether there was one.
     """
@@ -36,6 +38,8 @@ class OneNormMemory:
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
     target: TargetMotion
+    limits: LimitsMemory
+    missed: NDArray[np.int64]
     sent_rad: Real
     tilt_rad: Real
     has_tilt: NDArray[np.bool_]
@@ -52,6 +56,9 @@ class OneNormStep:
     plan_rad:    (n, control, 2) the optimized moves; the first and the rate feedback are the command.
     iterations:  (n,) updates made.
     converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
+    limits:      (n, k) all numbers of nmpc_bounds_t in their order; None without limits, as the next two.
+    missed:      (n,) control steps since the last good state.
+    active:      (n,) the limits that act, as `Limit`, but TILT.
 
     With fixed point the numbers are those of the C, converted exactly to SI units in float64.
     """
@@ -63,6 +70,9 @@ class OneNormStep:
     plan_rad: Real
     iterations: NDArray[np.int64]
     converged: NDArray[np.bool_]
+    limits: Real | None = None
+    missed: NDArray[np.int64] | None = None
+    active: NDArray[np.int64] | None = None
 
 
 class OneNormController:
@@ -73,6 +83,7 @@ class OneNormController:
 
     def __init__(self, constants: OneNormConstants, n: int = 1, minimize: Minimize = Rprop.minimize) -> None:
         settings, products = constants.settings, arithmetic(constants)
+        self._constants = constants
         self.settings = settings
         self._numbers, self._inputs = constants.numbers, Inputs(constants)
         self._products = products
@@ -81,6 +92,8 @@ class OneNormController:
         )
         self._predictor = Predictor(constants, products)
         self._tracker = Tracker(constants.tracker, products) if constants.tracker else None
+        self._limits = Limits(constants, constants.limiting) if constants.limiting else None
+        self._outage_steps = constants.outage_steps
         self._rprop = Rprop(settings, products)
         self._minimize = minimize
         self.scalar = self._numbers.scalar
@@ -95,6 +108,10 @@ class OneNormController:
             iterations=np.zeros(n, np.int64),
             converged=np.zeros(n, np.bool_),
             target=unknown_motion(np.zeros((n, 2), computed)),
+            limits=self._limited(np.repeat(self._limits.defaults, n, axis=0))
+            if self._limits
+            else no_limits(np.zeros((n, 2), computed)),
+            missed=np.zeros(n, np.int64),
             sent_rad=np.zeros((n, 2), computed),
             tilt_rad=np.zeros((n, 2), computed),
             has_tilt=np.zeros(n, np.bool_),
@@ -106,18 +123,30 @@ class OneNormController:
         Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
         nothing.
         """
-        command, good = self._inputs.command(command_rad)
-        plan = np.broadcast_to(command[:, None], self.memory.plan_rad.shape)
-        new = replace(
-            self.memory,
-            command_rad=command,
-            plan_rad=plan,
-            target=unknown_motion(command),
-            sent_rad=command,
-            has_tilt=np.zeros(len(command), np.bool_),
-        )
-        self.memory = choose(good, new, self.memory)
+        given, good = self._inputs.command(command_rad)
+        self.memory = choose(good, self._held(clamp(given, self._tilt_limit())), self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
+
+    def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
+        """Replace the limits by `limits` (n, 7), in the order of nmpc_limits_t.
+
+        Returns a status (n,); bad limits change nothing. Raises ValueError without limits in the settings.
+        """
+        if self._limits is None:
+            raise ValueError("the settings have no limits")
+        given, old = self._limits.quantize(limits), self.memory.limits
+        good = self._limits.check(given)
+        new = replace(old, bounds=self._limits.bounds(given))
+        memory, tilt = self.memory, new.bounds.tilt_rad[:, None]
+        limited = replace(
+            memory,
+            command_rad=clamp(memory.command_rad, tilt),
+            plan_rad=clamp(memory.plan_rad, tilt[:, None]),
+            limits=new,
+            sent_rad=clamp(memory.sent_rad, tilt),
+        )
+        self.memory = choose(good, limited, memory)
+        return np.where(good, Status.OK, Status.BAD_LIMITS)
 
     def set_weights(self, weights: ArrayLike) -> NDArray[np.int64]:
         """Replace tracking and effort weight by `weights` (n, 2), each from 0 to its limit.
@@ -144,6 +173,7 @@ class OneNormController:
         thrusts = np.where(good, thrusts, self._inputs.limits.thrust_least)
         if self.settings.model.thrust == "hover":
             thrusts = np.full_like(thrusts, self._numbers.constant(hover_thrust(self.settings), "thrust"))
+        limits, targets = self._limit(states, targets)
         motion = self._track(targets)
         searched = self._search(states, targets, thrusts, motion.acceleration_m_step2)
         new = replace(
@@ -155,11 +185,13 @@ class OneNormController:
             iterations=searched.iterations,
             converged=searched.converged,
             target=motion,
+            limits=limits,
+            missed=np.zeros(len(states), np.int64),
             sent_rad=self._command(searched.moves_rad[:, 0], states[:, 4:6]),
             tilt_rad=states[:, 4:6],
             has_tilt=np.ones(len(states), np.bool_),
         )
-        new = self.memory = choose(good, new, self.memory)
+        new = self.memory = self._after_outage(status, choose(good, new, self.memory))
         to_si = self._numbers.to_si
         return OneNormStep(
             status=status,
@@ -169,21 +201,36 @@ class OneNormController:
             plan_rad=to_si(new.plan_rad, "angle"),
             iterations=new.iterations,
             converged=new.converged,
+            limits=to_si(self.stored_limits, *self._constants.limits_stored) if self._limits else None,
+            missed=new.missed if self._limits else None,
+            active=new.limits.active if self._limits else None,
         )
+
+    @property
+    def stored_limits(self) -> Real:
+        """All numbers of nmpc_bounds_t (n, k), in their order; k is 0 without limits."""
+        if self._limits is None:
+            return np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)
+        return np.concatenate(self._limits.stored(self.memory.limits, has_command=False), axis=1)
 
     @property
     def outcome(self) -> dict[str, NDArray[Any]]:
         """What the last call left, in the numbers of the C."""
         memory = self.memory
+        limits = {
+            "limits": self.stored_limits,
+            "missed": memory.missed,
+            "active": memory.limits.active,
+        }
         return {
             "iterations": memory.iterations,
             "converged": memory.converged,
-            "saturated": np.any(np.abs(memory.sent_rad) >= self._inputs.limits.tilt, axis=1),
+            "saturated": np.any(np.abs(memory.sent_rad) >= self._tilt_limit(), axis=1),
             "command_rad": memory.sent_rad,
             "cost": memory.cost,
             "gradient": memory.gradient,
             "plan_rad": memory.plan_rad,
-        }
+        } | (limits if self._limits else {})
 
     def _command(self, moves_rad: Real, tilt_rad: Real) -> Real:
         """Return the commands (n, 2): the first moves, and what the rates of the attitude add."""
@@ -192,7 +239,49 @@ class OneNormController:
         memory = self.memory
         change = self._products.feedback_product(self._feedback, tilt_rad - memory.tilt_rad)
         added = np.where(memory.has_tilt[:, None], moves_rad + change, moves_rad)
-        return clamp(added, self._inputs.limits.tilt)
+        return clamp(added, self._tilt_limit())
+
+    def _limited(self, limits: Real) -> LimitsMemory:
+        """Return the memory of limits (n, 7), of the quantities LIMITS."""
+        assert self._limits is not None
+        bounds = self._limits.bounds(limits)
+        return replace(no_limits(bounds.centre_m), bounds=bounds)
+
+    def _limit(self, state: Real, target: Real) -> tuple[LimitsMemory, Real]:
+        """Return what limits keep, and the targets within them."""
+        memory = self.memory.limits
+        return self._limits.limit(memory, state[:, 0:2], target) if self._limits else (memory, target)
+
+    def _tilt_limit(self) -> Any:
+        """Return the tilt limit, or one for each controller (n, 1)."""
+        return self.memory.limits.bounds.tilt_rad[:, None] if self._limits else self._inputs.limits.tilt
+
+    def _held(self, command: Real) -> OneNormMemory:
+        """Return the memory of controllers that hold commands (n, 2) and have forgotten the target."""
+        n = len(command)
+        return replace(
+            self.memory,
+            command_rad=command,
+            plan_rad=np.broadcast_to(command[:, None], self.memory.plan_rad.shape),
+            target=unknown_motion(command),
+            missed=np.zeros(n, np.int64),
+            sent_rad=command,
+            has_tilt=np.zeros(n, np.bool_),
+        )
+
+    def _after_outage(self, status: NDArray[np.int64], memory: OneNormMemory) -> OneNormMemory:
+        """Return the memory with one more missed state where it was bad; the command is level after many."""
+        if self._outage_steps is None:
+            return memory
+        bad = status == Status.BAD_STATE
+        missed = np.where(bad, np.minimum(memory.missed + 1, self._outage_steps), memory.missed)
+        memory = replace(memory, missed=missed)
+        level = replace(
+            self._held(np.zeros_like(memory.sent_rad)),
+            limits=replace(memory.limits, active=np.zeros_like(memory.limits.active)),
+            missed=missed,
+        )
+        return choose(bad & (missed == self._outage_steps), level, memory)
 
     def _track(self, target: Real) -> TargetMotion:
         if self._tracker is None:
@@ -208,6 +297,8 @@ class OneNormController:
             return cost.evaluate(self._predictor, prediction, memory.weights, moves_rad, memory.command_rad)
 
         start = memory.plan_rad
+        if self._limits:
+            self._rprop.limit = self._tilt_limit()[:, :, None]
         if self.settings.optimizer.warm_start == "last_command":
             start = np.repeat(memory.command_rad[:, None], start.shape[1], axis=1)
         return self._minimize(self._rprop, evaluate, start)

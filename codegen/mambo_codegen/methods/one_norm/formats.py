@@ -20,6 +20,12 @@ from typing import Final
 
 import numpy as np
 
+from mambo_codegen.methods.limits_constants import (
+    ONE_NORM_APPROACH_1_S,
+    ONE_NORM_TILT,
+    limits_bits,
+    limits_constants,
+)
 from mambo_codegen.methods.one_norm.horizon import HorizonTables, horizon_tables
 from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.tracker_constants import TrackerConstants, tracker_constants
@@ -40,6 +46,9 @@ _WEIGHT_HEADROOM: Final = 4.0
 
 _COARSEST_ERROR_BITS: Final = 10
 """Fewest fractional bits of an error: its resolution is 1 mm or better."""
+
+_PLACES: Final = 4.02
+"""Bound of what limits compute with positions, over the range of positions."""
 
 _SMALLEST_WEIGHT: Final = 512
 """Smallest integer for a weight: rounding changes a larger one by less than a thousandth."""
@@ -66,6 +75,7 @@ class OneNormFormats:
     tracker:            tau^2 over the update period, s, or tau^2, s^2, for a given acceleration; 0 without a
                         tracker.
     feedback:           rate feedback in steps; 0 without.
+    braking, approach, knee, slope, rate: of the limits, see `limits_bits`; 0 without.
     cost, gradient:     64-bit integers; cost without unit, gradient 1/rad.
     error_limit:        limit to which the initial error is clamped, an integer of the format of positions.
     tracking_limit, effort_limit: largest weights, integers of their formats.
@@ -89,6 +99,11 @@ class OneNormFormats:
     factor: int
     tracker: int
     feedback: int
+    braking: int
+    approach: int
+    knee: int
+    slope: int
+    rate: int
     cost: int
     gradient: int
     error_limit: int
@@ -148,7 +163,9 @@ def formats(settings: Sections, tables: HorizonTables) -> OneNormFormats:
     error = min(
         fractional_bits(settings.horizon.prediction * error_limit + bounds.error_sum), acceleration - 1
     )
-    position = min(fractional_bits(2 * ranges.position_m), error)
+    limiting = limits_constants(settings, ONE_NORM_APPROACH_1_S, ONE_NORM_TILT)
+    position = min(fractional_bits((_PLACES if limiting else 2) * ranges.position_m), error)
+    velocity = fractional_bits(2 * ranges.velocity_m_s)
     gradient_bound = 2 * gain * bounds.response
     distance_gradient = fractional_bits(gradient_bound)
 
@@ -173,7 +190,7 @@ def formats(settings: Sections, tables: HorizonTables) -> OneNormFormats:
     effort = min(effort, tracking + distance_gradient)
     return OneNormFormats(
         position=position,
-        velocity=fractional_bits(2 * ranges.velocity_m_s),
+        velocity=velocity,
         thrust=fractional_bits(ranges.thrust_acceleration_max_m_s2),
         yaw=fractional_bits(YAW_LIMIT_RAD),
         angle=angle,
@@ -190,6 +207,7 @@ def formats(settings: Sections, tables: HorizonTables) -> OneNormFormats:
         factor=factor,
         tracker=fractional_bits(tracker.factor) if tracker else 0,
         feedback=feedback_bits(feedback),
+        **limits_bits(limiting, velocity, position),
         cost=tracking + error,
         gradient=tracking + distance_gradient,
         error_limit=raw(error_limit, position),

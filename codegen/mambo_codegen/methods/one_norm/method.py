@@ -6,6 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from mambo_codegen.methods.interface import Method, StepResult
+from mambo_codegen.methods.limits_constants import LATER_LIMITS, ONE_NORM_TILT
+from mambo_codegen.methods.limits_constants import refusals as limits_refusals
 from mambo_codegen.methods.one_norm.constants import OneNormConstants
 from mambo_codegen.methods.one_norm.controller import OneNormController, OneNormStep
 from mambo_codegen.methods.one_norm.formats import refusals
@@ -29,6 +31,7 @@ class OneNorm(OneNormConstants, Method):
         "predictor": "the errors over the horizon, eqs 8-11",
         "cost": "their sum and its subgradient, eq 12",
         "optimizer": "RPROP",
+        "limits": "speed, braking and place",
         "step": "a control step",
         "interface": "the functions of nmpc.h",
         "float": "the same functions with floats",
@@ -45,13 +48,16 @@ class OneNorm(OneNormConstants, Method):
         "plan_rad",
     )
     iterates: ClassVar[bool] = True
-    unnamed: ClassVar[tuple[str, ...]] = ("cost.norm", "model.thrust", "damping", "target")
+    unnamed: ClassVar[tuple[str, ...]] = (
+        *("cost.norm", "model.thrust", "damping", "target"),
+        *LATER_LIMITS,
+    )
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = FLOAT_PROOFS
 
     def refusals(self) -> list[Refusal]:
         """Return why a controller with the 1-norm cannot have the settings."""
         settings = self.settings
-        refused = lag_refusals(settings, needs_lag=False)
+        refused = lag_refusals(settings, needs_lag=False) or limits_refusals(settings, ONE_NORM_TILT)
         return refused or (refusals(settings) if settings.code.scalar == "fixed" else [])
 
     def reference_controller(self, n: int = 1) -> OneNormController:
@@ -70,7 +76,13 @@ class OneNorm(OneNormConstants, Method):
             StepResult("plan_rad", ("angle",), (moves, 2)),
             StepResult("iterations"),
             StepResult("converged", count_type=np.bool_),
+            *(self._limits_results if self.limiting else ()),
         )
+
+    @property
+    def _limits_results(self) -> tuple[StepResult, ...]:
+        stored = self.limits_stored
+        return StepResult("limits", stored, (len(stored),)), StepResult("missed"), StepResult("active")
 
     def tested_numbers(self, step: OneNormStep) -> tuple[float, ...]:
         """Return cost and gradient by the first move (2,)."""
@@ -91,6 +103,8 @@ class OneNorm(OneNormConstants, Method):
         tracker, flags = (4 if self.tracker.is_given else 6, 3) if self.tracker else (0, 2)
         if self.feedback_steps:
             command, flags = command + 4, flags + 1
+        if self.limiting:
+            command, flags = command + len(self.limits_stored), flags + 2
         numbers, sums = weights + gains + tilt + rollouts + tracker + command + moves, moves + 1
         before_flags = -(-numbers * number_bytes // sum_bytes) * sum_bytes + sums * sum_bytes
         return -(-(before_flags + flags) // sum_bytes) * sum_bytes

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,8 @@ class Rprop:
             for step in (optimizer.initial_step_rad, optimizer.step_max_rad, optimizer.step_min_rad)
         )
         self.tolerance = constant(optimizer.tolerance, "cost")
-        self._limit = constant(settings.limits.tilt_rad, "angle")
+        self.limit: Any = constant(settings.limits.tilt_rad, "angle")
+        """The tilt limit, or one for each controller (n, 1, 1)."""
 
     def next_step(self, step: Real, agreement: Real) -> Real:
         """Return the next step sizes: grown where the gradient keeps its sign, shrunk where the sign changes.
@@ -87,7 +89,7 @@ class Rprop:
             agreement = signs * previous_sign
             step = self.next_step(step, agreement)
             moving = agreement >= 0
-            moved = np.minimum(np.maximum(moves_rad - (signs * step), -self._limit), self._limit)
+            moved = np.minimum(np.maximum(moves_rad - (signs * step), -self.limit), self.limit)
             stepped_back = previous if self._backtracking else moves_rad
             previous = np.where(moving, moves_rad, previous)
             moves_rad = np.where(moving, moved, stepped_back)

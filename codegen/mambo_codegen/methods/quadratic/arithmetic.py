@@ -87,6 +87,9 @@ class QuadraticArithmetic(Protocol):
     def move_acceleration(self, move_m_step2: Real) -> Real:
         """Return a move in the format of accelerations."""
 
+    def to_move(self, acceleration_m_step2: Real) -> Real:
+        """Return an acceleration in the format of moves, rounded down."""
+
     def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
         """Return ratio * move."""
 
@@ -123,6 +126,9 @@ class QuadraticFloatArithmetic:
 
     def move_acceleration(self, move_m_step2: Real) -> Real:
         return move_m_step2
+
+    def to_move(self, acceleration_m_step2: Real) -> Real:
+        return acceleration_m_step2
 
     def sine_difference(self, a: Real, b: Real, c: Real, d: Real) -> Real:
         return (a * b) - (c * d)
@@ -215,6 +221,9 @@ class QuadraticFixedArithmetic:
 
     def move_acceleration(self, move_m_step2: Real) -> Real:
         return move_m_step2 * 2 ** self._shifts["move"]
+
+    def to_move(self, acceleration_m_step2: Real) -> Real:
+        return acceleration_m_step2 >> self._shifts["move"]
 
     def ratio_product(self, ratio: Any, move_m_step2: Real) -> Real:
         return self._rounded(ratio * move_m_step2, "ratio_product")

@@ -65,6 +65,15 @@ class AttitudeModel:
         product = self._products.tilt_product(self._command_gain, command_rad - self._trim_command)
         return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
 
+    def command_limit_at(self, tilt_rad: Real, generated_rad: Any) -> Real:
+        """Return the largest moves (n, 2) at tilt limits (n,); those of the settings at `generated_rad`."""
+        product = self._products.tilt_product(
+            self._command_gain, tilt_rad[:, None] - np.abs(self._trim_command)
+        )
+        return np.where(
+            tilt_rad[:, None] == generated_rad, self.command_limit, self._products.to_move(product)
+        )
+
     def steady(self, command_rad: Real) -> AttitudeState:
         """Return the model at the steady attitude of the commands (n, 2)."""
         zeros = np.zeros_like(command_rad)

@@ -3,9 +3,10 @@
 from functools import cached_property
 
 from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.limits_constants import LimitsConstants, stored_quantities
 from mambo_codegen.methods.quadratic.attitude_constants import AttitudeConstants, attitude_constants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats, formats
-from mambo_codegen.methods.quadratic.law import LawConstants, law_constants
+from mambo_codegen.methods.quadratic.law import LawConstants, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import ObserverConstants, observer_constants
 
 
@@ -32,6 +33,11 @@ class QuadraticConstants(Constants):
         """The constants of the cost's minimum, in float64."""
         return law_constants(self.settings)
 
+    @cached_property
+    def limiting(self) -> LimitsConstants | None:
+        """The constants of the limits of speed, braking and place, in float64; None without any."""
+        return limits(self.settings)
+
     def choose_formats(self) -> QuadraticFormats:
         """Choose the formats of fixed point."""
         return formats(self.settings)
@@ -44,5 +50,8 @@ class QuadraticConstants(Constants):
         tracker = ["acceleration"] * 4 if self.tracker else []
         if self.tracker and not self.tracker.is_given:
             tracker = ["velocity"] * 2 + tracker
+        limiting = stored_quantities("move", "move") if self.limiting else ()
+        if self.limiting and self.tracker and self.tracker.is_given:
+            limiting += ("velocity", "velocity")
         tilt = ["angle"] * 2 if self.feedback_steps else []
-        return (*observer, *attitude, *tracker, *tilt, "angle", "angle")
+        return (*observer, *attitude, *tracker, *limiting, *tilt, "angle", "angle")

@@ -1,12 +1,13 @@
 """Controller with a quadratic cost: estimates the state, models the attitude loops, minimises the cost."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mambo_codegen.methods.inputs import Inputs, Status, choose
+from mambo_codegen.methods.inputs import Inputs, Rows, Status, choose
+from mambo_codegen.methods.limits import Limit, Limits, LimitsMemory, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
@@ -16,18 +17,22 @@ from mambo_codegen.methods.quadratic.optimizer import QuadraticOptimizer
 from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
 from mambo_codegen.numbers.representation import COMMAND
 
+REST_M_S: Final = 0.02
+"""After an outage the model brakes to this speed along both axes; then the command is level."""
+
 
 @dataclass(frozen=True)
 class QuadraticMemory:
     """State of n controllers between two steps.
 
     tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state, saturated
-    (n,) says whether the last command lies at the tilt limit.
+    (n,) says whether the last command lies at the tilt limit. Without limits `limits` stays zeros.
     """
 
     estimate: Estimate
     attitude: AttitudeState
     target: TargetMotion
+    limits: LimitsMemory
     tilt_rad: Real
     command_rad: Real
     missed: NDArray[np.int64]
@@ -43,6 +48,7 @@ class QuadraticStep:
     missed:      (n,) control steps since the last good state.
     saturated:   (n,) whether the last command lies at the tilt limit.
     stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `QuadraticConstants.stored`.
+    active:      (n,) the limits that act, as `Limit`, but TILT; None without limits.
     """
 
     status: NDArray[np.int64]
@@ -50,6 +56,7 @@ class QuadraticStep:
     missed: NDArray[np.int64]
     saturated: NDArray[np.bool_]
     stored: Real
+    active: NDArray[np.int64] | None = None
 
 
 class QuadraticController:
@@ -66,9 +73,18 @@ class QuadraticController:
         self._feedback = constants.feedback_steps and np.array(
             [self._numbers.constant(steps, "feedback") for steps in constants.feedback_steps]
         )
+        self._limits = Limits(constants, constants.limiting) if constants.limiting else None
         self._no_estimate = constants.observer.outage_steps + 1
+        """`missed` while the model brakes after an outage, and without limits from then on."""
+        self._at_rest = self._no_estimate + 1 if self._limits else self._no_estimate
+        """`missed` before the first good state and when the model has come to rest."""
+        self._rest_m_step = self._numbers.constant(REST_M_S * self.settings.horizon.update_period_s, "speed")
         self.scalar = self._numbers.scalar
-        self.memory = self._restarted(np.zeros((n, 2), self._numbers.computed))
+        level = np.zeros((n, 2), self._numbers.computed)
+        limits = (
+            self._limited(np.repeat(self._limits.defaults, n, axis=0)) if self._limits else no_limits(level)
+        )
+        self.memory = self._restarted(level, limits)
 
     def reset(self, command_rad: ArrayLike) -> NDArray[np.int64]:
         """Forget everything; the drones hold the attitudes of `command_rad` (n, 2), clamped to the limit.
@@ -76,8 +92,8 @@ class QuadraticController:
         Returns a status (n,); a command that is not finite, or beyond the range of attitudes, changes
         nothing.
         """
-        given, good = self._inputs.command(command_rad)
-        self.memory = choose(good, self._restarted(given), self.memory)
+        given, good = self._command(command_rad)
+        self.memory = choose(good, self._restarted(given, self.memory.limits), self.memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
     def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
@@ -85,11 +101,30 @@ class QuadraticController:
 
         Returns a status (n,) as `reset` does.
         """
-        given, good = self._inputs.command(command_rad)
+        given, good = self._command(command_rad)
         memory = self.memory
         new = replace(memory, command_rad=given, attitude=self._model.set_command(memory.attitude, given))
         self.memory = choose(good, new, memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
+
+    def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
+        """Replace the limits by `limits` (n, 7), in the order of nmpc_limits_t.
+
+        Returns a status (n,); bad limits change nothing. Raises ValueError without limits in the settings.
+        """
+        if self._limits is None:
+            raise ValueError("the settings have no limits")
+        given = self._limits.quantize(limits)
+        good = self._limits.check(given)
+        memory, new = self.memory, self._limited(given)
+        kept = memory.limits
+        limited = replace(
+            memory,
+            limits=replace(new, velocity_m_s=kept.velocity_m_s, active=kept.active),
+            command_rad=clamp(memory.command_rad, new.bounds.tilt_rad[:, None]),
+        )
+        self.memory = choose(good, limited, memory)
+        return np.where(good, Status.OK, Status.BAD_LIMITS)
 
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> QuadraticStep:
         """Compute the next commands; the inputs are those of `ReferenceController.step`."""
@@ -106,17 +141,40 @@ class QuadraticController:
             missed=memory.missed,
             saturated=memory.saturated,
             stored=self._numbers.to_si(self.stored, *self._constants.stored),
+            active=memory.limits.active if self._limits else None,
         )
 
-    def _restarted(self, command_rad: Real) -> QuadraticMemory:
+    def _limited(self, limits: Real) -> LimitsMemory:
+        """Return the memory of limits (n, 7), of the quantities LIMITS."""
+        assert self._limits is not None
+        bounds = self._limits.bounds(limits)
+        return replace(
+            no_limits(bounds.centre_m),
+            bounds=bounds,
+            command_limit=self._model.command_limit_at(bounds.tilt_rad, self._inputs.limits.tilt),
+        )
+
+    def _tilt_limit(self) -> Any:
+        """Return the tilt limit, or one for each controller (n, 1)."""
+        return (
+            self._inputs.limits.tilt if self._limits is None else self.memory.limits.bounds.tilt_rad[:, None]
+        )
+
+    def _command(self, command_rad: ArrayLike) -> tuple[Real, Rows]:
+        """Return commands (n, 2) clamped to the tilt limit, and whether each may be set."""
+        given, good = self._inputs.command(command_rad)
+        return clamp(given, self._tilt_limit()), good
+
+    def _restarted(self, command_rad: Real, limits: LimitsMemory) -> QuadraticMemory:
         n, zeros = len(command_rad), np.zeros_like(command_rad)
         return QuadraticMemory(
             estimate=Estimate(zeros, zeros, zeros),
             attitude=self._model.steady(command_rad),
             target=unknown_motion(zeros),
+            limits=limits,
             tilt_rad=zeros,
             command_rad=command_rad,
-            missed=np.full(n, self._no_estimate),
+            missed=np.full(n, self._at_rest),
             saturated=np.zeros(n, np.bool_),
         )
 
@@ -124,7 +182,7 @@ class QuadraticController:
         self, state: Real, has_state: NDArray[np.bool_], target: Real, allows_command: NDArray[np.bool_]
     ) -> None:
         memory, model = self.memory, self._model
-        none_yet = memory.missed == self._no_estimate
+        none_yet = memory.missed >= self._no_estimate
         attitude = model.advance(memory.attitude)
         sine, cosine = self._products.sine_cosine(state[:, 6])
         measured = choose(
@@ -143,34 +201,58 @@ class QuadraticController:
             self._observer.correct(memory.estimate, state, world),
         )
         estimate = choose(has_state, corrected, memory.estimate)
-        missed = np.where(has_state, 0, np.minimum(memory.missed + 1, self._no_estimate))
-        commands = allows_command & (missed != self._no_estimate)
-        motion = memory.target
+        waited = np.minimum(memory.missed + 1, np.maximum(memory.missed, self._no_estimate))
+        missed = np.where(has_state, 0, waited)
+        commands = allows_command & (missed < self._no_estimate)
+        motion, limits = memory.target, memory.limits
+        if self._limits is not None:
+            limited, within = self._limits.limit(limits, estimate.position_m, target)
+            limits = choose(commands, limited, limits)
+            target = np.where(commands[:, None], within, target)
         if self._tracker is not None:
             motion = choose(commands, self._tracker.update(motion, target[:, self._tracker.columns]), motion)
-        moves = self._minimize(attitude, estimate, motion, target, tilt)
+        overdue = missed == self._no_estimate
+        slow = np.all(np.abs(estimate.velocity_m_step) <= self._rest_m_step, axis=1)
+        brakes, rests = (overdue & ~slow, overdue & slow) if self._limits else (overdue & False,) * 2
+        if self._limits is not None:
+            stopped = np.concatenate([estimate.position_m, np.zeros_like(target[:, 2:])], axis=1)
+            target = np.where(brakes[:, None], stopped, target)
+            motion = choose(overdue, unknown_motion(motion.velocity_m_s), motion)
+            active = np.where(brakes, Limit.BRAKING, np.where(rests, 0, limits.active))
+            limits = replace(limits, active=active)
+        commands = commands | brakes
+        limit = limits.command_limit if self._limits else model.command_limit
+        moves = self._minimize(attitude, estimate, motion, target, tilt, limit=limit)
         moved = replace(attitude, command=self._products.move_acceleration(moves))
         command = (
             model.command_rad(moved) + feedback if self._feedback is not None else model.command_rad(moved)
         )
-        limit = model.command_limit
+        command = np.where(commands[:, None], clamp(command, self._tilt_limit()), memory.command_rad)
+        level = np.zeros_like(command)
+        attitude = choose(commands, moved, attitude)
         at_limit = np.any((moves >= limit) | (moves <= -limit), axis=1)
         self.memory = QuadraticMemory(
             estimate=self._observer.predict(estimate, world),
-            attitude=choose(commands, moved, attitude),
+            attitude=choose(rests, model.set_command(attitude, level), attitude),
             target=motion,
+            limits=limits,
             tilt_rad=np.where(has_state[:, None], state[:, 4:6], memory.tilt_rad),
-            command_rad=np.where(
-                commands[:, None], clamp(command, self._inputs.limits.tilt), memory.command_rad
-            ),
-            missed=missed,
-            saturated=np.where(commands, at_limit, memory.saturated),
+            command_rad=np.where(rests[:, None], level, command),
+            missed=np.where(rests, self._at_rest, missed),
+            saturated=np.where(commands, at_limit, memory.saturated & ~rests),
         )
 
     def _minimize(
-        self, attitude: AttitudeState, estimate: Estimate, motion: TargetMotion, target: Real, tilt: Real
+        self,
+        attitude: AttitudeState,
+        estimate: Estimate,
+        motion: TargetMotion,
+        target: Real,
+        tilt: Real,
+        *,
+        limit: Real,
     ) -> Real:
-        """Return the first free moves (n, 2), right and forward."""
+        """Return the first free moves (n, 2), right and forward, within `limit`, (2,) or (n, 2)."""
         disturbance, jerk = self._observer.disturbance(estimate), np.zeros_like(tilt)
         if self._tracker is not None:
             disturbance = disturbance - motion.acceleration_m_step2
@@ -190,7 +272,7 @@ class QuadraticController:
             attitude.lagged,
             attitude.command,
         ]
-        return self.optimizer.minimize(np.stack(state, axis=2))
+        return self.optimizer.minimize(np.stack(state, axis=2), limit)
 
     def _to_world(self, attitude: AttitudeState, heading: Real) -> Real:
         """Return vectors (n, 2) along x and y from those along right and forward."""
@@ -209,7 +291,14 @@ class QuadraticController:
             "saturated": memory.saturated,
             "command_rad": memory.command_rad,
             "stored": self.stored,
-        }
+        } | ({"active": memory.limits.active} if self._limits else {})
+
+    @property
+    def stored_limits(self) -> Real:
+        """All numbers of nmpc_bounds_t (n, k), in their order; k is 0 without limits."""
+        if self._limits is None:
+            return np.zeros((len(self.memory.command_rad), 0), self._numbers.computed)
+        return np.concatenate(self._limits.stored(self.memory.limits, has_command=True), axis=1)
 
     @property
     def stored(self) -> Real:
@@ -222,6 +311,7 @@ class QuadraticController:
         if self._tracker is not None:
             columns += [] if self._tracker.is_given else [motion.velocity_m_s]
             columns += [motion.acceleration_m_step2, motion.jerk_m_step2_update]
+        columns += [self.stored_limits]
         if self._feedback is not None:
             columns += [memory.tilt_rad]
         return np.concatenate([*columns, memory.command_rad], axis=1)

@@ -16,8 +16,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from mambo_codegen.methods.limits_constants import limits_bits
 from mambo_codegen.methods.quadratic.attitude_constants import attitude_constants
-from mambo_codegen.methods.quadratic.law import STATES, law_constants
+from mambo_codegen.methods.quadratic.law import STATES, law_constants, limits
 from mambo_codegen.methods.quadratic.observer_constants import observer_constants
 from mambo_codegen.methods.rate_feedback import feedback_bits, feedback_steps
 from mambo_codegen.methods.tracker_constants import tracker_constants
@@ -120,6 +121,7 @@ def _formats(*sections: Any) -> QuadraticFormats:
         "per_step": fractional_bits(observer.steps_per_s),
         "per_step2": fractional_bits(observer.steps2_per_s2),
     }
+    bits |= limits_bits(limits(settings), bits["velocity"], position)
     shifts = {
         "attitude": _attitude_shift(attitude.tilt_row, attitude.integral_row, bounds.states, bits),
         "row": _shift(

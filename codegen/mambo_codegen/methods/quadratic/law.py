@@ -22,8 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.kept import keep
+from mambo_codegen.methods.limits_constants import (
+    LimitsConstants,
+    TiltAcceleration,
+    has_limits,
+    limits_constants,
+)
+from mambo_codegen.methods.limits_constants import refusals as limits_refusals
 from mambo_codegen.methods.quadratic.attitude_constants import LoopValues, attitude_loops
 from mambo_codegen.methods.rate_feedback import lag_refusals
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import Sections
 
@@ -115,6 +123,24 @@ def _law(settings: Sections, loop: LoopValues) -> LawSolution:
     return LawSolution(**keep("law", inputs, solve))
 
 
+def limits(settings: Sections) -> LimitsConstants | None:
+    """Derive the constants of the limits of speed, braking and place; None if `settings` have none."""
+    if not has_limits(settings):
+        return None
+    rows = law_constants(settings).rows[:, 0]
+    rates_1_s = rows[:, 0] / rows[:, 1] / settings.horizon.update_period_s
+    return limits_constants(settings, float(np.min(rates_1_s)), _tilted(settings))
+
+
+def _tilted(settings: Sections) -> TiltAcceleration:
+    model = settings.model
+    slope_m_s2_rad = GRAVITY_M_S2 * model.acceleration_per_tilt
+    return TiltAcceleration(
+        slope_m_s2_rad * min(model.roll_gain, model.pitch_gain),
+        slope_m_s2_rad * max(abs(model.roll_trim_rad), abs(model.pitch_trim_rad)),
+    )
+
+
 def refusals(settings: Sections) -> list[Refusal]:
     """Return why a controller with a quadratic cost cannot have `settings`."""
     refused = lag_refusals(settings, needs_lag=True)
@@ -129,6 +155,7 @@ def refusals(settings: Sections) -> list[Refusal]:
         refused.append(Refusal("observer", "outage_s", rule))
     if horizon.ramp_s and horizon.ramp_s < 2 * horizon.update_period_s:
         refused.append(Refusal("horizon", "ramp_s", "must be 0 or at least 2 update periods"))
+    refused = refused or limits_refusals(settings, _tilted(settings))
     if refused:
         return refused
     try:

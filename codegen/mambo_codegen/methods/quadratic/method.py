@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.methods.interface import LinearLaw, Method, StepResult
+from mambo_codegen.methods.limits_constants import LATER_LIMITS
 from mambo_codegen.methods.proofs import FLOAT_PROOFS, TURN_EVERYWHERE
 from mambo_codegen.methods.quadratic import formats, law
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.controller import QuadraticController, QuadraticStep
+from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.numbers.representation import COMMAND
 from mambo_codegen.settings.key import Refusal
@@ -34,6 +35,7 @@ class Quadratic(QuadraticConstants, Method):
         "observer": "position, velocity and disturbance",
         "tracker": "acceleration of the target",
         "optimizer": "the minimum of the cost",
+        "limits": "speed, braking and place",
         "step": "a control step",
         "interface": "the functions of nmpc.h",
         "float": "the same functions with floats",
@@ -42,7 +44,7 @@ class Quadratic(QuadraticConstants, Method):
     setter_quantities: ClassVar[tuple[str, ...]] = COMMAND
     digested: ClassVar[tuple[str, ...]] = ("status", "missed", "saturated", "stored")
     iterates: ClassVar[bool] = False
-    unnamed: ClassVar[tuple[str, ...]] = ("target",)
+    unnamed: ClassVar[tuple[str, ...]] = ("target", *LATER_LIMITS)
     float_proofs: ClassVar[Mapping[str, tuple[str, ...]]] = {
         "take_numbers": (*FLOAT_PROOFS["take_numbers"], "-eva-use-spec sine_cosine"),
         "refuse_nan": (
@@ -72,6 +74,7 @@ class Quadratic(QuadraticConstants, Method):
             StepResult("missed"),
             StepResult("saturated", count_type=np.bool_),
             StepResult("stored", self.stored, (len(self.stored),)),
+            *((StepResult("active"),) if self.limiting else ()),
         )
 
     def tested_numbers(self, step: QuadraticStep) -> tuple[float, ...]:
@@ -87,7 +90,7 @@ class Quadratic(QuadraticConstants, Method):
     def instance_bytes(self) -> int:
         """The size of nmpc_t: its numbers and single bytes, with padding."""
         number_bytes, _ = self.numbers.bytes
-        flags = 3 if self.tracker else 2
+        flags = 2 + (self.tracker is not None) + (self.limiting is not None)
         return (len(self.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
 
     @property
@@ -131,6 +134,11 @@ class Quadratic(QuadraticConstants, Method):
             "shifts": (shifts := found.shifts if isinstance(found, formats.QuadraticFormats) else {}),
             "number_of": {name: _number_macro(bits) for name, bits in shifts.items()},
             "plain_products": _plain_products(self),
+            "rest_m_step": REST_M_S * period_s,
+            "trims": [
+                f" {'-' if trim_rad > 0 else '+'} NMPC_{name}_TRIM_COMMAND_RAD" if trim_rad else ""
+                for name, trim_rad in zip(("ROLL", "PITCH"), self.attitude.trim_rad.tolist(), strict=True)
+            ],
         }
 
 

@@ -31,15 +31,19 @@ class QuadraticOptimizer:
         )
         self._ratios = np.array([numbers.constant(ratio, "ratio") for ratio in law.ratios])
 
-    def minimize(self, state: Real) -> Real:
-        """Return the first free move (n, 2), right and forward, from states (n, 2, 8)."""
+    def minimize(self, state: Real, limit: Real | None = None) -> Real:
+        """Return the first free move (n, 2), right and forward, from states (n, 2, 8).
+
+        limit, (2,) or (n, 2), is that of the moves; None for that of the settings.
+        """
+        limit = self._limit if limit is None else limit
         moves = [self._row_product(self._rows[:, move], state) for move in range(self._rows.shape[1])]
         if len(moves) == 1:
-            return clamp(moves[0], self._limit)
+            return clamp(moves[0], limit)
         first, second = moves
-        limited = clamp(second, self._limit)
+        limited = clamp(second, limit)
         best = first - self._products.ratio_product(self._ratios, limited - second)
-        return clamp(np.where(limited == second, first, best), self._limit)
+        return clamp(np.where(limited == second, first, best), limit)
 
     def _row_product(self, rows: Real, state: Real) -> Real:
         total = rows[:, 0] * state[:, :, 0]

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from mambo_codegen.boards import Board
 from mambo_codegen.errors import InvalidSettingsError
-from mambo_codegen.settings.controller_toml import validate
+from mambo_codegen.settings.controller_toml import validate, with_value
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.footprint.measure import measure_footprint
 from mambo_sil.drone.plant.airframe import NOMINAL
@@ -99,8 +99,7 @@ def _measure_point(
 ) -> Point:
     """Measure one point in a worker process; the arguments are plain data: generic models do not pickle."""
     for key, value in values.items():
-        section, name = key.split(".")
-        document[section][name] = value
+        document = with_value(document, key, value)
     try:
         chosen = validate(document, "")
         vehicle = Vehicle.of(VehicleFile.model_validate(drone))

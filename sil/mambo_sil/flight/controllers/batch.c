@@ -12,6 +12,9 @@ typedef struct {
     int *missed;
     int *saturated;
     nmpc_real_t *stored;
+#ifdef NMPC_LIMIT_SPEED
+    int *active;
+#endif
 } nmpc_outcome_t;
 
 static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcome)
@@ -24,6 +27,9 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
     for (k = 0; k < NMPC_STORED_NUMBERS; k++) {
         outcome->stored[(i * NMPC_STORED_NUMBERS) + k] = stored[k];
     }
+#ifdef NMPC_LIMIT_SPEED
+    outcome->active[i] = (int)self->limited;
+#endif
 }
 #else
 /* Output arrays of a step: for each controller one element, of gradient and plan_rad NMPC_MOVES. */
@@ -35,6 +41,11 @@ typedef struct {
     nmpc_real_t *plan_rad;
     int *iterations;
     int *converged;
+#ifdef NMPC_LIMIT_SPEED
+    nmpc_bounds_t *limits;
+    int *missed;
+    int *active;
+#endif
 } nmpc_outcome_t;
 
 static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcome)
@@ -48,6 +59,11 @@ static void read_outcome(const nmpc_t *self, int i, const nmpc_outcome_t *outcom
         outcome->gradient[(i * NMPC_MOVES) + k] = self->gradient[k];
         outcome->plan_rad[(i * NMPC_MOVES) + k] = self->plan_rad[k];
     }
+#ifdef NMPC_LIMIT_SPEED
+    outcome->limits[i] = self->bounds;
+    outcome->missed[i] = (int)self->missed;
+    outcome->active[i] = (int)self->limited;
+#endif
 }
 #endif
 

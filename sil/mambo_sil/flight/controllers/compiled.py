@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from mambo_codegen.methods import Method, method_of
+from mambo_codegen.methods.limits_constants import LIMITS
 from mambo_codegen.numbers.representation import COMMAND, STATE, THRUST, WEIGHTS, Representation
 from mambo_codegen.settings.model import Settings
 from mambo_codegen.toolchain import host_toolchain
@@ -110,6 +111,22 @@ class CompiledController:
         """Tell that `command_rad` (n, 2) was sent, with a quadratic cost; returns a status (n,)."""
         return self._set_each(self._library.nmpc_host_set_command, command_rad, COMMAND)
 
+    def set_limits(self, limits: ArrayLike) -> NDArray[np.int64]:
+        """Replace the limits by `limits` (n, 7), in the order of nmpc_limits_t; returns a status (n,).
+
+        Raises ValueError without limits in the settings.
+        """
+        self._demand_limits()
+        return self._set_each(self._library.nmpc_host_set_limits, limits, LIMITS)
+
+    @property
+    def limits_active(self) -> NDArray[np.int64]:
+        """What `nmpc_limits_active` returns (n,), a `Limit` each; raises ValueError without limits."""
+        self._demand_limits()
+        active = np.empty(self.n, np.intc)
+        self._library.nmpc_host_limits_active(self._controllers, self.n, ffi.cast("int *", _address(active)))
+        return active.astype(np.int64)
+
     def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
         """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
 
@@ -124,6 +141,10 @@ class CompiledController:
         self._library.nmpc_batch_step(self._controllers, self.n, *map(_address, inputs), addresses)
         return self._method.make_step(outcome)
 
+    def _demand_limits(self) -> None:
+        if self._method.limiting is None:
+            raise ValueError("the settings have no limits")
+
     def _native_set(
         self, name: str, values: ArrayLike, quantities: Sequence[str]
     ) -> tuple[Any, NDArray[Any]]:
@@ -131,7 +152,7 @@ class CompiledController:
         return ffi.addressof(self._library, name), array
 
     def _set_each(self, function: Any, values: ArrayLike, quantities: Sequence[str]) -> NDArray[np.int64]:
-        array = as_array(self._numbers, values, quantities, (self.n, 2))
+        array = as_array(self._numbers, values, quantities, (self.n, len(quantities)))
         status = np.empty(self.n, np.intc)
         function(self._controllers, self.n, _address(array), ffi.cast("int *", _address(status)))
         return status.astype(np.int64)

@@ -48,6 +48,28 @@ void nmpc_host_set_weights(nmpc_t *controllers, int n, const nmpc_weights_t *wei
 }
 #endif
 
+#ifdef NMPC_LIMIT_SPEED
+typedef char assert_limits_are_an_array[(sizeof(nmpc_limits_t) == 7 * sizeof(nmpc_real_t)) ? 1 : -1];
+
+void nmpc_host_set_limits(nmpc_t *controllers, int n, const nmpc_limits_t *limits, int *status)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        status[i] = (int)nmpc_set_limits(&controllers[i], &limits[i]);
+    }
+}
+
+void nmpc_host_limits_active(const nmpc_t *controllers, int n, int *active)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        active[i] = (int)nmpc_limits_active(&controllers[i]);
+    }
+}
+#endif
+
 #ifdef NMPC_ANGLE_BITS
 /* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */
 static nmpc_real_t quantize(double value, int bits)

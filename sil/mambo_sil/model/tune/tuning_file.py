@@ -107,9 +107,8 @@ class Tuning:
         """
         document = self.base.model_dump()
         for path, value in values.items():
-            section, name = path.split(".")
             whole = KEYS[path].kind == "whole number"
-            document[section][name] = int(value) if whole else round_value(value)
+            document = controller_toml.with_value(document, path, int(value) if whole else round_value(value))
         return controller_toml.validate(document, "the search")
 
     def draw_flights(self) -> list[Draw]:
@@ -186,9 +185,7 @@ def _search(
 def _range(path: str, value: Any, base: Settings) -> Distribution:
     """Return the range of one key; raises ValueError, "must ..."."""
     key = KEYS.get(path)
-    free = [
-        one for one in KEYS if KEYS[one].low is not None and one not in _FIXED and base.uses(*one.split("."))
-    ]
+    free = [one for one in KEYS if KEYS[one].low is not None and one not in _FIXED and base.uses(one)]
     if key is None or key.low is None or key.high is None or path not in free:
         raise ValueError(f"must name a number of a controller.toml that may be tuned: {', '.join(free)}")
     found = parse(value, Domain(key.low, key.high, whole=key.kind == "whole number"))
@@ -215,5 +212,4 @@ def _demand_valid_corners(tuning: Tuning, source: str) -> None:
 
 
 def _value(settings: Settings, path: str) -> float:
-    section, name = path.split(".")
-    return float(getattr(getattr(settings, section), name))
+    return float(settings.value(path))

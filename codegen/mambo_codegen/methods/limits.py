@@ -1,0 +1,228 @@
+"""Limits of speed, braking and place: what the controller aims at instead of a target that is too far.
+
+While no limit acts, the target stays as it is, in every bit. Else the controller is given its own position
+for the target's, and the limited desired velocity for the target's velocity. `limits.c.j2` derives the law.
+"""
+
+from dataclasses import dataclass, replace
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.limits_arithmetic import limits_arithmetic
+from mambo_codegen.methods.limits_constants import LIMITS, SPELLING, LimitsConstants
+from mambo_codegen.methods.math import Real, clamp, larger, smaller
+from mambo_codegen.settings.fields import SMALLEST_LIMIT
+
+Rows = NDArray[np.bool_]
+
+
+class Limit(IntFlag):
+    """What `nmpc_limits_active` returns: the limits that act."""
+
+    SPEED = 1
+    BRAKING = 2
+    FENCE = 4
+    TILT = 8
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What follows from the limits of n controllers.
+
+    centre_m:   (n, 2) of the fence.
+    clear_m:    (n, 2) distance from the centre within which no wall limits the speed; less than 0 if the
+                fence is too small for that.
+    margin_m:   (n,) distance of that from the wall.
+    speed_m_s:  (n,) speed limit.
+    braking:    (n,) twice the braking, m/s^2, at most what the approach rate asks for at the speed limit.
+    tilt_rad:   (n,) tilt limit.
+    """
+
+    centre_m: Real
+    clear_m: Real
+    margin_m: Real
+    speed_m_s: Real
+    braking: Real
+    tilt_rad: Real
+
+
+@dataclass(frozen=True)
+class LimitsMemory:
+    """What the limits of n controllers keep between two steps; zeros without limits.
+
+    command_limit: (n, 2) acceleration of a command at the tilt limit, right and forward, m/step^2; zeros with
+                   the 1-norm.
+    velocity_m_s:  (n, 2) what stood for the target's velocity in the last step; zeros unless the target's
+                   acceleration is given.
+    active:        (n,) the limits that acted in the last step, but TILT.
+    """
+
+    bounds: Bounds
+    command_limit: Real
+    velocity_m_s: Real
+    active: NDArray[np.int64]
+
+
+def no_limits(like: Real) -> LimitsMemory:
+    """Return the memory of controllers without limits, with the shape (n, 2) and the type of `like`."""
+    pair, one = np.zeros_like(like), np.zeros_like(like[:, 0])
+    return LimitsMemory(Bounds(pair, pair, one, one, one, one), pair, pair, np.zeros(len(like), np.int64))
+
+
+class Limits:
+    """The constants of the limits, in the scalar type of the controller."""
+
+    def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
+        self._products = limits_arithmetic(constants, limits)
+        self._numbers, self._ranges = constants.numbers, constants.limits
+        constant = self._numbers.constant
+        self._smallest_speed = constant(SMALLEST_LIMIT, "velocity")
+        self._smallest_braking = constant(SMALLEST_LIMIT, "braking")
+        self._slope = constant(SPELLING * limits.tilted.slope_m_s2_rad, "slope")
+        self._trim = constant(limits.tilted.trim_m_s2, "braking")
+        tracker = constants.tracker
+        self.is_given = tracker is not None and tracker.is_given
+        self._jump = constant(tracker.input_limit, "thrust") if tracker and self.is_given else None
+        self.defaults: Real = self.quantize([limits.limits])
+
+    def quantize(self, limits: ArrayLike) -> Real:
+        """Return limits (n, 7), of the quantities LIMITS, as numbers."""
+        return self._numbers.quantize(limits, LIMITS).astype(self._numbers.computed)
+
+    def check(self, limits: Real) -> Rows:
+        """Return whether limits (n, 7) may be set (n,); not if one is NaN."""
+        speed, braking, tilt = limits[:, 0], limits[:, 1], limits[:, 6]
+        low, high, reach = limits[:, 2:4], limits[:, 4:6], self._ranges.position
+        most = self._products.tilt_product(self._slope, tilt) - self._trim
+        good: Rows = (
+            (speed >= self._smallest_speed)
+            & (speed <= self._ranges.velocity)
+            & (tilt <= self._ranges.tilt)
+            & (tilt >= -self._ranges.tilt)
+            & (braking >= self._smallest_braking)
+            & (braking <= most)
+            & np.all((low >= -reach) & (low < high) & (high <= reach), axis=1)
+        )
+        return good
+
+    def bounds(self, limits: Real) -> Bounds:
+        """Derive what the steps need from good limits (n, 7)."""
+        products, speed = self._products, limits[:, 0]
+        low, high = limits[:, 2:4], limits[:, 4:6]
+        braking = products.least_braking(limits[:, 1] + limits[:, 1], speed)
+        margin = products.margin(braking, speed)
+        return Bounds(
+            centre_m=products.half(low + high),
+            clear_m=products.half(high - low) - margin[:, None],
+            margin_m=margin,
+            speed_m_s=speed,
+            braking=braking,
+            tilt_rad=limits[:, 6],
+        )
+
+    def _desire(self, bounds: Bounds, position: Real, target: Real) -> tuple[Real, NDArray[np.int64]]:
+        """Return the desired velocities (n, 2) within the limits, and which limits act (n,), as `Limit`.
+
+        position (n, 2) is that of the drone, target (n, 4 or more). Where no limit acts the velocity is
+        not used: the target stays as it is.
+        """
+        products, place = self._products, position - bounds.centre_m
+        knee = products.knee(bounds.braking)
+        is_free = self._is_free(bounds, knee, place, position, target)
+        half_width = bounds.clear_m + bounds.margin_m[:, None]
+        error, velocity, outside = _walled(half_width, place, target, bounds.centre_m)
+        square = products.square_sum(error)
+        far = square > products.square(knee)
+        ratio = np.where(far, self._braking_ratio(bounds, knee, square, far), products.approach)
+        desired = velocity + products.approach_speed(ratio[:, None], error)
+        limited = self._below(bounds, knee, desired, half_width - place)
+        limited = -self._below(bounds, knee, -limited, half_width + place)
+        walled = outside | np.any(limited != desired, axis=1)
+        square = products.square_sum(limited)
+        fast = square > products.square(bounds.speed_m_s)
+        share = products.share(bounds.speed_m_s, products.inverse_root(square))
+        limited = np.where(fast[:, None], products.share_product(limited, share[:, None]), limited)
+        limited = clamp(limited, self._ranges.velocity)
+        active = np.where(fast, Limit.SPEED, np.where(far, Limit.BRAKING, 0)) + np.where(
+            walled, Limit.FENCE, 0
+        )
+        return limited, np.where(is_free, 0, active)
+
+    def _is_free(self, bounds: Bounds, knee: Real, place: Real, position: Real, target: Real) -> Rows:
+        """Return whether drone, target and desired velocity are so far from every limit that none can act."""
+        products = self._products
+        error = target[:, 0:2] - position
+        desired = target[:, 2:4] + products.approach_speed(products.approach, error)
+        free: Rows = (
+            np.all(np.abs(place) <= bounds.clear_m, axis=1)
+            & (products.square_sum(error) <= products.square(knee))
+            & (products.square_sum(desired) <= products.square(bounds.speed_m_s))
+        )
+        return free
+
+    def _braking_ratio(self, bounds: Bounds, knee: Real, square: Real, far: Rows) -> Real:
+        """Return the approach speed over the distance (n,), beyond the knee, from the distance's square."""
+        products = self._products
+        root = products.inverse_root(square)
+        half = products.half(knee)
+        beyond = larger(np.where(far, products.length(square, root), knee) - half, half)
+        speed = products.braking_speed(products.braking_square(bounds.braking, beyond))
+        return products.ratio(speed, root)
+
+    def _below(self, bounds: Bounds, knee: Real, velocity: Real, room: Real) -> Real:
+        """Return velocities (n, 2) towards walls at the distances `room`, cut off at what brakes in time.
+
+        Outside, where `room` is negative, they lead back in.
+        """
+        products, knees = self._products, knee[:, None]
+        size = np.abs(room)
+        far = size > knees
+        half = products.half(knees)
+        beyond = larger(np.where(far, size, knees) - half, half)
+        square = products.braking_square(bounds.braking[:, None], beyond)
+        speed = products.braking_speed(square)
+        most = np.where(
+            far, np.where(room < 0, -speed, speed), products.approach_speed(products.approach, room)
+        )
+        zero = velocity.dtype.type(0)
+        slow = (velocity <= zero) | products.is_slower(velocity, square)
+        return np.where(far & (room > 0) & slow, velocity, smaller(velocity, most))
+
+    def limit(self, memory: LimitsMemory, position: Real, target: Real) -> tuple[LimitsMemory, Real]:
+        """Return the targets (n, k) that stand for `target`, at drones at `position` (n, 2)."""
+        desired, active = self._desire(memory.bounds, position, target)
+        acts = (active != 0)[:, None]
+        velocity = np.where(acts, desired, target[:, 2:4])
+        columns = [np.where(acts, position, target[:, 0:2]), velocity]
+        if self.is_given:
+            columns.append(np.where(acts, self._rate(velocity, memory.velocity_m_s), target[:, 4:6]))
+            memory = replace(memory, velocity_m_s=velocity)
+        return replace(memory, active=active), np.concatenate(columns, axis=1)
+
+    def stored(self, memory: LimitsMemory, *, has_command: bool) -> list[Real]:
+        """Return the columns of nmpc_bounds_t, in the order of `stored_quantities`."""
+        bounds = memory.bounds
+        columns = [bounds.centre_m, bounds.clear_m]
+        columns += [
+            one[:, None] for one in (bounds.margin_m, bounds.speed_m_s, bounds.braking, bounds.tilt_rad)
+        ]
+        columns += [memory.command_limit] if has_command else []
+        return columns + ([memory.velocity_m_s] if self.is_given else [])
+
+    def _rate(self, velocity: Real, previous: Real) -> Real:
+        """Return the acceleration (n, 2) of a desired velocity, m/s^2; 0 where it has jumped."""
+        rate = self._products.rate_product(velocity - previous)
+        return np.where(np.abs(rate) <= self._jump, rate, np.zeros_like(rate))
+
+
+def _walled(half_width: Real, place: Real, target: Real, centre: Real) -> tuple[Real, Real, Rows]:
+    """Return error (n, 2) and velocity (n, 2) of targets that are held within the walls, and which were not."""
+    aim, velocity = target[:, 0:2] - centre, target[:, 2:4]
+    held = clamp(aim, half_width)
+    beyond = held != aim
+    zero = np.zeros_like(velocity)
+    leads_out = np.where(aim > 0, velocity > 0, velocity < 0)
+    return held - place, np.where(beyond & leads_out, zero, velocity), np.any(beyond, axis=1)

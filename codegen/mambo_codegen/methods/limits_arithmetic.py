@@ -1,0 +1,289 @@
+"""Arithmetic of the limits: products and inverse square roots, in floating and in fixed point.
+
+A step has no division and calls no function of the C library: an inverse square root is Newton's iteration,
+products alone, from a start that a shift of the bits gives.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.methods.constants import Constants
+from mambo_codegen.methods.limits_constants import ROOT_BITS, SHARE_BITS, LimitsConstants
+from mambo_codegen.methods.math import Real, rounded, smaller
+from mambo_codegen.numbers.representation import Representation
+
+ITERATIONS: Final = {np.float32: 3, np.float64: 4}
+"""Newton's iterations in floating point; each squares the error, which is 0.035 at the start."""
+
+STARTS: Final[dict[Any, tuple[Any, int]]] = {
+    np.float32: (np.uint32, 0x5F3759DF),
+    np.float64: (np.uint64, 0x5FE6EB50C7B537A9),
+}
+"""Type of the bits, and the number from which half of them is taken for the start."""
+
+ROOT_ERROR: Final = {"float32": 3e-7, "float64": 7e-16, "fixed": 7e-8}
+"""Largest relative error of an inverse square root."""
+
+FIXED_ITERATIONS: Final = 3
+FIXED_START: Final = (2289921229, 1308545065)
+"""The line 2.1327 - 1.2187 m, with SHARE_BITS: within 0.086 of 1/sqrt(m) for m in 1/4..1."""
+
+
+@dataclass(frozen=True)
+class FixedRoot:
+    """Inverse square roots in fixed point: mantissa / 2^(SHARE_BITS + half), the mantissa in 2^30..2^31.
+
+    scaled: the argument in 2^30..2^32, less 2 half - 32 powers of two.
+    """
+
+    mantissa: NDArray[np.int64]
+    half: NDArray[np.int64]
+    scaled: NDArray[np.int64]
+
+
+class LimitsArithmetic(Protocol):
+    """The products of the limits; a root is what `inverse_root` returns."""
+
+    numbers: Representation
+    approach: Any
+    """k, 1/s."""
+
+    def half(self, value: Real) -> Real:
+        """Return half of a number."""
+
+    def square(self, value: Real) -> Real:
+        """Return the square of a number."""
+
+    def square_sum(self, values: Real) -> Real:
+        """Return the sum of the squares (n,) of vectors (n, 2)."""
+
+    def inverse_root(self, square: Real) -> Any:
+        """Return the roots of positive squares."""
+
+    def knee(self, braking: Real) -> Real:
+        """Return the distance at which braking begins, m, for twice the braking."""
+
+    def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
+        """Return ratio * distance, m/s, with a ratio in 1/s."""
+
+    def braking_square(self, braking: Real, distance_m: Real) -> Real:
+        """Return twice the braking times a distance, the square of a speed."""
+
+    def braking_speed(self, square: Real) -> Real:
+        """Return the root of such a square, m/s."""
+
+    def is_slower(self, speed_m_s: Real, square: Real) -> NDArray[np.bool_]:
+        """Return whether a speed, at least 0, is at most the root of such a square."""
+
+    def length(self, square: Real, root: Any) -> Real:
+        """Return the root of a sum of squares of distances, m, given its inverse."""
+
+    def ratio(self, speed_m_s: Real, root: Any) -> Real:
+        """Return speed over distance, 1/s, at most k, given the inverse of the distance."""
+
+    def share(self, speed_m_s: Real, root: Any) -> Real:
+        """Return speed over speed, given the inverse of the second."""
+
+    def share_product(self, velocity_m_s: Real, share: Real) -> Real:
+        """Return velocity * share."""
+
+    def least_braking(self, braking: Real, speed_m_s: Real) -> Real:
+        """Return twice the braking, at most what the approach rate asks for at a speed."""
+
+    def margin(self, braking: Real, speed_m_s: Real) -> Real:
+        """Return the distance from which on a wall allows a speed, m, for twice the braking."""
+
+    def rate_product(self, change_m_s: Real) -> Real:
+        """Return the change of a velocity in an update period as an acceleration, m/s^2."""
+
+    def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
+        """Return slope * tilt, the acceleration of a tilt, m/s^2."""
+
+
+class LimitsFloatArithmetic:
+    """Products in float32 or float64."""
+
+    def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
+        self.numbers = constants.numbers
+        scalar = self._scalar = self.numbers.scalar
+        self.approach = scalar(limits.approach_1_s)
+        self._knee_s2 = scalar(limits.knee_s2)
+        self._twice_approach = scalar(2 * limits.approach_1_s)
+        self._steps_per_s = scalar(limits.steps_per_s)
+
+    def half(self, value: Real) -> Real:
+        return self._scalar(0.5) * value
+
+    def square(self, value: Real) -> Real:
+        return value * value
+
+    def square_sum(self, values: Real) -> Real:
+        return (values[:, 0] * values[:, 0]) + (values[:, 1] * values[:, 1])
+
+    def inverse_root(self, square: Real) -> Real:
+        scalar, (bits, start) = self._scalar, STARTS[self._scalar]
+        half = scalar(0.5) * square
+        root: Real = (bits(start) - (square.view(bits) >> bits(1))).view(scalar)
+        for _ in range(ITERATIONS[scalar]):
+            root = root * (scalar(1.5) - ((half * root) * root))
+        return root
+
+    def knee(self, braking: Real) -> Real:
+        return self._knee_s2 * braking
+
+    def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
+        return ratio * distance_m
+
+    def braking_square(self, braking: Real, distance_m: Real) -> Real:
+        return braking * distance_m
+
+    def braking_speed(self, square: Real) -> Real:
+        return square * self.inverse_root(square)
+
+    def is_slower(self, speed_m_s: Real, square: Real) -> NDArray[np.bool_]:
+        slower: NDArray[np.bool_] = (speed_m_s * speed_m_s) <= square
+        return slower
+
+    def length(self, square: Real, root: Real) -> Real:
+        return square * root
+
+    def ratio(self, speed_m_s: Real, root: Real) -> Real:
+        return speed_m_s * root
+
+    def share(self, speed_m_s: Real, root: Real) -> Real:
+        return speed_m_s * root
+
+    def share_product(self, velocity_m_s: Real, share: Real) -> Real:
+        return velocity_m_s * share
+
+    def least_braking(self, braking: Real, speed_m_s: Real) -> Real:
+        return smaller(braking, self._twice_approach * speed_m_s)
+
+    def margin(self, braking: Real, speed_m_s: Real) -> Real:
+        root = self.inverse_root(braking)
+        stopping = (speed_m_s * root) * (speed_m_s * root)
+        return stopping + self.half(self.knee(braking))
+
+    def rate_product(self, change_m_s: Real) -> Real:
+        return self._steps_per_s * change_m_s
+
+    def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
+        return slope * tilt_rad
+
+
+class LimitsFixedArithmetic:
+    """Products in fixed point: to 64 bits, shifted to the format of the result."""
+
+    def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
+        numbers = self.numbers = constants.numbers
+        bits = numbers.bits or {}
+        self._position, self._velocity = bits["position"], bits["velocity"]
+        self._braking, self._approach, self._knee = bits["braking"], bits["approach"], bits["knee"]
+        self._thrust, self._angle = bits["thrust"], bits["angle"]
+        self._slope, self._rate = bits["slope"], bits["rate"]
+        self.approach = numbers.constant(limits.approach_1_s, "approach")
+        self._knee_s2 = numbers.constant(limits.knee_s2, "knee")
+        self._fastest = numbers.constant(constants.settings.ranges.velocity_m_s, "velocity")
+        self._farthest = 2 * numbers.constant(constants.settings.ranges.position_m, "position")
+        self._steps_per_s = numbers.constant(limits.steps_per_s, "rate")
+        square_bits = self._braking + self._position
+        self._odd = square_bits % 2
+        self._square_bits = square_bits + self._odd
+
+    def half(self, value: Real) -> Real:
+        return value >> 1
+
+    def square(self, value: Real) -> Real:
+        return value * value
+
+    def square_sum(self, values: Real) -> Real:
+        return (values[:, 0] * values[:, 0]) + (values[:, 1] * values[:, 1])
+
+    def inverse_root(self, square: Real) -> FixedRoot:
+        scaled, half = np.maximum(square, 1).astype(np.uint64), np.full(square.shape, 32)
+        for shift in (32, 16, 8, 4, 2):
+            small = scaled < np.uint64(2 ** (64 - shift))
+            scaled = np.where(small, scaled << np.uint64(shift), scaled)
+            half = half - np.where(small, shift // 2, 0)
+        top = (scaled >> np.uint64(32)).astype(np.int64)
+        mantissa = FIXED_START[0] - ((FIXED_START[1] * top) >> 32)
+        for _ in range(FIXED_ITERATIONS):
+            product = (((mantissa * mantissa) >> SHARE_BITS) * top) >> 32
+            mantissa = (mantissa * ((3 << SHARE_BITS) - product)) >> (SHARE_BITS + 1)
+        return FixedRoot(mantissa, half, top)
+
+    def knee(self, braking: Real) -> Real:
+        return _shifted(self._knee_s2 * braking, self._knee + self._braking - self._position)
+
+    def approach_speed(self, ratio: Any, distance_m: Real) -> Real:
+        product = rounded(ratio * distance_m, self._approach + self._position - self._velocity)
+        return np.clip(product, -self._fastest, self._fastest)
+
+    def braking_square(self, braking: Real, distance_m: Real) -> Real:
+        return (braking * distance_m) << self._odd
+
+    def braking_speed(self, square: Real) -> Real:
+        root = self._root(square)
+        speed = _shifted(root, (self._square_bits // 2) - self._velocity)
+        return np.minimum(speed, self._fastest)
+
+    def is_slower(self, speed_m_s: Real, square: Real) -> NDArray[np.bool_]:
+        finer = (2 * self._velocity) - self._square_bits
+        ours, theirs = speed_m_s * speed_m_s, square
+        if finer > 0:
+            ours = ours >> finer
+        else:
+            theirs = theirs >> -finer
+        slower: NDArray[np.bool_] = ours <= theirs
+        return slower
+
+    def length(self, square: Real, root: FixedRoot) -> Real:
+        del square
+        return (root.scaled * root.mantissa) >> (62 - root.half)
+
+    def ratio(self, speed_m_s: Real, root: FixedRoot) -> Real:
+        shift = SHARE_BITS + root.half + (self._velocity - self._position - self._approach)
+        return np.minimum((speed_m_s * root.mantissa) >> shift, self.approach)
+
+    def share(self, speed_m_s: Real, root: FixedRoot) -> Real:
+        return np.minimum((speed_m_s * root.mantissa) >> root.half, 2**SHARE_BITS)
+
+    def share_product(self, velocity_m_s: Real, share: Real) -> Real:
+        return rounded(velocity_m_s * share, SHARE_BITS)
+
+    def least_braking(self, braking: Real, speed_m_s: Real) -> Real:
+        most = (self.approach * speed_m_s) >> (self._approach + self._velocity - self._braking - 1)
+        return np.minimum(braking, most)
+
+    def margin(self, braking: Real, speed_m_s: Real) -> Real:
+        odd = self._braking % 2
+        root = self.inverse_root(braking << odd)
+        shift = self._velocity + SHARE_BITS + root.half - ((self._braking + odd) // 2) - ROOT_BITS
+        quotient = (speed_m_s * root.mantissa) >> shift
+        stopping = (quotient * quotient) >> ((2 * ROOT_BITS) - self._position)
+        return np.minimum(stopping + self.half(self.knee(braking)), self._farthest)
+
+    def rate_product(self, change_m_s: Real) -> Real:
+        return rounded(self._steps_per_s * change_m_s, self._rate + self._velocity - self._thrust)
+
+    def tilt_product(self, slope: Any, tilt_rad: Real) -> Real:
+        return rounded(slope * tilt_rad, self._slope + self._angle - self._braking)
+
+    def _root(self, square: Real) -> Real:
+        root = self.inverse_root(square)
+        return (root.scaled * root.mantissa) >> (62 - root.half)
+
+
+def limits_arithmetic(constants: Constants, limits: LimitsConstants) -> LimitsArithmetic:
+    """Return the products of the limits of a controller."""
+    if constants.numbers.formats is None:
+        return LimitsFloatArithmetic(constants, limits)
+    return LimitsFixedArithmetic(constants, limits)
+
+
+def _shifted(value: Real, bits: int) -> Real:
+    """Shift right by `bits`, rounded down, or left by as many as are negative."""
+    return value >> bits if bits >= 0 else value << -bits

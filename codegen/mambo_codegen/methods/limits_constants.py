@@ -1,0 +1,157 @@
+"""Constants of the limits of speed, braking and place: what the settings ask for, whatever the method.
+
+The law K_e (p - p_T) + K_v (v - v_T) follows the desired velocity v_T + k (p_T - p), with the approach rate
+k = K_e / K_v. All limits are limits of that velocity: `limits.c.j2` derives them.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mambo_codegen.numbers.fixed_point import fractional_bits
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.key import Refusal
+from mambo_codegen.settings.sections import DEFAULTS, Sections
+
+ONE_NORM_APPROACH_1_S: Final = 1.6
+"""Approach rate with the 1-norm, whose law is not linear: measured on presets mambo-1norm and table1."""
+
+ONE_NORM_OUTAGE_S: Final = 0.5
+"""Time without a good state after which a controller with the 1-norm commands level attitude."""
+
+BRAKING_SHARE: Final = 0.8
+"""Braking limit where none is given, over what the tilt limit gives: the rest is left for wind and lag."""
+
+SPELLING: Final = 1.0005
+"""A braking limit may exceed what the tilt limit gives by this factor, since both are rounded."""
+
+LIMITS: Final = ("velocity", "braking", *["position"] * 4, "angle")
+"""The quantity of each number in nmpc_limits_t, in their order."""
+
+LATER_LIMITS: Final = ("limits.speed_m_s", "limits.braking_m_s2", "limits.fence")
+"""Keys that the settings' digest leaves out at their defaults."""
+
+SHARE_BITS: Final = 30
+"""Format of the factor that shortens a velocity, and of the mantissa of an inverse square root."""
+
+ROOT_BITS: Final = 16
+"""Format of a speed over the root of twice the braking."""
+
+
+@dataclass(frozen=True)
+class TiltAcceleration:
+    """The acceleration along any axis of the heading by a tilt: at least slope * tilt - trim, in m/s^2."""
+
+    slope_m_s2_rad: float
+    trim_m_s2: float
+
+    def at(self, tilt_rad: float) -> float:
+        """Return the acceleration of a tilt, m/s^2."""
+        return (self.slope_m_s2_rad * tilt_rad) - self.trim_m_s2
+
+
+@dataclass(frozen=True)
+class LimitsConstants:
+    """Constants of the limits, float64.
+
+    approach_1_s: k.
+    tilted:       what the tilt limit gives.
+    limits:       (7,) the limits of the settings, of the quantities LIMITS: a missing one is the widest that
+                  may be set.
+    steps_per_s:  the update rate.
+    """
+
+    approach_1_s: float
+    tilted: TiltAcceleration
+    limits: NDArray[np.float64]
+    steps_per_s: float
+
+    @property
+    def knee_s2(self) -> float:
+        """The distance at which braking begins, over twice the braking limit."""
+        return 1 / (2 * self.approach_1_s * self.approach_1_s)
+
+
+def has_limits(settings: Sections) -> bool:
+    """Return whether the settings limit speed, braking or place."""
+    limits = settings.limits
+    return bool(limits.speed_m_s or limits.braking_m_s2) or limits.fence != DEFAULTS.limits.fence
+
+
+def limits_constants(
+    settings: Sections, approach_1_s: float, tilted: TiltAcceleration
+) -> LimitsConstants | None:
+    """Derive the constants of the limits; None if `settings` have none."""
+    if not has_limits(settings):
+        return None
+    limits, ranges = settings.limits, settings.ranges
+    low, high = zip(*(_walls(settings, axis) for axis in "xy"), strict=True)
+    braking_m_s2 = limits.braking_m_s2 or BRAKING_SHARE * tilted.at(settings.limits.tilt_rad)
+    return LimitsConstants(
+        approach_1_s=approach_1_s,
+        tilted=tilted,
+        limits=np.array(
+            [limits.speed_m_s or ranges.velocity_m_s, braking_m_s2, *low, *high, limits.tilt_rad]
+        ),
+        steps_per_s=1 / settings.horizon.update_period_s,
+    )
+
+
+def refusals(settings: Sections, tilted: TiltAcceleration) -> list[Refusal]:
+    """Return why a controller cannot have the limits of `settings`."""
+    limits, ranges = settings.limits, settings.ranges
+    refused = []
+    if limits.speed_m_s > ranges.velocity_m_s:
+        refused.append(
+            Refusal("limits", "speed_m_s", f"must be at most {ranges.velocity_m_s!r} (ranges.velocity_m_s)")
+        )
+    most_m_s2 = tilted.at(settings.limits.tilt_rad)
+    if limits.braking_m_s2 > most_m_s2:
+        rule = (
+            f"must be at most {math.floor(most_m_s2 * 1000) / 1000:g}, the deceleration at "
+            f"limits.tilt_rad = {limits.tilt_rad:g}"
+        )
+        refused.append(Refusal("limits", "braking_m_s2", rule))
+    for name, value in limits.fence.model_dump().items():
+        if abs(value) > ranges.position_m:
+            rule = f"must lie in {-ranges.position_m!r}..{ranges.position_m!r} (ranges.position_m)"
+            refused.append(Refusal("limits.fence", name, rule))
+    return refused
+
+
+def limits_bits(found: LimitsConstants | None, velocity: int, position: int) -> dict[str, int]:
+    """Return the fractional bits of the limits' own quantities in fixed point; 0 without limits.
+
+    velocity and position are the formats of those inputs. braking: of twice the braking, with three bits to
+    spare for its product with a distance. approach: of k. knee: of `knee_s2`. slope: of `TiltAcceleration`.
+    rate: of the update rate.
+    """
+    if found is None:
+        return dict.fromkeys(("braking", "approach", "knee", "slope", "rate"), 0)
+    slope = found.tilted.slope_m_s2_rad
+    return {
+        "braking": fractional_bits(16 * slope * found.limits[-1]),
+        "approach": min(fractional_bits(found.approach_1_s), 29 + velocity - position),
+        "knee": fractional_bits(found.knee_s2),
+        "slope": fractional_bits(SPELLING * slope),
+        "rate": fractional_bits(found.steps_per_s),
+    }
+
+
+def stored_quantities(*command: str) -> tuple[str, ...]:
+    """Return the quantity of each number in nmpc_bounds_t; `command` are those of the command limits."""
+    return (*["position"] * 5, "velocity", "braking", "angle", *command)
+
+
+ONE_NORM_TILT: Final = TiltAcceleration(GRAVITY_M_S2, 0.0)
+"""The model of a controller with the 1-norm answers a command with its own acceleration."""
+
+
+def _walls(settings: Sections, axis: str) -> tuple[float, float]:
+    """Return the walls along an axis; without any those of the range."""
+    low, high = (getattr(settings.limits.fence, f"{axis}_{end}_m") for end in ("min", "max"))
+    reach_m = settings.ranges.position_m
+    return (low, high) if low < high else (-reach_m, reach_m)

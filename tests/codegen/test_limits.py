@@ -1,0 +1,245 @@
+"""Limits of speed, braking and place: their law, their numbers, and what the settings refuse."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mambo_codegen.methods import method_of
+from mambo_codegen.methods.inputs import Status
+from mambo_codegen.methods.limits import Limit, Limits
+from mambo_codegen.methods.limits_arithmetic import ROOT_ERROR, limits_arithmetic
+from mambo_codegen.methods.limits_constants import LATER_LIMITS, LIMITS
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.verify.cases import random_limits
+from tests.support.cases import SCALARS
+
+FENCE = {"x_min_m": -2.0, "x_max_m": 2.0, "y_min_m": -1.5, "y_max_m": 1.5}
+BASES = ("mambo", "mambo-1norm")
+
+
+def limited(base: str = "mambo", scalar: str = "float64", **limits: Any) -> Settings:
+    """Return a preset of a scalar type with these limits; by default a speed of 2 and a braking of 2."""
+    settings = with_option(presets.preset(base), "code.scalar", scalar)
+    for name, value in ({"speed_m_s": 2.0, "braking_m_s2": 2.0} | limits).items():
+        settings = with_option(settings, f"limits.{name}", value)
+    return settings
+
+
+def law(settings: Settings) -> tuple[Limits, Any]:
+    """Return the limits of a controller with `settings`, and their bounds for one controller."""
+    method = method_of(settings)
+    assert method.limiting is not None
+    limits = Limits(method, method.limiting)
+    return limits, limits.bounds(limits.defaults)
+
+
+def desired(settings: Settings, position: Any, target: Any) -> tuple[Any, Any]:
+    """Return desired velocities (n, 2), m/s, and which limits act (n,): position (n, 2), target (n, 4)."""
+    method = method_of(settings)
+    limits, bounds = law(settings)
+    n = len(position)
+    many = replace(bounds, **{name: np.repeat(value, n, axis=0) for name, value in vars(bounds).items()})
+    inputs = (
+        method.numbers.quantize(values, names).astype(method.numbers.computed)
+        for values, names in ((position, ("position",) * 2), (target, ("position",) * 2 + ("velocity",) * 2))
+    )
+    velocity, active = limits._desire(many, *inputs)
+    return method.numbers.to_si(velocity, "velocity"), active
+
+
+def random_flights(seed: int, n: int = 4000) -> tuple[Any, Any]:
+    """Draw positions (n, 2) and targets (n, 4), near and far, in and outside of a fence of 2 m."""
+    rng = np.random.default_rng(seed)
+    scale = 10.0 ** rng.uniform(-2, 2, (n, 1))
+    position = rng.normal(0, 1.5, (n, 2))
+    return position, np.column_stack(
+        [position + (scale * rng.normal(0, 1, (n, 2))), rng.normal(0, 1.5, (n, 2))]
+    )
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+def test_an_inverse_square_root_keeps_to_its_error(scalar: str) -> None:
+    """Over all magnitudes that occur, the relative error stays below ROOT_ERROR."""
+    method = method_of(limited(scalar=scalar))
+    assert method.limiting is not None
+    arithmetic = limits_arithmetic(method, method.limiting)
+    rng = np.random.default_rng(1)
+    if scalar == "fixed":
+        squares = np.floor(2.0 ** rng.uniform(0, 62, 200_000)).astype(np.int64)
+        squares = np.concatenate([squares, [1, 2, 3, 4, 2**62, 2**62 - 1, 2**32, 2**32 - 1]])
+        root = arithmetic.inverse_root(squares)
+        found = np.ldexp(root.mantissa.astype(np.float64), -(30 + root.half))
+    else:
+        squares = (10.0 ** rng.uniform(-9, 12, 200_000)).astype(method.numbers.scalar)
+        found = arithmetic.inverse_root(squares).astype(np.longdouble)
+    exact = 1 / np.sqrt(squares.astype(np.longdouble))
+    assert np.max(np.abs((found / exact) - 1)) < ROOT_ERROR[scalar]
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("base", BASES)
+def test_no_desired_velocity_exceeds_a_limit(base: str, scalar: str) -> None:
+    """Its size is at most the speed limit, and towards a wall at most what the braking takes away in time."""
+    settings = limited(base, scalar, fence=FENCE)
+    position, target = random_flights(2)
+    velocity, active = desired(settings, position, target)
+    acts = active != 0
+    assert 0.5 < np.mean(acts) < 1
+    slack = 1e-5 if scalar != "float64" else 1e-12
+    assert np.max(np.hypot(*velocity[acts].T)) <= 2.0 * (1 + slack)
+    for axis, wall in ((0, 2.0), (1, 1.5)):
+        for sign in (1, -1):
+            room = wall - (sign * position[:, axis])
+            towards = sign * velocity[:, axis]
+            inside = acts & (room > 0)
+            assert np.all(towards[inside] <= np.sqrt(2 * 2.0 * room[inside]) + (10 * slack) + 1e-5)
+            assert np.all(towards[acts & (room < -1e-3)] < 0), "outside it leads back in"
+
+
+def test_the_law_is_that_of_the_page() -> None:
+    """In float64 it equals the formulas, with roots and norms, where drone and target are inside."""
+    settings = limited(fence=FENCE)
+    method = method_of(settings)
+    assert method.limiting is not None
+    k, position, target = method.limiting.approach_1_s, *random_flights(3)
+    walls = np.array([2.0, 1.5])
+    position, target[:, 0:2] = np.clip(position, -walls, walls), np.clip(target[:, 0:2], -walls, walls)
+    velocity, active = desired(settings, position, target)
+
+    def f(d: Any) -> Any:
+        return np.where(d <= 2.0 / k**2, k * d, np.sqrt(np.maximum(2 * 2.0 * (d - (2.0 / (2 * k**2))), 0)))
+
+    error = target[:, 0:2] - position
+    distance = np.maximum(np.hypot(*error.T), 1e-12)[:, None]
+    expected = target[:, 2:4] + (f(distance) * error / distance)
+    expected = np.clip(expected, -f(walls + position), f(walls - position))
+    size = np.maximum(np.hypot(*expected.T)[:, None], 1e-12)
+    expected = np.where(size > 2.0, expected * 2.0 / size, expected)
+    acts = active != 0
+    assert velocity[acts] == pytest.approx(expected[acts], abs=1e-9)
+    untouched = target[:, 2:4] + (k * error)
+    assert expected[~acts] == pytest.approx(untouched[~acts], abs=1e-9), (
+        "where no limit acts none would change it"
+    )
+
+
+@pytest.mark.parametrize("scalar", SCALARS)
+@pytest.mark.parametrize("base", BASES)
+def test_flights_within_the_limits_keep_every_bit(base: str, scalar: str) -> None:
+    """A controller with limits answers as one without while no limit acts."""
+    rng = np.random.default_rng(4)
+    plain = with_option(presets.preset(base), "code.scalar", scalar)
+    wide = limited(base, scalar, speed_m_s=20.0, fence={"x_min_m": -900.0, "x_max_m": 900.0})
+    ours, theirs = (method_of(settings).reference_controller(20) for settings in (wide, plain))
+    target = np.column_stack([rng.normal(0, 5, (20, 2)), np.zeros((20, 2))])
+    for _ in range(40):
+        state = np.column_stack([target + rng.normal(0, 0.2, (20, 4)), rng.normal(0, 0.1, (20, 3))])
+        steps = [one.step(state, target, np.full(20, 9.8)) for one in (ours, theirs)]
+        assert not ours.memory.limits.active.any()
+        assert steps[0].command_rad.tobytes() == steps[1].command_rad.tobytes()
+
+
+def test_active_limits_are_named() -> None:
+    """SPEED for a fast target, BRAKING near a still one, FENCE for a target outside."""
+    settings = limited(fence={"x_min_m": -50.0, "x_max_m": 50.0})
+    position = np.zeros((4, 2))
+    target = np.array([[40.0, 0, 0, 0], [1.0, 0, 0, 0], [0.1, 0, 0, 0], [70.0, 0, 0, 0]])
+    _, active = desired(settings, position, target)
+    assert active.tolist() == [Limit.SPEED, Limit.BRAKING, 0, Limit.SPEED | Limit.FENCE]
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_bad_limits_change_nothing(base: str) -> None:
+    """Limits that are not finite, out of range or against each other get BAD_LIMITS."""
+    settings = limited(base)
+    controller: Any = method_of(settings).reference_controller(8)
+    good = np.array([2.0, 2.0, -1.0, -1.0, 1.0, 1.0, 0.35])
+    bad = np.tile(good, (8, 1))
+    for row, (index, value) in enumerate(
+        [(0, np.nan), (0, 0.05), (0, 101.0), (1, 3.6), (2, 1.0), (3, -1001.0), (6, 0.36)]
+    ):
+        bad[row, index] = value
+    before = controller.stored_limits.copy()
+    assert controller.set_limits(bad).tolist() == [Status.BAD_LIMITS] * 7 + [Status.OK]
+    after = controller.stored_limits
+    assert np.array_equal(before[:7], after[:7])
+    assert not np.array_equal(before[7], after[7])
+
+
+def test_a_lower_tilt_limit_cuts_off_every_later_command() -> None:
+    """Commands keep within the tilt limit that is set, in flight and on refused inputs."""
+    settings = limited("mambo-1norm", "float32")
+    controller: Any = method_of(settings).reference_controller(1)
+    far = [[20.0, 20.0, 0, 0]]
+    for _ in range(60):
+        controller.step(np.zeros((1, 7)), far, [9.8])
+    limits = np.array([[2.0, 0.9, -900, -900, 900, 900, 0.1]])
+    assert controller.set_limits(limits).tolist() == [Status.OK]
+    for state in (np.full((1, 7), np.nan), np.zeros((1, 7))):
+        step = controller.step(state, far, [9.8])
+        assert np.all(np.abs(step.command_rad) <= np.float32(0.1))
+
+
+@pytest.mark.parametrize(
+    ("limits", "fault"),
+    [
+        ({"speed_m_s": 101.0}, "limits.speed_m_s"),
+        ({"braking_m_s2": 3.5}, "limits.braking_m_s2"),
+        ({"fence": {"x_min_m": -1.0, "x_max_m": 1001.0}}, "limits.fence.x_max_m"),
+        ({"fence": {"y_min_m": 1.0, "y_max_m": 1.0}}, "limits.fence.y_max_m"),
+    ],
+)
+@pytest.mark.parametrize("base", BASES)
+def test_settings_refuse_limits_that_cannot_be_kept(base: str, limits: dict[str, Any], fault: str) -> None:
+    """A limit beyond a range, a braking that the tilt limit cannot give, walls the wrong way round."""
+    document = presets.preset(base).model_dump()
+    with pytest.raises(ValidationError) as caught:
+        Settings.model_validate(document | {"limits": document["limits"] | limits})
+    assert [".".join(map(str, one["loc"])) for one in caught.value.errors()] == [fault]
+
+
+@pytest.mark.parametrize("base", [*BASES, "table1"])
+def test_limits_that_are_not_set_have_no_trace_in_the_digest(base: str) -> None:
+    """The digest is of the values that earlier versions had."""
+    settings = presets.preset(base)
+    for path in LATER_LIMITS:
+        settings = with_option(settings, path, {} if path.endswith("fence") else 0.0)
+    assert not any(
+        "limits.fence" in path or "speed_m_s" in str(values) for path, values in settings.in_use.items()
+    )
+
+
+def test_drawn_limits_are_of_the_quantities_of_the_struct() -> None:
+    """What tests draw has a number for each member of nmpc_limits_t."""
+    drawn = random_limits(limited(), 5, np.random.default_rng(0))
+    assert drawn.shape == (5, len(LIMITS))
+
+
+@pytest.mark.parametrize("acceleration", ["none", "tracked", "given"])
+def test_an_outage_ends_in_level_attitude(acceleration: str) -> None:
+    """After outage_s without a state the model brakes to rest, and then the command is level."""
+    settings = with_option(limited(), "target.acceleration", acceleration)
+    controller: Any = method_of(settings).reference_controller(2)
+    state = np.array([[0.0, 0, 2.0, 0, 0, 0, 0.3], [0.0, 0, 0, -1.5, 0, 0, 1.0]])
+    target = np.array([[5.0, 0, 0, 0, 0, 0], [0, -5.0, 0, 0, 0, 0]])
+    for _ in range(20):
+        controller.step(state, target, np.full(2, 9.81))
+    commands = [controller.step(np.full((2, 7), np.nan), target, np.full(2, 9.81)) for _ in range(600)]
+    assert np.max(np.abs(commands[60].command_rad)) > 0.05, "it brakes"
+    assert np.all(commands[-1].command_rad == 0)
+    assert np.all(controller.memory.missed == 52)
+
+
+def test_the_1norm_is_level_after_half_a_second_without_a_state() -> None:
+    """It has no model of the state to brake by."""
+    controller: Any = method_of(limited("mambo-1norm")).reference_controller(1)
+    for _ in range(20):
+        controller.step(np.zeros((1, 7)), [[5.0, 5.0, 0, 0]], [9.81])
+    commands = [controller.step(np.full((1, 7), np.nan), np.zeros((1, 4)), [9.81]) for _ in range(51)]
+    assert np.all(commands[48].command_rad != 0)
+    assert np.all(commands[49].command_rad == 0)
