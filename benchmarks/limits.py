@@ -1,4 +1,4 @@
-"""What limits of speed, braking and place are worth: steps, circles and fences, with the state known and seen.
+"""What limits of speed, braking and place are worth: steps, circles and fences, state known and seen.
 
 Prints a table in Markdown and draws a step of 30 m and a fence that a target leaves, into the folder
 that is given. `tests/benchmarks/test_limits.py` holds the figures to bounds.
@@ -49,7 +49,7 @@ class Case:
     """
 
     seen: bool = False
-    changes: dict[str, float] = field(default_factory=dict)
+    changes: dict[str, Any] = field(default_factory=dict)
     push_m_s2: tuple[float, float] = (0.0, 0.0)
     gusts_m_s: float = 0.0
 
@@ -100,7 +100,7 @@ def flown(settings: Settings, vehicle: str, trajectory: Trajectory, duration_s: 
 
 
 def leaving(speed_m_s: float) -> Waypoints:
-    """Return a target that leaves a fence of WALL_M through its wall, stays outside for 3 s and comes back."""
+    """Return a target that leaves a fence of WALL_M, stays outside for 3 s and comes back."""
     away_s = 8.0 / speed_m_s
     points = ((2.0, 0.0), (2.0 + away_s, 8.0), (5.0 + away_s, 8.0), (5.0 + (2 * away_s), 0.0))
     return Waypoints(tuple((time_s, x_m, 0.0) for time_s, x_m in points))

@@ -75,9 +75,9 @@ class _Recorder:
         optimizer = self._controller.optimizer
         minimize = optimizer.minimize
 
-        def record(state: Array) -> Array:
+        def record(state: Array, limit: Array | None = None) -> Array:
             self.states.append(state[0])
-            return minimize(state)
+            return minimize(state, limit)
 
         optimizer.minimize = record  # type: ignore[method-assign]
 

@@ -1,4 +1,4 @@
-"""Flights with limits: none is faster, goes farther or comes past the wall by more than the bounds of the evidence."""
+"""Flights with limits: none is faster, goes farther or comes past the wall by more than its bound."""
 
 import numpy as np
 import pytest
@@ -56,13 +56,14 @@ def test_a_target_through_the_fence_does_not_take_the_drone_along(
 ) -> None:
     """A target that leaves at 1 to 6 m/s and comes back."""
     settings = limited(preset, 3.0, 2.0, WALL_M)
-    trace = flown(settings, QUADRATIC.get(preset, "mambo"), leaving(speed_m_s), 12.0 + (16.0 / speed_m_s), Case())
+    duration_s = 12.0 + (16.0 / speed_m_s)
+    trace = flown(settings, QUADRATIC.get(preset, "mambo"), leaving(speed_m_s), duration_s, Case())
     assert np.all(past_wall_m(trace) < bound_m)
 
 
 @pytest.mark.parametrize("preset", QUADRATIC)
 def test_a_drone_outside_a_fence_flies_back_in(preset: str) -> None:
-    """A fence round the origin, 12 m away, with the target outside: in at the speed limit, and no farther out."""
+    """A fence 12 m away, with the target outside: in at the speed limit, and no farther out."""
     settings = limited(preset, 3.0, 2.0, WALL_M)
     target = Waypoints(((0.0, 12.0, 12.0), (20.0, 12.0, 12.0)))
     trace = flown(settings, QUADRATIC[preset], target, 14.0, Case())

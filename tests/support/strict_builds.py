@@ -10,6 +10,7 @@ import cffi
 
 from mambo_codegen.bundle.flags import COMPILE_FLAGS, WARNING_FLAGS
 from mambo_codegen.bundle.render import render, with_prefix
+from mambo_codegen.methods import method_of
 from mambo_codegen.settings.model import Settings
 from mambo_sil.flight.controllers.controller_library import DECLARATIONS, glue
 from tests.support.bundles import place
@@ -43,6 +44,8 @@ def built(settings: Settings, folder: Path, compiler: str) -> SimpleNamespace:
     ffi = cffi.FFI()
     ffi.cdef(with_prefix(_DECLARATIONS, prefix))
     opened = ffi.dlopen(str(folder / "bundle.so"))
-    absent = "_host_set_weights" if settings.cost.norm == "quadratic" else "_host_set_command"
-    names = [name for name in re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS) if name != absent]
+    absent = {"_host_set_weights" if settings.cost.norm == "quadratic" else "_host_set_command"}
+    if method_of(settings).limiting is None:
+        absent |= {"_host_set_limits", "_host_limits_active"}
+    names = [name for name in re.findall(r"\bnmpc(_\w+)\(", _DECLARATIONS) if name not in absent]
     return SimpleNamespace(**{f"nmpc{name}": getattr(opened, f"{prefix}{name}") for name in names})

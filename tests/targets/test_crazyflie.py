@@ -343,7 +343,7 @@ def test_weights_of_a_1_norm_are_parameters(tmp_path: Path) -> None:
 
 
 def test_limits_are_parameters(tmp_path: Path) -> None:
-    """A fence in the firmware's frame, with y to the left, acts at the next update; a bad one changes nothing."""
+    """A fence in the firmware's frame, y to the left, acts at the next update; a bad one changes nothing."""
     limited = build(folder_of(with_option(SETTINGS, "limits.speed_m_s", 2.0), tmp_path))
     app = limited.app()
     app.modes("modeAbs")

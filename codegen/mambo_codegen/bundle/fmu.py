@@ -31,8 +31,8 @@ class FmuVariable:
 def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
     """Return the variables in the order of the C: 12 inputs, 2 outputs, then those of some settings.
 
-    A given acceleration of the target has 2 inputs, a 1-norm 2 weights; limits of speed, braking and place are
-    6 parameters.
+    A given acceleration of the target has 2 inputs, a 1-norm 2 weights; limits of speed, braking and place
+    are 6 parameters.
     """
     ranges, tilt_rad = settings.ranges, settings.limits.tilt_rad
 
@@ -84,7 +84,8 @@ def fmu_variables(settings: Settings) -> tuple[FmuVariable, ...]:
         most_m_s2 = limiting.tilted.at(tilt_rad)
         variables += [
             FmuVariable(
-                "speed_limit", "parameter", "m/s", SMALLEST_LIMIT, ranges.velocity_m_s, speed_m_s, "speed limit"
+                *("speed_limit", "parameter", "m/s", SMALLEST_LIMIT),
+                *(ranges.velocity_m_s, speed_m_s, "speed limit"),
             ),
             FmuVariable(
                 *("braking_limit", "parameter", "m/s2", SMALLEST_LIMIT),

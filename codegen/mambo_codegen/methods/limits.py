@@ -219,7 +219,7 @@ class Limits:
 
 
 def _walled(half_width: Real, place: Real, target: Real, centre: Real) -> tuple[Real, Real, Rows]:
-    """Return error (n, 2) and velocity (n, 2) of targets that are held within the walls, and which were not."""
+    """Return error and velocity (n, 2) of targets held within the walls, and which were outside (n,)."""
     aim, velocity = target[:, 0:2] - centre, target[:, 2:4]
     held = clamp(aim, half_width)
     beyond = held != aim

@@ -40,6 +40,7 @@ nmpc_host_set_limits and nmpc_host_limits_active with limits. `ffi` is made from
 
 ffi: Final[Any] = controller_interface.ffi
 
+
 def with_default_prefix(settings: Settings) -> Settings:
     """Return `settings` with the prefix nmpc, which the Python side expects; no computed value changes."""
     return with_option(settings, "code.prefix", "nmpc")
