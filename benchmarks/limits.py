@@ -39,7 +39,7 @@ WALL_M: Final = 2.0
 
 
 @dataclass(frozen=True)
-class Case:
+class LimitsCase:
     """What a flight meets beside its target.
 
     seen:      whether the controller sees the drone through the vehicle's sensors.
@@ -54,16 +54,16 @@ class Case:
     gusts_m_s: float = 0.0
 
 
-def cases(vehicle: str) -> dict[str, Case]:
+def cases(vehicle: str) -> dict[str, LimitsCase]:
     """Return the cases of a vehicle by their names."""
     mass_kg = Vehicle.of(vehicle_toml.preset(vehicle)).airframe.mass_kg
     return {
-        "state known": Case(),
-        "slow motors": Case(changes={"motor_lag_s": 0.10 if vehicle == "crazyflie" else 0.05}),
-        "push of 1 m/s^2": Case(push_m_s2=(0.8, 0.6)),
-        "15 % more mass": Case(changes={"mass_kg": 1.15 * mass_kg}),
-        "sensors": Case(seen=True),
-        "sensors, gusts": Case(seen=True, gusts_m_s=5.0),
+        "state known": LimitsCase(),
+        "slow motors": LimitsCase(changes={"motor_lag_s": 0.10 if vehicle == "crazyflie" else 0.05}),
+        "push of 1 m/s^2": LimitsCase(push_m_s2=(0.8, 0.6)),
+        "15 % more mass": LimitsCase(changes={"mass_kg": 1.15 * mass_kg}),
+        "sensors": LimitsCase(seen=True),
+        "sensors, gusts": LimitsCase(seen=True, gusts_m_s=5.0),
     }
 
 
@@ -77,7 +77,9 @@ def limited(preset: str, speed_m_s: float, braking_m_s2: float, wall_m: float = 
     return settings
 
 
-def flown(settings: Settings, vehicle: str, trajectory: Trajectory, duration_s: float, case: Case) -> Trace:
+def flown(
+    settings: Settings, vehicle: str, trajectory: Trajectory, duration_s: float, case: LimitsCase
+) -> Trace:
     """Fly at HEADINGS headings round the circle."""
     drone = vehicle_toml.preset(vehicle)
     plant = Vehicle.of(drone)
@@ -138,14 +140,14 @@ def rows() -> list[dict[str, str]]:
 
     found = []
     for preset, vehicle in PRESETS.items():
-        plain = flown(presets.preset(preset), vehicle, PositionStep(24, 18), 20.0, Case())
+        plain = flown(presets.preset(preset), vehicle, PositionStep(24, 18), 20.0, LimitsCase())
         circle = Circle(1.0, 2.2)
         found.append(
             _row(
                 preset,
                 "state known, no limits",
                 plain,
-                flown(presets.preset(preset), vehicle, circle, 30.0, Case()),
+                flown(presets.preset(preset), vehicle, circle, 30.0, LimitsCase()),
                 cell,
             )
         )
@@ -185,7 +187,7 @@ def draw_step(stem: Path) -> None:
         figure = Figure(figsize=(PAGE_INCHES, 2.2), layout="constrained")
         place, speed = figure.subplots(1, 2)
         for label, (settings, colour) in flights.items():
-            trace = flown(settings, "mambo", PositionStep(30.0, 0.0), 14.0, Case())
+            trace = flown(settings, "mambo", PositionStep(30.0, 0.0), 14.0, LimitsCase())
             time_s = trace.time_s - STEP_TIME_S
             place.plot(time_s, trace.position_m[:, 0, 0], color=colour, label=label)
             speed.plot(time_s, np.hypot(*trace.velocity_m_s[:, 0, :2].T), color=colour, label=label)
@@ -199,7 +201,7 @@ def draw_step(stem: Path) -> None:
 def draw_fence(stem: Path) -> None:
     """Draw a target that leaves a fence, and the drone in it."""
     target = Waypoints(((2.0, 0.0, 0.0), (4.0, 3.4, 2.6), (6.5, 3.4, -1.0), (9.0, -0.6, -1.2)))
-    trace = flown(limited("mambo", 5.0, 3.0, WALL_M), "mambo", target, 12.0, Case())
+    trace = flown(limited("mambo", 5.0, 3.0, WALL_M), "mambo", target, 12.0, LimitsCase())
     with style():
         figure = Figure(figsize=(PAGE_INCHES, 2.6), layout="constrained")
         plan, along = figure.subplots(1, 2)

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.limits import (
     SPEEDS_M_S,
     WALL_M,
-    Case,
+    LimitsCase,
     cases,
     flown,
     leaving,
@@ -41,7 +41,7 @@ def test_steps_of_any_length_stop(preset: str, length_m: float) -> None:
     """From 1 to 100 m, at eight headings."""
     settings = limited(preset, 5.0, 2.0)
     step = PositionStep(0.8 * length_m, 0.6 * length_m)
-    trace = flown(settings, QUADRATIC[preset], step, 8.0 + (length_m / 5.0), Case())
+    trace = flown(settings, QUADRATIC[preset], step, 8.0 + (length_m / 5.0), LimitsCase())
     assert np.all(top_speed_m_s(trace) < 5.0 * 1.03)
     assert np.all(overshoot_m(trace) < 0.035)
     assert np.all(horizontal_error_m(trace)[-1] < 0.02)
@@ -57,7 +57,7 @@ def test_a_target_through_the_fence_does_not_take_the_drone_along(
     """A target that leaves at 1 to 6 m/s and comes back."""
     settings = limited(preset, 3.0, 2.0, WALL_M)
     duration_s = 12.0 + (16.0 / speed_m_s)
-    trace = flown(settings, QUADRATIC.get(preset, "mambo"), leaving(speed_m_s), duration_s, Case())
+    trace = flown(settings, QUADRATIC.get(preset, "mambo"), leaving(speed_m_s), duration_s, LimitsCase())
     assert np.all(past_wall_m(trace) < bound_m)
 
 
@@ -66,7 +66,7 @@ def test_a_drone_outside_a_fence_flies_back_in(preset: str) -> None:
     """A fence 12 m away, with the target outside: in at the speed limit, and no farther out."""
     settings = limited(preset, 3.0, 2.0, WALL_M)
     target = Waypoints(((0.0, 12.0, 12.0), (20.0, 12.0, 12.0)))
-    trace = flown(settings, QUADRATIC[preset], target, 14.0, Case())
+    trace = flown(settings, QUADRATIC[preset], target, 14.0, LimitsCase())
     assert np.all(top_speed_m_s(trace) < 3.0 * 1.03)
     assert np.all(np.abs(trace.position_m[..., :2]).max(axis=(0, 2)) < 12.01)
     assert np.all(np.abs(trace.position_m[-1, :, :2]).max(axis=1) < WALL_M + 0.002)
@@ -75,7 +75,7 @@ def test_a_drone_outside_a_fence_flies_back_in(preset: str) -> None:
 @pytest.mark.parametrize("preset", QUADRATIC)
 def test_a_circle_beyond_the_tilt_limit_is_no_orbit(preset: str) -> None:
     """1 m at 2.2 rad/s with speed 2 and braking 2: at most 0.18 m after the first ten seconds."""
-    trace = flown(limited(preset, 2.0, 2.0), QUADRATIC[preset], Circle(1.0, 2.2), 30.0, Case())
+    trace = flown(limited(preset, 2.0, 2.0), QUADRATIC[preset], Circle(1.0, 2.2), 30.0, LimitsCase())
     assert np.all(horizontal_error_m(trace)[trace.time_s > TRANSIENT_S] < 0.18)
 
 
@@ -84,7 +84,7 @@ def test_a_circle_beyond_the_tilt_limit_is_no_orbit(preset: str) -> None:
 def test_the_target_s_acceleration_is_that_of_the_limited_velocity(preset: str, acceleration: str) -> None:
     """However the acceleration is known, a step stops, since braking is fed forward where it can be."""
     settings = with_option(limited(preset, 5.0, 2.0), "target.acceleration", acceleration)
-    trace = flown(settings, QUADRATIC[preset], PositionStep(24, 18), 16.0, Case())
+    trace = flown(settings, QUADRATIC[preset], PositionStep(24, 18), 16.0, LimitsCase())
     assert np.all(overshoot_m(trace) < (0.5 if acceleration == "none" else 0.04))
     assert np.all(top_speed_m_s(trace) < 5.0 * 1.04)
 
@@ -94,12 +94,14 @@ def test_a_flight_that_asks_for_less_keeps_its_bits(preset: str) -> None:
     """A circle well within the limits is flown by the same commands."""
     vehicle = QUADRATIC.get(preset, "mambo")
     wide = limited(preset, 20.0, 3.0, 900.0)
-    traces = [flown(one, vehicle, Circle(1.0, 0.7), 12.0, Case()) for one in (wide, presets.preset(preset))]
+    traces = [
+        flown(one, vehicle, Circle(1.0, 0.7), 12.0, LimitsCase()) for one in (wide, presets.preset(preset))
+    ]
     assert traces[0].digest() == traces[1].digest()
 
 
 def test_without_limits_a_step_of_30_m_is_missed() -> None:
     """What the bounds above are worth: the preset alone flies 8 m past."""
-    trace = flown(presets.preset("mambo-1norm"), "mambo", PositionStep(24, 18), 14.0, Case())
+    trace = flown(presets.preset("mambo-1norm"), "mambo", PositionStep(24, 18), 14.0, LimitsCase())
     assert np.all(overshoot_m(trace) > 5.0)
-    assert np.all(past_wall_m(flown(presets.preset("mambo-1norm"), "mambo", Hover(), 2.0, Case())) < 0)
+    assert np.all(past_wall_m(flown(presets.preset("mambo-1norm"), "mambo", Hover(), 2.0, LimitsCase())) < 0)

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from mambo_codegen.methods import method_of
 from mambo_codegen.methods.inputs import Status
-from mambo_codegen.methods.limits import Limit, Limits
+from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw
 from mambo_codegen.methods.limits_arithmetic import ROOT_ERROR, limits_arithmetic
 from mambo_codegen.methods.limits_constants import LATER_LIMITS, LIMITS
 from mambo_codegen.settings import presets
@@ -30,11 +30,11 @@ def limited(base: str = "mambo", scalar: str = "float64", **limits: Any) -> Sett
     return settings
 
 
-def law(settings: Settings) -> tuple[Limits, Any]:
+def law(settings: Settings) -> tuple[LimitsLaw, Any]:
     """Return the limits of a controller with `settings`, and their bounds for one controller."""
     method = method_of(settings)
     assert method.limiting is not None
-    limits = Limits(method, method.limiting)
+    limits = LimitsLaw(method, method.limiting)
     return limits, limits.bounds(limits.defaults)
 
 
@@ -150,7 +150,12 @@ def test_active_limits_are_named() -> None:
     position = np.zeros((4, 2))
     target = np.array([[40.0, 0, 0, 0], [1.0, 0, 0, 0], [0.1, 0, 0, 0], [70.0, 0, 0, 0]])
     _, active = desired(settings, position, target)
-    assert active.tolist() == [Limit.SPEED, Limit.BRAKING, 0, Limit.SPEED | Limit.FENCE]
+    assert active.tolist() == [
+        ActiveLimit.SPEED,
+        ActiveLimit.BRAKING,
+        0,
+        ActiveLimit.SPEED | ActiveLimit.FENCE,
+    ]
 
 
 @pytest.mark.parametrize("base", BASES)

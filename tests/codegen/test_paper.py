@@ -12,7 +12,14 @@ from mambo_codegen.methods.one_norm.predictor import Predictor
 from mambo_codegen.methods.tracker import Tracker, unknown_motion
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
-from tests.support.cases import settings_case
+from tests.support.cases import settings_case as drawn_settings
+
+
+def settings_case(index: int, scalar: str) -> Settings:
+    """Make the settings number `index` without limits of speed, braking and place: the paper has none."""
+    document = drawn_settings(index, scalar).model_dump()
+    return Settings.model_validate(document | {"limits": {"tilt_rad": document["limits"]["tilt_rad"]}})
+
 
 CASES = [index for index in range(60) if settings_case(index, "float64").horizon.prediction <= 20]
 

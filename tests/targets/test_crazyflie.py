@@ -347,7 +347,7 @@ def test_limits_are_parameters(tmp_path: Path) -> None:
     limited = build(folder_of(with_option(SETTINGS, "limits.speed_m_s", 2.0), tmp_path))
     app = limited.app()
     app.modes("modeAbs")
-    app.aim(np.array([0.0, 1.5, 0.0, 0.0, 0.0, 0.0]))
+    app.aim(np.array([0.0, -1.5, 0.0, 0.0, 0.0, 0.0]))
     here = np.zeros(7)
     app.update(here)
     assert app.logged("limits") & 4 == 0

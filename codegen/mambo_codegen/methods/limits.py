@@ -19,7 +19,7 @@ from mambo_codegen.settings.fields import SMALLEST_LIMIT
 Rows = NDArray[np.bool_]
 
 
-class Limit(IntFlag):
+class ActiveLimit(IntFlag):
     """What `nmpc_limits_active` returns: the limits that act."""
 
     SPEED = 1
@@ -72,7 +72,7 @@ def no_limits(like: Real) -> LimitsMemory:
     return LimitsMemory(Bounds(pair, pair, one, one, one, one), pair, pair, np.zeros(len(like), np.int64))
 
 
-class Limits:
+class LimitsLaw:
     """The constants of the limits, in the scalar type of the controller."""
 
     def __init__(self, constants: Constants, limits: LimitsConstants) -> None:
@@ -124,7 +124,7 @@ class Limits:
         )
 
     def _desire(self, bounds: Bounds, position: Real, target: Real) -> tuple[Real, NDArray[np.int64]]:
-        """Return the desired velocities (n, 2) within the limits, and which limits act (n,), as `Limit`.
+        """Return the desired velocities (n, 2) within the limits, and which limits act (n,), as `ActiveLimit`.
 
         position (n, 2) is that of the drone, target (n, 4 or more). Where no limit acts the velocity is
         not used: the target stays as it is.
@@ -146,8 +146,8 @@ class Limits:
         share = products.share(bounds.speed_m_s, products.inverse_root(square))
         limited = np.where(fast[:, None], products.share_product(limited, share[:, None]), limited)
         limited = clamp(limited, self._ranges.velocity)
-        active = np.where(fast, Limit.SPEED, np.where(far, Limit.BRAKING, 0)) + np.where(
-            walled, Limit.FENCE, 0
+        active = np.where(fast, ActiveLimit.SPEED, np.where(far, ActiveLimit.BRAKING, 0)) + np.where(
+            walled, ActiveLimit.FENCE, 0
         )
         return limited, np.where(is_free, 0, active)
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from mambo_codegen.methods.interface import Method
-from mambo_codegen.methods.limits import Limit
+from mambo_codegen.methods.limits import ActiveLimit
 from mambo_codegen.methods.limits_arithmetic import (
     FIXED_ITERATIONS,
     FIXED_START,
@@ -32,7 +32,7 @@ def limits_context(method: Method) -> dict[str, object]:
         FIXED_START if fixed else f"0x{STARTS[numbers.scalar][1]:X}{'UL' if scalar == 'float32' else 'ULL'}"
     )
     return {
-        "limit_bits": {limit.name: limit.value for limit in Limit},
+        "limit_bits": {limit.name: limit.value for limit in ActiveLimit},
         "smallest_limit": SMALLEST_LIMIT,
         "braking_slope": SPELLING * limiting.tilted.slope_m_s2_rad,
         "root_error": f"{ROOT_ERROR[scalar]:g}",

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Status, choose
-from mambo_codegen.methods.limits import Limits, LimitsMemory, no_limits
+from mambo_codegen.methods.limits import LimitsLaw, LimitsMemory, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.one_norm import cost
 from mambo_codegen.methods.one_norm.arithmetic import arithmetic
@@ -58,7 +58,7 @@ class OneNormStep:
     converged:   (n,) whether the cost changed by less than the tolerance between two iterations.
     limits:      (n, k) all numbers of nmpc_bounds_t in their order; None without limits, as the next two.
     missed:      (n,) control steps since the last good state.
-    active:      (n,) the limits that act, as `Limit`, but TILT.
+    active:      (n,) the limits that act, as `ActiveLimit`, but TILT.
 
     With fixed point the numbers are those of the C, converted exactly to SI units in float64.
     """
@@ -92,7 +92,7 @@ class OneNormController:
         )
         self._predictor = Predictor(constants, products)
         self._tracker = Tracker(constants.tracker, products) if constants.tracker else None
-        self._limits = Limits(constants, constants.limiting) if constants.limiting else None
+        self._limits = LimitsLaw(constants, constants.limiting) if constants.limiting else None
         self._outage_steps = constants.outage_steps
         self._rprop = Rprop(settings, products)
         self._minimize = minimize

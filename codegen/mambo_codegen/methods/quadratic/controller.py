@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mambo_codegen.methods.inputs import Inputs, Rows, Status, choose
-from mambo_codegen.methods.limits import Limit, Limits, LimitsMemory, no_limits
+from mambo_codegen.methods.limits import ActiveLimit, LimitsLaw, LimitsMemory, no_limits
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import arithmetic
 from mambo_codegen.methods.quadratic.attitude import AttitudeModel, AttitudeState, rotate
@@ -48,7 +48,7 @@ class QuadraticStep:
     missed:      (n,) control steps since the last good state.
     saturated:   (n,) whether the last command lies at the tilt limit.
     stored:      (n, k) all numbers of nmpc_t in their order, of the quantities `QuadraticConstants.stored`.
-    active:      (n,) the limits that act, as `Limit`, but TILT; None without limits.
+    active:      (n,) the limits that act, as `ActiveLimit`, but TILT; None without limits.
     """
 
     status: NDArray[np.int64]
@@ -73,7 +73,7 @@ class QuadraticController:
         self._feedback = constants.feedback_steps and np.array(
             [self._numbers.constant(steps, "feedback") for steps in constants.feedback_steps]
         )
-        self._limits = Limits(constants, constants.limiting) if constants.limiting else None
+        self._limits = LimitsLaw(constants, constants.limiting) if constants.limiting else None
         self._no_estimate = constants.observer.outage_steps + 1
         """`missed` while the model brakes after an outage, and without limits from then on."""
         self._at_rest = self._no_estimate + 1 if self._limits else self._no_estimate
@@ -218,7 +218,7 @@ class QuadraticController:
             stopped = np.concatenate([estimate.position_m, np.zeros_like(target[:, 2:])], axis=1)
             target = np.where(brakes[:, None], stopped, target)
             motion = choose(overdue, unknown_motion(motion.velocity_m_s), motion)
-            active = np.where(brakes, Limit.BRAKING, np.where(rests, 0, limits.active))
+            active = np.where(brakes, ActiveLimit.BRAKING, np.where(rests, 0, limits.active))
             limits = replace(limits, active=active)
         commands = commands | brakes
         limit = limits.command_limit if self._limits else model.command_limit

@@ -121,7 +121,7 @@ class CompiledController:
 
     @property
     def limits_active(self) -> NDArray[np.int64]:
-        """What `nmpc_limits_active` returns (n,), a `Limit` each; raises ValueError without limits."""
+        """What `nmpc_limits_active` returns (n,), an `ActiveLimit` each; raises ValueError without limits."""
         self._demand_limits()
         active = np.empty(self.n, np.intc)
         self._library.nmpc_host_limits_active(self._controllers, self.n, ffi.cast("int *", _address(active)))
