@@ -124,7 +124,7 @@ class LimitsLaw:
         )
 
     def _desire(self, bounds: Bounds, position: Real, target: Real) -> tuple[Real, NDArray[np.int64]]:
-        """Return the desired velocities (n, 2) within the limits, and which limits act (n,), as `ActiveLimit`.
+        """Return the desired velocities (n, 2) within the limits, and which limits act (n,).
 
         position (n, 2) is that of the drone, target (n, 4 or more). Where no limit acts the velocity is
         not used: the target stays as it is.
