@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mambo_codegen.methods.inputs import Status
+from mambo_codegen.settings.controller_toml import with_option
 from mambo_sil.verify import bits, dialects, fuzzing, rules, sanitizers
 from mambo_sil.verify.cases import cases
 from mambo_sil.verify.check import CheckOutcome, Result, Subject
@@ -145,9 +146,20 @@ FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
 def test_the_cases_have_outcomes_of_every_status() -> None:
     """All statuses but that of weights, a command at its limit, and an outage longer than the estimate."""
     outcomes = np.concatenate(cases(quadratic_settings())[1])
-    assert set(outcomes["status"]) == {int(status) for status in Status} - {Status.BAD_WEIGHT}
+    assert set(outcomes["status"]) == {int(status) for status in Status} - {
+        Status.BAD_WEIGHT,
+        Status.BAD_LIMITS,
+    }
     assert set(outcomes["saturated"]) == {0, 1}
     assert set(outcomes["missed"]) == set(range(52))
+
+
+def test_the_cases_have_limits_of_every_kind() -> None:
+    """Limits that are set and refused, each limit acting, and commands after an outage."""
+    outcomes = np.concatenate(cases(with_option(quadratic_settings(), "limits.speed_m_s", 2.0))[1])
+    assert set(outcomes["status"]) == {int(status) for status in Status} - {Status.BAD_WEIGHT}
+    assert set(outcomes["active"]) >= {0, 1, 2, 5, 6}
+    assert set(outcomes["missed"]) >= set(range(52))
 
 
 @pytest.mark.first_is_quick
@@ -178,9 +190,9 @@ def test_a_check_passes(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("variant", ["one move", "measured", "untracked", "given"])
+@pytest.mark.parametrize("variant", ["one move", "measured", "untracked", "given", "limits"])
 def test_other_settings_are_proven(variant: str, tmp_path: Path) -> None:
-    """One free move, a measured attitude of old measurements, no tracker and no feedback, an acceleration."""
+    """One free move, a measured attitude of old measurements, no tracker and feedback, an acceleration; limits."""
     require("frama-c", "frama-c-base")
     document = quadratic_settings().model_dump()
     match variant:
@@ -189,6 +201,8 @@ def test_other_settings_are_proven(variant: str, tmp_path: Path) -> None:
         case "measured":
             document["model"]["attitude"] = "measured"
             document["observer"]["age_s"] = 0.03
+        case "limits":
+            document["limits"]["speed_m_s"] = 2.0
         case "given":
             document["target"]["acceleration"] = "given"
         case _:
