@@ -192,7 +192,7 @@ def test_a_check_passes(
 @pytest.mark.long
 @pytest.mark.parametrize("variant", ["one move", "measured", "untracked", "given", "limits"])
 def test_other_settings_are_proven(variant: str, tmp_path: Path) -> None:
-    """One free move, a measured attitude of old measurements, no tracker and feedback, an acceleration; limits."""
+    """One free move, a measured attitude of old measurements, no tracker, an acceleration, limits."""
     require("frama-c", "frama-c-base")
     document = quadratic_settings().model_dump()
     match variant:
