@@ -23,11 +23,8 @@ def _steps_stay_long(settings: Settings) -> bool:
     return shortest > 1.01 * optimizer.step_min_rad
 
 
-def _has_scalar(scalar: str) -> Callable[[Settings], bool]:
-    return lambda settings: settings.code.scalar == scalar
-
-
-_is_float32, _is_float64, _is_fixed = map(_has_scalar, ("float32", "float64", "fixed"))
+def _is_fixed(settings: Settings) -> bool:
+    return settings.code.scalar == "fixed"
 
 
 def _axes_alike(settings: Settings) -> bool:
@@ -74,14 +71,6 @@ _MOST_WALKED: Final = 8
 _STEPS: Final = "with these settings no step grows or shrinks that far in the iterations there are"
 _EQUAL: Final = "of two equal numbers either may be taken; a limit is never zero, of which there are two"
 _REFUSED: Final = "saturation value: no range contains it, its neighbours or -2^31"
-_TURNS: Final = (
-    "of all float32 numbers in range, tried one by one, only +-0.78539807 falls into another quadrant; "
-    "its sine and cosine have the same bits in both"
-)
-_THIRD: Final = (
-    "not the same, but without effect: the third part, 3.5e-27, changes a sine that is nearly zero, and "
-    "every outcome adds a multiple of the cosine to that"
-)
 _PROVEN: Final = "not read before it is written again; it is written so that the proof need not know why"
 _TERMS: Final = "the table grows by a zero, and a polynomial by a term of zero, which changes no bit"
 _PARTS: Final = "the counter bounds the loop for static analysis; the sign changes run out first"
@@ -164,23 +153,8 @@ REASONS: Final[tuple[Reason, ...]] = (
     *reasons("nmpc.c", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
     *(
         Reason("nmpc.c", f"#define NMPC_{series}_TERMS {terms}", f"{terms} -> {terms + 1}", _TERMS)
-        for series, terms in (("SINE", 4), ("COSINE", 5), ("SINE", 8), ("COSINE", 8))
+        for series, terms in (("SINE", 3), ("COSINE", 3), ("COSINE", 4), ("SINE", 8), ("COSINE", 8))
     ),
-    *reasons(
-        "nmpc.c",
-        "const int quadrant = (int)(quarter_turns + ((quarter_turns < (nmpc_real_t)0) ? -half : half));",
-        "with quarter_turns = 0 the quadrant is 0, half added or subtracted",
-        "< -> <=",
-    ),
-    *reasons(
-        "nmpc.c",
-        "<real>, <real>, <real>",
-        _THIRD,
-        "negative #2",
-        "a thousandth more #2",
-        holds=_is_float64,
-    ),
-    *reasons("nmpc.c", "- (count * quarter_turn_rad[2]);", _THIRD, "- -> +", holds=_is_float64),
     *reasons(
         "nmpc.c",
         "#define NMPC_RESPONSES (NMPC_MOVES / NMPC_ANGLES_PER_RESPONSE)",
@@ -197,5 +171,4 @@ REASONS: Final[tuple[Reason, ...]] = (
             "TRACKER_JERK_GAIN <number> /* beta */",
         )
     ),
-    *reasons("nmpc.c", "const nmpc_real_t half = <real>;", _TURNS, "next number", holds=_is_float32),
 )
