@@ -16,7 +16,7 @@ from benchmarks.evidence.item import PAGES
 from benchmarks.markdown import table
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.results.pictures import save
-from mambo_sil.results.style import BLUE, PAGE_INCHES, QUIET, THIN, VERMILION, style
+from mambo_sil.results.style import BLUE, DOT, PAGE_INCHES, QUIET, THIN, VERMILION, style
 
 RINGING_RAD: Final = 0.015
 """A larger command variation is ringing: five times the median of the default campaign."""
@@ -222,7 +222,7 @@ def draw(found: dict[tuple[str, str], DrawnDrones], stem: Path) -> None:
                 if "change" in name:
                     x = np.where(x >= LARGEST, 0.1, x)
                 axes.plot(
-                    x, one.variation_rad, color=colour, marker=marker, linestyle="none", markersize=1.5,
+                    x, one.variation_rad, color=colour, marker=marker, linestyle="none", markersize=DOT,
                     label=words, alpha=0.6,
                 )  # fmt: skip
             axes.axhline(RINGING_RAD, color=QUIET, linewidth=THIN, linestyle=(0, (1, 2)))

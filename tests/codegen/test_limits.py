@@ -81,6 +81,22 @@ def test_an_inverse_square_root_keeps_to_its_error(scalar: str) -> None:
     assert np.max(np.abs((found / exact) - 1)) < ROOT_ERROR[scalar]
 
 
+@pytest.mark.long
+def test_an_inverse_square_root_keeps_to_its_error_for_every_float32() -> None:
+    """Every number from 1 to 4; times a power of 4, from 1e-30 to 1e30, the result is scaled exactly."""
+    method = method_of(limited(scalar="float32"))
+    assert method.limiting is not None
+    arithmetic = limits_arithmetic(method, method.limiting)
+    first, last = np.array([1.0, 4.0], np.float32).view(np.uint32)
+    for start in range(int(first), int(last), 1 << 21):
+        numbers = np.arange(start, min(start + (1 << 21), int(last)), dtype=np.uint32).view(np.float32)
+        found = arithmetic.inverse_root(numbers)
+        assert np.max(np.abs((found * np.sqrt(numbers.astype(np.float64))) - 1)) < ROOT_ERROR["float32"]
+        for power in (-50, -7, 3, 50):
+            scaled = arithmetic.inverse_root(np.ldexp(numbers[::64], 2 * power))
+            assert np.array_equal(scaled, np.ldexp(found[::64], -power))
+
+
 @pytest.mark.parametrize("scalar", SCALARS)
 @pytest.mark.parametrize("base", BASES)
 def test_no_desired_velocity_exceeds_a_limit(base: str, scalar: str) -> None:

@@ -13,7 +13,7 @@ from mambo_sil.experiment.margins.axis_margins import AXES, PLACES, PlaceName
 from mambo_sil.experiment.margins.loop_margins import open_loop
 from mambo_sil.experiment.margins.response_file import Curve
 from mambo_sil.results.pictures import PlainLogFormatter, inline, save
-from mambo_sil.results.style import BLUE, COLUMN_INCHES, ORANGE, QUIET, THIN, style
+from mambo_sil.results.style import BLUE, COLUMN_INCHES, DOT, ORANGE, QUIET, THIN, style
 
 _ASKED: Final = 2.0
 """The largest sensitivity that textbooks ask for at most."""
@@ -72,7 +72,7 @@ def _nyquist(panels: Any, curve: Curve, look: dict[str, Any]) -> None:
     panel.plot(loop.real, loop.imag, **look)
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     panel.plot(np.cos(turn) / _ASKED - 1.0, np.sin(turn) / _ASKED, color=QUIET, linewidth=THIN)
-    panel.plot([-1.0], [0.0], color=QUIET, marker="+", markersize=6)
+    panel.plot([-1.0], [0.0], color=QUIET, marker="+", markersize=2 * DOT)
     panel.set_aspect("equal")
     panel.set_xlim(-3.0, 1.0)
     panel.set_ylim(-2.5, 1.5)
