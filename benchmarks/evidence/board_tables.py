@@ -46,6 +46,8 @@ def _board(board: Figures) -> Figures:
         "ram_bytes": sum(board["ram_bytes"].values()),
         "stack_bytes": sum(frame["bytes"] for frame in board["stack_path"]),
         "instructions": {key: counts[key] for key in ("least", "mean", "most_met")},
+        "cycles": board["cycles"],
+        "cycles_estimate": board["cycles_estimate"],
         "time_s": board["time_s_estimate"],
         "share_of_budget": time["share"],
     }
@@ -72,13 +74,22 @@ def footprint(controller: str) -> Callable[[Figures], str]:
                     "RAM, B": str(board["ram_bytes"]),
                     "stack, B": str(board["stack_bytes"]),
                     "instructions a step: least / mean / most met": steps,
-                    "ms, estimated": f"{time_ms[0]:.3g}..{time_ms[1]:.3g}",
+                    "cycles a step": _cycles(board),
+                    "ms, least to most": f"{time_ms[0]:.3g}..{time_ms[1]:.3g}",
                     "budget": "fits" if board["fits"] else "OVER",
                 }
             )
         return table(rows)
 
     return make
+
+
+def _cycles(board: Figures) -> str:
+    """Return the modelled cycles, or one estimated number, as `footprint` prints them."""
+    cycles = board["cycles"]
+    if cycles is None:
+        return f"about {sum(board['cycles_estimate']) / 2:.0f}"
+    return f"{cycles['least']} / {cycles['mean']:.0f} / {cycles['most_met']}"
 
 
 def footprint_scalars(figures: Figures) -> str:

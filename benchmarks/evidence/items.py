@@ -201,6 +201,7 @@ ITEMS: Final = (
             f"mambo-nmpc footprint mambo --scalar float64 -o {RESULTS}/footprint/float64",
             f"mambo-nmpc footprint mambo --scalar fixed -o {RESULTS}/footprint/fixed",
             f"mambo-nmpc footprint mambo-1norm -o {RESULTS}/footprint/1norm",
+            f"mambo-nmpc footprint mambo --optimisation=-Os -o {RESULTS}/footprint/size",
         ),
         controllers=_MEASURED,
         paths=(
@@ -209,9 +210,13 @@ ITEMS: Final = (
             "codegen/mambo_codegen/data/boards",
             "codegen/mambo_codegen/bundle/flags.py",
         ),
-        read=read_footprints(dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))),
+        read=read_footprints(
+            dict(zip(_MEASURED, ("float32", "float64", "fixed", "1norm"), strict=True))
+            | {"mambo -Os": "size"}
+        ),
         tables={
             "footprint": footprint("mambo"),
+            "footprint-size": footprint("mambo -Os"),
             "footprint-float64": footprint("mambo --scalar float64"),
             "footprint-fixed": footprint("mambo --scalar fixed"),
             "footprint-1norm": footprint("mambo-1norm"),

@@ -8,7 +8,7 @@ program and no file.
 import difflib
 import re
 from collections.abc import Sequence
-from typing import Annotated, Any, Final, Generic, Literal, TypeVar
+from typing import Annotated, Any, Final, Generic, Literal, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -106,11 +106,24 @@ class Compiler(_BoardSection):
         return self.candidates[0]
 
 
-class Cycles(_BoardSection):
+MODELLED: Final = ("cortex-m0", "cortex-m4", "avr")
+"""Emulated cores whose cycles are modelled from their manuals, if the board's file has no [cycles]."""
+
+
+class CycleEstimate(_BoardSection):
     """Estimate of clock cycles from an instruction count, with warm caches and prefetch buffers."""
 
     per_instruction: float = Field(gt=0, le=100, description="mean clock cycles per instruction")
     error_share: Share = Field(description="half-width of the band around the estimate, as a share of it")
+
+
+class FlashWait(_BoardSection):
+    """Wait states of the flash, behind caches that replace the line used longest ago."""
+
+    cycles_per_line: int = Field(ge=1, le=10_000, description="clock cycles that the core waits for a line")
+    line_bytes: int = Field(ge=2, le=4096, description="line of the flash and of its caches, in bytes")
+    code_lines: int = Field(ge=1, le=2**20, description="lines of code in the cache; 1 without a cache")
+    data_lines: int = Field(ge=1, le=2**20, description="lines of constants in the cache; 1 without a cache")
 
 
 class Budget(_BoardSection):
@@ -140,8 +153,25 @@ class Board(BaseModel):
     flash_bytes: Fact[Bytes] = Field(description="memory for code and constants, in bytes")
     ram_bytes: Fact[Bytes] = Field(description="memory for data and stack, in bytes")
     compiler: Compiler = Field(description="compiler and flags")
-    cycles: Cycles = Field(description="estimate of clock cycles from instructions")
+    cycles: CycleEstimate | None = Field(
+        None,
+        validate_default=True,
+        description="estimate of clock cycles from instructions; without it the model of the core",
+    )
+    flash_wait: FlashWait | None = Field(
+        None, description="wait states of the flash, for the model; without it there are none"
+    )
     budget: Budget = Field(description="limits of a controller on the board")
+
+    @field_validator("cycles")
+    @classmethod
+    def _estimated_without_a_model(
+        cls, cycles: CycleEstimate | None, info: ValidationInfo
+    ) -> CycleEstimate | None:
+        core = info.data.get("emulated_core")
+        if cycles is None and core is not None and core.value not in MODELLED:
+            raise PydanticCustomError("cycles", f"add it: {core.value} has no model of its cycles")
+        return cycles
 
     @field_validator("budget")
     @classmethod
@@ -222,6 +252,8 @@ def _fault(details: ErrorDetails) -> str:
             return f"{dotted} = {value} must be a section; write [{dotted}] and its keys below"
         case "budget":
             return f"{dotted}.{details['msg']}"
+        case "cycles":
+            return f"{dotted} is missing; {details['msg']}"
         case _:
             rule = details["msg"]
             for subject in _PYDANTIC_SUBJECTS:
@@ -233,5 +265,6 @@ def _fields(section: Sequence[int | str]) -> dict[str, Any]:
     """Return the fields of a section, those of a board if `section` is empty."""
     model: Any = Board
     for part in section:
-        model = model.model_fields[part].annotation
+        annotation = model.model_fields[part].annotation
+        model = next((one for one in get_args(annotation) if one is not type(None)), annotation)
     return {key: field for key, field in model.model_fields.items() if key != "name"}

@@ -234,7 +234,7 @@ def test_readme_says_what_the_crazyflie_takes() -> None:
     """Flash, RAM, time and instructions of preset mambo, and those in fixed point on the Mambo."""
     text = " ".join((ROOT / "README.md").read_text("utf-8").split())
     takes = r"\*\*([\d.]+) KB of flash, (\d+) bytes of RAM and (\d+) to (\d+) us a step\*\*"
-    found = re.search(rf"{takes}, estimated from (\d+) instructions", text)
+    found = re.search(rf"{takes}, modelled from (\d+) instructions", text)
     assert found is not None, "README no longer says it in these words: change this test with it"
     footprints = read_stamp(next(item for item in ITEMS if item.name == "footprint"))["figures"]
     board = next(one for one in footprints["mambo"] if one["name"] == "crazyflie")

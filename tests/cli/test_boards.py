@@ -45,8 +45,13 @@ def test_a_footprint_leaves_page_and_pictures_and_prints_json(tmp_path: Path) ->
     assert values["stack"] == sum(frame["bytes"] for frame in board["stack_path"])
     counts = board["instructions"]
     assert 0 < counts["least"] <= counts["mean"] <= counts["most_met"]
-    low, high = board["cycles_estimate"]
-    assert low < counts["most_met"] * boards.load("crazyflie").cycles.per_instruction < high
+    cycles = board["cycles"]
+    assert counts["most_met"] < cycles["most_met"]
+    assert board["cycles_estimate"] == [cycles["fewest"], cycles["most_with_wait"]]
+    assert (
+        cycles["fewest"] < cycles["least"] <= cycles["mean"] <= cycles["most_met"] < cycles["most_with_wait"]
+    )
+    assert board["cycles_source"] == "model: Cortex-M4 TRM, ARM DDI 0439D"
 
     page = (out / "footprint.html").read_text("utf-8")
     assert "<img" not in page

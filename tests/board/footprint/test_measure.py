@@ -69,18 +69,41 @@ def test_table_1_runs_on_the_mambo_in_75_000_instructions() -> None:
     assert counts.by_function["__addsf3"] + counts.by_function["__mulsf3"] > counts.mean / 2
 
 
-def test_time_follows_from_instructions_clock_and_band() -> None:
+def test_an_estimated_time_follows_from_instructions_clock_and_band() -> None:
     """Time = instructions x cycles per instruction / clock, with the board's band."""
-    footprint = measure_once("crazyflie")
+    footprint = measure_once("teensy41")
     board, counts, time_s = footprint.board, footprint.counts, footprint.time_s
     assert counts is not None
     assert time_s is not None
+    assert board.cycles is not None
     middle_s = counts.most_met * board.cycles.per_instruction / board.clock_hz.value
     assert time_s == pytest.approx(
         (middle_s * (1 - board.cycles.error_share), middle_s * (1 + board.cycles.error_share))
     )
     time = next(limit for limit in footprint.limits if limit.name == "time")
     assert (time.value, time.budget) == pytest.approx((1000 * time_s[1], 1.0), rel=1e-3)  # four digits
+
+
+def test_the_report_says_whether_cycles_are_modelled_or_estimated() -> None:
+    """In the table, below it, in the summary and on the page."""
+    modelled, estimated = measure_once("crazyflie"), measure_once("teensy41")
+    assert modelled.counts is not None
+    assert estimated.counts is not None
+    cycles = modelled.counts.cycles
+    assert cycles is not None
+    text = footprint_report.text([modelled, estimated])
+    assert f" {cycles.least} / {cycles.mean:.0f} / {cycles.most_met} " in text
+    bounds = f"{cycles.fewest} to {cycles.most_with_wait} with the wait states of the flash"
+    assert "crazyflie: cycles are a model: Cortex-M4 TRM, ARM DDI 0439D, without wait states; the " in text
+    assert f"most expensive step met takes {bounds}\n" in text
+    assert f" about {estimated.counts.most_met} " in text
+    assert "teensy41: cycles are an estimate: 1 per instruction, +/- 40 %; of the most expensive" in text
+    summary = footprint_report.summarise([modelled, estimated], "mambo", presets.load("mambo"))
+    assert [board.cycles for board in summary.boards] == [cycles, None]
+    assert [board.cycles_source.partition(":")[0] for board in summary.boards] == ["model", "estimate"]
+    page = footprint_report.page(summary)
+    assert f"which takes {bounds}" in page
+    assert "an estimate: 1 per instruction, +/- 40 %" in page
 
 
 def test_the_mega_is_measured_whole() -> None:
@@ -130,7 +153,7 @@ def test_a_tiny_budget_is_exceeded_everywhere() -> None:
         found = re.search(rf"^tiny: {limit} (\d+) B is over its budget of {budget} B by (\d+) B$", text, re.M)
         assert found, text
         assert int(found[1]) == budget + int(found[2]) > budget
-    assert re.search(r"^tiny: time 0\.00\d+ ms is over its budget of 0\.005 ms by 0\.00\d+ ms$", text, re.M)
+    assert re.search(r"^tiny: time 0\.0\d+ ms is over its budget of 0\.005 ms by 0\.0\d+ ms$", text, re.M)
     largest = re.search(r"^tiny: largest symbols: (.*)$", text, re.MULTILINE)
     assert largest
     sizes = [int(size) for size in re.findall(r" (\d+) B", largest[1])]

@@ -13,10 +13,12 @@ from typing import Final
 
 import numpy as np
 from elftools.elf.elffile import ELFFile
+from numpy.typing import NDArray
 
 from mambo_codegen.errors import BuildError
 from mambo_codegen.toolchain import Toolchain, host_toolchain
 from mambo_sil.board.emulation.arena import Arena
+from mambo_sil.board.emulation.executed import Executed
 from mambo_sil.board.emulation.gdb import GdbStub
 from mambo_sil.errors import EmulationError, EmulatorError
 from mambo_sil.results.cache import build_cached
@@ -44,7 +46,8 @@ _RESULT: Final = slice(22, 26)
 _ARGUMENTS: Final = range(8, 26)
 """Registers of arguments, allocated from the highest down (avr-gcc, calling convention)."""
 
-_COUNT_BYTES: Final = 8 * _FLASH_BYTES // 2
+_TWO_WORDS: Final = ((0xFE0F, 0x9000), (0xFE0F, 0x9200), (0xFE0E, 0x940C), (0xFE0E, 0x940E))
+"""Mask and opcode of the instructions of two words: lds, sts, jmp, call (DS40002198)."""
 _COUNTING_SLOWDOWN: Final = 3
 
 
@@ -73,8 +76,10 @@ class AvrMachine:
         files = [_open_memory_file("flash", flash)]
         options = ["-bios", f"/proc/self/fd/{files[0]}"]
         if counting:
-            files.append(_open_memory_file("counts", bytes(_COUNT_BYTES)))
-            self._counts = np.frombuffer(mmap.mmap(files[1], _COUNT_BYTES), np.uint64)
+            tables = _count_tables(flash)
+            files.append(_open_memory_file("counts", tables.tobytes()))
+            shared = mmap.mmap(files[1], tables.nbytes)
+            self._times, self._taken, _ = np.frombuffer(shared, np.uint64).reshape(tables.shape)
             options += ["-plugin", f"{_build_plugin()},counts={files[1]}"]
         quiet = ["-display", "none", "-monitor", "none", "-serial", "none"]
         command = [_EMULATOR, "-M", "mega2560", "-S", "-gdb", "stdio", *quiet, *options]
@@ -101,12 +106,9 @@ class AvrMachine:
         """Read data memory; `address` with or without the offset of ELF files."""
         return self._stub.read(address | _DATA_SPACE, size)
 
-    def take_counts(self) -> Counter[int]:
-        """Return the instructions executed since the last call, by start address of their basic block."""
-        words = np.flatnonzero(self._counts)
-        counts = Counter({2 * int(word): int(self._counts[word]) for word in words})
-        self._counts[words] = 0
-        return counts
+    def take_executed(self) -> Executed:
+        """Return what was executed since the last call, without blocks and reads of flash."""
+        return Executed(_take(self._times), _take(self._taken))
 
     def call(self, function: str, *arguments: int) -> int:
         """Call `function` with arguments of type int, pointer or Long; returns an unsigned long.
@@ -162,6 +164,22 @@ def _read_program(elf: Path) -> tuple[bytes, list[tuple[int, bytes]], dict[str, 
             else:
                 flash[start : start + segment["p_filesz"]] = segment.data()
     return bytes(flash), data, symbols
+
+
+def _count_tables(flash: bytes) -> NDArray[np.uint64]:
+    """Return the plugin's tables (3, words of flash) before the first step: 0, 0, lengths in words."""
+    words = np.frombuffer(flash, "<u2")
+    tables = np.zeros((3, len(words)), np.uint64)
+    tables[2] = 1 + np.any([words & mask == opcode for mask, opcode in _TWO_WORDS], axis=0)
+    return tables
+
+
+def _take(table: NDArray[np.uint64]) -> Counter[int]:
+    """Return the numbers of a table by byte address, and set them to 0."""
+    words = np.flatnonzero(table)
+    taken = Counter({2 * int(word): int(table[word]) for word in words})
+    table[words] = 0
+    return taken
 
 
 def _open_memory_file(name: str, content: bytes) -> int:

@@ -25,7 +25,7 @@ address range of the stack, including the return address if calls push it.
 
 
 def start(elf: Path, core: str, time_limit_s: float = TIME_LIMIT_S, *, counting: bool = False) -> Machine:
-    """Load a program into an emulated core; `take_counts` needs `counting`.
+    """Load a program into an emulated core; `take_executed` needs `counting`.
 
     Raises EmulatorError if the emulator is missing or the program does not fit into memory.
     """

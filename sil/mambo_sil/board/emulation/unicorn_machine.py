@@ -1,6 +1,7 @@
 """ARM and RISC-V cores, emulated in this process by Unicorn."""
 
 import bisect
+import itertools
 import time
 from collections import Counter
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from elftools.elf.elffile import ELFFile
 from unicorn import arm_const, riscv_const
 
 from mambo_sil.board.emulation.arena import Arena
+from mambo_sil.board.emulation.executed import Executed
 from mambo_sil.board.firmware.disassembly import disassemble
 from mambo_sil.board.firmware.elf import load
 from mambo_sil.errors import EmulationError
@@ -99,11 +101,13 @@ class UnicornMachine:
         if "__global_pointer$" in self._symbols:
             self._engine.reg_write(riscv_const.UC_RISCV_REG_GP, self._symbols["__global_pointer$"])
         self.arena = Arena(_STACK_TOP, _STACK_TOP + _DATA_BYTES, _ALIGNMENT)
-        self._block_counts: Counter[tuple[int, int]] = Counter()
+        self._blocks: list[tuple[int, int]] = []
+        self._flash_reads: list[int] = []
         if counting:
             self._starts = sorted(disassemble(load(elf)).instructions)
             self._time_limit_s *= _COUNTING_SLOWDOWN
             self._engine.hook_add(unicorn.UC_HOOK_BLOCK, self._record_block)
+            self._engine.hook_add(unicorn.UC_HOOK_MEM_READ, self._record_read, begin=0, end=_CODE_BYTES - 1)
 
     @property
     def stack(self) -> range:
@@ -118,17 +122,28 @@ class UnicornMachine:
         """Read memory."""
         return bytes(self._engine.mem_read(address, size))
 
-    def take_counts(self) -> Counter[int]:
-        """Return the instructions executed since the last call, by start address of their basic block."""
-        counts: Counter[int] = Counter()
-        for (address, size), times in self._block_counts.items():
-            first, end = (bisect.bisect_left(self._starts, place) for place in (address, address + size))
-            counts[address] += times * (end - first)
-        self._block_counts.clear()
-        return counts
+    def take_executed(self) -> Executed:
+        """Return what was executed since the last call."""
+        executed = Executed(blocks=self._blocks, flash_reads=self._flash_reads)
+        self._blocks, self._flash_reads = [], []
+        for block, number in Counter(executed.blocks).items():
+            for start in self._instructions(*block):
+                executed.times[start] += number
+        for (block, after), number in Counter(itertools.pairwise(executed.blocks)).items():
+            if after[0] != sum(block):
+                executed.taken[self._instructions(*block)[-1]] += number
+        return executed
+
+    def _instructions(self, address: int, size: int) -> list[int]:
+        """Return the addresses of the instructions in a block."""
+        first, end = (bisect.bisect_left(self._starts, place) for place in (address, address + size))
+        return self._starts[first:end]
 
     def _record_block(self, _engine: Any, address: int, size: int, _data: Any) -> None:
-        self._block_counts[address, size] += 1
+        self._blocks.append((address, size))
+
+    def _record_read(self, _engine: Any, _access: int, address: int, *_: Any) -> None:
+        self._flash_reads.append(address)
 
     def call(self, function: str, *arguments: int) -> int:
         """Call `function` with arguments of 32 bits; returns an unsigned long.

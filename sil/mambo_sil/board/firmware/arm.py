@@ -34,7 +34,8 @@ _MULTIPLE: Final[dict[int, tuple[type[Load | Store], int, bool]]] = {
     arm.ARM_INS_PUSH: (Store, -1, True),
 }
 """Multiple loads and stores: effect, sign of the address step, whether it precedes each access."""
-_ALWAYS: Final = {arm.ARM_CC_AL, arm.ARM_CC_INVALID}
+ALWAYS: Final = {arm.ARM_CC_AL, arm.ARM_CC_INVALID}
+"""Conditions of an instruction that is never skipped."""
 _CALLS: Final = {arm.ARM_INS_BL, arm.ARM_INS_BLX}
 _ENDS: Final = {arm.ARM_INS_UDF, arm.ARM_INS_BKPT}
 
@@ -57,7 +58,7 @@ def model_instruction(insn: Any, *, thumb: bool) -> Instruction:
         text=f"{insn.mnemonic} {insn.op_str}".strip(),
         effects=effects,
         flow=flow,
-        conditional=insn.cc not in _ALWAYS or insn.id in {arm.ARM_INS_CBZ, arm.ARM_INS_CBNZ},
+        conditional=insn.cc not in ALWAYS or insn.id in {arm.ARM_INS_CBZ, arm.ARM_INS_CBNZ},
     )
 
 

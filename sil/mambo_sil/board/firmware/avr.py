@@ -41,7 +41,7 @@ _LINE: Final = re.compile(r"^ *([0-9a-f]+):\t((?:[0-9a-f]{2} )+) *\t(\S+)(?:\t([
 _PLACE: Final = re.compile(r"(-?)([XYZ])(\+?)(\d*)")
 
 _POINTERS: Final = {"X": 26, "Y": 28, "Z": 30}
-_SKIPS: Final = frozenset({"cpse", "sbrc", "sbrs", "sbic", "sbis"})
+SKIPS: Final = frozenset({"cpse", "sbrc", "sbrs", "sbic", "sbis"})
 _BRANCH: Final = re.compile(r"br\w\w")
 _NO_EFFECT: Final = re.compile(r"cp|cpc|cpi|(cl|se)[cnzvshti]|bst|sts|sbi|cbi|nop|break|wdr|sleep")
 """Instructions that change no register: comparisons, flags, stores to fixed addresses."""
@@ -53,7 +53,9 @@ _CLOBBERING: Final = frozenset(
 
 
 @dataclass(frozen=True)
-class _Line:
+class Line:
+    """One instruction as avr-objdump prints it."""
+
     address: int
     size_bytes: int
     mnemonic: str
@@ -61,10 +63,12 @@ class _Line:
 
     @property
     def text(self) -> str:
+        """Mnemonic and operands."""
         return f"{self.mnemonic} {', '.join(self.operands)}".strip()
 
     @property
     def next_address(self) -> int:
+        """Address of the instruction behind it."""
         return self.address + self.size_bytes
 
 
@@ -76,14 +80,23 @@ def disassemble(image: Image) -> tuple[dict[int, Instruction], Convention]:
     text = _objdump(image)
     architecture = _ARCHITECTURE.search(text)
     return_bytes = 3 if architecture and architecture[1] in _THREE_BYTE_PC else 2
-    lines = [
-        _Line(int(address, 16), len(code.split()), mnemonic, _operands(operands))
-        for address, code, mnemonic, operands in _LINE.findall(text)
-    ]
+    lines = _lines(text)
     instructions = {one.address: one for one in _instructions(lines, return_bytes)}
     preserved = {_RETURN, *(f"r{index}" for index in (*range(2, 18), 28, 29))}
     convention = Convention(_RETURN, frozenset(preserved), 1, return_bytes, _EXCEPTIONS)
     return instructions, convention
+
+
+def decode(image: Image) -> list[Line]:
+    """Return the instructions of a program by rising address; raises FootprintError as `disassemble` does."""
+    return _lines(_objdump(image))
+
+
+def _lines(text: str) -> list[Line]:
+    return [
+        Line(int(address, 16), len(code.split()), mnemonic, _operands(operands))
+        for address, code, mnemonic, operands in _LINE.findall(text)
+    ]
 
 
 def _objdump(image: Image) -> str:
@@ -107,7 +120,7 @@ def _operands(text: str) -> tuple[str, ...]:
     return tuple(word.strip() for word in text.split(",") if word.strip())
 
 
-def _instructions(lines: list[_Line], return_bytes: int) -> Iterator[Instruction]:
+def _instructions(lines: list[Line], return_bytes: int) -> Iterator[Instruction]:
     """Yield the instructions; a 16-bit subtraction (subi, sbci) becomes one, so no jump can split it."""
     at = {line.address: line for line in lines}
     merged = None
@@ -123,8 +136,8 @@ def _instructions(lines: list[_Line], return_bytes: int) -> Iterator[Instruction
             continue
         effects = _effects(line, return_bytes)
         flow: Flow = "next"
-        conditional = line.mnemonic in _SKIPS or _BRANCH.fullmatch(line.mnemonic) is not None
-        if line.mnemonic in _SKIPS:
+        conditional = line.mnemonic in SKIPS or _BRANCH.fullmatch(line.mnemonic) is not None
+        if line.mnemonic in SKIPS:
             effects, flow = ((Assign(PC, None, after.next_address),) if after else (Clobber(PC),)), "jump"
         elif conditional or line.mnemonic in {"rjmp", "jmp", "ijmp", "eijmp", "ret"}:
             flow = "jump"
@@ -134,7 +147,7 @@ def _instructions(lines: list[_Line], return_bytes: int) -> Iterator[Instruction
             yield Instruction(line.address, line.size_bytes, line.text, effects, flow, conditional)
 
 
-def _match_subtraction(line: _Line, after: _Line) -> tuple[int, int] | None:
+def _match_subtraction(line: Line, after: Line) -> tuple[int, int] | None:
     """Return lower register and signed value if two lines subtract a 16-bit constant from a pair.
 
     GCC keeps zero in r1 where `sbc` uses it.
@@ -150,7 +163,7 @@ def _match_subtraction(line: _Line, after: _Line) -> tuple[int, int] | None:
     return (low, (value + 2**15) % 2**16 - 2**15) if low % 2 == 0 and high == low + 1 else None
 
 
-def _effects(line: _Line, return_bytes: int) -> tuple[Effect, ...] | None:  # noqa: C901, PLR0911, PLR0912 - one table
+def _effects(line: Line, return_bytes: int) -> tuple[Effect, ...] | None:  # noqa: C901, PLR0911, PLR0912 - one table
     """Model changes of stack pointer, registers and program counter; None if the mnemonic is unknown."""
     mnemonic, operands = line.mnemonic, line.operands
     match mnemonic, operands:

@@ -4,13 +4,15 @@ import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import capstone
 
 from mambo_sil.board.firmware import arm, avr, riscv
 from mambo_sil.board.firmware.elf import ElfSection, Image
 from mambo_sil.board.firmware.instructions import Convention, Instruction
+
+T = TypeVar("T")
 
 _A32: Final = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_ARM)
 _THUMB: Final = capstone.Cs(capstone.CS_ARCH_ARM, capstone.CS_MODE_THUMB | capstone.CS_MODE_MCLASS)
@@ -39,18 +41,20 @@ def disassemble(image: Image) -> Disassembly:
         )
     if image.machine == "EM_AVR":
         return Disassembly(*avr.disassemble(image))
-    decode, convention = (
-        (_decode_arm, arm.CONVENTION) if image.machine == "EM_ARM" else (_decode_riscv, riscv.CONVENTION)
-    )
-    return Disassembly({instruction.address: instruction for instruction in decode(image)}, convention)
+    if image.machine == "EM_ARM":
+        meanings = (partial(arm.model_instruction, thumb=thumb) for thumb in (False, True))
+        decoded, convention = decode_arm(image, *meanings), arm.CONVENTION
+    else:
+        decoded, convention = _decode_riscv(image), riscv.CONVENTION
+    return Disassembly({instruction.address: instruction for instruction in decoded}, convention)
 
 
-def _decode_arm(image: Image) -> Iterator[Instruction]:
-    """Decode between mapping symbols, which mark A32, Thumb and data (AAELF 2020Q2, 5.5.5)."""
-    decoders = {
-        "a": (_A32, partial(arm.model_instruction, thumb=False)),
-        "t": (_THUMB, partial(arm.model_instruction, thumb=True)),
-    }
+def decode_arm(image: Image, a32: Callable[[Any], T], thumb: Callable[[Any], T]) -> Iterator[T]:
+    """Yield what `a32` or `thumb` returns for each of Capstone's instructions, by rising address.
+
+    Decodes between mapping symbols, which mark A32, Thumb and data (AAELF 2020Q2, 5.5.5).
+    """
+    decoders = {"a": (_A32, a32), "t": (_THUMB, thumb)}
     for section in image.sections:
         if section.executable:
             modes = [(at, mode) for at, mode in image.modes if 0 <= at - section.address < section.size_bytes]
@@ -71,8 +75,8 @@ def _decode_riscv(image: Image) -> Iterator[Instruction]:
 
 
 def _decode(
-    decoder: capstone.Cs, meaning: Callable[[Any], Instruction], section: ElfSection, start: int, end: int
-) -> Iterator[Instruction]:
+    decoder: capstone.Cs, meaning: Callable[[Any], T], section: ElfSection, start: int, end: int
+) -> Iterator[T]:
     """Decode from `start` to `end`, skipping halfwords that are no instruction."""
     decoder.detail = True
     at = start

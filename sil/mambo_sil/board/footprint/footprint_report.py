@@ -9,7 +9,7 @@ from mambo_codegen.settings.model import Settings
 from mambo_sil.board.firmware.gate import Forbidden
 from mambo_sil.board.firmware.sizes import Parts
 from mambo_sil.board.firmware.stack import Frame
-from mambo_sil.board.footprint.counts import InstructionCounts
+from mambo_sil.board.footprint.counts import CycleCounts, InstructionCounts
 from mambo_sil.board.footprint.measure import Footprint, Limit
 from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.results.html_page import render_page
@@ -21,6 +21,7 @@ _HEAD = (
     "RAM B",
     "stack B",
     "instructions a step: least / mean / most met",
+    "cycles a step",
     "time ms",
     "period",
     "",
@@ -55,12 +56,26 @@ class BoardFootprint:
     instance_bytes: int
     stack_path: tuple[Frame, ...]
     instructions: InstructionCounts | None
+    cycles: CycleCounts | None
+    cycles_source: str
     cycles_estimate: tuple[float, float] | None
     time_s_estimate: tuple[float, float] | None
     forbidden: tuple[Forbidden, ...]
     functions: list[FunctionFootprint]
     notes: list[str]
     on_board: BoardMeasurement | None = None
+
+    @property
+    def cycles_sentence(self) -> str:
+        """What the cycles are, and the bounds of the most expensive step."""
+        if self.cycles is None or self.cycles_estimate is None:
+            return f"{self.name}: cycles are an {self.cycles_source}; of the most expensive step met"
+        low, high = (f"{limit:.0f}" for limit in self.cycles_estimate)
+        bounds = low if low == high else f"{low} to {high} with the wait states of the flash"
+        return (
+            f"{self.name}: cycles are a {self.cycles_source}, without wait states; "
+            f"the most expensive step met takes {bounds}"
+        )
 
     @property
     def compared(self) -> list[tuple[str, str, str]]:
@@ -135,6 +150,8 @@ def text(footprints: Sequence[Footprint]) -> str:
         functions = _functions(footprints[0])
         head = ("function", "size B", "own frame B", "deepest B", "instructions")
         lines += ["", *_columns([head, *(tuple(map(str, astuple(one))) for one in functions)])]
+    cycles = [_board(footprint).cycles_sentence for footprint in footprints if footprint.cycles]
+    lines += ["", *cycles] if cycles else []
     notes = [note for footprint in footprints for note in _notes(footprint)]
     return "\n".join([*lines, *(["", *notes] if notes else [])])
 
@@ -152,10 +169,23 @@ def _row(footprint: Footprint) -> tuple[str, ...]:
         str(footprint.added.ram.total),
         "-" if footprint.stack is None else str(footprint.stack.bytes),
         "-" if counts is None else f"{counts.least} / {counts.mean:.0f} / {counts.most_met}",
+        _cycles_cell(footprint),
         "-" if time_s is None else f"{1000 * time_s[0]:.3g}..{1000 * time_s[1]:.3g}",
         "-" if time_s is None else f"{100 * time_s[1] / footprint.update_period_s:.2g} %",
         ("fits" if footprint.complete else "incomplete") if footprint.fits else "OVER",
     )
+
+
+def _cycles_cell(footprint: Footprint) -> str:
+    """Return the modelled cycles, or one estimated number."""
+    modelled = _modelled(footprint)
+    if modelled is not None:
+        return f"{modelled.least} / {modelled.mean:.0f} / {modelled.most_met}"
+    return "-" if footprint.cycles is None else f"about {sum(footprint.cycles) / 2:.0f}"
+
+
+def _modelled(footprint: Footprint) -> CycleCounts | None:
+    return None if footprint.counts is None else footprint.counts.cycles
 
 
 def _board(footprint: Footprint) -> BoardFootprint:
@@ -173,6 +203,8 @@ def _board(footprint: Footprint) -> BoardFootprint:
         instance_bytes=footprint.instance_bytes,
         stack_path=() if footprint.stack is None else footprint.stack.path,
         instructions=footprint.counts,
+        cycles=_modelled(footprint),
+        cycles_source=footprint.cycles_source,
         cycles_estimate=footprint.cycles,
         time_s_estimate=footprint.time_s,
         forbidden=footprint.forbidden,

@@ -19,6 +19,7 @@ from mambo_sil.board.firmware.gate import Forbidden, find_forbidden
 from mambo_sil.board.firmware.sizes import Added, measure_added
 from mambo_sil.board.firmware.stack import StackReport, bound_stack
 from mambo_sil.board.footprint.counts import InstructionCounts, count_instructions
+from mambo_sil.board.footprint.cycles import MODELS
 from mambo_sil.board.footprint.on_board import BoardMeasurement
 from mambo_sil.errors import EmulatorError, FlightError
 from mambo_sil.flight.controllers.controller_library import with_default_prefix
@@ -83,19 +84,28 @@ class Footprint:
     """What the board at a port measured, if there is one."""
 
     @property
+    def cycles_source(self) -> str:
+        """Where `cycles` are from: the manual of a model, or an estimate."""
+        if self.board.cycles is None:
+            return f"model: {MODELS[self.board.emulated_core.value].source}"
+        estimate = self.board.cycles
+        return f"estimate: {estimate.per_instruction:g} per instruction, +/- {100 * estimate.error_share:g} %"
+
+    @property
     def cycles(self) -> tuple[float, float] | None:
-        """Estimated clock cycles of the most expensive step met, lower and upper end of the band."""
+        """Clock cycles of the most expensive step met, lower and upper end, modelled or estimated."""
         if self.counts is None:
             return None
-        cycles, error = (
-            self.board.cycles.per_instruction * self.counts.most_met,
-            self.board.cycles.error_share,
-        )
-        return (1 - error) * cycles, (1 + error) * cycles
+        if self.board.cycles is None:
+            modelled = self.counts.cycles
+            return None if modelled is None else (modelled.fewest, modelled.most_with_wait)
+        estimate = self.board.cycles
+        cycles = estimate.per_instruction * self.counts.most_met
+        return (1 - estimate.error_share) * cycles, (1 + estimate.error_share) * cycles
 
     @property
     def time_s(self) -> tuple[float, float] | None:
-        """Estimated time of the most expensive step met in seconds, lower and upper end of the band."""
+        """Time of the most expensive step met in seconds, lower and upper end, by `cycles`."""
         clock_hz = self.board.clock_hz.value
         return None if self.cycles is None else (self.cycles[0] / clock_hz, self.cycles[1] / clock_hz)
 
@@ -176,10 +186,20 @@ def _counts(
     """
     ticks = usual_ticks(settings, ticks)
     elf = build_guest(settings, found, folder)
+    board = found.board
     try:
-        return count_instructions(settings, elf, found.board.emulated_core.value, ticks, ticks // 2), ""
+        counts = count_instructions(
+            settings,
+            elf,
+            board.emulated_core.value,
+            ticks,
+            ticks // 2,
+            modelled=board.cycles is None,
+            flash=board.flash_wait,
+        )
     except (EmulatorError, FlightError) as error:
         return None, str(error)
+    return counts, ""
 
 
 def measure_boards(

@@ -1,0 +1,95 @@
+"""A model of the clock cycles of executed instructions: the core's manual, and the flash's wait states.
+
+Not in the model: interrupts, bus contention, prefetching.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from mambo_codegen.boards import FlashWait
+from mambo_sil.board.emulation.executed import Executed
+from mambo_sil.board.firmware.elf import Image
+from mambo_sil.board.footprint.timing import NONE, Cycles, Timing
+from mambo_sil.board.footprint.timing_arm import cortex_m0plus, cortex_m4
+from mambo_sil.board.footprint.timing_avr import atmega2560
+
+
+@dataclass(frozen=True)
+class TimingSource:
+    """Where the cycles of a core's instructions are from, and the function that returns them by address."""
+
+    source: str
+    timings: Callable[[Image], Mapping[int, Timing]]
+
+
+MODELS: Final = {
+    "cortex-m4": TimingSource("Cortex-M4 TRM, ARM DDI 0439D", cortex_m4),
+    "cortex-m0": TimingSource("Cortex-M0+ TRM, ARM DDI 0484C", cortex_m0plus),
+    "avr": TimingSource("AVR Instruction Set Manual, DS40002198", atmega2560),
+}
+"""Models by emulated core. The other cores are estimated.
+
+The Cortex-M7 issues two instructions at once, the ARM926 has caches of unknown content, and of the RV32 core
+no timing is published.
+"""
+
+
+@dataclass(frozen=True)
+class ModelledCycles:
+    """Modelled cycles of one step: without wait states, and the wait states of a flash with empty caches."""
+
+    without_wait: Cycles
+    wait: int
+
+    @property
+    def most(self) -> int:
+        """Return the most cycles, wait states included."""
+        return self.without_wait.most + self.wait
+
+
+class CycleModel:
+    """The modelled cycles of a program on a core; `flash` is None if its flash has no wait states."""
+
+    def __init__(self, image: Image, core: str, flash: FlashWait | None) -> None:
+        self._timings = MODELS[core].timings(image)
+        self._flash = flash
+
+    def cycles(self, executed: Executed) -> ModelledCycles:
+        """Add up the cycles of what was executed."""
+        total = NONE
+        for address, times in executed.times.items():
+            timing = self._timings[address]
+            total = total.plus(timing.cycles.times(times))
+            total = total.plus(timing.taken.times(executed.taken[address]))
+        return ModelledCycles(total, self._wait(executed))
+
+    def _wait(self, executed: Executed) -> int:
+        """Return the wait states of every line that the caches, empty at the start, have to fetch."""
+        flash = self._flash
+        if flash is None:
+            return 0
+        code = (
+            line
+            for address, size in executed.blocks
+            for line in range(address // flash.line_bytes, (address + size - 1) // flash.line_bytes + 1)
+        )
+        data = (address // flash.line_bytes for address in executed.flash_reads)
+        misses = _misses(code, flash.code_lines) + _misses(data, flash.data_lines)
+        return misses * flash.cycles_per_line
+
+
+def _misses(lines: Iterable[int], kept: int) -> int:
+    """Count the lines that are not among the `kept` ones used last."""
+    cache: OrderedDict[int, None] = OrderedDict()
+    misses = 0
+    for line in lines:
+        if line in cache:
+            cache.move_to_end(line)
+            continue
+        misses += 1
+        cache[line] = None
+        if len(cache) > kept:
+            cache.popitem(last=False)
+    return misses
