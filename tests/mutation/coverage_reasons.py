@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from mambo_codegen.settings.model import Settings
 from tests.mutation.reasons import Reason, reasons
 
 _SELF_TEST: Final = (
@@ -11,6 +12,15 @@ _STATUS_AND_ROLL: Final = (
     "&& !((status == expected->status) && (command.roll_rad == expected->command.roll_rad)"
 )
 _FILE: Final = "nmpc_self_test.c"
+_THRUST: Final = (
+    "the thrusts of the self-test, within 3 m/s^2 of hover, are in range; other settings limit them"
+)
+
+
+def _has_room_for_thrust(settings: Settings) -> bool:
+    ranges = settings.ranges
+    return ranges.thrust_acceleration_min_m_s2 < 6.8 and ranges.thrust_acceleration_max_m_s2 > 12.9
+
 
 REASONS: Final[tuple[Reason, ...]] = (
     *reasons(_FILE, _STATUS_AND_ROLL, _SELF_TEST, "branch 1 never taken", "branch 3 never taken"),
@@ -23,6 +33,15 @@ REASONS: Final[tuple[Reason, ...]] = (
             ("&& (scratch->gradient[0] == expected->gradient[0])", "branch 1 never taken"),
             ("&& (scratch->gradient[1] == expected->gradient[1]))) {", "branch 0 never taken"),
             ("first_difference = i + 1;", "never run"),
+        )
+    ),
+    *(
+        Reason(_FILE, line, what, _THRUST, _has_room_for_thrust)
+        for line, what in (
+            ("if (thrust_m_s2 < NMPC_THRUST_ACCELERATION_MIN_M_S2) {", "branch 0 never taken"),
+            ("thrust_m_s2 = NMPC_THRUST_ACCELERATION_MIN_M_S2;", "never run"),
+            ("} else if (thrust_m_s2 > NMPC_THRUST_ACCELERATION_MAX_M_S2) {", "branch 0 never taken"),
+            ("thrust_m_s2 = NMPC_THRUST_ACCELERATION_MAX_M_S2;", "never run"),
         )
     ),
     *reasons(

@@ -89,6 +89,7 @@ _SIGN: Final = "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? 
 _CHANGES: Final = "for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {"
 _STEP_MAX: Final = "#define NMPC_STEP_MAX_RAD <{}> /* Delta_max, Table I */"
 _STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
+_CLAMP: Final = "return (value > limit) ? limit : ((value < -limit) ? -limit : value);"
 _NEAREST: Final = ("one more", "one less")
 
 REASONS: Final[tuple[Reason, ...]] = (
@@ -149,6 +150,7 @@ REASONS: Final[tuple[Reason, ...]] = (
         "0 -> 1",
         "0 -> (-1)",
     ),
+    *reasons("nmpc.c", _CLAMP, _EQUAL, "> -> >=", "< -> <="),
     *reasons("nmpc.c", "return (a < b) ? a : b;", _EQUAL, "< -> <="),
     *reasons("nmpc.c", "return (a > b) ? a : b;", _EQUAL, "> -> >="),
     *(

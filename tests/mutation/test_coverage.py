@@ -32,7 +32,8 @@ def counts(its: Subject) -> dict[tuple[str, int], tuple[int, list[int]]]:
     Several objects contain the functions of a header: their counts are added.
     """
     require("gcov", "gcc")
-    assert played_fault(its, "--coverage", "-O0") is None
+    # Functions that are inlined in any case have their branches once for each call.
+    assert played_fault(its, "--coverage", "-O0", "-Dalways_inline=unused") is None
     command = ["gcov", "--json-format", "--branch-probabilities", "--stdout"]
     objects = [str(path) for path in its.folder.glob("*.gcda")]
     done = subprocess.run([*command, *objects], cwd=its.folder, capture_output=True, text=True, check=True)
@@ -75,7 +76,7 @@ def test_every_line_runs_and_every_branch_is_taken(name: str, tmp_path: Path) ->
 @pytest.mark.long
 def test_a_dead_line_and_its_branch_are_gaps(tmp_path: Path) -> None:
     """A condition that no input meets, and what it guards."""
-    guard = "    if (!(is_good"
+    guard = "        if (!is_good_state(state))"
     dead = f"    if (status == NMPC_BAD_THRUST) {{\n        return NMPC_BAD_COMMAND;\n    }}\n{guard}"
     found = {(line, what) for _, line, what in gaps(subject(MAMBO, tmp_path, ("nmpc.c", guard, dead)))}
     assert ("return NMPC_BAD_COMMAND;", "never run") in found

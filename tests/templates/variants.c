@@ -26,7 +26,7 @@ static float real_of(unsigned int bits)
 
 static const float limits[] = {NMPC_TILT_LIMIT_RAD, 3.4028235e38F};
 
-static unsigned int bits_of(float real)
+static unsigned int word_of(float real)
 {
     union {
         float real;
@@ -68,8 +68,8 @@ int main(void)
         }
     }
     for (i = 0U; i < (sizeof limits / sizeof limits[0]); i++) { /* found early: a fault at a limit alone */
-        if ((differ_for(bits_of(limits[i])) != 0) || (differ_for(bits_of(-limits[i])) != 0)) {
-            printf("they differ for the float with the bits %08x or its negative\n", bits_of(limits[i]));
+        if ((differ_for(word_of(limits[i])) != 0) || (differ_for(word_of(-limits[i])) != 0)) {
+            printf("they differ for the float with the bits %08x or its negative\n", word_of(limits[i]));
             return 1;
         }
     }

@@ -39,7 +39,7 @@ FAULTS = {
     ),
     "a memory that is nobody's": (
         "nmpc.c",
-        "        self->command_rad[0] = self->plan_rad[0];",
+        "    self->command_rad[0] = self->plan_rad[0];",
         "        { static int n; self->command_rad[0] = (n++ % 2 == 1) ? 0 : self->plan_rad[0]; }",
     ),
 }
