@@ -224,9 +224,9 @@ class QuadraticController:
         limit = limits.command_limit if self._limits else model.command_limit
         moves = self._minimize(attitude, estimate, motion, target, tilt, limit=limit)
         moved = replace(attitude, command=self._products.move_acceleration(moves))
-        command = (
-            model.command_rad(moved) + feedback if self._feedback is not None else model.command_rad(moved)
-        )
+        command = model.command_rad(moved)
+        if self._feedback is not None:  # the C adds none where its factor is 0: a sum with 0 has no sign -0
+            command = np.where(self._feedback != 0, command + feedback, command)
         command = np.where(commands[:, None], clamp(command, self._tilt_limit()), memory.command_rad)
         level = np.zeros_like(command)
         attitude = choose(commands, moved, attitude)
