@@ -86,6 +86,7 @@ _ROUNDED: Final = "rounds to the same steps on every path that the iterations th
 
 _ABSOLUTE: Final = "return (value < (nmpc_sum_t)0) ? -value : value;"
 _SIGN: Final = "return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);"
+_MAGNITUDE: Final = "#define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)"
 _CHANGES: Final = "for (count = 1; (changes != 0U) && (count < NMPC_HORIZON_PREDICTION); count++) {"
 _STEP_MAX: Final = "#define NMPC_STEP_MAX_RAD <{}> /* Delta_max, Table I */"
 _STEP_MIN: Final = "#define NMPC_STEP_MIN_RAD <{}> /* Delta_min, Table I */"
@@ -163,6 +164,13 @@ REASONS: Final[tuple[Reason, ...]] = (
         "a wider table, whose further columns nobody reads",
         "/ -> *",
         holds=_axes_alike,
+    ),
+    Reason("nmpc.c", _MAGNITUDE, "1 -> 0", "both sides of a comparison are shifted alike"),
+    Reason(
+        "nmpc.c",
+        _MAGNITUDE,
+        "1 -> 2",
+        "no bit is lost, since an unsigned long of this computer has 64; of 32, the largest numbers would be",
     ),
     *reasons("nmpc.c", "self->has_target = 1U;", "only 0 means none", "1U -> 2U"),
     *(
