@@ -36,8 +36,13 @@ typedef char nmpc_assert_instance_fits[(sizeof(nmpc_t) <= NMPC_INSTANCE_BYTES) ?
 typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_STORED_NUMBERS * sizeof(nmpc_real_t)))
                                             ? 1 : -1];
 
-/* A function of a control step; the compiler decides whether it is inlined. */
+/* A function of a control step; the compiler decides whether it is inlined. On a Cortex-M0 few are: its products are
+ * calls, and it has few registers. */
+#if defined(__ARM_ARCH_6M__)
 #define NMPC_INLINE static
+#else
+#define NMPC_INLINE static
+#endif
 
 /* Ask gcc to unroll the next loop; other compilers decide for themselves. */
 #if defined(__GNUC__) && !defined(__clang__) && (__GNUC__ >= 8)
@@ -46,7 +51,7 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 #define NMPC_UNROLL
 #endif
 
-/* ---- Numbers ------------------------------------------------------------------------------------------------------
+/* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
  * Comparisons, limits and products with the same bits on every board.
  */
@@ -209,22 +214,22 @@ NMPC_INLINE nmpc_real_t tracker_product(nmpc_real_t factor, nmpc_real_t value)
     return NMPC_NUMBER_BELOW(wide_product(factor, value), 30);
 }
 
-NMPC_INLINE nmpc_real_t position_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
-                                          nmpc_real_t innovation_m_step)
+NMPC_INLINE nmpc_real_t position_correction(nmpc_real_t by_position, nmpc_real_t innovation_m,
+                                    nmpc_real_t by_velocity, nmpc_real_t innovation_m_step)
 {
     return NMPC_NUMBER_ABOVE(wide_product(by_position, innovation_m) + wide_product(by_velocity, innovation_m_step),
                              35);
 }
 
-NMPC_INLINE nmpc_real_t velocity_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
-                                          nmpc_real_t innovation_m_step)
+NMPC_INLINE nmpc_real_t velocity_correction(nmpc_real_t by_position, nmpc_real_t innovation_m,
+                                    nmpc_real_t by_velocity, nmpc_real_t innovation_m_step)
 {
     return NMPC_NUMBER_BELOW(wide_product(by_position, innovation_m) + wide_product(by_velocity, innovation_m_step),
                              31);
 }
 
-NMPC_INLINE nmpc_real_t disturbance_correction(nmpc_real_t by_position, nmpc_real_t innovation_m, nmpc_real_t by_velocity,
-                                          nmpc_real_t innovation_m_step)
+NMPC_INLINE nmpc_real_t disturbance_correction(nmpc_real_t by_position, nmpc_real_t innovation_m,
+                                    nmpc_real_t by_velocity, nmpc_real_t innovation_m_step)
 {
     return NMPC_NUMBER_BELOW(wide_product(by_position, innovation_m) + wide_product(by_velocity, innovation_m_step),
                              29);
@@ -614,11 +619,12 @@ static void observer_clear(nmpc_observer_t *observer)
     }
 }
 
-/* ---- Target tracker -----------------------------------------------------------------------------------------------
+/* ---- Target tracker -------------------------------------------------------------------------------------------------
  *
- * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the
- * target, A_T = tau^2 a_T its acceleration, and J_T the change of A_T from one control step to the next: the jerk. In
- * every control step the measured acceleration M, the predicted one P and the new estimates are
+ * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
+ * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its
+ * acceleration, and J_T the change of A_T from one control step to the next: the jerk. In every control step the
+ * measured acceleration M, the predicted one P and the new estimates are
  *
  *     M = tau^2/T_s (Tv_k - Tv_k-1)          P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
@@ -690,7 +696,7 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
     self->has_target = 1U;
 }
 
-/* ---- Optimizer ----------------------------------------------------------------------------------------------------
+/* ---- Optimizer ------------------------------------------------------------------------------------------------------
  *
  * The exact minimum of the quadratic cost (not in the paper).
  *
@@ -780,8 +786,8 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *
  *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
  *
- * with R the rotation from x and y to right and forward.
- * To roll and pitch are added the changes of the measured angles since the last step times constants.
+ * with R the rotation from x and y to right and forward. Rate feedback adds to the commands the changes of the measured
+ * angles since the last step, times constants.
  */
 
 /* `missed` before the first good state, and after an outage. */

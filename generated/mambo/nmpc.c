@@ -48,8 +48,11 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
                                             ? 1 : -1];
 
 /* A function of a control step, inlined in any case: the axis is then a constant, the coefficients are operands of the
- * instructions, and the states stay in registers. Other compilers than gcc and clang decide for themselves. */
-#if defined(__GNUC__)
+ * instructions, and the states stay in registers. Other compilers than gcc and clang decide for themselves; so does a
+ * Cortex-M0, whose operations are calls. */
+#if defined(__ARM_ARCH_6M__)
+#define NMPC_INLINE static
+#elif defined(__GNUC__)
 #define NMPC_INLINE static inline __attribute__((always_inline))
 #else
 #define NMPC_INLINE static inline
@@ -62,7 +65,7 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 #define NMPC_UNROLL
 #endif
 
-/* ---- Numbers ------------------------------------------------------------------------------------------------------
+/* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
  * Comparisons, limits with the same bits on every board.
  */
@@ -500,11 +503,12 @@ static void observer_clear(nmpc_observer_t *observer)
     }
 }
 
-/* ---- Target tracker -----------------------------------------------------------------------------------------------
+/* ---- Target tracker -------------------------------------------------------------------------------------------------
  *
- * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the
- * target, A_T = tau^2 a_T its acceleration, and J_T the change of A_T from one control step to the next: the jerk. In
- * every control step the measured acceleration M, the predicted one P and the new estimates are
+ * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
+ * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its
+ * acceleration, and J_T the change of A_T from one control step to the next: the jerk. In every control step the
+ * measured acceleration M, the predicted one P and the new estimates are
  *
  *     M = tau^2/T_s (Tv_k - Tv_k-1)          P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
@@ -573,7 +577,7 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
     self->has_target = 1U;
 }
 
-/* ---- Optimizer ----------------------------------------------------------------------------------------------------
+/* ---- Optimizer ------------------------------------------------------------------------------------------------------
  *
  * The exact minimum of the quadratic cost (not in the paper).
  *
@@ -667,8 +671,8 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *
  *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
  *
- * with R the rotation from x and y to right and forward.
- * To roll and pitch are added the changes of the measured angles since the last step times constants.
+ * with R the rotation from x and y to right and forward. Rate feedback adds to the commands the changes of the measured
+ * angles since the last step, times constants.
  */
 
 /* `missed` before the first good state, and after an outage. */

@@ -50,8 +50,11 @@ typedef char nmpc_assert_horizons[((NMPC_HORIZON_CONTROL >= 1)
                                    && (NMPC_ITERATIONS <= 100)) ? 1 : -1];
 
 /* A function of a control step, inlined in any case: the axis is then a constant, the coefficients are operands of the
- * instructions, and the states stay in registers. Other compilers than gcc and clang decide for themselves. */
-#if defined(__GNUC__)
+ * instructions, and the states stay in registers. Other compilers than gcc and clang decide for themselves; so does a
+ * Cortex-M0, whose operations are calls. */
+#if defined(__ARM_ARCH_6M__)
+#define NMPC_INLINE static
+#elif defined(__GNUC__)
 #define NMPC_INLINE static inline __attribute__((always_inline))
 #else
 #define NMPC_INLINE static inline
@@ -64,7 +67,7 @@ typedef char nmpc_assert_horizons[((NMPC_HORIZON_CONTROL >= 1)
 #define NMPC_UNROLL
 #endif
 
-/* ---- Numbers ------------------------------------------------------------------------------------------------------
+/* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
  * Comparisons, limits with the same bits on every board.
  */
@@ -150,7 +153,8 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
 
 /* ---- Signs ----------------------------------------------------------------------------------------------------------
  *
- * RPROP and the 1-norm read signs; without an FPU, reading the sign's bit takes far fewer instructions than a comparison.
+ * RPROP and the 1-norm read signs; without an FPU, reading the sign's bit takes far fewer instructions than a
+ * comparison.
  */
 
 /* -1, 0 or 1; 0 for +0 and -0. */
@@ -307,7 +311,7 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
     }
 }
 
-/* ---- Predictor ----------------------------------------------------------------------------------------------------
+/* ---- Predictor ------------------------------------------------------------------------------------------------------
  *
  * The error between drone and target over the horizon, for given moves (eqs 8-11).
  *
@@ -417,7 +421,7 @@ static void predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *ta
                   state->velocity_m_s[1] - target->velocity_m_s[1]);
 }
 
-/* ---- Cost ---------------------------------------------------------------------------------------------------------
+/* ---- Cost -----------------------------------------------------------------------------------------------------------
  *
  * The Manhattan distance to the target and the change of the moves, with its subgradient (eq 12):
  *
@@ -551,10 +555,10 @@ static nmpc_sum_t cost_evaluate(nmpc_t *self)
     return (weight.tracking * distance_m) + (weight.effort * variation_rad);
 }
 
-/* ---- Optimizer ----------------------------------------------------------------------------------------------------
+/* ---- Optimizer ------------------------------------------------------------------------------------------------------
  *
- * RPROP with a fixed number of iterations, variant rprop+ (Riedmiller and Braun 1993; Igel and Huesken 2000). Each move u
- * has a step size Delta. From the sign of the gradient g = dJ/du and that of the iteration before,
+ * RPROP with a fixed number of iterations, variant rprop+ (Riedmiller and Braun 1993; Igel and Huesken 2000). Each
+ * move u has a step size Delta. From the sign of the gradient g = dJ/du and that of the iteration before,
  *
  *     equal:     Delta = min(eta+ Delta, Delta_max),   u -= sign(g) Delta
  *     opposite:  Delta = max(eta- Delta, Delta_min),   u back to what it was before its last update
@@ -636,7 +640,7 @@ static void optimizer_minimize(nmpc_t *self)
     self->converged = (unsigned char)converged;
 }
 
-/* ---- Step ---------------------------------------------------------------------------------------------------------
+/* ---- Step -----------------------------------------------------------------------------------------------------------
  *
  * A control step: prepare the prediction at the measured state, optimise the plan from the initial guess, and take its
  * first moves as the command, u*_k.
@@ -666,7 +670,7 @@ static void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t
     self->command_rad[1] = self->plan_rad[1];
 }
 
-/* ---- Interface ----------------------------------------------------------------------------------------------------
+/* ---- Interface ------------------------------------------------------------------------------------------------------
  *
  * The functions of nmpc.h.
  */

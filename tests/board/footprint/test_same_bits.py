@@ -49,7 +49,7 @@ FAULTS = {
         "rollout->acceleration_m_step2 + (roll_m_step2 + pitch_m_step2)",
         "(rollout->acceleration_m_step2 + roll_m_step2) + pitch_m_step2",
     ),
-    "another sign": ("nmpc.c", "effort_gradient = -weight", "effort_gradient = weight"),
+    "another sign": ("nmpc.c", "effort_slope = -weight", "effort_slope = weight"),
 }
 """Faults by name: file, the line, what it becomes."""
 
