@@ -81,8 +81,6 @@ class Rprop:
             cost, gradient = evaluate(moves_rad)
             if iteration > 0:
                 converged = converged | (np.abs(cost - previous_cost) < self.tolerance)
-                if converged.all():  # no move changes any more, so no cost and no gradient does
-                    break
             iterations = iterations + ~converged
 
             signs = np.where(converged[:, None, None], scalar(0), sign(gradient))
