@@ -191,7 +191,7 @@ def test_wider_arithmetic_is_reported_with_its_caller(
     found = find_forbidden(image, scalar)
     assert {one.kind for one in found} == {kind}
     callers = {caller.partition(".")[0] for one in found for caller in one.callers}
-    assert callers & {"cost_evaluate", "advance", "nmpc_step"}, "the function, or the one that it is inlined into"
+    assert callers & {"cost_evaluate", "advance", "nmpc_step"}, "the function, or one that it is inlined into"
     if scalar == "float32":
         labels = {label for one in found for label in image.symbol(one.symbol).labels}
         assert labels & {"__aeabi_dmul", "__muldf3"}
