@@ -17,7 +17,7 @@ CONTROLLER = "nmpc.c"
 
 _NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?f")
 _TABLE = re.compile(r"^static const nmpc_real_t (\w+)(?:\[\w+\])+ = \{(.*?)\};$", re.MULTILINE | re.DOTALL)
-TABLES = {"tilt_rows", "integral_rows", "lagged_shares", "move_rows", "move_ratios"}
+TABLES = {"tilt_rows", "integral_rows", "lagged_rows", "move_rows", "move_ratios"}
 
 
 @pytest.fixture(scope="module")
