@@ -309,7 +309,11 @@ def margins_folder(folder: Path) -> None:
             ),
             gust_to_place_s2=0.25 if stable else np.inf,
             gust_to_command_rad_s2_m=0.25,
-            noise={"position": NoiseGain(to_place=0.1, to_command=0.5)},
+            noise={
+                "position": NoiseGain(to_place=0.1, to_command=0.5),
+                "velocity": NoiseGain(to_place=0.2, to_command=0.25),
+                "angle": NoiseGain(to_place=0.05, to_command=0.75),
+            },
             sensed_variation_rad=None,
         )
 

@@ -10,6 +10,8 @@ from mambo_sil.results.number_format import three_digits, three_digits_or_dash
 
 _INFINITE: Final = "\N{INFINITY}"
 _DASH: Final = "\N{EN DASH}"
+_UNITS: Final = {"position": "m", "velocity": "m/s", "angle": "rad"}
+"""Units of what the controller sees."""
 
 Row = tuple[str, float, str]
 """Name, value and unit of a figure."""
@@ -56,9 +58,9 @@ def figure_rows(axis: AxisMargins) -> Iterator[Row]:
     yield "slowest pole: time constant", poles.slowest_s, "s"
     yield "gust to position", axis.gust_to_place_s2, "m per m/s^2"
     yield "gust to command", axis.gust_to_command_rad_s2_m, "rad per m/s^2"
-    for (name, noise), unit in zip(axis.noise.items(), ("m", "m/s", "rad"), strict=True):
-        yield f"noise of {name} to position", noise.to_place, f"m per {unit}"
-        yield f"noise of {name} to command", noise.to_command, f"rad per {unit}"
+    for name, noise in axis.noise.items():
+        yield f"noise of {name} to position", noise.to_place, f"m per {_UNITS[name]}"
+        yield f"noise of {name} to command", noise.to_command, f"rad per {_UNITS[name]}"
     if axis.sensed_variation_rad is not None:
         yield "sensors' noise to change of command", axis.sensed_variation_rad, "rad"
 
