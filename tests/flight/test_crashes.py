@@ -77,6 +77,16 @@ def test_the_ground_is_a_crash(calm: Trace) -> None:
     assert first_crash(landed, 1) == Crash(time_s=first_s, how="on the ground")
 
 
+def test_below_a_low_target_the_ground_is_none(calm: Trace) -> None:
+    """Before a take-off and after a landing a drone stands; with a target above 0.5 m it has fallen."""
+    landed = with_sample(calm, "position_m", 2, 0.0)
+    for height_m, crashed in ((0.5, False), (0.5001, True)):
+        heights = np.broadcast_to([height_m, 0.0], (*landed.target.shape[:2], 2))
+        lower = replace(landed, target=np.concatenate([landed.target, heights], axis=-1))
+        assert detect_crashes(lower).tolist() == [False, crashed]
+        assert (first_crash(lower, 1) is not None) == crashed
+
+
 def test_a_lost_flight_counts_and_has_no_first_crash(calm: Trace) -> None:
     """NaN is neither tilt nor ground; `lost` says it."""
     lost = with_sample(with_sample(calm, "euler_rad", 0, np.nan), "position_m", 2, np.nan)

@@ -1,9 +1,12 @@
 """Metrics of synthetic traces whose integrals are known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.metrics import TRANSIENT_S, measure, saturated_share
 from mambo_sil.flight.traces import Trace
 
@@ -14,7 +17,7 @@ def trace_of(time_s: FloatArray, error_m: FloatArray, command_rad: FloatArray) -
     """Return a trace of horizontal errors (k, n, 2) and commands (k, n, 2)."""
     shape = error_m.shape[:2]
     target = np.broadcast_to([7.0, -3.0, 0.0, 0.0], (*shape, 4)).copy()
-    position_m = np.full((*shape, 3), 50.0)
+    position_m = np.full((*shape, 3), -HOVER_HEIGHT_M)
     position_m[..., :2] = target[..., :2] - error_m
     return Trace(
         time_s=time_s,
@@ -82,6 +85,27 @@ def test_final_error_is_that_of_the_last_sample() -> None:
     metrics = measure(trace_of(np.array([0.0, 1.0, 2.0]), error_m, np.zeros((3, 1, 2))))
     np.testing.assert_array_equal(metrics.final_error_m, 2.0)
     np.testing.assert_array_equal(metrics.max_error_m, 5.0)
+
+
+def test_errors_of_the_height_and_in_space() -> None:
+    """Horizontal metrics do not see the height; of 3 m and 4 m the distance in space is 5 m."""
+    time_s = np.linspace(0.0, 2.0, 201)
+    error_m = np.zeros((201, 2, 2))
+    error_m[..., 0] = 3.0
+    level = trace_of(time_s, error_m, np.zeros((201, 2, 2)))
+    heights = np.broadcast_to([[2.0, 0.5], [HOVER_HEIGHT_M, 0.0]], (201, 2, 2))
+    position_m = level.position_m.copy()
+    position_m[:, 0, 2] = -6.0
+    position_m[100, 0, 2] = 3.0
+    trace = replace(level, target=np.concatenate([level.target, heights], axis=-1), position_m=position_m)
+    metrics = measure(trace)
+    assert metrics.rms_error_m.tolist() == measure(level).rms_error_m.tolist()
+    np.testing.assert_allclose(metrics.max_height_error_m, [5.0, 0.0], rtol=1e-12)
+    np.testing.assert_allclose(
+        metrics.rms_height_error_m, [np.sqrt(16.0 + 0.01 * 9.0 / 2.0), 0.0], rtol=1e-12
+    )
+    np.testing.assert_allclose(metrics.rms_error_3d_m, [np.sqrt(25.0 + 0.01 * 9.0 / 2.0), 3.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics.max_error_3d_m, [np.sqrt(34.0), 3.0], rtol=1e-12)
 
 
 def test_take_off_is_left_out() -> None:

@@ -10,9 +10,11 @@ import pytest
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.errors import TraceError
 from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.traces import (
     CSV_COLUMNS,
+    HEIGHT_COLUMNS,
     SEEN_COLUMNS,
     SensedTrace,
     Trace,
@@ -20,7 +22,7 @@ from mambo_sil.flight.traces import (
     write_csv,
     write_npz,
 )
-from mambo_sil.flight.trajectories import Bernoulli, Circle, Trajectories
+from mambo_sil.flight.trajectories import CURVES, Bernoulli, Circle, Trajectories
 
 
 @pytest.fixture(scope="module")
@@ -144,6 +146,25 @@ def test_a_trace_without_sensors_has_no_estimates(trace: SensedTrace, tmp_path: 
     assert not Trace(**arrays).same_bits(trace)
     write_csv(plain, tmp_path / "plain.csv")
     assert (tmp_path / "plain.csv").read_text().splitlines()[0] == ",".join(CSV_COLUMNS)
+
+
+def test_a_course_with_a_height_has_two_columns_more(tmp_path: Path) -> None:
+    """Height and climb of the target follow its horizontal velocity, in NPZ and CSV."""
+    both = Trajectories((CURVES["helix"](1.0, 1.0), Circle(1.0, 0.5)))
+    flown = fly(Flight(both, duration_s=0.05, flights=2), PdController())
+    assert flown.spatial
+    assert flown.target.shape == (6, 2, 6)
+    write_npz(flown, tmp_path / "space.npz")
+    assert read_npz(tmp_path / "space.npz").same_bits(flown)
+    write_csv(flown, tmp_path / "space.csv")
+    header, *rows = (tmp_path / "space.csv").read_text().splitlines()
+    names = header.split(",")
+    assert names == [*CSV_COLUMNS[:14], *HEIGHT_COLUMNS, *CSV_COLUMNS[14:]]
+    assert float(rows[-1].split(",")[14]) == flown.target_height_m[-1, 0] > HOVER_HEIGHT_M
+    alone = fly(Flight(Circle(1.0, 0.5), duration_s=0.05), PdController())
+    assert (alone.spatial, alone.target_height_m.tolist()) == (False, [[HOVER_HEIGHT_M]] * 6)
+    assert alone.digest() == flown.digest(1)
+    assert flown.digest(0) != flown.digest(1)
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(SensedTrace)])

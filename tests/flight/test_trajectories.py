@@ -7,17 +7,29 @@ import numpy as np
 import pytest
 
 from mambo_sil.errors import TrajectoryError
+from mambo_sil.flight.height_profiles import (
+    HOVER_HEIGHT_M,
+    Climb,
+    HeightProfile,
+    Swing,
+    TakeOffAndLanding,
+    UpAndDown,
+    helix_climb,
+)
 from mambo_sil.flight.trajectories import CURVES as CURVES_BY_NAME
 from mambo_sil.flight.trajectories import (
     Bernoulli,
     Circle,
     Gerono,
     Hover,
+    InSpace,
     Lissajous,
     PositionStep,
     Trajectories,
     Trajectory,
     Waypoints,
+    is_spatial,
+    vertical_of,
 )
 
 CURVES: list[Trajectory] = [
@@ -129,7 +141,13 @@ def test_curves_have_names_sizes_and_rates() -> None:
         "circle": Circle(2.0, 0.5),
         "hover": Hover(),
         "step": PositionStep(2.0, 0.0),
+        "tilted-circle": InSpace(Circle(2.0, 0.5), Swing(0.3, 0.5)),
+        "helix": InSpace(Circle(2.0, 0.5), Climb(0.5 * 0.5 / (2.0 * np.pi))),
+        "swinging-eight": InSpace(Bernoulli(2.0, 0.5), Swing(0.3, 1.0)),
+        "height-step": InSpace(Hover(), UpAndDown(2.0)),
+        "take-off-and-landing": InSpace(Hover(), TakeOffAndLanding(2.0)),
     }
+    assert helix_climb(-0.5, 0.5) == helix_climb(0.5, 0.5)
 
 
 def test_hover_stays_at_the_origin() -> None:
@@ -234,3 +252,50 @@ def test_flights_may_follow_different_trajectories() -> None:
     assert targets.shape == (len(TIMES_S), 3, 4)
     for flight, each in enumerate(both.each):
         np.testing.assert_array_equal(targets[:, flight], each.target(TIMES_S))
+
+
+PROFILES: list[HeightProfile] = [Swing(0.3, 1.5), Climb(0.4), UpAndDown(-0.5), TakeOffAndLanding(1.2)]
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda each: type(each).__name__)
+def test_climb_and_acceleration_are_the_derivatives_of_the_height(profile: HeightProfile) -> None:
+    """Analytic values agree with central differences; before t = 0 the target rests at the first height."""
+    half_s = 1e-6
+    rates = (profile.vertical(TIMES_S + half_s) - profile.vertical(TIMES_S - half_s)) / (2.0 * half_s)
+    np.testing.assert_allclose(profile.vertical(TIMES_S)[:, 1:], rates[:, :2], atol=1e-8)
+    before = profile.vertical(np.array([-5.0, -0.01]))
+    np.testing.assert_array_equal(before[:, 0], profile.vertical(0.0)[0])
+    np.testing.assert_array_equal(before[:, 1:], 0.0)
+    assert profile.vertical(0.5).shape == (3,)
+    np.testing.assert_allclose(profile.vertical(float(TIMES_S[700])), profile.vertical(TIMES_S)[700])
+
+
+def test_heights_go_where_their_names_say() -> None:
+    """A swing of 0.3 m, a climb, up at 1 s and down at 6 s, from the ground and back to it, at rest."""
+    swing, climb, step, landing = (
+        profile.vertical(np.array([0.0, 0.9, 1.0, 3.0, 5.9, 6.0, 8.0, 9.0])) for profile in PROFILES
+    )
+    assert np.abs(Swing(0.3, 1.5).vertical(TIMES_S)[:, 0] - HOVER_HEIGHT_M).max() == pytest.approx(0.3, 1e-4)
+    assert swing[0].tolist() == [HOVER_HEIGHT_M, pytest.approx(0.45), 0.0]
+    np.testing.assert_allclose(climb[3], [HOVER_HEIGHT_M + 1.2, 0.4, 0.0])
+    np.testing.assert_allclose(step[:, 0], HOVER_HEIGHT_M - 0.5 * np.array([0, 0, 1, 1, 1, 0, 0, 0]))
+    np.testing.assert_allclose(landing[:, 0], [0, 0, 0, 1.2, 1.2, 1.2, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(landing[:, 1:], 0.0, atol=1e-12)
+
+
+def test_level_and_spatial_trajectories_fly_together() -> None:
+    """A level one has the hover height; an attribute that only looks like a height makes none spatial."""
+    space = CURVES_BY_NAME["helix"](1.0, 1.0)
+    both = Trajectories((Lissajous(1.0, 0.5), space))
+    assert [is_spatial(one) for one in (Lissajous(1.0, 0.5), space, both, Trajectories((Hover(),)))] == [
+        False,
+        True,
+        True,
+        False,
+    ]
+    heights = vertical_of(both, TIMES_S)
+    assert heights.shape == (len(TIMES_S), 2, 3)
+    np.testing.assert_array_equal(heights[:, 0], np.tile([HOVER_HEIGHT_M, 0.0, 0.0], (len(TIMES_S), 1)))
+    np.testing.assert_array_equal(heights[:, 1], vertical_of(space, TIMES_S))
+    np.testing.assert_array_equal(space.target(TIMES_S), Circle(1.0, 1.0).target(TIMES_S))
+    np.testing.assert_array_equal(space.acceleration(TIMES_S), Circle(1.0, 1.0).acceleration(TIMES_S))

@@ -16,7 +16,7 @@ _CLIP: Final = "return choose(value < low, splat(low), choose(value > high, spla
 _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no flight shows"
 
 REASONS: Final[Mapping[Key, str]] = {
-    **{("evaluation.c", "for (i = 0; i < 9; i++) {", change): _BESIDE for change in ("< -> <=", "9 -> 10")},
+    **{("evaluation.c", "for (i = 0; i < METRICS; i++) {", change): _BESIDE for change in ("< -> <=",)},
     **{
         ("evaluation.c", "for (i = 0; i < 4; i++) {", change): "writes what the mean square then overwrites"
         for change in ("< -> <=", "4 -> 5")

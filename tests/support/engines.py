@@ -134,7 +134,7 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
             integrate(simulation, flight, &around, row[32], &r, steady_rad_s, &state);
         }
         memcpy(row, &state, sizeof state);
-        row[25] = altitude_thrust_n(simulation, &seen);
+        row[25] = altitude_thrust_n(simulation, splat(simulation->height_reference_m), &seen);
         for (k = 0; k < 3; k++) {
             row[26 + k] = seen.velocity_m_s[k];
         }

@@ -16,15 +16,23 @@ from mambo_sil.flight.traces import Trace
 LIMIT_RAD = 0.35
 
 
-def any_trace(seed: int, samples: int, flights: int, *, sensed: bool, lifting: int = 0) -> Trace:
+def any_trace(
+    seed: int, samples: int, flights: int, *, sensed: bool, lifting: int = 0, spatial: bool = False
+) -> Trace:
     """Return flights with any errors, angles, heights, commands and statuses; `lifting` samples before t = 0.
+
+    If `spatial` the targets have heights, many of them so low that the drone may be on the ground.
 
     A third of the flights has no fault; of the others each has some samples with a crash, NaN or infinity.
     """
     rng = np.random.default_rng(seed)
     time_s = np.cumsum(rng.uniform(0.001, 0.02, samples))
     time_s -= time_s[lifting] - 5e-4  # no sample at 0 itself
-    trace = allocate_trace(time_s, rng.normal(0.0, 2.0, (samples, flights, 4)), sensed=sensed)
+    targets = rng.normal(0.0, 2.0, (samples, flights, 4))
+    if spatial:
+        heights = rng.choice([0.0, 0.5, np.nextafter(0.5, 1.0), 1.1], (samples, flights, 2))
+        targets = np.concatenate([targets, heights], axis=-1)
+    trace = allocate_trace(time_s, targets, sensed=sensed)
     scales = {"position_m": 2.0, "velocity_m_s": 1.0, "euler_rad": 0.2, "command_rad": 0.1}
     for field in fields(trace):
         array = getattr(trace, field.name)
@@ -72,7 +80,8 @@ def traces() -> Iterator[Trace]:
     """Yield the traces on which C and NumPy are compared."""
     yield edges()
     for seed, (samples, flights, lifting) in enumerate([(2, 1, 0), (3, 5, 1), (700, 13, 0), (300, 6, 200)]):
-        yield any_trace(seed, samples, flights, sensed=bool(seed % 2), lifting=lifting)
+        spatial = seed in (1, 2)
+        yield any_trace(seed, samples, flights, sensed=bool(seed % 2), lifting=lifting, spatial=spatial)
 
 
 def bits(results: Evaluation) -> str:

@@ -162,6 +162,32 @@ def captured(drone: VehicleFile) -> tuple[Scenario, ...]:
     )
 
 
+SPACE: Final = (
+    *captured(CRAZYFLIE)[:2],
+    *(
+        Scenario(
+            vehicle=CRAZYFLIE,
+            duration_s=2.0,
+            sensors="mocap",
+            seed=6,
+            trajectory=curve,
+            size_m=size_m,
+            rate_rad_s=1.7,
+            start_offset_m=(0.1, 0.0, z_m),
+            start_velocity_m_s=(0.3, -0.2, 0.4),
+            start_tilt_rad=(0.1, -0.2),
+        )
+        for curve, size_m, z_m in (
+            ("tilted-circle", 1.0, 0.1),
+            ("helix", 0.5, -0.2),
+            ("height-step", -2.0, 0.0),
+            ("take-off-and-landing", 0.6, -0.05),
+            ("swinging-eight", 1.0, 0.0),
+        )
+    ),
+)
+"""Courses with heights among level ones; one falls to the ground, one begins there."""
+
 BATCHES: Final = {
     "truth": TRUTH,
     "sensed": SENSED,
@@ -172,6 +198,7 @@ BATCHES: Final = {
     "limited": captured(LIMITED),
     "flown": captured(FLOWN),
     "late": captured(LATE),
+    "space": SPACE,
 }
 
 

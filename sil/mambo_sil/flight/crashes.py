@@ -1,7 +1,7 @@
-"""Crashes: a drone tilted too far or on the ground, which the simulation lets fly on."""
+"""Crashes: a drone tilted too far, or on the ground where it should not be; the simulation goes on."""
 
 import math
-from typing import Any
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -11,6 +11,11 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import arc_cosine, sine_cosine
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.traces import Trace
+
+Bools: TypeAlias = np.ndarray[Any, np.dtype[np.bool_]]
+
+LOW_TARGET_M: Final = 0.5
+"""A drone may be on the ground while its target is no higher: before a take-off, after a landing."""
 
 
 def crash_tilt_rad(drone: VehicleFile) -> float:
@@ -30,17 +35,18 @@ class Crash(BaseModel):
     how: str
 
 
-def detect_crashes(trace: Trace, drone: VehicleFile = NOMINAL) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def detect_crashes(trace: Trace, drone: VehicleFile = NOMINAL) -> Bools:
     """Return which flights (n,) were lost, tilted beyond `crash_tilt_rad` or on the ground after t = 0."""
-    level, height_m = _level_and_height(trace)
-    aloft = (level > least_level(drone)) & (height_m > 0.0)
-    return np.asarray(~aloft.all(axis=0))
+    level, height_m, low = _level_and_height(trace)
+    safe = (level > least_level(drone)) & ((height_m > 0.0) | (low & (height_m <= 0.0)))
+    return np.asarray(~safe.all(axis=0))
 
 
 def first_crash(trace: Trace, flight: int = 0, drone: VehicleFile = NOMINAL) -> Crash | None:
     """Return when and how a flight first crashed after t = 0; None if it did not, or was lost without."""
-    level, height_m = (values[:, flight] for values in _level_and_height(trace))
-    tilted, grounded = level <= least_level(drone), height_m <= 0.0
+    levels, heights_m, low = _level_and_height(trace)
+    level, height_m = levels[:, flight], heights_m[:, flight]
+    tilted, grounded = level <= least_level(drone), (height_m <= 0.0) & ~low[:, flight]
     crashed = tilted | grounded
     if not crashed.any():
         return None
@@ -59,9 +65,10 @@ def least_level(drone: VehicleFile) -> float:
     return float(sine_cosine(crash_tilt_rad(drone))[1])
 
 
-def _level_and_height(trace: Trace) -> tuple[FloatArray, FloatArray]:
-    """Return the cosine of the tilt and the height in m, each (samples from t = 0 on, n)."""
+def _level_and_height(trace: Trace) -> tuple[FloatArray, FloatArray, Bools]:
+    """Return cosine of tilt, height in m, whether the target is low, each (samples from t = 0 on, n)."""
     flown = trace.time_s >= 0.0
     angles_rad: FloatArray = trace.euler_rad[flown]
     _, (cos_roll, cos_pitch) = sine_cosine(np.moveaxis(angles_rad[..., :2], -1, 0))
-    return cos_roll * cos_pitch, -trace.position_m[flown][..., 2]
+    low = trace.target_height_m[flown] <= LOW_TARGET_M
+    return cos_roll * cos_pitch, -trace.position_m[flown][..., 2], low

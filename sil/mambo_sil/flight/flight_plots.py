@@ -1,4 +1,7 @@
-"""Pictures of flights as in the paper's Fig. 3: path, error, commands; as files and for a page."""
+"""Pictures of flights as in the paper's Fig. 3: path, error, commands; as files and for a page.
+
+Where a course has a height, the path is shown from the side, too, and the height over time.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +18,16 @@ from mambo_sil.flight.traces import Trace
 from mambo_sil.results.pictures import inline, save
 from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, TARGET, THIN, style
 
-_LABELS: Final = ("y (east), m", "error, m", "roll, rad", "pitch, rad")
+_LEVEL: Final = {"y (east), m": 1.9, "error, m": 1.0, "roll, rad": 1.0, "pitch, rad": 1.0}
+_SPATIAL: Final = {
+    "y (east), m": 1.9,
+    "height from the east, m": 1.3,
+    "height, m": 1.0,
+    "horizontal error, m": 1.0,
+    "roll, rad": 1.0,
+    "pitch, rad": 1.0,
+}
+"""Labels of the axes of a column, and their heights relative to each other."""
 
 
 def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
@@ -24,26 +36,38 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
     Writes stem.png and stem.svg.
     """
     with style():
-        figure = Figure(figsize=(COLUMN_INCHES * len(flights), 7.2), layout="constrained")
-        rows = figure.subplots(4, len(flights), squeeze=False, sharey="row", height_ratios=(1.9, 1, 1, 1))
+        labels = _labels(flights)
+        figure = Figure(
+            figsize=(COLUMN_INCHES * len(flights), 1.47 * sum(labels.values())), layout="constrained"
+        )
+        ratios = tuple(labels.values())
+        rows = figure.subplots(len(labels), len(flights), squeeze=False, sharey="row", height_ratios=ratios)
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
             _draw_column(column, trace, title)
         _share_scales(rows[0])
         rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
-        _label_column(rows[:, 0])
+        _label_column(rows[:, 0], labels)
         return save(figure, stem)
 
 
+def _labels(flights: Mapping[str, Trace]) -> Mapping[str, float]:
+    """Return the labels of the axes of a column, and their relative heights."""
+    return _SPATIAL if any(trace.spatial for trace in flights.values()) else _LEVEL
+
+
 def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
-    """Draw the first flight of a trace in four axes (4,): path, error, roll, pitch.
+    """Draw the first flight of a trace in axes (4,): path, error, roll, pitch; or (6,), with the height.
 
     Target and commands are broad lines below the flown ones, so that both stay visible.
     """
-    path, error, *angles = column
+    path, *heights, error, roll, pitch = column
+    angles = roll, pitch
     path.plot(*trace.target[:, 0, :2].T, color=TARGET, linewidth=BROAD, label="target")
     path.plot(*trace.position_m[:, 0, :2].T, color=FLOWN, label="flown")
     path.set_title(title, loc="left", pad=20, parse_math=False)  # above the legend
     path.set(xlabel="x (north), m", aspect="equal")
+    if heights:
+        _draw_heights(heights, trace)
     error.plot(trace.time_s, horizontal_error_m(trace)[:, 0], color=FLOWN)
     error.set_ylim(0, None)
     for axis, axes in enumerate(angles):
@@ -54,10 +78,21 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
     angles[-1].set_xlabel("time, s")
 
 
-def _label_column(column: NDArray[Any]) -> None:
-    for axes, label in zip(column, _LABELS, strict=True):
+def _draw_heights(axes: Sequence[Axes], trace: Trace) -> None:
+    """Draw the height of the first flight along x and over time."""
+    target_m, flown_m = trace.target_height_m[:, 0], -trace.position_m[:, 0, 2]
+    abscissae = (trace.target[:, 0, 0], trace.position_m[:, 0, 0]), (trace.time_s, trace.time_s)
+    for place, (targets, flown) in zip(axes, abscissae, strict=True):
+        place.plot(targets, target_m, color=TARGET, linewidth=BROAD)
+        place.plot(flown, flown_m, color=FLOWN)
+    axes[0].set(xlabel="x (north), m")
+    axes[0].set_aspect("equal", adjustable="datalim")
+
+
+def _label_column(column: NDArray[Any], labels: Mapping[str, float]) -> None:
+    for axes, label in zip(column, labels, strict=True):
         axes.set_ylabel(label)
-    for axes in (column[0], column[2]):
+    for axes in (column[0], column[-2]):
         axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.1)
 
 
@@ -70,25 +105,30 @@ def page_pictures(flights: Mapping[str, Trace]) -> dict[str, Any]:
 
 
 def flight_columns(flights: Mapping[str, Trace]) -> list[Markup]:
-    """Return one picture per flight: path, error, roll and pitch, with the same scales in all."""
+    """Return one picture per flight: path, height, error, roll and pitch, with the same scales in all."""
     with style():
-        figures = [_column(title, trace) for title, trace in flights.items()]
+        labels = _labels(flights)
+        height = "height, " if labels is _SPATIAL else ""
+        figures = [_column(title, trace, labels) for title, trace in flights.items()]
         for row in zip(*(figure.axes for figure in figures), strict=True):
             _share_scales(row)
         for figure in figures:
             figure.axes[0].invert_yaxis()  # seen from above, with north to the right
         return [
-            inline(figure, f"{title}: path seen from above, distance to the target, roll and pitch over time")
+            inline(
+                figure,
+                f"{title}: path seen from above, {height}distance to the target, roll and pitch over time",
+            )
             for title, figure in zip(flights, figures, strict=True)
         ]
 
 
-def _column(title: str, trace: Trace) -> Figure:
-    figure = Figure(figsize=(COLUMN_INCHES, 6.6), layout="constrained")
-    column = figure.subplots(len(_LABELS), 1, height_ratios=(1.9, 1, 1, 1))
+def _column(title: str, trace: Trace, labels: Mapping[str, float]) -> Figure:
+    figure = Figure(figsize=(COLUMN_INCHES, 1.347 * sum(labels.values())), layout="constrained")
+    column = figure.subplots(len(labels), 1, height_ratios=tuple(labels.values()))
     _draw_column(column, trace, "")
     figure.suptitle(title, parse_math=False)  # above the legend, whatever the path's shape
-    _label_column(column)
+    _label_column(column, labels)
     return figure
 
 

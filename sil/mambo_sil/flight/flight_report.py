@@ -1,6 +1,7 @@
 """The summary of a flight as a record, as text and as a section of the report."""
 
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight.crashes import Crash, first_crash
-from mambo_sil.flight.metrics import TRANSIENT_S, Metrics, measure
+from mambo_sil.flight.metrics import HEIGHT_METRICS, TRANSIENT_S, Metrics, measure
 from mambo_sil.flight.names import PD_TITLES
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import SensedTrace, Trace, read_existing
@@ -71,6 +72,7 @@ class FlightSummary(ReportedSummary):
             bad = [*bad, "the controller refused more than half of its inputs"]
         columns = self.columns
         tracked = {"rms error": self.metrics.get("rms_error_m"), "largest": self.metrics.get("max_error_m")}
+        tracked |= {"rms of the height": self.metrics.get("rms_height_error_m")}
         content = {
             "facts": facts,
             "refusals": self.refusals,
@@ -182,9 +184,10 @@ def _course(flown: FlySummary | Scenario) -> dict[str, str]:
     }
 
 
-def numbers(metrics: Metrics, flight: int = 0) -> dict[str, float]:
-    """Return the metrics of the flight with index `flight`, by name."""
-    return {field.name: float(getattr(metrics, field.name)[flight]) for field in fields(metrics)}
+def numbers(metrics: Metrics, flight: int = 0, *, spatial: bool = False) -> dict[str, float]:
+    """Return the metrics of the flight with index `flight` by name; of a level course those along it only."""
+    names = (field.name for field in fields(metrics) if spatial or field.name not in HEIGHT_METRICS)
+    return {name: float(getattr(metrics, name)[flight]) for name in names}
 
 
 def refusals(trace: Trace, settings: Settings) -> list[str]:
@@ -224,15 +227,16 @@ def judge(trace: Trace, settings: Settings, drone: VehicleFile) -> dict[str, Any
     counts = {name: int((status == value).sum()) for value, name in names.items()}
     refused = ~np.isin(status[trace.time_s >= 0.0], (Status.OK, NOT_CALLED))
     long = trace.time_s[-2] >= TRANSIENT_S
+    shown = partial(numbers, spatial=trace.spatial)
     return {
         "lost": bool(trace.diverged[0]),
         "crash": first_crash(trace, drone=drone),
         "mostly_refused": bool(np.mean(refused) > 0.5),
         "statuses": {name: count for name, count in counts.items() if count},
         "refusals": refusals(trace, settings),
-        "metrics": numbers(measure(trace)),
-        "metrics_without_transient": numbers(measure(trace, TRANSIENT_S)) if long else None,
-        "metrics_as_seen": numbers(measure(trace.as_seen())) if isinstance(trace, SensedTrace) else None,
+        "metrics": shown(measure(trace)),
+        "metrics_without_transient": shown(measure(trace, TRANSIENT_S)) if long else None,
+        "metrics_as_seen": shown(measure(trace.as_seen())) if isinstance(trace, SensedTrace) else None,
     }
 
 

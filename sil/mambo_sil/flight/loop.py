@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray, PerFlight
 from mambo_sil.drone.plant.disturbances import Disturbances, World
+from mambo_sil.drone.plant.ground import carry_on_ground
 from mambo_sil.drone.plant.link import NOT_CALLED, Drops, Link, Wire
 from mambo_sil.drone.plant.rigid_body import EULER, POSITION, VELOCITY, to_body
 from mambo_sil.drone.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, truth
@@ -31,12 +32,17 @@ from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
 from mambo_sil.flight.traces import AXES, SensedTrace, Trace
-from mambo_sil.flight.trajectories import Trajectory
+from mambo_sil.flight.trajectories import Trajectory, is_spatial, vertical_of
 
-HEIGHT_REFERENCE_M = -1.1
-"""Altitude reference of every flight: z points down."""
+HEIGHT_REFERENCE_M = -HOVER_HEIGHT_M
+"""Altitude reference of a flight on a level course: z points down."""
+
+LEVEL_COLUMNS: Final = 6
+HEIGHT: Final = slice(6, 9)
+"""Columns of a target: [x, y, vx, vy, ax, ay], then [height, climb, acceleration] if courses have heights."""
 
 TAKE_OFF_PHASE_S = 5.0
 """Time from the beginning of a take-off to t = 0 of the trajectory's clock."""
@@ -66,6 +72,7 @@ class PositionController(Protocol):
         """Return the command for states (n, 7), targets (n, 6) and thrust accelerations (n,).
 
         The columns are [x, y, vx, vy, roll, pitch, yaw] and [x, y, vx, vy, ax, ay], in the world frame (NED).
+        On a course with a height the targets (n, 9) end with height, climb and vertical acceleration, up.
         The thrust acceleration is positive along -z of the body.
         """
         ...
@@ -94,8 +101,8 @@ class Flight:
     duration_s: float = 100.0
     flights: int = 1
     start: Start = "hover"
-    """Above the first point of the trajectory: at `HEIGHT_REFERENCE_M`, level and at rest, at t = 0; or on
-    the ground, `TAKE_OFF_PHASE_S` before t = 0."""
+    """At the first point of the trajectory, which is at `HEIGHT_REFERENCE_M` on a level course, level and at
+    rest, at t = 0; or on the ground, `TAKE_OFF_PHASE_S` before t = 0."""
     yaw_rad: PerFlight = 0.0
     """Heading at the start, and reference of the yaw loop."""
     yaw_rate_rad_s: PerFlight = 0.0
@@ -148,18 +155,37 @@ class Flight:
 
     @cached_property
     def given_targets(self) -> FloatArray:
-        """The targets (k, n, 6) as controllers are given them: with their accelerations.
+        """The targets as controllers are given them: with accelerations (k, n, 6), with heights (k, n, 9).
 
         Those of a flight are contiguous in memory, as in `allocate_trace`.
         Raises `FlightError` as `targets`.
         """
-        targets = self.targets()
-        given = np.empty((self.flights, len(targets), 6)).swapaxes(0, 1)
+        targets, spatial = self.targets(), is_spatial(self.trajectory)
+        columns = HEIGHT.stop if spatial else LEVEL_COLUMNS
+        given = np.empty((self.flights, len(targets), columns)).swapaxes(0, 1)
         given[..., :4] = targets
-        given[..., 4:] = self._for_each_flight(
+        given[..., 4:6] = self._for_each_flight(
             "acceleration", self.trajectory.acceleration(self.times_s()), 2
         )
+        if spatial:
+            heights = vertical_of(self.trajectory, self.times_s())
+            given[..., HEIGHT] = self._for_each_flight("vertical", heights, 3)
         return given
+
+    @cached_property
+    def traced_targets(self) -> FloatArray:
+        """The targets as a trace has them: (k, n, 4), on a course with a height (k, n, 6)."""
+        given = self.given_targets
+        if given.shape[2] == LEVEL_COLUMNS:
+            return given[..., :4]
+        by_flight = given.swapaxes(0, 1)
+        traced = np.concatenate([by_flight[..., :4], by_flight[..., 6:8]], axis=-1)
+        return traced.swapaxes(0, 1)
+
+    @cached_property
+    def landing(self) -> NDArray[np.bool_]:
+        """Which courses (n,) touch the ground; there it carries the drone."""
+        return np.asarray((self.given_targets[..., HEIGHT][..., :1] <= 0.0).any(axis=(0, 2)))
 
     def _for_each_flight(self, method: str, values: FloatArray, columns: int) -> FloatArray:
         """Return what a method of one trajectory gives (k, m), or of each (k, n, m), as (k, n, m)."""
@@ -184,7 +210,7 @@ def fly(
     Raises `FlightError` if the number of trajectories is not the number of flights.
     """
     times_s, targets = flight.times_s(), flight.given_targets
-    lifting_until = lifting_updates(flight, times_s)
+    lifting_until, landing = lifting_updates(flight, times_s), flight.landing
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
     drone, step_s = vehicle.drone, vehicle.drone.step_s
@@ -195,24 +221,27 @@ def fly(
         controller,
         Drops(flight.link, seeds),
         targets,
-        allocate_trace(times_s, targets[..., :4], sensed=suite is not None),
+        allocate_trace(times_s, flight.traced_targets, sensed=suite is not None),
         drone.body.mass_kg,
     )
     for update, time_s in enumerate(times_s):
         state = _mark_lost(state)
         lifting = update < lifting_until
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
+        reference_m = height_reference_m(targets[update])
         for tick in range(flight.ticks_per_update):
             with np.errstate(all="ignore"):
                 state, moment = world.tick(state, time_s + step_s * tick)
                 true = truth(state)
                 seen = true if suite is None else suite.estimate(true)
-                thrust_n = _thrust_n(drone, seen, lifting)
+                thrust_n = _thrust_n(drone, reference_m, seen, lifting)
             if tick == 0:
                 caller.call(update, true, seen, thrust_n)
             command_rad = wire.carry(caller.command_rad)
             with np.errstate(all="ignore"):
                 state = vehicle.step(state, command_rad, thrust_n, heading_rad, seen=seen, moment=moment)
+                if landing.any():
+                    state = carry_on_ground(state, landing)
         if progress is not None:
             progress((update + 1) / len(times_s))
     _unify_nan(caller.trace)
@@ -237,14 +266,14 @@ def lifting_updates(flight: Flight, times_s: FloatArray) -> int:
 
 
 def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
-    """Return the initial state of n flights, above their first targets (n, 4) or on the ground below."""
+    """Return the initial state of n flights, at their first targets (n, 6 or 9) or on the ground below."""
     position_m = np.zeros((3, flight.flights))
     position_m[:2] = first_target[:, :2].T
     nominal = airframe_of(flight.vehicle.drone)
     command: PerFlight = nominal.command_min
     if flight.start == "hover":
-        position_m[2] = HEIGHT_REFERENCE_M
-        command = nominal.hover_command
+        position_m[2] = height_reference_m(first_target)
+        command = np.where(position_m[2] < 0.0, nominal.hover_command, nominal.command_min)
     state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
     if flight.offset is None:
         return state
@@ -258,11 +287,16 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     return state
 
 
-def _thrust_n(drone: VehicleFile, seen: Seen, lifting: bool) -> FloatArray:
+def height_reference_m(target: FloatArray) -> PerFlight:
+    """Return the reference of the altitude loop, z down, for targets (n, 6) or (n, 9)."""
+    return HEIGHT_REFERENCE_M if target.shape[1] < HEIGHT.stop else 0.0 - target[:, HEIGHT.start]
+
+
+def _thrust_n(drone: VehicleFile, reference_m: PerFlight, seen: Seen, lifting: bool) -> FloatArray:
     """Return the demanded total thrust (n,) in N: constant while lifting, then from the altitude loop."""
     if lifting:
         return np.full(seen.position_m.shape[1], loops.take_off_thrust_n(drone))
-    return loops.altitude_thrust(drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2])
+    return loops.altitude_thrust(drone, reference_m, seen.position_m[2], seen.velocity_m_s[2])
 
 
 def _mark_lost(state: VehicleState) -> VehicleState:

@@ -1,11 +1,12 @@
 """Tracking metrics of a trace.
 
-e(t) is the Euclidean norm of the horizontal position error, u(t) the command, t the time on the
-trajectory's clock; the take-off is left out. Integrals of e use the trapezoidal rule over the samples of the
-trace. Integrals of u are exact, because commands are held between samples.
+e(t) is the Euclidean norm of the horizontal position error, h(t) the error of the height, u(t) the command,
+t the time on the trajectory's clock; the take-off is left out. Integrals of e and h use the trapezoidal rule
+over the samples of the trace. Integrals of u are exact, because commands are held between samples.
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -38,11 +39,28 @@ class Metrics:
     """Integral of the 1-norm of u."""
     command_variation_rad: FloatArray
     """Mean 1-norm of the change of u from one update of the controller to the next."""
+    rms_height_error_m: FloatArray
+    """Root of the mean of h^2 over time."""
+    max_height_error_m: FloatArray
+    """Largest magnitude of h."""
+    rms_error_3d_m: FloatArray
+    """Root of the mean of e^2 + h^2 over time."""
+    max_error_3d_m: FloatArray
+    """Largest distance to the target in space."""
 
     @property
     def table2(self) -> FloatArray:
         """The indices of Table II (4, n): IAE, ISE, ITSE, ITAE."""
         return np.array([self.iae_m_s, self.ise_m2_s, self.itse_m2_s2, self.itae_m_s2])
+
+
+HEIGHT_METRICS: Final = ("rms_height_error_m", "max_height_error_m", "rms_error_3d_m", "max_error_3d_m")
+"""Metrics that a flight on a level course does not show."""
+
+
+def height_error_m(trace: Trace) -> FloatArray:
+    """Return h (k, n), the height of the drone less that of its target in m."""
+    return -trace.position_m[..., 2] - trace.target_height_m
 
 
 def horizontal_error_m(trace: Trace) -> FloatArray:
@@ -70,6 +88,9 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
     weight_s = time_s[:, np.newaxis]
     span_s = time_s[-1] - time_s[0]
     squared_m2 = error_m * error_m
+    height_m = height_error_m(trace)[measured]
+    height_m2 = height_m * height_m
+    whole_m2 = squared_m2 + height_m2
     ise_m2_s = _integral(squared_m2, time_s)
     effort_rad = np.abs(command_rad[:-1]).sum(axis=-1)
     return Metrics(
@@ -82,6 +103,10 @@ def measure(trace: Trace, start_s: float = 0.0) -> Metrics:
         final_error_m=error_m[-1],
         effort_rad_s=_sum(np.diff(time_s)[:, np.newaxis] * effort_rad),
         command_variation_rad=_sum(np.abs(np.diff(command_rad, axis=0)).sum(axis=-1)) / (len(time_s) - 1),
+        rms_height_error_m=np.sqrt(_integral(height_m2, time_s) / span_s),
+        max_height_error_m=np.abs(height_m).max(axis=0),
+        rms_error_3d_m=np.sqrt(_integral(whole_m2, time_s) / span_s),
+        max_error_3d_m=np.sqrt(whole_m2.max(axis=0)),
     )
 
 

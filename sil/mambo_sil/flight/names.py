@@ -2,7 +2,20 @@
 
 from typing import Final, Literal, get_args
 
-CurveName = Literal["bernoulli", "gerono", "lissajous", "circle", "hover", "step"]
+CurveName = Literal[
+    "bernoulli",
+    "gerono",
+    "lissajous",
+    "circle",
+    "hover",
+    "step",
+    "tilted-circle",
+    "helix",
+    "swinging-eight",
+    "height-step",
+    "take-off-and-landing",
+]
+"""Level curves, then curves in space."""
 Start = Literal["hover", "take-off"]
 """In the air, or on the ground 5 s before the trajectory begins."""
 SensorsName = Literal["none", "mambo", "mambo-derotated", "mocap"]
@@ -25,9 +38,12 @@ STARTS: Final[tuple[Start, ...]] = get_args(Start)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
-TIMED: Final = tuple(name for name in CURVE_NAMES if name not in ("hover", "step"))
+IN_SPACE: Final = CURVE_NAMES[6:]
+"""Curves with a height."""
+_UNTIMED: Final = ("hover", "step", "height-step", "take-off-and-landing")
+TIMED: Final = tuple(name for name in CURVE_NAMES if name not in _UNTIMED)
 """Curves with an angular rate."""
-SIZED: Final = (*TIMED, "step")
+SIZED: Final = (*TIMED, *_UNTIMED[1:])
 """Curves with a size."""
 PD: Final = "PD"
 PD_FEEDFORWARD: Final = "PD-feedforward"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.errors import TraceError
+from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 
 CSV_COLUMNS = (
     *("time_s", "x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s", "roll_rad", "pitch_rad", "yaw_rad"),
@@ -24,15 +25,24 @@ SEEN_COLUMNS = (
 )
 """Columns that follow `CSV_COLUMNS` in a flight with sensors."""
 
+HEIGHT_COLUMNS = ("target_height_m", "target_climb_m_s")
+"""Columns that follow `target_vy_m_s` where the course has a height."""
+
+TARGET_COLUMNS: Final = 4
+SPATIAL_TARGET_COLUMNS: Final = 6
+
 AXES: Final[dict[str, tuple[int, ...]]] = {
     "position_m": (3,),
     "velocity_m_s": (3,),
     "euler_rad": (3,),
-    "target": (4,),
+    "target": (TARGET_COLUMNS,),
     "command_rad": (2,),
     "thrust_acceleration_m_s2": (),
 }
-"""Axes of each array after sample and flight; `seen_position_m` has those of `position_m`, and so on."""
+"""Axes of each array after sample and flight; `seen_position_m` has those of `position_m`, and so on.
+
+A course with a height has a target of `SPATIAL_TARGET_COLUMNS`.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +61,7 @@ class Trace:
     euler_rad: FloatArray
     """Roll, pitch, yaw (k, n, 3)."""
     target: FloatArray
-    """Target [x, y, vx, vy] in m and m/s (k, n, 4)."""
+    """Target [x, y, vx, vy] in m and m/s (k, n, 4), or with [height, climb] (k, n, 6) in space."""
     command_rad: FloatArray
     """Roll and pitch command, held until the next sample (k, n, 2)."""
     thrust_acceleration_m_s2: FloatArray
@@ -66,12 +76,35 @@ class Trace:
         )
 
     def digest(self, flight: int = 0) -> str:
-        """Return the SHA-256 of times and arrays of one flight."""
+        """Return the SHA-256 of times and arrays of one flight; the height of a level course is left out."""
         hasher = hashlib.sha256(self.time_s.tobytes())
         for column in fields(self):
             if column.name != "time_s":
-                hasher.update(np.ascontiguousarray(getattr(self, column.name)[:, flight]).data)
+                array = (
+                    self._target_of(flight)
+                    if column.name == "target"
+                    else getattr(self, column.name)[:, flight]
+                )
+                hasher.update(np.ascontiguousarray(array).data)
         return hasher.hexdigest()
+
+    def _target_of(self, flight: int) -> FloatArray:
+        """Return the target (k, 4 or 6) of one flight: on a level course that which the flight has alone."""
+        target: FloatArray = self.target[:, flight]
+        level = self.spatial and (target[:, TARGET_COLUMNS:] == (HOVER_HEIGHT_M, 0.0)).all()
+        return target[:, :TARGET_COLUMNS] if level else target
+
+    @property
+    def spatial(self) -> bool:
+        """Whether the course of any flight has a height."""
+        return int(self.target.shape[-1]) == SPATIAL_TARGET_COLUMNS
+
+    @property
+    def target_height_m(self) -> FloatArray:
+        """Height of the target above the ground (k, n)."""
+        if self.spatial:
+            return np.asarray(self.target[..., TARGET_COLUMNS])
+        return np.full(self.status.shape, HOVER_HEIGHT_M)
 
     @property
     def flights(self) -> int:
@@ -113,7 +146,11 @@ def write_csv(trace: Trace, path: Path, flight: int = 0) -> None:
     columns = [trace.time_s.tolist()]
     for name in (field.name for field in fields(trace) if field.name != "time_s"):
         columns += getattr(trace, name)[:, flight].reshape(len(trace.time_s), -1).T.tolist()
-    names = CSV_COLUMNS + (SEEN_COLUMNS if isinstance(trace, SensedTrace) else ())
+    names: tuple[str, ...] = CSV_COLUMNS
+    if trace.spatial:
+        place = names.index("target_vy_m_s") + 1
+        names = names[:place] + HEIGHT_COLUMNS + names[place:]
+    names += SEEN_COLUMNS if isinstance(trace, SensedTrace) else ()
     spelled = zip(*(map(repr, column) for column in columns), strict=True)
     lines = (",".join(names), *map(",".join, spelled), "")
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -143,6 +180,8 @@ def read_npz(path: Path) -> Trace:
         raise TraceError(f"{path}: is no trace: time_s {trace.time_s.shape} and status {steps} disagree")
     for name in (field.name for field in fields(trace) if field.name not in ("time_s", "status")):
         array, axes = getattr(trace, name), AXES[name.removeprefix("seen_")]
+        if name == "target" and array.shape[-1:] == (SPATIAL_TARGET_COLUMNS,):
+            axes = (SPATIAL_TARGET_COLUMNS,)
         if array.shape != (*steps, *axes) or array.dtype.kind not in "fi":
             raise TraceError(f"{path}: is no trace: {name} has the shape {array.shape}")
     if not (np.isfinite(trace.target).all() and np.isfinite(trace.time_s).all()):

@@ -1,7 +1,7 @@
 """Trajectories: target position, velocity and acceleration in the world frame as pure functions of time.
 
 Every curve is centred at the origin. Before t = 0 the target rests on the first point of its curve.
-A jump of the position or of the velocity has no acceleration.
+A jump of the position or of the velocity has no acceleration. A trajectory in space has a height, too.
 Half-width and radius are in metres, the angular rate in rad/s.
 """
 
@@ -10,7 +10,7 @@ import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Protocol, Self
+from typing import Final, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,9 +20,21 @@ from mambo_codegen.plain_file import read_plain_file
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.elementary import sine_cosine
 from mambo_sil.errors import TrajectoryError
+from mambo_sil.flight.height_profiles import (
+    HeightProfile,
+    Swing,
+    TakeOffAndLanding,
+    UpAndDown,
+    helix_climb,
+    level,
+)
 from mambo_sil.flight.names import CurveName
 
 STEP_TIME_S = 1.0
+SWING_M: Final = 0.3
+"""Amplitude of the height of `tilted-circle` and `swinging-eight`, whatever their size."""
+HELIX_PITCH_M: Final = 0.5
+"""Rise of `helix` in each turn."""
 COLUMNS = ("time_s", "x_m", "y_m")
 LARGEST = (1e6, 1e4, 1e4)
 """Largest magnitude of a waypoint's time in s, x in m and y in m."""
@@ -47,6 +59,15 @@ class Trajectory(Protocol):
 
     def acceleration(self, time_s: ArrayLike) -> FloatArray:
         """Return [ax, ay] in m/s^2: (..., 2), or (..., n, 2)."""
+        ...
+
+
+@runtime_checkable
+class SpatialTrajectory(Trajectory, Protocol):
+    """A trajectory with a height; any other one is level, at the hover height."""
+
+    def vertical(self, time_s: ArrayLike) -> FloatArray:
+        """Return [height, climb, vertical acceleration] in m, m/s, m/s^2, up: (..., 3), or (..., n, 3)."""
         ...
 
 
@@ -271,6 +292,26 @@ def _number(field: Sequence[str], line: str, column: str) -> float:
 
 
 @dataclass(frozen=True)
+class InSpace:
+    """A horizontal trajectory with a height."""
+
+    plan: Trajectory
+    profile: HeightProfile
+
+    def target(self, time_s: ArrayLike) -> FloatArray:
+        """Return [x, y, vx, vy] (..., 4)."""
+        return self.plan.target(time_s)
+
+    def acceleration(self, time_s: ArrayLike) -> FloatArray:
+        """Return [ax, ay] (..., 2)."""
+        return self.plan.acceleration(time_s)
+
+    def vertical(self, time_s: ArrayLike) -> FloatArray:
+        """Return [height, climb, vertical acceleration] (..., 3)."""
+        return self.profile.vertical(time_s)
+
+
+@dataclass(frozen=True)
 class Trajectories:
     """One trajectory for each of n flights."""
 
@@ -286,10 +327,32 @@ class Trajectories:
         found = {id(one): one.acceleration(time_s) for one in self._different}
         return np.stack([found[id(one)] for one in self.each], axis=-2)
 
+    def vertical(self, time_s: ArrayLike) -> FloatArray:
+        """Return [height, climb, vertical acceleration] (..., n, 3)."""
+        found = {id(one): vertical_of(one, time_s) for one in self._different}
+        return np.stack([found[id(one)] for one in self.each], axis=-2)
+
+    @property
+    def spatial(self) -> bool:
+        """Whether any of them has a height."""
+        return any(is_spatial(one) for one in self._different)
+
     @property
     def _different(self) -> Iterable[Trajectory]:
         """Each trajectory once: equal ones need not have the same bits, as -0 equals 0."""
         return {id(one): one for one in self.each}.values()
+
+
+def is_spatial(trajectory: Trajectory) -> bool:
+    """Return whether a trajectory, or any of several, has a height."""
+    if isinstance(trajectory, Trajectories):
+        return trajectory.spatial
+    return isinstance(trajectory, SpatialTrajectory)
+
+
+def vertical_of(trajectory: Trajectory, time_s: ArrayLike) -> FloatArray:
+    """Return [height, climb, vertical acceleration] of a trajectory (..., 3), or of each (..., n, 3)."""
+    return trajectory.vertical(time_s) if isinstance(trajectory, SpatialTrajectory) else level(time_s)
 
 
 CURVES: Final[dict[CurveName, Callable[[float, float], Trajectory]]] = {
@@ -299,5 +362,18 @@ CURVES: Final[dict[CurveName, Callable[[float, float], Trajectory]]] = {
     "circle": Circle,
     "hover": lambda size_m, rate_rad_s: Hover(),  # noqa: ARG005 - has neither size nor rate
     "step": lambda size_m, rate_rad_s: PositionStep(size_m, 0.0),  # noqa: ARG005 - has no rate
+    "tilted-circle": lambda size_m, rate_rad_s: InSpace(
+        Circle(size_m, rate_rad_s), Swing(SWING_M, rate_rad_s)
+    ),
+    "helix": lambda size_m, rate_rad_s: InSpace(
+        Circle(size_m, rate_rad_s), helix_climb(rate_rad_s, HELIX_PITCH_M)
+    ),
+    "swinging-eight": lambda size_m, rate_rad_s: InSpace(
+        Bernoulli(size_m, rate_rad_s), Swing(SWING_M, 2.0 * rate_rad_s)
+    ),
+    "height-step": lambda size_m, rate_rad_s: InSpace(Hover(), UpAndDown(size_m)),  # noqa: ARG005 - no rate
+    "take-off-and-landing": lambda size_m, rate_rad_s: InSpace(  # noqa: ARG005 - no rate
+        Hover(), TakeOffAndLanding(size_m)
+    ),
 }
-"""Curve by name, as a function of size (half-width, radius or step in m) and angular rate in rad/s."""
+"""Curve by name, as a function of size (half-width, radius, step, height, in m) and angular rate in rad/s."""

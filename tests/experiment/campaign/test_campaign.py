@@ -262,7 +262,7 @@ BAD = {
     "[flight]\nduration_s = 0": "flight.duration_s = 0 must lie in 1..3600",
     '[flight]\ntrajectory = "spiral"': 'flight.trajectory = "spiral" must be one of bernoulli, gerono',
     '[flight]\ntrajectory = { choice = ["circle", "spiral"] }': "must be one of bernoulli, gerono, lissajous",
-    "[flight]\ntrajectory = { choice = [] }": "hover, step, or { choice = [name, ...] } of them",
+    "[flight]\ntrajectory = { choice = [] }": "take-off-and-landing, or { choice = [name, ...] } of them",
     "[flight]\ntrajectory = { uniform = [0, 1] }": "or { choice = [name, ...] } of them",
     '[flight]\ntrajectory = { choice = ["circle"], uniform = [0, 1] }': "or { choice = [name, ...] } of them",
     "[flight]\ntrajectory = 3": "flight.trajectory = 3 must be one of bernoulli",

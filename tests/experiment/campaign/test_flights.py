@@ -1,6 +1,7 @@
 """The results of drawn flights: crash detection, counts and metrics of each flight in a batch."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.experiment.campaign.campaign_file import Entrant, default, scenario
+from mambo_sil.experiment.campaign.campaign_file import Entrant, default, read, scenario
 from mambo_sil.experiment.campaign.campaign_flights import (
     MOST_TOGETHER,
     _evaluate,
@@ -27,7 +28,7 @@ from mambo_sil.flight.controllers.pd import PdController, pd_controller
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
-from mambo_sil.flight.metrics import measure, saturated_share
+from mambo_sil.flight.metrics import HEIGHT_METRICS, measure, saturated_share
 from mambo_sil.flight.names import PD_NAMES, PdName
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.traces import SensedTrace, Trace
@@ -107,7 +108,7 @@ def test_a_row_holds_the_results_of_the_flight_alone(sensors: str, pd: PdName) -
         alone = fly(single, pd_controller(pd, single))
         assert (alone.status == NOT_CALLED).any()
         assert row == {f"{pd}_crashed": 0, f"{pd}_refused_updates": 0} | expected_row(alone, pd)
-        titles = {*columns([pd], sensed=sensors != "none"), f"{pd}_saturated_share"}
+        titles = {*columns([pd], sensed=sensors != "none", spatial=True), f"{pd}_saturated_share"}
         assert set(row) == titles
 
 
@@ -127,13 +128,23 @@ def test_packed_rows_are_those_of_a_batch() -> None:
 
 def test_the_table_has_crashes_and_counts_before_metrics_and_digest() -> None:
     """The columns of a controller stand together, each controller after the other."""
-    names = list(vars(measure(flown())))
-    keys = ["crashed", "refused_updates", *names]
-    assert columns(["a", "b"], sensed=False) == tuple(
-        f"{name}_{key}" for name in "ab" for key in [*keys, "trace_sha256"]
-    )
-    seen = [f"seen_{name}" for name in names if "rad" not in name]
-    assert columns(["a"], sensed=True) == tuple(f"a_{key}" for key in [*keys, *seen, "trace_sha256"])
+    for spatial in (False, True):
+        names = [name for name in vars(measure(flown())) if spatial or name not in HEIGHT_METRICS]
+        keys = ["crashed", "refused_updates", *names]
+        assert columns(["a", "b"], sensed=False, spatial=spatial) == tuple(
+            f"{name}_{key}" for name in "ab" for key in [*keys, "trace_sha256"]
+        )
+        seen = [f"seen_{name}" for name in names if "rad" not in name]
+        assert columns(["a"], sensed=True, spatial=spatial) == tuple(
+            f"a_{key}" for key in [*keys, *seen, "trace_sha256"]
+        )
+
+
+def test_a_campaign_that_may_draw_a_course_with_a_height_has_its_metrics(tmp_path: Path) -> None:
+    """One such curve in a choice is enough."""
+    for trajectory, spatial in (('{ choice = ["circle", "helix"] }', True), ('"step"', False)):
+        (tmp_path / "one.toml").write_text(f"[flight]\ntrajectory = {trajectory}\n")
+        assert read(tmp_path / "one.toml").spatial == spatial
 
 
 def test_an_update_is_refused_when_the_controller_was_called_and_did_not_accept() -> None:

@@ -18,6 +18,7 @@ from mambo_sil.experiment.campaign.statistics import (
     read_table,
 )
 from mambo_sil.experiment.campaign.store import DATABASE, FlightStore
+from mambo_sil.flight.metrics import HEIGHT_METRICS
 
 COLUMNS = ("trajectory", "mass_kg", "pd_trace_sha256")
 
@@ -93,10 +94,12 @@ def test_a_single_ratio_has_no_interval() -> None:
     assert compared([1.0, 2.0]) == (1.0, 2.0)
 
 
+@pytest.mark.parametrize("spatial", [False, True])
 @pytest.mark.parametrize("sensed", [False, True])
-def test_all_controllers_are_compared_with_the_first(sensed: bool) -> None:
+def test_all_controllers_are_compared_with_the_first(sensed: bool, spatial: bool) -> None:
     """By the indices of Table II, then by those of the estimated error; where all crash, by none."""
-    indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES)]
+    shown = [index for index in INDICES if spatial or index not in HEIGHT_METRICS]
+    indices = [*shown, *(SEEN + index for index in SEEN_INDICES if index in shown)]
     table = {
         f"{name}_{index}": np.full(4, value)
         for name, value in zip("abc", (6.0, 2.0, 3.0), strict=True)
@@ -111,13 +114,13 @@ def test_all_controllers_are_compared_with_the_first(sensed: bool) -> None:
     ]
     assert [one.median for one in found] == [3.0] * len(names) + [2.0] * len(names)
     assert [one.better.count for one in found] == [3] * len(names) + [4] * len(names)
-    spread = distributions(table, "abc", sensed=sensed)
+    spread = distributions(table, "abc", sensed=sensed, spatial=spatial)
     assert [(one.crashed.count, one.refused_an_input.count) for one in spread.values()] == [
         (0, 0),
         (1, 0),
         (0, 3),
     ]
-    assert list(spread["b"].quantiles) == (indices if sensed else list(INDICES))
+    assert list(spread["b"].quantiles) == (indices if sensed else shown)
     assert spread["b"].quantiles["iae_m_s"]["1"] == math.inf
     hopeless = table | {f"{name}_crashed": np.ones(4) for name in "ab"}
     assert {one.controller for one in improvements(hopeless, "abc", sensed=sensed)} == {"c"}

@@ -30,12 +30,14 @@ def expected(trace: Trace) -> str:
     flights=st.integers(1, 9),
     lifting=st.integers(0, 298),
     sensed=st.booleans(),
+    spatial=st.booleans(),
 )
 def test_any_trace_has_the_results_of_numpy(
-    seed: int, samples: int, flights: int, lifting: int, *, sensed: bool
+    seed: int, samples: int, flights: int, lifting: int, *, sensed: bool, spatial: bool
 ) -> None:
     """In every number of lanes; crashes, NaN, infinity and take-off among them."""
-    trace = any_trace(seed, samples, flights, sensed=sensed, lifting=min(lifting, samples - 2))
+    lifting = min(lifting, samples - 2)
+    trace = any_trace(seed, samples, flights, sensed=sensed, lifting=lifting, spatial=spatial)
     for lanes in lanes_here():
         found = evaluate_compiled(load(toolchain("gcc"), lanes), trace, LIMIT_RAD, NOMINAL)
         assert bits(found) == expected(trace), lanes

@@ -27,7 +27,7 @@ class Course:
     ] = "bernoulli"
     size_m: Annotated[
         float | None,
-        typer.Option(help=f"Half-width, radius or step of the curve, in m; by default {SIZE_M:g}."),
+        typer.Option(help=f"Half-width, radius, step or height of the curve, in m; by default {SIZE_M:g}."),
     ] = None
     rate_rad_s: Annotated[
         float | None, typer.Option(help=f"Angular rate of the curve, in rad/s; by default {RATE_RAD_S:g}.")

@@ -25,7 +25,7 @@ def take_off_thrust_n(drone: VehicleFile) -> float:
 
 
 def altitude_thrust(
-    drone: VehicleFile, reference_m: float, z_m: FloatArray, velocity_z_m_s: FloatArray
+    drone: VehicleFile, reference_m: PerFlight, z_m: FloatArray, velocity_z_m_s: FloatArray
 ) -> FloatArray:
     """Return the total thrust (n,) in N, positive upwards, that the altitude loop demands; z points down."""
     gains = drone.altitude

@@ -39,7 +39,7 @@ from mambo_sil.experiment.campaign.parameters import (
     draw,
     scenario_values,
 )
-from mambo_sil.flight.names import PD_NAMES, RENAMED, SENSORS_OF, PdName, SensorsName, Start
+from mambo_sil.flight.names import IN_SPACE, PD_NAMES, RENAMED, SENSORS_OF, PdName, SensorsName, Start
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -146,6 +146,12 @@ class Campaign:
     def flight(self) -> dict[str, Any]:
         """The section [flight] as plain values, with all of the drone."""
         return self.file.flight.model_dump() | {"vehicle": self.drone.model_dump()}
+
+    @property
+    def spatial(self) -> bool:
+        """Whether any flight may follow a course with a height."""
+        drawn = self.file.flight.trajectory
+        return any(drawn.domain.value(number) in IN_SPACE for number in drawn.numbers)
 
     def draw(self, flight: int) -> Draw:
         """Return seed and parameters of flight number `flight`."""

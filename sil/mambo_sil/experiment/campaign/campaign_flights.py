@@ -23,7 +23,7 @@ from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
 from mambo_sil.flight.engine.simulate import fly_groups
 from mambo_sil.flight.loop import Flight, PositionController
-from mambo_sil.flight.metrics import Metrics
+from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 
@@ -52,10 +52,16 @@ _BUILDING: Final = threading.Lock()
 """Lets only one thread of a worker compile at a time; the next finds the result in the cache."""
 
 
-def columns(names: Sequence[str], *, sensed: bool) -> tuple[str, ...]:
+def indices(*, sensed: bool, spatial: bool) -> tuple[str, ...]:
+    """Return the metrics of a campaign: as flown, with sensors as seen, in space with those of the height."""
+    found = (*INDICES, *(SEEN + name for name in SEEN_INDICES if sensed))
+    return tuple(name for name in found if spatial or name.removeprefix(SEEN) not in HEIGHT_METRICS)
+
+
+def columns(names: Sequence[str], *, sensed: bool, spatial: bool = False) -> tuple[str, ...]:
     """Return the keys of a row for controllers of these names, in the order of the table."""
-    seen = tuple(SEEN + name for name in SEEN_INDICES) if sensed else ()
-    return tuple(f"{name}_{key}" for name in names for key in (CRASHED, REFUSED, *INDICES, *seen, DIGEST))
+    keys = CRASHED, REFUSED, *indices(sensed=sensed, spatial=spatial), DIGEST
+    return tuple(f"{name}_{key}" for name in names for key in keys)
 
 
 def fly_batch(

@@ -142,7 +142,7 @@ def summarise(campaign: Campaign, table: Table) -> CampaignSummary:
     return CampaignSummary(
         campaign=Drawn.model_validate(campaign.document()),
         flights=len(table[FLIGHT]),
-        controllers=distributions(table, names, sensed=sensed),
+        controllers=distributions(table, names, sensed=sensed, spatial=campaign.spatial),
         improvements=improvements(table, names, sensed=sensed),
         worst={name: [_worst(table, name, row) for row in worst_flights(table, name)] for name in names},
     )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ResultsError
-from mambo_sil.experiment.campaign.campaign_flights import CRASHED, INDICES, REFUSED, SEEN, SEEN_INDICES
+from mambo_sil.experiment.campaign.campaign_flights import CRASHED, REFUSED, SEEN, indices
 from mambo_sil.experiment.campaign.store import FLIGHT, read_rows
 from mambo_sil.results.summary import Number
 
@@ -165,14 +165,18 @@ def worst_flights(table: Table, name: str) -> list[int]:
     return [int(position) for position in order[:WORST]]
 
 
-def distributions(table: Table, names: Sequence[str], *, sensed: bool) -> dict[str, Distributions]:
+def distributions(
+    table: Table, names: Sequence[str], *, sensed: bool, spatial: bool = False
+) -> dict[str, Distributions]:
     """Return crashes, rejected inputs and quantiles of each controller."""
-    indices = [*INDICES, *(SEEN + index for index in SEEN_INDICES if sensed)]
     return {
         name: Distributions(
             crashed=_share(table[f"{name}_{CRASHED}"]),
             refused_an_input=_share(table[f"{name}_{REFUSED}"]),
-            quantiles={index: quantiles(index_values(table, name, index)) for index in indices},
+            quantiles={
+                index: quantiles(index_values(table, name, index))
+                for index in indices(sensed=sensed, spatial=spatial)
+            },
         )
         for name in names
     }

@@ -70,8 +70,9 @@ def fly(
 ) -> Flown:
     """Fly the settings of a controller on a vehicle, once for each seed, with new controllers.
 
-    trajectory: a curve of the command `fly` with half-width, radius or step `size_m` and angular rate
-                `rate_rad_s`, or an object with its methods `target` and `acceleration`.
+    trajectory: a curve of the command `fly` with half-width, radius, step or height `size_m` and angular
+                rate `rate_rad_s`, or an object with its methods `target` and `acceleration`, and `vertical`
+                if it has a height, which the altitude loop of the vehicle then follows.
     yaw_rad:    constant heading, one for all flights or an array (n,).
     sensors:    what controller and inner loops see: the truth ("none"), or the vehicle's sensors by name.
     seeds:      of sensor noise, one for each of n flights.

@@ -103,7 +103,7 @@ class PdFeedForwardController:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> PdOutcome:
-        """Return the commands for states (n, 7) and targets (n, 6); the last two are accelerations."""
+        """Return the commands for states (n, 7) and targets (n, 6), which end with accelerations, or more."""
         gains = self.gains
         sine, cosine = sine_cosine(state[:, 6])
         tilt_x, tilt_y = (
@@ -180,17 +180,17 @@ class PidFeedForwardController:
         target: FloatArray,
         thrust_acceleration_m_s2: FloatArray,  # noqa: ARG002 - part of the interface
     ) -> PdOutcome:
-        """Return the commands for states (n, 7) and targets (n, 6); the last two are accelerations."""
+        """Return the commands for states (n, 7) and targets (n, 6), which end with accelerations, or more."""
         sine, cosine = sine_cosine(state[:, 6])
         roll, pitch = state[:, 4], state[:, 5]
         measured_rad = np.stack([-(cosine * pitch + sine * roll), cosine * roll - sine * pitch], axis=-1)
-        error_m = target[:, :2] - state[:, :2]
-        tilt_rad = self._sum(error_m, target[:, 2:4] - state[:, 2:4], target[:, 4:], measured_rad)
+        error_m, acceleration_m_s2 = target[:, :2] - state[:, :2], target[:, 4:6]
+        tilt_rad = self._sum(error_m, target[:, 2:4] - state[:, 2:4], acceleration_m_s2, measured_rad)
         known = ~np.isnan(tilt_rad[:, 0] + tilt_rad[:, 1])
         self._integrate(error_m, tilt_rad)
         passed_rad = self._tilt_rad + self.low_pass_share * (tilt_rad - self._tilt_rad)
         self._tilt_rad = np.where(known[:, np.newaxis], passed_rad, self._tilt_rad)
-        self._acceleration_m_s2 = np.where(known[:, np.newaxis], target[:, 4:], self._acceleration_m_s2)
+        self._acceleration_m_s2 = np.where(known[:, np.newaxis], acceleration_m_s2, self._acceleration_m_s2)
         tilt_x, tilt_y = self._tilt_rad.T
         command_rad = np.stack([cosine * tilt_y - sine * tilt_x, -(cosine * tilt_x + sine * tilt_y)], axis=-1)
         return PdOutcome(

@@ -22,6 +22,7 @@ HEADERS: Final = (
     "elementary.h",
     "engine.h",
     "first_order.h",
+    "ground.h",
     "lanes.h",
     "loop.h",
     "mocap.h",

@@ -10,7 +10,7 @@ from mambo_codegen.toolchain import host_toolchain
 from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.flight import evaluation
-from mambo_sil.flight.crashes import least_level
+from mambo_sil.flight.crashes import LOW_TARGET_M, least_level
 from mambo_sil.flight.engine.engine_library import chosen_engine, ffi, lanes_for, load, pointer
 from mambo_sil.flight.engine.simulate import trace_record
 from mambo_sil.flight.evaluation import Evaluation
@@ -45,7 +45,9 @@ def evaluate_compiled(engine: Any, trace: Trace, limit_rad: float, drone: Vehicl
         if name not in ("time_s", "target")
     }
     times_s = np.ascontiguousarray(trace.time_s)
-    targets = np.ascontiguousarray(trace.target[..., :2].swapaxes(0, 1))
+    targets = np.empty((flights, updates, 3))
+    targets[..., :2] = trace.target[..., :2].swapaxes(0, 1)
+    targets[..., 2] = trace.target_height_m.T
     how = ffi.new(
         "engine_evaluation_t *",
         {
@@ -55,6 +57,7 @@ def evaluate_compiled(engine: Any, trace: Trace, limit_rad: float, drone: Vehicl
             "not_called": NOT_CALLED,
             "limit_rad": limit_rad,
             "least_level": least_level(drone),
+            "low_target_m": LOW_TARGET_M,
         },
     )
     counts = {name: np.empty(flights, np.int64) for name in ("crashed", "refused", "saturated")}

@@ -4,6 +4,9 @@
  */
 #include "elementary.h"
 
+/* Fields of Metrics in sil/mambo_sil/flight/metrics.py. */
+#define METRICS 13
+
 /* Samples of the group: the first sample of the flight in each lane. */
 typedef struct {
     int64_t start[LANES];
@@ -28,24 +31,29 @@ static inline void measure(const engine_evaluation_t *evaluation, const group_t 
 {
     const int64_t first = evaluation->first_update;
     const int64_t last = evaluation->updates - 1;
-    real_t before[6];
+    real_t before[8];
     int64_t k;
     int i;
 
-    for (i = 0; i < 9; i++) {
+    for (i = 0; i < METRICS; i++) {
         metrics[i] = splat(0.0);
     }
     for (k = first; k <= last; k++) {
-        const real_t x_m = sample(targets, group, k, 2, 0) - sample(position_m, group, k, 3, 0);
-        const real_t y_m = sample(targets, group, k, 2, 1) - sample(position_m, group, k, 3, 1);
+        const real_t x_m = sample(targets, group, k, 3, 0) - sample(position_m, group, k, 3, 0);
+        const real_t y_m = sample(targets, group, k, 3, 1) - sample(position_m, group, k, 3, 1);
         const real_t error_m = square_root((x_m * x_m) + (y_m * y_m));
         const real_t squared_m2 = error_m * error_m;
-        const real_t now[6] = { error_m,
+        const real_t height_m = -sample(position_m, group, k, 3, 2) - sample(targets, group, k, 3, 2);
+        const real_t height_m2 = height_m * height_m;
+        const real_t whole_m2 = squared_m2 + height_m2;
+        const real_t now[8] = { error_m,
                                 squared_m2,
                                 times_s[k] * squared_m2,
                                 times_s[k] * error_m,
                                 sample(command_rad, group, k, 2, 0),
-                                sample(command_rad, group, k, 2, 1) };
+                                sample(command_rad, group, k, 2, 1),
+                                height_m2,
+                                whole_m2 };
 
         if (k > first) {
             const double step_s = times_s[k] - times_s[k - 1];
@@ -53,17 +61,24 @@ static inline void measure(const engine_evaluation_t *evaluation, const group_t 
             for (i = 0; i < 4; i++) {
                 metrics[i] = metrics[i] + ((step_s * (now[i] + before[i])) / 2.0);
             }
+            metrics[9] = metrics[9] + ((step_s * (now[6] + before[6])) / 2.0);
+            metrics[11] = metrics[11] + ((step_s * (now[7] + before[7])) / 2.0);
             metrics[7] = metrics[7] + (step_s * (magnitude(before[4]) + magnitude(before[5])));
             metrics[8] = metrics[8] + (magnitude(now[4] - before[4]) + magnitude(now[5] - before[5]));
         }
         metrics[5] = maximum(metrics[5], error_m);
         metrics[6] = error_m;
-        for (i = 0; i < 6; i++) {
+        metrics[10] = maximum(metrics[10], magnitude(height_m));
+        metrics[12] = maximum(metrics[12], whole_m2);
+        for (i = 0; i < 8; i++) {
             before[i] = now[i];
         }
     }
     metrics[4] = square_root(metrics[1] / (times_s[last] - times_s[first]));
     metrics[8] = metrics[8] / (double)(last - first);
+    metrics[9] = square_root(metrics[9] / (times_s[last] - times_s[first]));
+    metrics[11] = square_root(metrics[11] / (times_s[last] - times_s[first]));
+    metrics[12] = square_root(metrics[12]);
 }
 
 static void write_metrics(const engine_evaluation_t *evaluation, int64_t index, const real_t *metrics, double *rows)
@@ -72,29 +87,32 @@ static void write_metrics(const engine_evaluation_t *evaluation, int64_t index, 
     int i;
 
     for (lane = 0; (lane < LANES) && ((index + lane) < evaluation->flights); lane++) {
-        for (i = 0; i < 9; i++) {
-            rows[((index + lane) * 9) + i] = lane_of(metrics[i], lane);
+        for (i = 0; i < METRICS; i++) {
+            rows[((index + lane) * METRICS) + i] = lane_of(metrics[i], lane);
         }
     }
 }
 
-/* Whether the drones crash: tilted too far or on the ground, or lost. */
-static inline mask_t crash(const engine_evaluation_t *evaluation, const group_t *group, const engine_trace_t *trace)
+/* Whether the drones crash: tilted too far, on the ground below a high target, or lost. */
+static inline mask_t crash(const engine_evaluation_t *evaluation, const group_t *group, const double *targets,
+                           const engine_trace_t *trace)
 {
-    mask_t aloft = splat(0.0) == splat(0.0);
+    mask_t safe = splat(0.0) == splat(0.0);
     int64_t k;
 
     for (k = evaluation->first_update; k < evaluation->updates; k++) {
+        const real_t height_m = -sample(trace->position_m, group, k, 3, 2);
+        const mask_t low = sample(targets, group, k, 3, 2) <= evaluation->low_target_m;
         real_t sine;
         real_t cos_roll;
         real_t cos_pitch;
 
         sine_cosine(sample(trace->euler_rad, group, k, 3, 0), &sine, &cos_roll);
         sine_cosine(sample(trace->euler_rad, group, k, 3, 1), &sine, &cos_pitch);
-        aloft = aloft & ((cos_roll * cos_pitch) > evaluation->least_level);
-        aloft = aloft & (-sample(trace->position_m, group, k, 3, 2) > 0.0);
+        safe = safe & ((cos_roll * cos_pitch) > evaluation->least_level);
+        safe = safe & ((height_m > 0.0) | (low & (height_m <= 0.0)));
     }
-    return aloft == 0;
+    return safe == 0;
 }
 
 void engine_evaluate(const engine_evaluation_t *evaluation, int64_t index, const double *times_s,
@@ -102,7 +120,7 @@ void engine_evaluate(const engine_evaluation_t *evaluation, int64_t index, const
 {
     group_t group;
     lanes_t crashed;
-    real_t metrics[9];
+    real_t metrics[METRICS];
     int64_t k;
     int lane;
 
@@ -111,7 +129,7 @@ void engine_evaluate(const engine_evaluation_t *evaluation, int64_t index, const
 
         group.start[lane] = flight * evaluation->updates;
     }
-    crashed.whole = crash(evaluation, &group, trace);
+    crashed.whole = crash(evaluation, &group, targets, trace);
     for (lane = 0; (lane < LANES) && ((index + lane) < evaluation->flights); lane++) {
         int64_t refused = 0;
         int64_t saturated = 0;

@@ -5,6 +5,10 @@
 #include "cascade.h"
 #include "loop.h"
 
+/* Columns of a target with a height, and the first one of these. */
+#define SPATIAL_COLUMNS 9
+#define HEIGHT_COLUMN 6
+
 /* A number of the trace: all NaN are one, whatever the processor makes of them. */
 static inline double number(double value)
 {
@@ -60,7 +64,7 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
 
             measured[i] = dropped ? NAN : lane_of(value, lane);
         }
-        status = controller((char *)self + (lane * stride), measured, targets + (6 * row),
+        status = controller((char *)self + (lane * stride), measured, targets + (simulation->target_columns * row),
                             lane_of(thrust_acceleration_m_s2, lane), answer_rad);
         if (dropped) {
             status = -1;
@@ -112,6 +116,23 @@ static inline void take(const double *numbers, int64_t rows, int64_t row, int wi
     }
 }
 
+/* Reference of the altitude loop, z down, from the targets of an update. */
+static inline real_t height_reference_m(const engine_simulation_t *simulation, int64_t index, int64_t update,
+                                        const double *targets)
+{
+    lanes_t reference_m = { splat(simulation->height_reference_m) };
+    int lane;
+
+    if (simulation->target_columns == SPATIAL_COLUMNS) {
+        for (lane = 0; (lane < LANES) && ((index + lane) < simulation->flights); lane++) {
+            const int64_t row = ((index + lane) * simulation->updates) + update;
+
+            reference_m.lane[lane] = 0.0 - targets[(SPATIAL_COLUMNS * row) + HEIGHT_COLUMN];
+        }
+    }
+    return reference_m.real;
+}
+
 void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
                   flying_t *flying)
 {
@@ -153,6 +174,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
 {
     const int64_t rows = simulation->updates * simulation->ticks_per_update;
     const real_t heading_rad = flight->yaw_rad + (flight->yaw_rate_rad_s * maximum(splat(times_s[update]), splat(0.0)));
+    const real_t reference_m = height_reference_m(simulation, index, update, targets);
     vehicle_state_t *state = &flying->state;
     int64_t tick;
 
@@ -193,7 +215,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             seen = estimate(simulation, flight, &truth_now, &r, drawn, &flying->suite);
         }
         if (update >= simulation->lifting_updates) {
-            thrust_n = altitude_thrust_n(simulation, &seen);
+            thrust_n = altitude_thrust_n(simulation, reference_m, &seen);
         }
         if (tick == 0) {
             call(simulation, flight, index, update, targets, draws, controller, self, stride, &truth_now, &seen,
@@ -211,6 +233,9 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             }
             commanded_speeds(simulation, shares, steady_rad_s);
             integrate(simulation, flight, &around, thrust_share, &r, steady_rad_s, state);
+        }
+        if (simulation->landing) {
+            carry_on_ground(flight, state->body);
         }
         flying->ticks = ticks + 1;
     }

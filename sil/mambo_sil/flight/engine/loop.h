@@ -7,6 +7,7 @@
 #define ENGINE_LOOP_H
 
 #include "first_order.h"
+#include "ground.h"
 #include "mocap.h"
 #include "sensors.h"
 #include "world.h"

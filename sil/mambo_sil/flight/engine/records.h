@@ -18,6 +18,8 @@ typedef struct {
     int64_t sensed;           /* whether controllers receive estimates */
     int64_t captured;         /* whether these come from motion capture */
     int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
+    int64_t landing;          /* whether the ground carries any drone */
+    int64_t target_columns;   /* of a row of targets: 6, or 9 if courses have heights */
 
     double step_s;            /* a tick */
     double gravity_m_s2;
@@ -110,6 +112,7 @@ typedef struct {
     real_t rotor_start_rad_s[4];
     real_t yaw_rad;
     real_t yaw_rate_rad_s;
+    whole_t landing;          /* all bits if the ground carries the drone, else 0 */
 
     real_t mass_kg;
     real_t inertia_kg_m2[3];
@@ -161,7 +164,8 @@ typedef struct {
     double *seen_euler_rad;
 } engine_trace_t;
 
-/* A position controller: reads a state of 7 and a target of 6 numbers, writes roll and pitch, returns a status. */
+/* A position controller: reads a state of 7 and a target of 6 numbers, to which a course with a height adds height,
+ * climb and vertical acceleration; writes roll and pitch, returns a status. */
 typedef int64_t (*engine_controller_t)(void *self, const double *state, const double *target,
                                        double thrust_acceleration_m_s2, double *command_rad);
 
@@ -171,8 +175,8 @@ int64_t engine_lanes(void);
 /* How many lanes are fastest with this compiler on this processor: 1, 2 or 4. */
 int64_t engine_fastest_lanes(void);
 
-/* Simulate a group of flights from start to end, with their rows of `targets` (flights, updates, 6), and write their
- * rows of the trace. The first flight has index `index` and the controller `self`; the controllers lie `stride` bytes
+/* Simulate a group of flights from start to end, with their rows of `targets` (flights, updates, target_columns), and
+ * write their rows of the trace. The first flight has index `index` and the controller `self`; the controllers lie `stride` bytes
  * apart. A lane beyond the last flight of the simulation has no controller and no rows. */
 void engine_fly(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                 const double *times_s, const double *targets, const engine_draws_t *draws,
@@ -186,9 +190,10 @@ typedef struct {
     int64_t not_called;       /* the status of an update for which the controller was not called */
     double limit_rad;         /* a command of this size is saturated */
     double least_level;       /* cosine of the tilt beyond which a drone has crashed */
+    double low_target_m;      /* on the ground a drone has crashed if its target is higher */
 } engine_evaluation_t;
 
-/* Of each flight: whether it crashed, its refused updates and saturated commands, and its metrics (flights, 9) as
+/* Of each flight: whether it crashed, its refused updates and saturated commands, and its metrics (flights, 13) as
  * flown and, with sensors, as seen. */
 typedef struct {
     int64_t *crashed;
@@ -198,7 +203,7 @@ typedef struct {
     double *seen_metrics;
 } engine_results_t;
 
-/* Evaluate a group of flights with their targets (flights, updates, 2); the first has index `index`. */
+/* Evaluate a group of flights with their targets (flights, updates, 3), x, y and height; the first has index `index`. */
 void engine_evaluate(const engine_evaluation_t *evaluation, int64_t index, const double *times_s,
                      const double *targets, const engine_trace_t *trace, const engine_results_t *results);
 

@@ -58,6 +58,8 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "sensed": sensors is not None,
             "captured": isinstance(sensors, MotionCapture),
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
+            "landing": flight.landing.any(),
+            "target_columns": flight.given_targets.shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,
@@ -103,7 +105,7 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
 
 
 def flight_records(flight: Flight, first_target: FloatArray) -> Record:
-    """Return one engine_flight_t for each of n flights, whose first targets are (n, 4)."""
+    """Return one engine_flight_t for each of n flights, whose first targets are (n, 6 or 9)."""
     n, vehicle, disturbances = flight.flights, flight.vehicle, flight.disturbances
     airframe = vehicle.airframe
     start, step_s = start_state(flight, first_target), vehicle.drone.step_s
@@ -122,6 +124,7 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
             "rotor_start_rad_s": start.rotor_speed_rad_s.T,
             "yaw_rad": flight.yaw_rad,
             "yaw_rate_rad_s": flight.yaw_rate_rad_s,
+            "landing": -flight.landing.astype(np.int64),
             "mass_kg": airframe.mass_kg,
             "inertia_kg_m2": _columns(airframe.inertia_kg_m2, n),
             "thrust_factor_n_s2": airframe.thrust_factor_n_s2,

@@ -99,7 +99,7 @@ def _fly_groups(
     done = 0
     for first in simulation.firsts:
         size = min(simulation.lanes, flight.flights - first)
-        trace = replace(traces(size), target=flight.given_targets[:, first : first + size, :4])
+        trace = replace(traces(size), target=flight.traced_targets[:, first : first + size])
         record = trace_record(trace)
         simulation.draw(first)
         for number, one in enumerate(called):
@@ -144,7 +144,7 @@ class _Simulation:
 
     def allocate(self, flights: int) -> Trace:
         """Return a trace with the times, and the targets of the first flights."""
-        targets = self._targets[:, :flights, :4]
+        targets = self._flight.traced_targets[:, :flights]
         return allocate_trace(self._times_s, targets, sensed=self._flight.sensors is not None)
 
     def draw(self, first: int) -> None:

@@ -39,9 +39,9 @@ static inline seen_t truth(const vehicle_state_t *state, const rotation_t *r)
     return seen;
 }
 
-static inline real_t altitude_thrust_n(const engine_simulation_t *simulation, const seen_t *seen)
+static inline real_t altitude_thrust_n(const engine_simulation_t *simulation, real_t reference_m, const seen_t *seen)
 {
-    const real_t error_m = simulation->height_reference_m - seen->position_m[2];
+    const real_t error_m = reference_m - seen->position_m[2];
     const real_t thrust_n = (simulation->weight_n - (simulation->altitude_p_n_m * error_m))
                             + (simulation->altitude_d_n_s_m * seen->velocity_m_s[2]);
 
