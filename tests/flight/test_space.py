@@ -16,11 +16,11 @@ from mambo_sil.flight.flight_plots import draw_flights, flight_columns
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
-from mambo_sil.flight.scenario import flight_of
+from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import CURVES, Circle, Hover, Trajectories, vertical_of
 from tests.support.engines import lanes_here
-from tests.support.scenarios import SPACE
+from tests.support.scenarios import FLOWN_IN_SPACE, SPACE
 from tests.support.tools import toolchain
 
 CRAZYFLIE = Vehicle.from_preset("crazyflie")
@@ -36,11 +36,14 @@ def flown(curve: str, size_m: float, duration_s: float, vehicle: Vehicle = CRAZY
     return fly(flight, pd_controller("pd-feedforward", flight))
 
 
-def test_a_batch_in_space_has_the_bits_of_numpy() -> None:
-    """Level courses, swings, a climb, jumps, the ground, and drones that meet it in flight."""
-    flight = flight_of(SPACE, 0.01)
+@pytest.mark.parametrize("batch", [SPACE, FLOWN_IN_SPACE], ids=["cascade", "first order"])
+def test_a_batch_in_space_has_the_bits_of_numpy(batch: tuple[Scenario, ...]) -> None:
+    """Level courses, swings, a climb, jumps, vertical gusts, ground effect, drones that meet the ground."""
+    flight = flight_of(batch, 0.01)
     theirs = loop.fly(flight, PdController())
-    assert flight.landing.tolist() == [False, False, False, False, True, True, False]
+    touching = [one.trajectory == "take-off-and-landing" or one.size_m == -2.0 for one in batch]
+    assert flight.landing.tolist() == touching
+    assert any(touching)
     assert (theirs.position_m[..., 2].max(axis=0)[flight.landing] == 0.0).all()
     for lanes in lanes_here():
         ours = fly_compiled(load(toolchain("gcc"), lanes), flight, PdController())

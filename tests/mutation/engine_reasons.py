@@ -88,7 +88,7 @@ REASONS: Final[Mapping[Key, str]] = {
     **{
         (
             "loop.c",
-            "surroundings_t around = { flight->mass_kg, { splat(<real>), splat(<real>) } };",
+            "surroundings_t around = { flight->mass_kg, { splat(<real>), splat(<real>) }, splat(<real>) };",
             change,
         ): ("read only in wind, which sets it")
         for change in ("zero -> one", "zero -> one #1")

@@ -114,6 +114,7 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
         around.mass_kg = flight->mass_kg + row[29];
         around.air_m_s[0] = row[30];
         around.air_m_s[1] = row[31];
+        around.lift_m_s2 = flight->vertical_gust_m_s2;
         memcpy(&state, row, sizeof state);
         r = rotation(state.body + EULER);
         seen = truth(&state, &r);

@@ -176,17 +176,27 @@ SPACE: Final = (
             start_offset_m=(0.1, 0.0, z_m),
             start_velocity_m_s=(0.3, -0.2, 0.4),
             start_tilt_rad=(0.1, -0.2),
+            vertical_gust_m_s2=gust_m_s2,
+            vertical_gust_time_s=0.7,
+            ground_effect_radius_m=radius_m,
         )
-        for curve, size_m, z_m in (
-            ("tilted-circle", 1.0, 0.1),
-            ("helix", 0.5, -0.2),
-            ("height-step", -2.0, 0.0),
-            ("take-off-and-landing", 0.6, -0.05),
-            ("swinging-eight", 1.0, 0.0),
+        for curve, size_m, z_m, gust_m_s2, radius_m in (
+            ("tilted-circle", 1.0, 0.1, 1.0, 0.0),
+            ("helix", 0.5, -0.2, 0.0, 0.2),
+            ("height-step", -2.0, 0.0, -0.5, 0.3),
+            ("take-off-and-landing", 0.6, -0.05, 0.0, 0.05),
+            ("swinging-eight", 1.0, 0.0, 0.0, 0.0),
         )
     ),
 )
-"""Courses with heights among level ones; one falls to the ground, one begins there."""
+"""Courses with heights among level ones, with vertical gusts and ground effect; one falls to the ground, one
+begins there."""
+FLOWN_IN_SPACE: Final = tuple(
+    one.model_copy(
+        update={"vehicle": FLOWN} | {key: getattr(Scenario(vehicle=FLOWN), key) for key in OF_THE_VEHICLE}
+    )
+    for one in SPACE[2:5]
+)
 
 BATCHES: Final = {
     "truth": TRUTH,
@@ -199,6 +209,7 @@ BATCHES: Final = {
     "flown": captured(FLOWN),
     "late": captured(LATE),
     "space": SPACE,
+    "flown in space": FLOWN_IN_SPACE,
 }
 
 
@@ -267,6 +278,9 @@ def scenarios(**fixed: Any) -> st.SearchStrategy[Scenario]:
             st.just((0.0, 0.0, 0.0)), st.tuples(small, small, small), st.just((40.0, 0.0, 0.0))
         ),
         "impulse_time_s": _within(0.0, 1.0),
+        "vertical_gust_m_s2": st.one_of(st.just(0.0), _within(-2.0, 2.0)),
+        "vertical_gust_time_s": _within(-1.0, 1.0),
+        "ground_effect_radius_m": st.one_of(st.just(0.0), _within(0.0, 1.0)),
         "command_delay_ticks": st.sampled_from([0, 0, 1, 2, 7, 200]),
         "dropped_share": st.sampled_from([0.0, 0.0, 0.3, 1.0]),
         "noise_scale": st.sampled_from([0.0, 1.0, 3.0]),

@@ -113,6 +113,11 @@ class Scenario(_Record):
     payload_time_s: float = 0.0
     impulse_n_s: Three = (0.0, 0.0, 0.0)
     impulse_time_s: float = 0.0
+    vertical_gust_m_s2: float = Field(0.0, ge=-100.0, le=100.0)
+    """Acceleration upwards from `vertical_gust_time_s` on."""
+    vertical_gust_time_s: float = 0.0
+    ground_effect_radius_m: float = Field(0.0, ge=0.0, le=1.0)
+    """Radius of the rotor in the ground effect of Cheeseman and Bennett; 0 for none."""
 
     command_delay_ticks: int = Field(0, ge=0, le=200)
     """Delay of the roll and pitch commands in ticks of the vehicle."""

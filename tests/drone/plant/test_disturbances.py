@@ -8,6 +8,7 @@ from scipy import linalg
 
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.disturbances import Disturbances, World
+from mambo_sil.drone.plant.ground import ROTOR_HEIGHT_M, carry_on_ground, ground_effect
 from mambo_sil.drone.plant.gusts import (
     ACROSS_GAINS,
     FOOT_M,
@@ -24,7 +25,7 @@ from mambo_sil.drone.plant.vehicle import STEP_S, Vehicle, VehicleState
 from mambo_sil.flight.controllers.pd import PdController
 from mambo_sil.flight.loop import Flight, Offset, fly
 from mambo_sil.flight.traces import Trace
-from mambo_sil.flight.trajectories import Bernoulli, Hover
+from mambo_sil.flight.trajectories import CURVES, Bernoulli, Hover
 
 
 def hover(duration_s: float = 1.0, flights: int = 1, **more: object) -> Trace:
@@ -320,3 +321,72 @@ def test_start_can_be_offset_in_position_velocity_and_tilt() -> None:
     np.testing.assert_allclose(trace.position_m[0, 0], [0.1, -0.2, -0.8])
     np.testing.assert_allclose(trace.velocity_m_s[0, 0], [0.4, 0.5, -0.6])
     np.testing.assert_allclose(trace.euler_rad[0, 0], [0.05, -0.06, 0.8])
+
+
+def test_ground_effect_is_the_formula_of_cheeseman_and_bennett() -> None:
+    """4/3 at z = R/2 and below, 16/15 at z = R, 1.0159 at 2 R, nothing far away or without a radius."""
+    z_m = np.array([0.2, 0.25, 0.5, 1.0, 1e6])
+    found = ground_effect(z_m - ROTOR_HEIGHT_M, 0.5)
+    np.testing.assert_allclose(found, [4 / 3, 4 / 3, 16 / 15, 1 / (1 - 1 / 64), 1.0], rtol=1e-12)
+    with np.errstate(all="ignore"):
+        without = ground_effect(np.array([-ROTOR_HEIGHT_M, 0.0, 1.0]), np.zeros(3))
+    np.testing.assert_array_equal(without, 1.0)
+
+
+@pytest.mark.parametrize("vehicle", ["crazyflie", "crazyflie-flown", "mambo"])
+def test_a_vertical_gust_lifts_the_drone_until_the_altitude_loop_balances_it(vehicle: str) -> None:
+    """Acceleration times mass over the loop's gain, from its time on; downwards as far as upwards."""
+    drone = Vehicle.from_preset(vehicle)
+    trace = hover(
+        6.0,
+        3,
+        vehicle=drone,
+        disturbances=Disturbances(
+            vertical_gust_m_s2=np.array([1.0, 0.0, -1.0]), vertical_gust_time_s=np.array([2.0, 0.0, 2.0])
+        ),
+    )
+    gained_m = drone.drone.body.mass_kg / drone.drone.altitude.p_n_m
+    heights_m = -trace.position_m[..., 2] - 1.1
+    np.testing.assert_allclose(heights_m[200], 0.0, atol=1e-12)
+    np.testing.assert_allclose(heights_m[-1], gained_m * np.array([1.0, 0.0, -1.0]), atol=2e-3 * gained_m)
+
+
+def test_ground_effect_lifts_a_low_drone() -> None:
+    """The altitude loop demands less thrust, which it does where the drone is too high."""
+    drone = Vehicle.from_preset("crazyflie")
+    flight = Flight(
+        CURVES["height-step"](-1.0, 0.0),
+        5.0,
+        2,
+        vehicle=drone,
+        disturbances=Disturbances(ground_effect_radius_m=np.array([0.0, 0.05])),
+    )
+    trace = fly(flight, PdController())
+    plain_m, lifted_m = -trace.position_m[-1, :, 2]
+    assert plain_m == pytest.approx(0.1, abs=1e-3)
+    share = float(ground_effect(np.array([lifted_m]), 0.05)[0])
+    gain_n = drone.drone.weight_n * (1.0 - 1.0 / share)
+    assert lifted_m - plain_m == pytest.approx(gain_n / drone.drone.altitude.p_n_m, rel=0.02)
+    assert lifted_m - plain_m > 0.005
+
+
+def test_the_ground_stops_what_falls_and_lets_go_what_rises() -> None:
+    """Position to 0; what sinks or stands is level and at rest, with its heading and rotors; no one else."""
+    state = at_rest(5)
+    state.body[2] = [0.1, 0.1, -0.1, 0.1, 0.0]
+    state.body[5] = [1.0, -1.0, 1.0, 1.0, 0.0]
+    state.body[6:9] = [[0.1], [0.2], [0.3]]
+    state.body[9:] = 0.4
+    there = np.array([True, True, True, False, True])
+    after = carry_on_ground(state, there)
+    assert after.body[2].tolist() == [0.0, 0.0, -0.1, 0.1, 0.0]
+    for flight, (stops, before) in enumerate(
+        zip([True, False, False, False, True], state.body.T, strict=True)
+    ):
+        expected = before.copy()
+        expected[2] = after.body[2, flight]
+        if stops:
+            expected[3:8] = expected[9:] = 0.0
+        np.testing.assert_array_equal(after.body[:, flight], expected)
+    np.testing.assert_array_equal(after.rotor_speed_rad_s, state.rotor_speed_rad_s)
+    assert carry_on_ground(state, ~there & False) is state

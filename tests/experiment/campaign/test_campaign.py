@@ -10,7 +10,7 @@ from statistics import NormalDist, median
 import numpy as np
 import pytest
 
-from mambo_codegen.errors import MamboNmpcError, UnreadableFileError
+from mambo_codegen.errors import InvalidSettingsError, MamboNmpcError, UnreadableFileError
 from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.drone.vehicles import VEHICLES
 from mambo_sil.experiment.campaign import campaign_file
@@ -187,12 +187,13 @@ def test_draws_of_the_default_campaign_fill_their_ranges() -> None:
 def test_every_parameter_changes_the_scenario() -> None:
     """Each parameter at a limit of its domain gives a valid scenario that differs from the nominal one."""
     section = campaign_file.default().flight
-    plain = campaign_file.scenario(section, draw(0, 0, CONSTANT))
+    heavy = CONSTANT | {"mass_kg": Distribution("constant", (0.6,), PARAMETERS["mass_kg"].domain)}
+    plain = campaign_file.scenario(section, draw(0, 0, heavy))
     for name, parameter in PARAMETERS.items():
         for limit in (parameter.domain.low, parameter.domain.high):
-            extreme = CONSTANT | {name: Distribution("constant", (limit,), parameter.domain)}
+            extreme = heavy | {name: Distribution("constant", (limit,), parameter.domain)}
             changed = campaign_file.scenario(section, draw(0, 0, extreme))
-            assert (changed != plain) == (limit != CONSTANT[name].numbers[0]), name
+            assert (changed != plain) == (limit != heavy[name].numbers[0]), name
 
 
 def test_scales_apply_to_the_nominal_mambo() -> None:
@@ -298,6 +299,21 @@ def test_limits_belong_to_their_domain() -> None:
     assert parse({"uniform": [2.0, 2.0]}, WIDE).quantile(0.9) == 2.0
     assert parse({"normal": [1e3, 2e3]}, WIDE).quantile(0.9) < 1e3
     assert parse({"log_uniform": [1e-300, 1e-300]}, WIDE).quantile(0.9) == 1e-300
+
+
+def test_a_payload_may_be_dropped_but_not_the_drone(tmp_path: Path) -> None:
+    """A negative payload leaves a positive mass, with the tails of a normal distribution, too."""
+    for payload, fault in (
+        ("-0.02", ""),
+        ("{ normal = [0.0, 0.002] }", ""),
+        ("-0.064", "payload_kg, down to -0.064"),
+    ):
+        (tmp_path / "drop.toml").write_text(f"[draws]\npayload_kg = {payload}\n")
+        if not fault:
+            assert campaign_file.read(tmp_path / "drop.toml").draw(0)["payload_kg"] != 0.0
+            continue
+        with pytest.raises(InvalidSettingsError, match=fault):
+            campaign_file.read(tmp_path / "drop.toml")
 
 
 @pytest.mark.parametrize("text", BAD)

@@ -5,8 +5,10 @@ from pathlib import Path
 import pytest
 
 from mambo_codegen.errors import InvalidSettingsError, SourceNotFoundError, UnreadableFileError
-from mambo_sil.experiment.campaign.campaign_flights import INDICES
+from mambo_sil.experiment.campaign.campaign_file import load_entrant
+from mambo_sil.experiment.campaign.campaign_flights import INDICES, fly_scenarios
 from mambo_sil.experiment.regress.suite_file import MOST_FLIGHTS, FlightSuite, load_suite
+from mambo_sil.flight.names import IN_SPACE
 from mambo_sil.flight.scenario import Scenario
 
 
@@ -210,7 +212,7 @@ def test_what_is_no_suite_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SourceNotFoundError, match=r"nor a file \(did you mean envelope\?\)"):
         load_suite("envelop")
-    with pytest.raises(SourceNotFoundError, match="nor a file; shipped suites are envelope"):
+    with pytest.raises(SourceNotFoundError, match="nor a file; shipped suites are envelope, space"):
         load_suite("zzz")
     Path("envelope").write_text("no", "utf-8")
     with pytest.raises(UnreadableFileError, match="envelope: line 1"):
@@ -231,3 +233,25 @@ def test_the_envelope_has_33_headings_over_the_full_turn() -> None:
         assert all("iae_m_s" in flight.bounds for flight in flights)
         sensors = {flight.scenario.sensors for flight in flights}
         assert sensors == {"mambo-derotated" if group.endswith("-sensors") else "none"}
+
+
+def test_the_suite_in_space_flies_every_course_and_condition() -> None:
+    """All curves with a height; heavy, sagging, unloaded, in gusts and close to the ground."""
+    flights = [flight.scenario for flight in load_suite("space").flights]
+    assert set(IN_SPACE) <= {one.trajectory for one in flights}
+    for key in ("battery_sag_1_s", "payload_kg", "vertical_gust_m_s2", "ground_effect_radius_m"):
+        assert any(getattr(one, key) for one in flights), key
+    assert any(one.mass_kg == pytest.approx(1.3 * one.vehicle.body.mass_kg) for one in flights)
+
+
+@pytest.mark.long
+def test_preset_crazyflie_with_the_stock_altitude_loop_passes_the_suite_in_space() -> None:
+    """No bound is exceeded, and none is twice what is flown."""
+    suite = load_suite("space")
+    entrant = load_entrant("crazyflie", Path(), "test")
+    for group in dict.fromkeys((one.group, one.scenario.duration_s) for one in suite.flights):
+        flights = [one for one in suite.flights if (one.group, one.scenario.duration_s) == group]
+        rows = fly_scenarios([entrant], [one.scenario for one in flights], lambda _: None)
+        for metric, bound in flights[0].bounds.items():
+            worst = max(float(row[f"crazyflie_{metric}"]) for row in rows)
+            assert 0.5 * bound <= worst <= bound, (group, metric, worst)

@@ -84,13 +84,13 @@ def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
     body, rotors, memory, command, thrust_n, heading, payload, air, share = np.split(
         rows.T, [12, 16, 25, 27, 28, 29, 30, 32]
     )
-    vehicle, push_m_s2 = Vehicle.of(drone), (0.5, -0.2)
+    vehicle, push_m_s2, lift_m_s2 = Vehicle.of(drone), (0.5, -0.2), 0.7
     first_order = isinstance(vehicle.loop, FirstOrderDrone)
     known = np.resize(memory[:2], (vehicle.loop.rows, TICKS)) if first_order else memory[: vehicle.loop.rows]
     before = VehicleState(body, rotors, known)
     with np.errstate(all="ignore"):
         seen = truth(before)
-        moment = Moment(share[0], payload[0], (air[0], air[1]), push_m_s2)
+        moment = Moment(share[0], payload[0], (air[0], air[1]), push_m_s2, lift_m_s2)
         after = vehicle.step(before, command, thrust_n[0], heading[0], seen=seen, moment=moment)
         demanded_n = loops.altitude_thrust(
             drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
@@ -101,7 +101,7 @@ def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
     expected = np.concatenate(
         [after.body, after.rotor_speed_rad_s, kept, demanded_n[np.newaxis], seen.velocity_m_s]
     )
-    disturbances = Disturbances(wind_speed_m_s=1.0, push_m_s2=push_m_s2)
+    disturbances = Disturbances(wind_speed_m_s=1.0, push_m_s2=push_m_s2, vertical_gust_m_s2=lift_m_s2)
     flight = Flight(Hover(), duration_s=1.0, vehicle=vehicle, disturbances=disturbances)
     assert unified(ticked(engine, flight, rows)) == unified(expected.T)
 

@@ -1,4 +1,4 @@
-"""Disturbances of a flight: push, wind with gusts, battery sag, payload and impulse."""
+"""Disturbances of a flight: push, wind, gusts, battery sag, payload, impulse, ground effect."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
+from mambo_sil.drone.plant.ground import ground_effect
 from mambo_sil.drone.plant.gusts import Gusts
+from mambo_sil.drone.plant.rigid_body import POSITION
 from mambo_sil.drone.plant.vehicle import Moment, Vehicle, VehicleState
 
 
@@ -32,6 +34,11 @@ class Disturbances:
     impulse_n_s: tuple[PerFlight, PerFlight, PerFlight] = (0.0, 0.0, 0.0)
     """Impulse in the world frame (NED), applied in one instant at `impulse_time_s`."""
     impulse_time_s: PerFlight = 0.0
+    vertical_gust_m_s2: PerFlight = 0.0
+    """Acceleration upwards from `vertical_gust_time_s` on."""
+    vertical_gust_time_s: PerFlight = 0.0
+    ground_effect_radius_m: PerFlight = 0.0
+    """Radius of the rotor of `ground.ground_effect`; 0 for none."""
 
     @property
     def windy(self) -> bool:
@@ -44,9 +51,15 @@ class Disturbances:
         return any(bool(np.any(component)) for component in self.impulse_n_s)
 
     @cached_property
+    def near_ground(self) -> bool:
+        """Whether any flight has ground effect."""
+        return bool(np.any(self.ground_effect_radius_m))
+
+    @cached_property
     def any(self) -> bool:
         """Whether any disturbance is on in any flight."""
-        steady = *self.push_m_s2, self.battery_sag_1_s, self.payload_kg
+        vertical = self.vertical_gust_m_s2, self.ground_effect_radius_m
+        steady = *self.push_m_s2, self.battery_sag_1_s, self.payload_kg, *vertical
         return self.windy or self.struck or any(bool(np.any(one)) for one in steady)
 
 
@@ -82,6 +95,7 @@ class World:
         self._ticks += 1
         loaded = np.rint(np.asarray(disturbances.payload_time_s) / step_s) <= now
         payload_kg: FloatArray = np.asarray(disturbances.payload_kg, np.float64) * loaded
+        risen = np.rint(np.asarray(disturbances.vertical_gust_time_s) / step_s) <= now
         due = np.rint(np.asarray(disturbances.impulse_time_s) / step_s) == now
         if disturbances.struck and due.any():
             flights = state.body.shape[1]
@@ -89,10 +103,15 @@ class World:
                 [np.broadcast_to(component * due, flights) for component in disturbances.impulse_n_s]
             )
             state = self._vehicle.apply_impulse(state, impulse_n_s, payload_kg)
+        thrust_share = np.maximum(1.0 - disturbances.battery_sag_1_s * flown_s, 0.0)
+        if disturbances.near_ground:
+            height_m = -state.body[POSITION][2]
+            thrust_share = thrust_share * ground_effect(height_m, disturbances.ground_effect_radius_m)
         moment = Moment(
-            thrust_share=np.maximum(1.0 - disturbances.battery_sag_1_s * flown_s, 0.0),
+            thrust_share=thrust_share,
             payload_kg=payload_kg,
             air_m_s=None if self._gusts is None else self._gusts.next(),
             push_m_s2=disturbances.push_m_s2,
+            lift_m_s2=np.asarray(disturbances.vertical_gust_m_s2, np.float64) * risen,
         )
         return state, moment

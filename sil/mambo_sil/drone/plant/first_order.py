@@ -54,6 +54,7 @@ class Surroundings:
     drag_1_s: PerFlight
     push_m_s2: tuple[PerFlight, PerFlight]
     air_m_s: tuple[PerFlight, PerFlight]
+    lift_m_s2: PerFlight
 
 
 class FirstOrderDrone:
@@ -119,7 +120,7 @@ class FirstOrderDrone:
         return nodes, slopes
 
     def _acceleration(self, angles_rad: FloatArray, around: Surroundings) -> FloatArray:
-        """Return the acceleration (3, n) in the world by thrust, push and gravity."""
+        """Return the acceleration (3, n) in the world by thrust, push, gravity and lift."""
         thrust = np.zeros_like(angles_rad)
         thrust[2] = -around.thrust_acceleration_m_s2
         acceleration = to_world(*sine_cosine(angles_rad - self._trim_rad), thrust)
@@ -127,7 +128,7 @@ class FirstOrderDrone:
             acceleration[axis] = (
                 self._attitude.acceleration_per_tilt_g * acceleration[axis] + around.push_m_s2[axis]
             )
-        acceleration[2] = acceleration[2] + GRAVITY_M_S2
+        acceleration[2] = acceleration[2] + (GRAVITY_M_S2 - around.lift_m_s2)
         return acceleration
 
 

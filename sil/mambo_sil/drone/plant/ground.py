@@ -1,13 +1,29 @@
-"""The ground at height 0: it carries a drone that stands on it."""
+"""The ground at height 0: it carries a drone that stands on it, and raises the thrust of rotors near it."""
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.arrays import FloatArray, PerFlight
 from mambo_sil.drone.plant.rigid_body import EULER, POSITION, RATES, VELOCITY, to_world
 from mambo_sil.drone.plant.vehicle import VehicleState
+
+ROTOR_HEIGHT_M: Final = 0.03
+"""Height of the rotors above the feet."""
+
+
+def ground_effect(height_m: FloatArray, radius_m: PerFlight) -> FloatArray:
+    """Return thrust near the ground over that far from it (n,), at the same power, for feet at heights (n,).
+
+    1 / (1 - (R / 4 z)^2), z the height of the rotors: Cheeseman and Bennett, The Effect of the Ground on a
+    Helicopter Rotor in Forward Flight, ARC R&M 3021 (1955). Below z = R / 2, where the formula ends, it stays
+    the same. It is that of one rotor; for four, R lies between the radius of one and twice that.
+    """
+    rotor_height_m = np.maximum(height_m + ROTOR_HEIGHT_M, radius_m / 2.0)
+    ratio = radius_m / (4.0 * rotor_height_m)
+    return np.where(np.asarray(radius_m) > 0.0, 1.0 / (1.0 - ratio * ratio), 1.0)
 
 
 def carry_on_ground(state: VehicleState, there: NDArray[np.bool_]) -> VehicleState:

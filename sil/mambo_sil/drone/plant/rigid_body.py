@@ -37,7 +37,8 @@ class RigidBody:
     """A rigid body under gravity, thrust, linear rotor drag, wind and a push.
 
     The drag models blade flapping: it acts in the plane of the rotors and is proportional to the velocity in
-    that plane (Pounds, Mahony and Corke 2010). `push_m_s2` is a steady acceleration in the world frame.
+    that plane (Pounds, Mahony and Corke 2010). `push_m_s2` is a steady acceleration in the world frame,
+    `lift_m_s2` one upwards.
     """
 
     mass_kg: PerFlight
@@ -46,6 +47,7 @@ class RigidBody:
     push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
     air_m_s: tuple[PerFlight, PerFlight] | None = None
     """Air velocity along x and y of the world; None is still air."""
+    lift_m_s2: PerFlight = 0.0
 
     def derivative(
         self, state: FloatArray, wrench: FloatArray, known: SineCosine | None = None
@@ -68,11 +70,12 @@ class RigidBody:
         # Equation 2.
         rate[POSITION] = to_world(sines, cosines, state[VELOCITY])
 
-        # Equation 7, gravity plus push: R transposed takes the sum to the body frame.
+        # Equation 7, gravity less lift plus push: R transposed takes the sum to the body frame.
         heading_x = cos_yaw * push_x + sin_yaw * push_y
         heading_y = cos_yaw * push_y - sin_yaw * push_x
-        pitched_z = cos_pitch * GRAVITY_M_S2 + sin_pitch * heading_x
-        external_x = cos_pitch * heading_x - sin_pitch * GRAVITY_M_S2
+        down = GRAVITY_M_S2 - self.lift_m_s2
+        pitched_z = cos_pitch * down + sin_pitch * heading_x
+        external_x = cos_pitch * heading_x - sin_pitch * down
         external_y = cos_roll * heading_y + sin_roll * pitched_z
         external_z = cos_roll * pitched_z - sin_roll * heading_y
 

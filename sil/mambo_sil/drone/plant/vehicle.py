@@ -86,6 +86,8 @@ class Moment:
     """Air velocity along x and y of the world; None is still air."""
     push_m_s2: tuple[PerFlight, PerFlight] = (0.0, 0.0)
     """Steady acceleration along x and y of the world."""
+    lift_m_s2: PerFlight = 0.0
+    """Acceleration upwards."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +209,7 @@ class Vehicle:
             self.drag_1_s,
             moment.push_m_s2,
             moment.air_m_s or (0.0, 0.0),
+            moment.lift_m_s2,
         )
 
     def integrate(
@@ -220,7 +223,13 @@ class Vehicle:
         if moment is not None:
             wrenches = moment.thrust_share * wrenches
             mass_kg = self.airframe.mass_kg + moment.payload_kg
-            body = replace(body, mass_kg=mass_kg, push_m_s2=moment.push_m_s2, air_m_s=moment.air_m_s)
+            body = replace(
+                body,
+                mass_kg=mass_kg,
+                push_m_s2=moment.push_m_s2,
+                air_m_s=moment.air_m_s,
+                lift_m_s2=moment.lift_m_s2,
+            )
         inputs = (wrenches[:, 0], wrenches[:, 1], wrenches[:, 2])
 
         def derivative(stage: FloatArray, wrench: FloatArray) -> FloatArray:

@@ -44,6 +44,8 @@ from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _LONGEST_LIST: Final = 10
+_RARE: Final = 1e-9
+"""A share of draws that no campaign meets."""
 
 
 class FileSection(BaseModel):
@@ -265,7 +267,20 @@ def load_its_drone(file: File, folder: Path, source: str, vehicle: str | None) -
         "flight": with_drone(content.flight, drone, source, replaced=vehicle is not None),
         "draws": with_defaults(content.draws, drone),
     }
+    _demand_mass(update["draws"], source)
     return file.model_copy(update=update), drone
+
+
+def _demand_mass(draws: Any, source: str) -> None:
+    """Raise InvalidSettingsError if dropping the payload can leave no mass: of 10^9 flights one or more."""
+    mass_kg, payload_kg = (one.quantile(_RARE) for one in (draws.mass_kg, draws.payload_kg))
+    if mass_kg + payload_kg <= 0.0:
+        raise InvalidSettingsError(
+            (
+                f"{source}: draws.payload_kg, down to {payload_kg:g}, must leave a positive mass of "
+                f"draws.mass_kg, down to {mass_kg:g}; a negative payload is dropped",
+            )
+        )
 
 
 def with_drone(flight: Flown, drone: VehicleFile, source: str, *, replaced: bool) -> Flown:

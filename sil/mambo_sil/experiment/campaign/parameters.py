@@ -54,13 +54,16 @@ PARAMETERS: Final[dict[str, Distribution]] = {
     **_axes("start_velocity", "_m_s", "xyz", (-10.0, 10.0), _uniform(-0.2, 0.2)),
     "start_roll_rad": _parameter(-1.0, 1.0, _uniform(-0.1, 0.1)),
     "start_pitch_rad": _parameter(-1.0, 1.0, _uniform(-0.1, 0.1)),
-    "payload_kg": _parameter(0.0, 1.0, 0.0),
+    "payload_kg": _parameter(-0.5, 1.0, 0.0),
     "payload_time_s": _parameter(0.0, 3600.0, 0.0),
     **_axes("impulse", "_n_s", "xyz", (-1.0, 1.0), 0.0),
     "impulse_time_s": _parameter(0.0, 3600.0, 0.0),
     "trajectory": parse("bernoulli", Domain.of_names(CURVE_NAMES)),
     "size_m": _parameter(-1000.0, 1000.0, 2.0),
     "rate_rad_s": _parameter(-100.0, 100.0, 0.5),
+    "vertical_gust_m_s2": _parameter(-100.0, 100.0, 0.0),
+    "vertical_gust_time_s": _parameter(0.0, 3600.0, 0.0),
+    "ground_effect_radius_m": _parameter(0.0, 1.0, 0.0),
 }
 """Domain and default distribution by name, with the Mambo, in the order in which they use the
 random stream of a flight: a new parameter must be appended."""

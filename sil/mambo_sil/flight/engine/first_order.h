@@ -41,9 +41,9 @@ static inline void follow(const engine_simulation_t *simulation, int64_t tick, c
     slopes_rad_s[2] = (heading_rad - nodes_rad[2][2]) / simulation->yaw_lag_s;
 }
 
-/* Acceleration in the world by thrust, push and gravity. */
+/* Acceleration in the world by thrust, push, gravity and lift. */
 static inline void accelerate(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                              real_t thrust_acceleration_m_s2, const real_t *angles_rad, real_t *acceleration_m_s2)
+                              const surroundings_t *around, real_t thrust_acceleration_m_s2, const real_t *angles_rad, real_t *acceleration_m_s2)
 {
     const real_t thrust[3] = { splat(0.0), splat(0.0), -thrust_acceleration_m_s2 };
     const real_t trimmed_rad[3] = { angles_rad[0] - simulation->trim_rad[0],
@@ -55,7 +55,7 @@ static inline void accelerate(const engine_simulation_t *simulation, const engin
     for (i = 0; i < 2; i++) {
         acceleration_m_s2[i] = (simulation->acceleration_per_tilt_g * acceleration_m_s2[i]) + flight->push_m_s2[i];
     }
-    acceleration_m_s2[2] = acceleration_m_s2[2] + simulation->gravity_m_s2;
+    acceleration_m_s2[2] = acceleration_m_s2[2] + (simulation->gravity_m_s2 - around->lift_m_s2);
 }
 
 /* Time derivative of position and velocity in the world. */
@@ -102,17 +102,17 @@ static inline void advance(const engine_simulation_t *simulation, const engine_f
     }
     to_world(r, body + VELOCITY, motion + 3);
 
-    accelerate(simulation, flight, thrust_acceleration_m_s2, body + EULER, acceleration_m_s2);
+    accelerate(simulation, flight, around, thrust_acceleration_m_s2, body + EULER, acceleration_m_s2);
     motion_derivative(flight, around, motion, acceleration_m_s2, first);
     for (i = 0; i < 6; i++) {
         inner[i] = motion[i] + (half_s * first[i]);
     }
-    accelerate(simulation, flight, thrust_acceleration_m_s2, nodes_rad[0], acceleration_m_s2);
+    accelerate(simulation, flight, around, thrust_acceleration_m_s2, nodes_rad[0], acceleration_m_s2);
     motion_derivative(flight, around, inner, acceleration_m_s2, second);
     for (i = 0; i < 6; i++) {
         inner[i] = motion[i] + (three_quarters_s * second[i]);
     }
-    accelerate(simulation, flight, thrust_acceleration_m_s2, nodes_rad[1], acceleration_m_s2);
+    accelerate(simulation, flight, around, thrust_acceleration_m_s2, nodes_rad[1], acceleration_m_s2);
     motion_derivative(flight, around, inner, acceleration_m_s2, third);
     for (i = 0; i < 6; i++) {
         motion[i] = motion[i] + (ninth_s * (((2.0 * first[i]) + (3.0 * second[i])) + (4.0 * third[i])));

@@ -7,6 +7,16 @@
 
 #include "vehicle.h"
 
+/* Thrust near the ground over that far from it: Cheeseman and Bennett (1955). */
+static inline real_t ground_effect(const engine_simulation_t *simulation, const engine_flight_t *flight, real_t height_m)
+{
+    const real_t radius_m = flight->ground_effect_radius_m;
+    const real_t rotor_height_m = maximum(height_m + simulation->rotor_height_m, radius_m / 2.0);
+    const real_t ratio = radius_m / (4.0 * rotor_height_m);
+
+    return choose(radius_m > 0.0, 1.0 / (1.0 - (ratio * ratio)), splat(1.0));
+}
+
 /* Put drones that are below the ground on it, at rest and level unless they rise. */
 static inline void carry_on_ground(const engine_flight_t *flight, real_t *body)
 {

@@ -184,7 +184,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
         const int64_t ticks = flying->ticks;
         const int64_t now = simulation->first_tick + ticks;
         const int64_t row = (update * simulation->ticks_per_update) + tick;
-        surroundings_t around = { flight->mass_kg, { splat(0.0), splat(0.0) } };
+        surroundings_t around = { flight->mass_kg, { splat(0.0), splat(0.0) }, splat(0.0) };
         real_t thrust_share = splat(1.0);
         real_t thrust_n = splat(simulation->take_off_thrust_n);
         real_t drawn[8];
@@ -199,7 +199,11 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
 
             apply_impulse(flight, now, payload_kg, &r, state);
             thrust_share = maximum(1.0 - (flight->battery_sag_1_s * (simulation->step_s * (double)ticks)), splat(0.0));
+            if (simulation->near_ground) {
+                thrust_share = thrust_share * ground_effect(simulation, flight, -state->body[POSITION + 2]);
+            }
             around.mass_kg = flight->mass_kg + payload_kg;
+            around.lift_m_s2 = choose(flight->vertical_gust_tick <= now, flight->vertical_gust_m_s2, splat(0.0));
             if (simulation->windy) {
                 take(draws->gusts, rows + 1, row + 1, 3, drawn);
                 blow(simulation, flight, drawn, &flying->gusts, around.air_m_s);

@@ -12,12 +12,14 @@ typedef struct {
     int64_t ticks_per_update;
     int64_t first_tick;       /* on the trajectory's clock: negative for a take-off */
     int64_t lifting_updates;  /* updates with the constant thrust of a take-off */
-    int64_t disturbed;        /* whether any flight has gusts, payload, push, impulse or battery sag */
+    int64_t disturbed;        /* whether any flight has gusts, payload, push, impulse, battery sag or ground
+                               * effect */
     int64_t windy;            /* whether any flight has gusts */
     int64_t dropping;         /* whether any flight drops updates */
     int64_t sensed;           /* whether controllers receive estimates */
     int64_t captured;         /* whether these come from motion capture */
     int64_t derotated;        /* whether the gyro's rotation is subtracted from the optical flow */
+    int64_t near_ground;      /* whether any flight has ground effect */
     int64_t landing;          /* whether the ground carries any drone */
     int64_t target_columns;   /* of a row of targets: 6, or 9 if courses have heights */
 
@@ -25,6 +27,7 @@ typedef struct {
     double gravity_m_s2;
     double lost_m;
     double height_reference_m;
+    double rotor_height_m;    /* above the feet */
 
     double gust_across[2];    /* gains of the states a and b of the gust across the wind */
 
@@ -134,6 +137,9 @@ typedef struct {
     whole_t payload_tick;     /* on the trajectory's clock */
     real_t impulse_n_s[3];
     whole_t impulse_tick;        /* on the trajectory's clock */
+    real_t vertical_gust_m_s2;
+    whole_t vertical_gust_tick; /* on the trajectory's clock */
+    real_t ground_effect_radius_m;
 
     whole_t delay_ticks;
     real_t dropped_share;

@@ -12,6 +12,7 @@ from mambo_sil.drone.plant import gusts, loops
 from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
+from mambo_sil.drone.plant.ground import ROTOR_HEIGHT_M
 from mambo_sil.drone.plant.rotors import wrench_per_command
 from mambo_sil.drone.plant.vehicle import STEP_S
 from mambo_sil.drone.sensors import estimators, instruments, mocap
@@ -58,12 +59,14 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "sensed": sensors is not None,
             "captured": isinstance(sensors, MotionCapture),
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
+            "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
             "target_columns": flight.given_targets.shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,
             "height_reference_m": HEIGHT_REFERENCE_M,
+            "rotor_height_m": ROTOR_HEIGHT_M,
             "gust_across": gusts.ACROSS_GAINS,
             "altitude_p_n_m": drone.altitude.p_n_m,
             "altitude_d_n_s_m": drone.altitude.d_n_s_m,
@@ -143,6 +146,9 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
             "payload_tick": np.rint(np.asarray(disturbances.payload_time_s) / step_s),
             "impulse_n_s": _columns(disturbances.impulse_n_s, n),
             "impulse_tick": np.rint(np.asarray(disturbances.impulse_time_s) / step_s),
+            "vertical_gust_m_s2": disturbances.vertical_gust_m_s2,
+            "vertical_gust_tick": np.rint(np.asarray(disturbances.vertical_gust_time_s) / step_s),
+            "ground_effect_radius_m": disturbances.ground_effect_radius_m,
             "delay_ticks": flight.link.delay_ticks,
             "dropped_share": flight.link.dropped_share,
             **_noise(flight),

@@ -19,10 +19,11 @@ typedef struct {
     real_t sin_roll, cos_roll, sin_pitch, cos_pitch, sin_yaw, cos_yaw;
 } rotation_t;
 
-/* Mass and wind of one tick. */
+/* Mass, wind and acceleration upwards in one tick. */
 typedef struct {
     real_t mass_kg;
     real_t air_m_s[2];
+    real_t lift_m_s2;
 } surroundings_t;
 
 static inline rotation_t rotation(const real_t *euler_rad)
@@ -81,8 +82,9 @@ static inline void derivative(const engine_simulation_t *simulation, const engin
     const real_t push_y = flight->push_m_s2[1];
     real_t heading_x = (r->cos_yaw * push_x) + (r->sin_yaw * push_y);
     real_t heading_y = (r->cos_yaw * push_y) - (r->sin_yaw * push_x);
-    const real_t pitched_z = (r->cos_pitch * simulation->gravity_m_s2) + (r->sin_pitch * heading_x);
-    const real_t external_x = (r->cos_pitch * heading_x) - (r->sin_pitch * simulation->gravity_m_s2);
+    const real_t down = simulation->gravity_m_s2 - around->lift_m_s2;
+    const real_t pitched_z = (r->cos_pitch * down) + (r->sin_pitch * heading_x);
+    const real_t external_x = (r->cos_pitch * heading_x) - (r->sin_pitch * down);
     const real_t external_y = (r->cos_roll * heading_y) + (r->sin_roll * pitched_z);
     const real_t external_z = (r->cos_roll * pitched_z) - (r->sin_roll * heading_y);
     real_t yaw_rate;
