@@ -67,6 +67,14 @@ def cases(vehicle: str) -> dict[str, LimitsCase]:
     }
 
 
+def unlimited(preset: str) -> Settings:
+    """Return a preset without limits of speed and braking."""
+    settings = presets.preset(preset)
+    for name in ("speed_m_s", "braking_m_s2"):
+        settings = with_option(settings, f"limits.{name}", 0.0)
+    return settings
+
+
 def limited(preset: str, speed_m_s: float, braking_m_s2: float, wall_m: float = 0.0) -> Settings:
     """Return a preset with these limits, and walls at plus and minus `wall_m` along x and y; 0 for none."""
     settings = presets.preset(preset)
@@ -140,14 +148,14 @@ def rows() -> list[dict[str, str]]:
 
     found = []
     for preset, vehicle in PRESETS.items():
-        plain = flown(presets.preset(preset), vehicle, PositionStep(24, 18), 20.0, LimitsCase())
+        plain = flown(unlimited(preset), vehicle, PositionStep(24, 18), 20.0, LimitsCase())
         circle = Circle(1.0, 2.2)
         found.append(
             _row(
                 preset,
                 "state known, no limits",
                 plain,
-                flown(presets.preset(preset), vehicle, circle, 30.0, LimitsCase()),
+                flown(unlimited(preset), vehicle, circle, 30.0, LimitsCase()),
                 cell,
             )
         )
@@ -180,7 +188,7 @@ def _row(preset: str, name: str, step: Trace, circle: Trace, cell: Callable[...,
 def draw_step(stem: Path) -> None:
     """Draw distance flown and speed of a step of 30 m, with and without limits."""
     flights = {
-        "no limits": (presets.preset("mambo"), VERMILION),
+        "no limits": (unlimited("mambo"), VERMILION),
         "speed 5 m/s, braking 3 m/s$^2$": (limited("mambo", 5.0, 3.0), BLUE),
     }
     with style():

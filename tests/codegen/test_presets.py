@@ -42,6 +42,8 @@ def departures(settings: Settings) -> dict[str, Any]:
                 "target.tracker_gain": 0.5,
                 "cost.norm": "quadratic",
                 "damping.roll_rate_feedback_s": 0.05,
+                "limits.speed_m_s": 5.0,
+                "limits.braking_m_s2": 3.0,
             },
         ),
         (
@@ -64,6 +66,8 @@ def departures(settings: Settings) -> dict[str, Any]:
                 "observer.velocity_noise": 0.15,
                 "observer.age_s": 0.01,
                 "limits.tilt_rad": 0.5,
+                "limits.speed_m_s": 5.0,
+                "limits.braking_m_s2": 3.75,
             },
         ),
         (

@@ -7,13 +7,13 @@
  * take_numbers() calls every function, and assumes of sine and cosine what turn_everywhere() proves for every heading:
  * no overflow, and a magnitude of at most one plus rounding.
  *
- * Settings bea66f7f9923efd1. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
+ * Settings 38dc42dde7443ad2. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
  */
 #include <stddef.h>
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x22D24429UL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x48A3891DUL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -105,6 +105,28 @@ static void reset(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_reset(self, (any_int != 0) ? &command : NULL);
 }
 
+static nmpc_limits_t limits_of(const nmpc_real_t input[INPUTS])
+{
+    nmpc_limits_t limits;
+
+    limits.speed_m_s = input[0];
+    limits.braking_m_s2 = input[1];
+    limits.fence_min_m[0] = input[2];
+    limits.fence_min_m[1] = input[3];
+    limits.fence_max_m[0] = input[4];
+    limits.fence_max_m[1] = input[5];
+    limits.tilt_rad = input[6];
+    return limits;
+}
+
+static void set_limits(nmpc_t *self, const nmpc_real_t input[INPUTS])
+{
+    nmpc_limits_t limits = limits_of(input);
+
+    nmpc_default_limits((any_int != 0) ? &limits : NULL);
+    (void)nmpc_set_limits(self, (any_int != 0) ? &limits : NULL);
+}
+
 static void set_command(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_command_t command = command_of(input);
@@ -117,6 +139,7 @@ static void read_results(const nmpc_t *self)
     nmpc_estimate_t estimate;
 
     (void)nmpc_is_saturated(self);
+    (void)nmpc_limits_active(self);
     (void)nmpc_last_estimate(self, &estimate);
     (void)nmpc_last_estimate(NULL, &estimate);
     (void)nmpc_last_estimate(self, NULL);
@@ -147,6 +170,9 @@ void take_numbers(void)
             break;
         case 3:
             read_results(&controller);
+            break;
+        case 4:
+            set_limits(self, input);
             break;
         default:
             step(self, input);

@@ -20,7 +20,7 @@
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF8CA429DUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x663AE989UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -32,6 +32,7 @@
 #define NMPC_FUZZ_RESET 1U
 #define NMPC_FUZZ_SET_COMMAND 2U
 #define NMPC_FUZZ_INIT 3U
+#define NMPC_FUZZ_SET_LIMITS 4U /* written as 2 with bit 6 */
 #define NMPC_FUZZ_NULL_SELF 1U
 #define NMPC_FUZZ_NULL_FIRST 2U
 #define NMPC_FUZZ_NULL_SECOND 4U
@@ -53,6 +54,7 @@ typedef struct {
     nmpc_target_t target;
     nmpc_real_t thrust_acceleration_m_s2;
     nmpc_command_t start;
+    nmpc_limits_t limits;
 } nmpc_fuzz_call_t;
 
 static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
@@ -77,6 +79,16 @@ static nmpc_fuzz_call_t nmpc_fuzz_decode(const uint8_t *bytes)
     call.thrust_acceleration_m_s2 = values[11];
     call.start.roll_rad = values[0];
     call.start.pitch_rad = values[1];
+    if ((call.function == 2U) && (((unsigned int)bytes[0] & 64U) != 0U)) {
+        call.function = NMPC_FUZZ_SET_LIMITS;
+    }
+    call.limits.speed_m_s = values[0];
+    call.limits.braking_m_s2 = values[1];
+    call.limits.fence_min_m[0] = values[2];
+    call.limits.fence_min_m[1] = values[3];
+    call.limits.fence_max_m[0] = values[4];
+    call.limits.fence_max_m[1] = values[5];
+    call.limits.tilt_rad = values[6];
     return call;
 }
 
@@ -99,6 +111,9 @@ static nmpc_status_t nmpc_fuzz_make(nmpc_t *controller, const nmpc_fuzz_call_t *
         break;
     case NMPC_FUZZ_SET_COMMAND:
         status = nmpc_set_command(self, no_first ? 0 : &call->start);
+        break;
+    case NMPC_FUZZ_SET_LIMITS:
+        status = nmpc_set_limits(self, no_first ? 0 : &call->limits);
         break;
     default:
         nmpc_init(self);
@@ -147,6 +162,31 @@ static nmpc_status_t nmpc_fuzz_promised_step(const nmpc_fuzz_call_t *call)
     return status;
 }
 
+/* Return whether every limit lies within its range; a braking may still be more than the tilt limit gives. */
+static int nmpc_fuzz_are_in_range(const nmpc_limits_t *limits)
+{
+    int axis;
+    int good = nmpc_fuzz_lies_in(limits->speed_m_s, NMPC_SMALLEST_SPEED_LIMIT_M_S, NMPC_VELOCITY_RANGE_M_S)
+               && nmpc_fuzz_lies_in(limits->tilt_rad, (nmpc_real_t)0, NMPC_TILT_LIMIT_RAD)
+               && !((limits->braking_m_s2 != limits->braking_m_s2) || (limits->braking_m_s2 < NMPC_SMALLEST_BRAKING_LIMIT_M_S2));
+
+    for (axis = 0; axis < 2; axis++) {
+        good = good && nmpc_fuzz_lies_in(limits->fence_min_m[axis], -NMPC_POSITION_RANGE_M, NMPC_POSITION_RANGE_M)
+               && nmpc_fuzz_lies_in(limits->fence_max_m[axis], -NMPC_POSITION_RANGE_M, NMPC_POSITION_RANGE_M)
+               && (limits->fence_min_m[axis] < limits->fence_max_m[axis]);
+    }
+    return good;
+}
+
+/* Return the status that nmpc.h promises for limits: that of another controller, where they are in range. */
+static nmpc_status_t nmpc_fuzz_promised_limits(const nmpc_limits_t *limits)
+{
+    static nmpc_t other;
+
+    nmpc_init(&other);
+    return nmpc_fuzz_are_in_range(limits) ? nmpc_set_limits(&other, limits) : NMPC_BAD_LIMITS;
+}
+
 /* Return the status that nmpc.h promises for `call`; NMPC_OK for nmpc_init(), which returns none. */
 static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
 {
@@ -166,6 +206,9 @@ static nmpc_status_t nmpc_fuzz_promised(const nmpc_fuzz_call_t *call)
             status = NMPC_BAD_COMMAND;
         }
         break;
+    case NMPC_FUZZ_SET_LIMITS:
+        status = nmpc_fuzz_promised_limits(&call->limits);
+        break;
     default:
         pointers = 0U;
         break;
@@ -180,12 +223,12 @@ static int nmpc_fuzz_same(nmpc_real_t a, nmpc_real_t b)
 }
 
 /* Return `value` clamped to the tilt limit. */
-static nmpc_real_t nmpc_fuzz_limited(nmpc_real_t value)
+static nmpc_real_t nmpc_fuzz_limited(const nmpc_t *self, nmpc_real_t value)
 {
-    if (value > NMPC_TILT_LIMIT_RAD) {
-        return NMPC_TILT_LIMIT_RAD;
+    if (value > self->bounds.tilt_rad) {
+        return self->bounds.tilt_rad;
     }
-    return (value < -NMPC_TILT_LIMIT_RAD) ? -NMPC_TILT_LIMIT_RAD : value;
+    return (value < -self->bounds.tilt_rad) ? -self->bounds.tilt_rad : value;
 }
 
 /* The numbers of a controller, in the order of its members. */
@@ -227,21 +270,24 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
     (void)memcpy(&before, self, sizeof(before));
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(self, call, &command) == promised);
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_make(twin, &other, &twin_command) == promised);
-    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND)) {
+    if ((promised == NMPC_NULL_POINTER) || (promised == NMPC_BAD_COMMAND) || (promised == NMPC_BAD_LIMITS)) {
         NMPC_FUZZ_REQUIRE(memcmp(&before, self, sizeof(before)) == 0);
         if (is_step && ((call->nulls & NMPC_FUZZ_NULL_COMMAND) == 0U)) {
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, has_self ? last->roll_rad : (nmpc_real_t)0));
             NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.pitch_rad, has_self ? last->pitch_rad : (nmpc_real_t)0));
         }
     } else if (is_step && ((promised == NMPC_BAD_TARGET) || (promised == NMPC_BAD_THRUST)
-                           || ((promised == NMPC_BAD_STATE) && (before.missed >= NMPC_OUTAGE_STEPS)))) {
+                           || ((promised == NMPC_BAD_STATE) && (before.missed >= (NMPC_OUTAGE_STEPS + 2U))))) {
         NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, last->roll_rad));
         NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.pitch_rad, last->pitch_rad));
     } else if (is_step) {
         *last = command;
     } else if ((call->function == NMPC_FUZZ_RESET) || (call->function == NMPC_FUZZ_SET_COMMAND)) {
-        last->roll_rad = nmpc_fuzz_limited(call->start.roll_rad);
-        last->pitch_rad = nmpc_fuzz_limited(call->start.pitch_rad);
+        last->roll_rad = nmpc_fuzz_limited(self, call->start.roll_rad);
+        last->pitch_rad = nmpc_fuzz_limited(self, call->start.pitch_rad);
+    } else if (call->function == NMPC_FUZZ_SET_LIMITS) {
+        last->roll_rad = nmpc_fuzz_limited(self, last->roll_rad);
+        last->pitch_rad = nmpc_fuzz_limited(self, last->pitch_rad);
     } else if (has_self) {
         last->roll_rad = (nmpc_real_t)0;
         last->pitch_rad = (nmpc_real_t)0;
@@ -257,11 +303,12 @@ static void nmpc_fuzz_check(nmpc_t *self, nmpc_t *twin, const nmpc_fuzz_call_t *
         NMPC_FUZZ_REQUIRE((stored - stored) == (nmpc_real_t)0);
     }
     NMPC_FUZZ_REQUIRE((self->missed == twin->missed) && (self->saturated == twin->saturated));
+    NMPC_FUZZ_REQUIRE(nmpc_limits_active(self) == nmpc_limits_active(twin));
     NMPC_FUZZ_REQUIRE(nmpc_step(self, 0, 0, (nmpc_real_t)0, &command) == NMPC_NULL_POINTER);
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.roll_rad, last->roll_rad));
     NMPC_FUZZ_REQUIRE(nmpc_fuzz_same(command.pitch_rad, last->pitch_rad));
-    NMPC_FUZZ_REQUIRE(nmpc_fuzz_lies_in(command.roll_rad, -NMPC_TILT_LIMIT_RAD, NMPC_TILT_LIMIT_RAD));
-    NMPC_FUZZ_REQUIRE(nmpc_fuzz_lies_in(command.pitch_rad, -NMPC_TILT_LIMIT_RAD, NMPC_TILT_LIMIT_RAD));
+    NMPC_FUZZ_REQUIRE(nmpc_fuzz_lies_in(command.roll_rad, -self->bounds.tilt_rad, self->bounds.tilt_rad));
+    NMPC_FUZZ_REQUIRE(nmpc_fuzz_lies_in(command.pitch_rad, -self->bounds.tilt_rad, self->bounds.tilt_rad));
     NMPC_FUZZ_REQUIRE((nmpc_is_saturated(self) == 0) || (nmpc_is_saturated(self) == 1));
     NMPC_FUZZ_REQUIRE(nmpc_last_estimate(self, 0) == NMPC_NULL_POINTER);
     NMPC_FUZZ_REQUIRE(nmpc_last_estimate(0, &estimate) == NMPC_NULL_POINTER);

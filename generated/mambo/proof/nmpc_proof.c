@@ -6,17 +6,17 @@
  * the tilt limit.
  *
  * There are three proofs. take_numbers() calls every function with any numbers and infinities; an operation that could
- * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset() and nmpc_set_command() refuse it and write nothing, and
+ * result in NaN is an alarm. refuse_nan() passes NaN: nmpc_reset(), nmpc_set_command() and nmpc_set_limits() refuse it and write nothing, and
  * a step handles a state or a target with NaN as take_numbers() shows it for one with an infinity: nothing reads it.
  * turn_everywhere() proves for every heading what take_numbers() assumes of sine and cosine.
  *
- * Settings 6be943adab3a6f0a. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
+ * Settings 60dc29ec4c35eb25. Not for firmware: Eva assumes that a read of a volatile variable gives any value of its type.
  */
 #include <stddef.h>
 
 #include "nmpc.h"
 
-#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0xF8CA429DUL)
+#if !defined(NMPC_SETTINGS_ID) || (NMPC_SETTINGS_ID != 0x663AE989UL)
 #error "this file and its headers are of different bundles: run mambo-nmpc generate again"
 #endif
 
@@ -50,11 +50,23 @@ static void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_step2
 
 /* Whatever reads a target also calls this. */
 /*@ requires no_nan_in_the_target: nan_at < TARGET || nan_at == INPUTS;
-    assigns \result, *saturated \from axis, state[0 .. 7], limit_m_step2, *saturated;
-    ensures is_set: \initialized(saturated);
+    assigns \result \from *bounds, knee_m, position_m[0 .. 1], *target;
 */
-static nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[8], nmpc_real_t limit_m_step2,
-                                      unsigned char *saturated);
+static int limits_are_free(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
+                           const nmpc_target_t *target);
+
+/* More than 1/sqrt(x) for any x that is a square of a speed or of a distance beyond the knee. */
+#define ROOT_LIMIT 63245.555f
+
+/* The shift of the bits of a float means nothing to Eva; tests try inverse_root() for every float from 1 to 4, and for
+ * others times 4, which halves it. */
+/*@ requires is_no_small_square: nan_at == INPUTS ==> x >= 1e-09f;
+    assigns \result \from x;
+    ensures is_small: \is_finite(\result) && 0 <= \result <= ROOT_LIMIT;
+    ensures of_a_speed: x >= 0.009f ==> \result <= 12.0f;
+    ensures of_a_braking: x >= 0.1f ==> \result <= 4.0f;
+*/
+static nmpc_real_t inverse_root(nmpc_real_t x);
 
 /* The functions that have a contract above are static. */
 #include "nmpc.c"
@@ -134,6 +146,28 @@ static void reset(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_reset(self, (any_int != 0) ? &command : NULL);
 }
 
+static nmpc_limits_t limits_of(const nmpc_real_t input[INPUTS])
+{
+    nmpc_limits_t limits;
+
+    limits.speed_m_s = input[0];
+    limits.braking_m_s2 = input[1];
+    limits.fence_min_m[0] = input[2];
+    limits.fence_min_m[1] = input[3];
+    limits.fence_max_m[0] = input[4];
+    limits.fence_max_m[1] = input[5];
+    limits.tilt_rad = input[6];
+    return limits;
+}
+
+static void set_limits(nmpc_t *self, const nmpc_real_t input[INPUTS])
+{
+    nmpc_limits_t limits = limits_of(input);
+
+    nmpc_default_limits((any_int != 0) ? &limits : NULL);
+    (void)nmpc_set_limits(self, (any_int != 0) ? &limits : NULL);
+}
+
 static void set_command(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_command_t command = command_of(input);
@@ -146,6 +180,7 @@ static void read_results(const nmpc_t *self)
     nmpc_estimate_t estimate;
 
     (void)nmpc_is_saturated(self);
+    (void)nmpc_limits_active(self);
     (void)nmpc_last_estimate(self, &estimate);
     (void)nmpc_last_estimate(NULL, &estimate);
     (void)nmpc_last_estimate(self, NULL);
@@ -186,6 +221,9 @@ void take_numbers(void)
             break;
         case 3:
             read_results(&controller);
+            break;
+        case 4:
+            set_limits(self, input);
             break;
         default:
             step(self, input);
@@ -229,6 +267,12 @@ void refuse_nan(void)
             /*@ assert reset_refuses_nan: status != NMPC_OK; */
             status = nmpc_set_command(self, &command);
             /*@ assert set_command_refuses_nan: status != NMPC_OK; */
+        }
+        if (which < 7) {
+            const nmpc_limits_t limits = limits_of(input);
+
+            status = nmpc_set_limits(self, &limits);
+            /*@ assert set_limits_refuses_nan: status != NMPC_OK; */
         }
         status = nmpc_step(&any_controller, &state, &target, input[11], &command);
         /*@ assert step_refuses_nan: status != NMPC_OK; */
