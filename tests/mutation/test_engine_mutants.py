@@ -87,10 +87,10 @@ def digests(path: Path) -> Iterator[str]:
         yield from (trace.digest(index) for index in range(trace.flights))
     for fault in SHOWN:
         yield hashlib.sha256(injected(path, fault, any_inputs()).tobytes()).hexdigest()
-    faulty, reweighted = faulty_controller(settings, FAULTS, CHANGES, PATIENCE)
+    faulty, adjusted = faulty_controller(settings, FAULTS, CHANGES, PATIENCE)
     trace = fly_compiled(engine, faulty_flight(FAULTS), faulty)
     yield from (trace.digest(index) for index in range(trace.flights))
-    yield from (str(reweighted.answers), str(engine.engine_fastest_lanes()))
+    yield from (str(adjusted.answers), str(engine.engine_fastest_lanes()))
     sensed = Flight(Hover(), duration_s=1.0, sensors=Sensors(derotated=True))
     draws = np.random.default_rng(1).standard_normal((TICKS, NOISES))
     for each in evaluated():

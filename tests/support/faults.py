@@ -18,13 +18,13 @@ from mambo_sil.experiment.faults.fault import (
     SetThrust,
     ShiftState,
     ShiftTarget,
-    WeightChange,
     WrapYaw,
     move_target,
     shift_yaw,
 )
-from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller, ReweightedController
+from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.adjusted import AdjustedController, Adjustment
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.trajectories import Bernoulli
 
@@ -61,9 +61,9 @@ FAULTS: Final[tuple[Fault | None, ...]] = (
 """Faults of the inputs, from the first update on, missing updates, late commands, and all of these."""
 
 CHANGES: Final = (
-    WeightChange(1, 10, (math.nan, 1.0)),
-    WeightChange(4, 0, (0.0, 0.0)),
-    WeightChange(1, 30, (1.0, 0.5)),
+    Adjustment(1, 10, "set_weights", (math.nan, 1.0)),
+    Adjustment(4, 0, "set_weights", (0.0, 0.0)),
+    Adjustment(1, 30, "set_weights", (1.0, 0.5)),
 )
 """New weights of a 1-norm, of which the first are refused."""
 
@@ -97,11 +97,11 @@ def faulty_flight(faults: Sequence[Fault | None]) -> Flight:
 def faulty_controller(
     settings: Settings,
     faults: Sequence[Fault | None],
-    changes: Sequence[WeightChange],
+    changes: Sequence[Adjustment],
     patience: Sequence[int],
-) -> tuple[FaultyController, ReweightedController]:
+) -> tuple[FaultyController, AdjustedController]:
     """Return controllers with all wrappers, and that of them which has the answers to new weights."""
     compiled = CompiledController(settings, len(faults))
-    reweighted = ReweightedController(compiled, len(faults), changes)
-    caller = LevellingCaller(reweighted, compiled, np.array(patience))
-    return FaultyController(caller, faults, compiled.instances), reweighted
+    adjusted = AdjustedController(compiled, len(faults), changes)
+    caller = LevellingCaller(adjusted, compiled, np.array(patience))
+    return FaultyController(caller, faults, compiled.instances), adjusted

@@ -102,6 +102,11 @@ class Scenario(_Record):
     motor_lag_s: float = Field(_AS_THE_VEHICLE, ge=0.0, le=1.0)
     drag_1_s: float = Field(_AS_THE_VEHICLE, ge=0.0)
 
+    fence_m: float = Field(0.0, ge=0.0, le=LARGEST_SIZE_M)
+    """Half the width of a square fence round the origin, which the controller is given in flight; 0: none."""
+    fence_time_s: float = Field(0.0, ge=0.0, le=LONGEST_S)
+    """Time at which it is given the fence."""
+
     push_m_s2: Two = (0.0, 0.0)
     """Steady acceleration along x and y of the world."""
     wind_speed_m_s: float = Field(0.0, ge=0.0, le=50.0)

@@ -26,7 +26,6 @@ from mambo_sil.experiment.faults.fault import (
     ScaleState,
     SetState,
     SetThrust,
-    WeightChange,
     WrapYaw,
     move_target,
     shift_yaw,
@@ -37,11 +36,11 @@ from mambo_sil.experiment.faults.injection import (
     Applied,
     FaultyController,
     LevellingCaller,
-    ReweightedController,
 )
 from mambo_sil.experiment.faults.scenarios import FaultScenario, scenarios
 from mambo_sil.experiment.table2.table2 import CASES
 from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.adjusted import AdjustedController, Adjustment
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.traces import Trace
@@ -178,8 +177,8 @@ def test_late_commands_are_those_computed_earlier() -> None:
 def test_a_fault_of_one_flight_does_not_affect_the_others() -> None:
     """Two fault-free flights beside a faulty one, new weights and levelling included, keep their bits."""
     compiled = CompiledController(MAMBO, 3)
-    reweighted = ReweightedController(compiled, 3, [WeightChange(1, 10, (0.0, 0.0))])
-    caller = LevellingCaller(reweighted, compiled, np.array([2, 2, 2]))
+    adjusted = AdjustedController(compiled, 3, [Adjustment(1, 10, "set_weights", (0.0, 0.0))])
+    caller = LevellingCaller(adjusted, compiled, np.array([2, 2, 2]))
     nan = Fault(30, 80, SetState(range(1), math.nan))
     together = fly_start(FaultyController(caller, [None, nan, None]), flights=3)
     alone = fly_start(CompiledController(MAMBO))
@@ -192,10 +191,13 @@ def test_a_fault_of_one_flight_does_not_affect_the_others() -> None:
 def test_bad_weights_are_rejected_and_good_ones_accepted() -> None:
     """`answers` has the status of each flight's change; rejected weights change no bit of the flight."""
     alone = fly_start(CompiledController(MAMBO))
-    changes = [WeightChange(0, 30, (math.nan, 1.0)), WeightChange(1, 30, (0.0, 0.0))]
-    reweighted = ReweightedController(CompiledController(MAMBO, 2), 2, changes)
-    trace = fly_start(reweighted, flights=2)
-    assert reweighted.answers == [(0, Status.BAD_WEIGHT), (1, Status.OK)]
+    changes = [
+        Adjustment(0, 30, "set_weights", (math.nan, 1.0)),
+        Adjustment(1, 30, "set_weights", (0.0, 0.0)),
+    ]
+    adjusted = AdjustedController(CompiledController(MAMBO, 2), 2, changes)
+    trace = fly_start(adjusted, flights=2)
+    assert adjusted.answers == [(0, Status.BAD_WEIGHT), (1, Status.OK)]
     assert np.array_equal(trace.position_m[:, 0], alone.position_m[:, 0])
     held = trace.command_rad[30:, 1]
     assert (held == held[0]).all()  # both weights 0: the gradient is 0 and the plan stays

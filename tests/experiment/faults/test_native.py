@@ -19,12 +19,12 @@ from mambo_sil.experiment.faults.fault import (
     SetThrust,
     ShiftState,
     ShiftTarget,
-    WeightChange,
     WrapYaw,
 )
 from mambo_sil.experiment.faults.injection import FaultyController
 from mambo_sil.flight import loop
 from mambo_sil.flight.controllers.pd import PdController
+from mambo_sil.flight.engine.adjusted import Adjustment
 from mambo_sil.flight.engine.native import is_native
 from mambo_sil.flight.engine.simulate import fly
 from tests.support.faults import CHANGES, FAULTS, PATIENCE, UPDATES, faulty_controller, faulty_flight
@@ -43,7 +43,7 @@ SETTINGS = {
 def assert_same_bits(
     chosen: Settings,
     faults: Sequence[Fault | None],
-    changes: Sequence[WeightChange],
+    changes: Sequence[Adjustment],
     patience: Sequence[int],
 ) -> list[tuple[int, int]]:
     """Fly in C and in Python, compare traces and answers to weights, and return the answers."""
@@ -106,7 +106,9 @@ def test_any_fault_has_the_bits_of_python(data: st.DataObject) -> None:
     kind = data.draw(st.sampled_from(sorted(SETTINGS)))
     chosen = data.draw(st.lists(faults(), min_size=1, max_size=4))
     row, weight = st.integers(0, len(chosen) - 1), NUMBERS | st.floats(0.0, 10.0)
-    change = st.builds(WeightChange, row, st.integers(0, UPDATES), st.tuples(weight, weight))
+    change = st.builds(
+        Adjustment, row, st.integers(0, UPDATES), st.just("set_weights"), st.tuples(weight, weight)
+    )
     changes = (
         data.draw(st.lists(change, max_size=3, unique_by=lambda one: (one.row, one.update)))
         if kind.startswith("1-norm")

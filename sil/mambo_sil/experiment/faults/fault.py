@@ -147,12 +147,3 @@ class Fault:
     def drops(self, since: int) -> bool:
         """Return whether the update `since` updates after the onset is dropped."""
         return self.drop_every > 0 and since % self.drop_every == 0
-
-
-@dataclass(frozen=True)
-class WeightChange:
-    """New weights (tracking, effort) of flight `row`, set before update `update`."""
-
-    row: int
-    update: int
-    weights: tuple[float, float]

@@ -23,13 +23,15 @@ from mambo_sil.drone.plant.link import NOT_CALLED
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
-from mambo_sil.experiment.faults.fault import Fault, WeightChange
-from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller, ReweightedController
+from mambo_sil.experiment.faults.fault import Fault
+from mambo_sil.experiment.faults.injection import FaultyController, LevellingCaller
 from mambo_sil.experiment.faults.scenarios import TO_THE_END, FaultScenario, scenarios
 from mambo_sil.experiment.table2.table2 import CASES
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import crash_tilt_rad
+from mambo_sil.flight.engine.adjusted import AdjustedController, Adjustment
 from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.fences import with_limits
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m, saturated_share
 from mambo_sil.flight.traces import Trace
@@ -130,9 +132,9 @@ def fly_faults(
     sorties = _sorties(scenarios(settings) if chosen is None else chosen, period_s)
     flight = _flight(sorties, period_s, drone)
     compiled = controller(len(sorties))
-    reweighted = ReweightedController(compiled, len(sorties), _weight_changes(sorties, settings))
+    adjusted = AdjustedController(compiled, len(sorties), _adjustments(sorties, settings))
     patience = np.array([PATIENCE if sortie.scenario.levelled else NEVER for sortie in sorties])
-    caller = LevellingCaller(reweighted, compiled, patience)
+    caller = LevellingCaller(adjusted, compiled, patience)
     faults = [
         Fault(s.begin, s.end, s.scenario.alter, s.scenario.drop_every, s.scenario.late_updates)
         for s in sorties
@@ -145,7 +147,7 @@ def fly_faults(
             f"{settings.ranges.velocity_m_s:g}: must include the figure of eight of Table II, 2 m and 1 m/s"
         )
     limits_rad = method_of(settings).tilt_limit_rad, crash_tilt_rad(drone)
-    return _judge_faults(trace, sorties, reweighted.answers, *limits_rad)
+    return _judge_faults(trace, sorties, adjusted.answers, *limits_rad)
 
 
 def _flight(sorties: Sequence[_Sortie], period_s: float, drone: VehicleFile) -> Flight:
@@ -181,14 +183,17 @@ def _sorties(chosen: Sequence[FaultScenario], period_s: float) -> list[_Sortie]:
     return sorties
 
 
-def _weight_changes(sorties: Sequence[_Sortie], settings: Settings) -> list[WeightChange]:
+def _adjustments(sorties: Sequence[_Sortie], settings: Settings) -> list[Adjustment]:
     right = (settings.cost.tracking_weight, settings.cost.effort_weight)
-    changes = []
+    found = []
     for row, sortie in enumerate(sorties):
         if sortie.scenario.weights is not None:
-            changes.append(WeightChange(row, sortie.begin, sortie.scenario.weights))
-            changes.append(WeightChange(row, sortie.end, right))
-    return changes
+            found.append(Adjustment(row, sortie.begin, "set_weights", sortie.scenario.weights))
+            found.append(Adjustment(row, sortie.end, "set_weights", right))
+        if sortie.scenario.limits is not None:
+            found.append(Adjustment(row, sortie.begin, "set_limits", sortie.scenario.limits))
+            found.append(Adjustment(row, sortie.end, "set_limits", with_limits(settings)))
+    return found
 
 
 def _judge_faults(
@@ -239,7 +244,7 @@ def _judge_flight(
     saturated: float,
     crash_rad: float,
 ) -> Verdict:
-    """Judge flight `row`; `refused` holds the statuses of rejected weights, `saturated` is a share."""
+    """Judge flight `row`; `refused`: statuses of rejected weights and limits; `saturated`: a share."""
     scenario = sortie.scenario
     flown = slice(sortie.begin, None)
     seen = refused | set(trace.status[sortie.begin : sortie.end, row].tolist())

@@ -18,7 +18,6 @@ from mambo_sil.experiment.faults.fault import (
     SetThrust,
     ShiftState,
     ShiftTarget,
-    WeightChange,
     WrapYaw,
 )
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -85,32 +84,3 @@ def native_levelling(engine: Any, inner: Native, compiled: CompiledController, p
         record.level, record.patience = pointer("char *", level), patient
     kept = inner, memory, level
     return Native(engine.engine_levelling_step, records, ffi.sizeof("engine_levelling_t"), kept)
-
-
-def native_reweighted(
-    engine: Any,
-    inner: Native,
-    compiled: CompiledController,
-    changes: Sequence[WeightChange],
-    status: IntArray,
-) -> Native:
-    """Return the n controllers `inner`, the steps of `compiled`, with changes of their weights.
-
-    The engine writes the answer to each change into its element of `status`.
-    """
-    records = ffi.new("engine_reweighted_t[]", compiled.n)
-    kept: list[Any] = [inner, status]
-    for row in range(compiled.n):
-        records[row].controller, records[row].memory = inner.step, inner.instance(row)
-        own = [index for index, change in enumerate(changes) if change.row == row]
-        if own:
-            set_weights, weights = compiled.native_set_weights([changes[index].weights for index in own])
-            due = ffi.new("engine_weight_change_t[]", len(own))
-            for place, index in enumerate(own):
-                due[place].update = changes[index].update
-                due[place].weights = pointer("char *", weights[place])
-                due[place].status = pointer("int64_t *", status[index : index + 1])
-            records[row].set_weights = foreign("engine_setter_t", set_weights)
-            records[row].changes, records[row].count = due, len(own)
-            kept += [weights, due]
-    return Native(engine.engine_reweighted_step, records, ffi.sizeof("engine_reweighted_t"), tuple(kept))

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
 from mambo_sil.drone.plant.link import NOT_CALLED
-from mambo_sil.experiment.faults.fault import ControllerInput, Fault, WeightChange
-from mambo_sil.experiment.faults.faults_in_c import native_faulty, native_levelling, native_reweighted
+from mambo_sil.experiment.faults.fault import ControllerInput, Fault
+from mambo_sil.experiment.faults.faults_in_c import native_faulty, native_levelling
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.native import Native
-from mambo_sil.flight.loop import Outcome, PositionController
+from mambo_sil.flight.loop import PositionController
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,45 +80,6 @@ class FaultyController:
     def wrap(self, engine: Any, inner: Native) -> Native:
         """Return the same around `inner` in the engine, for one flight of each controller from its start."""
         return native_faulty(engine, inner, self._given, self._instances)
-
-
-class ReweightedController:
-    """n controllers whose weights change in flight.
-
-    Controllers of the batch whose weights stay receive NaN, which they reject.
-    """
-
-    def __init__(self, controller: CompiledController, n: int, changes: Sequence[WeightChange]) -> None:
-        self.controller = controller
-        self._n = n
-        self._changes = changes
-        self._update = 0
-        self._status = np.full(len(changes), NOT_CALLED, np.int64)
-
-    @property
-    def answers(self) -> list[tuple[int, int]]:
-        """Row and status of each change that was made, in the order of the changes given."""
-        return [
-            (change.row, int(status))
-            for change, status in zip(self._changes, self._status, strict=True)
-            if status != NOT_CALLED
-        ]
-
-    def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
-        """Set the weights due at this update, and step."""
-        due = [index for index, change in enumerate(self._changes) if change.update == self._update]
-        if due:
-            rows = [self._changes[index].row for index in due]
-            weights = np.full((self._n, 2), np.nan)
-            weights[rows] = [self._changes[index].weights for index in due]
-            self._status[due] = self.controller.set_weights(weights)[rows]
-        self._update += 1
-        outcome: Outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
-        return outcome
-
-    def wrap(self, engine: Any, inner: Native) -> Native:
-        """Return the same around `inner` in the engine, for one flight of each controller from its start."""
-        return native_reweighted(engine, inner, self.controller, self._changes, self._status)
 
 
 class LevellingCaller:

@@ -19,8 +19,12 @@ from mambo_sil.experiment.faults.fault import (
     move_target,
     shift_yaw,
 )
+from mambo_sil.flight.fences import square_fence, with_limits
 
 TO_THE_END: Final = math.inf
+FAR_M: Final = 30.0
+FENCE_M: Final = 1.0
+"""Half the width of a fence round the origin, which the figure of eight leaves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +33,7 @@ class FaultScenario:
 
     answers: exactly the statuses that the controller must return during the fault; None: any.
     weights: tracking and effort weight set at the onset; the settings' weights return at the end.
+    limits:  the numbers of nmpc_limits_t set at the onset; the settings' limits return at the end.
     moved_m: displacement of the true target along x from the onset on.
     turning: whether the heading turns throughout the flight.
     levelled: whether the caller commands zero tilt after `flights.PATIENCE` rejected steps.
@@ -40,6 +45,7 @@ class FaultScenario:
     drop_every: int = 0
     late_updates: int = 0
     weights: tuple[float, float] | None = None
+    limits: tuple[float, ...] | None = None
     answers: frozenset[int] | None = None
     moved_m: float = 0.0
     turning: bool = False
@@ -54,7 +60,7 @@ _DEGREES_PER_RAD: Final = 180.0 / math.pi
 def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
     """Return the faults; their magnitudes depend on the input ranges of `settings`.
 
-    Faults of the weights are there with a 1-norm only.
+    Faults of the weights are there with a 1-norm only, those of the limits with limits only.
     """
     jump_m = min(100.0, settings.ranges.position_m / 2.0)
     beyond_m = 3.0 * settings.ranges.position_m
@@ -99,6 +105,30 @@ def scenarios(settings: Settings) -> tuple[FaultScenario, ...]:
         FaultScenario("position and velocity in feet, 5 s", 5.0, _scaled(_FEET_PER_M, 1.0)),
         FaultScenario("position and velocity in mm, 5 s", 5.0, _scaled(1000.0, 1.0)),
         *(_wrong_weights(settings) if method_of(settings).weight_limits else ()),
+        *(_limited(settings) if method_of(settings).limiting else ()),
+    )
+
+
+def _limited(settings: Settings) -> tuple[FaultScenario, ...]:
+    ok, refused = _only(Status.OK), _only(Status.OK, Status.BAD_LIMITS)
+    near = with_limits(settings, **square_fence(FENCE_M))
+    far = move_target(FAR_M)
+    return (
+        FaultScenario(f"target {FAR_M:g} m away and stays", TO_THE_END, far, answers=ok, moved_m=FAR_M),
+        FaultScenario(f"target {FAR_M:g} m through a wall, 5 s", 5.0, far, limits=near, answers=ok),
+        FaultScenario(
+            f"fence of {2 * FENCE_M:g} m, state NaN in 100 of 300 steps, 9 s",
+            9.0,
+            SetState(range(7), _NAN, on=100, of=300),
+            limits=near,
+            answers=_only(Status.OK, Status.BAD_STATE),
+        ),
+        FaultScenario(f"fence of {2 * FENCE_M:g} m, 5 s", 5.0, limits=near, answers=ok),
+        FaultScenario("speed limit 0.5 m/s, 5 s", 5.0, limits=with_limits(settings, speed=0.5), answers=ok),
+        FaultScenario("limits NaN, 5 s", 5.0, limits=(_NAN,) * 7, answers=refused),
+        FaultScenario(
+            "fence inside out, 5 s", 5.0, limits=with_limits(settings, **square_fence(-1.0)), answers=refused
+        ),
     )
 
 

@@ -1,7 +1,7 @@
 """The compiled controller: the generated C with the interface of the reference controller."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -62,6 +62,10 @@ def empty_outcome(method: Method, n: int, integer: DTypeLike) -> dict[str, NDArr
     }
 
 
+Setter = Literal["set_weights", "set_limits"]
+SETTERS: Final[dict[Setter, Sequence[str]]] = {"set_weights": WEIGHTS, "set_limits": LIMITS}
+"""The functions that change a controller in flight, and the quantities of their numbers."""
+
 DIRT = b"\xa5"
 """Fills a controller's memory before nmpc_init, since memory on a board is not zero either."""
 
@@ -89,9 +93,9 @@ class CompiledController:
         """Return the function `nmpc_host_reset`, and `command_rad` (n, 2) as it reads them."""
         return self._native_set("nmpc_host_reset", command_rad, COMMAND)
 
-    def native_set_weights(self, weights: ArrayLike) -> tuple[Any, NDArray[Any]]:
-        """Return the function `nmpc_host_set_weights`, and `weights` (n, 2) as it reads them; of a 1-norm."""
-        return self._native_set("nmpc_host_set_weights", weights, WEIGHTS)
+    def native_setter(self, setter: Setter, values: ArrayLike) -> tuple[Any, NDArray[Any]]:
+        """Return the function of `set_weights` or `set_limits`, and `values` (n, k) as it reads them."""
+        return self._native_set(f"nmpc_host_{setter}", values, SETTERS[setter])
 
     @property
     def instances(self) -> NDArray[np.uint8]:

@@ -137,22 +137,22 @@ int64_t engine_levelling_step(void *self, const double *state, const double *tar
     return status;
 }
 
-int64_t engine_reweighted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
-                               double *command_rad)
+int64_t engine_adjusted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                             double *command_rad)
 {
-    engine_reweighted_t *reweighted = self;
+    engine_adjusted_t *adjusted = self;
     int64_t i;
 
-    for (i = 0; i < reweighted->count; i++) {
-        const engine_weight_change_t *change = &reweighted->changes[i];
+    for (i = 0; i < adjusted->count; i++) {
+        const engine_adjustment_t *adjustment = &adjusted->adjustments[i];
 
-        if (change->update == reweighted->update) {
+        if (adjustment->update == adjusted->update) {
             int status;
 
-            reweighted->set_weights(reweighted->memory, 1, change->weights, &status);
-            *change->status = status;
+            adjustment->set(adjusted->memory, 1, adjustment->values, &status);
+            *adjustment->status = status;
         }
     }
-    reweighted->update++;
-    return reweighted->controller(reweighted->memory, state, target, thrust_acceleration_m_s2, command_rad);
+    adjusted->update++;
+    return adjusted->controller(adjusted->memory, state, target, thrust_acceleration_m_s2, command_rad);
 }

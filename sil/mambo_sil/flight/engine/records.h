@@ -299,22 +299,22 @@ typedef struct {
 int64_t engine_levelling_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
                               double *command_rad);
 
-/* Weights in the numbers of a generated controller, and the status with which it answers. */
+/* Weights or limits in the numbers of a generated controller, and the status with which it answers. */
 typedef struct {
     int64_t update;
-    const void *weights;
+    engine_setter_t set;
+    const void *values;
     int64_t *status;
-} engine_weight_change_t;
+} engine_adjustment_t;
 
-/* A generated controller whose weights change: ReweightedController. */
+/* A generated controller whose weights or limits change: AdjustedController. */
 typedef struct {
     engine_controller_t controller;
     void *memory;
-    engine_setter_t set_weights;
-    const engine_weight_change_t *changes;
+    const engine_adjustment_t *adjustments;
     int64_t count;
     int64_t update;
-} engine_reweighted_t;
+} engine_adjusted_t;
 
-int64_t engine_reweighted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
-                               double *command_rad);
+int64_t engine_adjusted_step(void *self, const double *state, const double *target, double thrust_acceleration_m_s2,
+                             double *command_rad);
