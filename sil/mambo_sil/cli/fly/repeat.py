@@ -13,6 +13,7 @@ from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
+from mambo_sil.flight.fences import fenced
 from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.loop import fly as simulate
@@ -39,7 +40,8 @@ def fly_again(file: Path, output: Output, context: typer.Context) -> None:
             raise FlightError(f"--repeat {echo(str(file))} contains the whole flight: leave out {option}")
     record = (None if file.exists() else campaign_record(file)) or read_record(file)
     flight = flight_of([record.scenario], record.settings.horizon.update_period_s)
-    watched, controller = _controllers(record, flight)
+    watched, flies = _controllers(record, flight)
+    controller = fenced(flies, record.settings, [record.scenario], flight)
     files = FLIGHT_FILES if watched is None else (*FLIGHT_FILES, INNER_STEPS)
     with new_results(output.output, RepeatSummary.command, files) as folder:
         with progress_bar("repeating") as progress:

@@ -22,10 +22,11 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.evaluate import evaluate
 from mambo_sil.flight.engine.simulate import fly_groups
+from mambo_sil.flight.fences import LIMIT_METRICS, fenced, measure_limits
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import HEIGHT_METRICS, Metrics
 from mambo_sil.flight.scenario import Scenario, flight_of
-from mambo_sil.flight.traces import Trace
+from mambo_sil.flight.traces import SensedTrace, Trace
 
 INDICES: Final = tuple(field.name for field in fields(Metrics))
 """Metrics of the true flight."""
@@ -37,6 +38,9 @@ SEEN_INDICES: Final = tuple(name for name in INDICES if "rad" not in name)
 CRASHED, REFUSED, DIGEST = "crashed", "refused_updates", "trace_sha256"
 SATURATED: Final = "saturated_share"
 """Share of the commands with roll or pitch at the tilt limit of the settings; not a column of a campaign."""
+
+OF_LIMITS: Final = (*LIMIT_METRICS, *(SEEN + name for name in LIMIT_METRICS))
+"""How flights keep within the limits, truly and as the estimates tell; no columns of a campaign."""
 
 _DIGEST_BYTES: Final = 32
 
@@ -147,9 +151,10 @@ def fly_scenarios(
         flight = flight_of(scenarios, period_s)
         these = [one for one in entrants if one.settings.horizon.update_period_s == period_s]
         share = partial(_report_part, report, flown, len(these), len(entrants))
-        for group in fly_groups(flight, [_controller(one, flight) for one in these], share):
+        for group in fly_groups(flight, [_controller(one, scenarios, flight) for one in these], share):
             entrant, last = these[group.controller], group.first + group.trace.flights
             results = _evaluate(group.trace, method_of(entrant.settings).tilt_limit_rad, scenarios[0].vehicle)
+            results |= _evaluate_limits(group.trace, entrant, scenarios[group.first : last])
             for key, values in results.items():
                 for row, value in zip(rows[group.first : last], values, strict=True):
                     row[f"{entrant.name}_{key}"] = value
@@ -163,11 +168,12 @@ def _report_part(report: Report, before: int, parts: int, total: int, share: flo
     report((before + parts * share) / total)
 
 
-def _controller(entrant: Entrant, flight: Flight) -> PositionController:
+def _controller(entrant: Entrant, scenarios: Sequence[Scenario], flight: Flight) -> PositionController:
     if entrant.kind != "nmpc":
         return pd_controller(entrant.kind, flight)
     with _BUILDING:
-        return CompiledController(entrant.settings, flight.flights)
+        compiled = CompiledController(entrant.settings, flight.flights)
+    return fenced(compiled, entrant.settings, scenarios, flight)
 
 
 def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> dict[str, list[Any]]:
@@ -182,3 +188,17 @@ def _evaluate(trace: Trace, limit_rad: float, drone: VehicleFile) -> dict[str, l
         if metrics is not None:
             found |= {prefix + name: getattr(metrics, name).tolist() for name in names}
     return found | {DIGEST: [trace.digest(flight) for flight in range(trace.flights)]}
+
+
+def _evaluate_limits(trace: Trace, entrant: Entrant, scenarios: Sequence[Scenario]) -> dict[str, list[Any]]:
+    """Return how n flights keep within the limits, by key, each a list of n; nothing without limits.
+
+    Without sensors the estimates are the true state.
+    """
+    found: dict[str, list[Any]] = {}
+    if entrant.kind == "nmpc" and method_of(entrant.settings).limiting is not None:
+        seen = trace.as_seen() if isinstance(trace, SensedTrace) else trace
+        for prefix, view in (("", trace), (SEEN, seen)):
+            metrics = measure_limits(view, entrant.settings, scenarios)
+            found |= {prefix + name: getattr(metrics, name).tolist() for name in LIMIT_METRICS}
+    return found

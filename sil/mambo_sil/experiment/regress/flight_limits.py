@@ -3,7 +3,15 @@
 from dataclasses import dataclass
 from typing import Final
 
-from mambo_sil.experiment.campaign.campaign_flights import CRASHED, DIGEST, INDICES, REFUSED, SATURATED, Row
+from mambo_sil.experiment.campaign.campaign_flights import (
+    CRASHED,
+    DIGEST,
+    INDICES,
+    OF_LIMITS,
+    REFUSED,
+    SATURATED,
+    Row,
+)
 from mambo_sil.experiment.regress.baseline import Recorded
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.results.number_format import digits
@@ -49,7 +57,8 @@ def judge_flight(suite: FlightSuite, number: int, row: Row, held: Recorded) -> F
     """Compare flight `number` of a suite with its bounds, and with the values recorded of it, if any."""
     flight = suite.flights[number]
     counts: dict[str, Number] = {name: int(row[name]) for name in (CRASHED, REFUSED)}
-    metrics = counts | {name: float(row[name]) for name in (*INDICES, SATURATED)}
+    found = (*INDICES, SATURATED, *(name for name in OF_LIMITS if name in row))
+    metrics = counts | {name: float(row[name]) for name in found}
     checks = [
         _check(name, now, flight.bounds.get(name), suite.tolerances.get(name), held.get(name))
         for name, now in metrics.items()

@@ -22,7 +22,7 @@ from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.campaign.campaign_file import FileSection, load_drone, read_as
-from mambo_sil.experiment.campaign.campaign_flights import INDICES
+from mambo_sil.experiment.campaign.campaign_flights import INDICES, OF_LIMITS
 from mambo_sil.flight.names import SENSORS_OF
 from mambo_sil.flight.scenario import Scenario
 
@@ -136,7 +136,7 @@ class _BaselineBase(FileSection):
 
 
 Bounds: Any = create_model(
-    "Bounds", __base__=_BoundsBase, **{metric: _metric_field(10**12) for metric in INDICES}
+    "Bounds", __base__=_BoundsBase, **{metric: _metric_field(10**12) for metric in (*INDICES, *OF_LIMITS)}
 )
 """Largest allowed value of each metric; `crashed` says whether a flight may crash."""
 

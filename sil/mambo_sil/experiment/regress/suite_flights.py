@@ -3,9 +3,10 @@
 from collections.abc import Callable, Iterator
 
 from mambo_codegen.errors import InvalidSettingsError
+from mambo_codegen.methods import method_of
 from mambo_sil.errors import FlightError, WorkerError
 from mambo_sil.experiment.campaign.campaign_file import Entrant
-from mambo_sil.experiment.campaign.campaign_flights import MOST_TOGETHER, Row, fly_scenarios
+from mambo_sil.experiment.campaign.campaign_flights import MOST_TOGETHER, OF_LIMITS, Row, fly_scenarios
 from mambo_sil.experiment.campaign.executors import Pool
 from mambo_sil.experiment.regress.suite_file import FlightSuite
 from mambo_sil.flight.scenario import SHARED_KEYS, flight_of
@@ -15,7 +16,18 @@ _LONGEST_BATCH_S = 10_000.0
 
 
 def demand_flyable(suite: FlightSuite, entrant: Entrant, place: str) -> None:
-    """Raise InvalidSettingsError, which begins with `place`, if a flight cannot be simulated."""
+    """Raise InvalidSettingsError, which begins with `place`, if a flight cannot be simulated or judged."""
+    if entrant.kind != "nmpc" or method_of(entrant.settings).limiting is None:
+        for flight in suite.flights:
+            wanted = [key for key in ("fence_m",) if getattr(flight.scenario, key)]
+            wanted += [name for name in OF_LIMITS if name in flight.bounds]
+            if wanted:
+                raise InvalidSettingsError(
+                    (
+                        f"{place}: flights.{flight.group}.{wanted[0]}: wants a controller with limits; "
+                        "give it limits.speed_m_s, limits.braking_m_s2 or limits.fence",
+                    )
+                )
     kinds = {tuple(getattr(flight.scenario, key) for key in SHARED_KEYS): flight for flight in suite.flights}
     for one in kinds.values():
         try:

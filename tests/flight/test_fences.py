@@ -1,0 +1,123 @@
+"""Fences set in flight, and metrics of limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.errors import FlightError
+from mambo_sil.flight import loop
+from mambo_sil.flight.controllers.compiled import CompiledController
+from mambo_sil.flight.engine.native import is_native
+from mambo_sil.flight.engine.simulate import fly
+from mambo_sil.flight.fences import LimitMetrics, fenced, measure_limits, square_fence, walls_m, with_limits
+from mambo_sil.flight.scenario import Scenario, flight_of
+from mambo_sil.flight.traces import Trace
+from tests.support.tools import toolchain
+
+MAMBO = presets.preset("mambo")
+ONE_NORM = with_option(presets.preset("mambo-1norm"), "limits.speed_m_s", 2.0)
+
+
+def scenarios(count: int) -> list[Scenario]:
+    """Return a flight without a fence, and flights whose fence comes while they are outside of it."""
+    circle = Scenario(trajectory="circle", size_m=2.0, rate_rad_s=0.5, duration_s=4.0)
+    fence = circle.model_copy(update={"fence_m": 1.0, "fence_time_s": 1.0})
+    return [circle, *(fence.model_copy(update={"yaw_rad": 0.7 * one}) for one in range(1, count))]
+
+
+def trace_of(x_m: list[float], speed_m_s: list[float], target_x_m: list[float]) -> Trace:
+    """Return a flight along x with samples 5 s apart, whose target moves by jumps."""
+    shape = len(x_m), 1
+    position_m, velocity_m_s, target = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros((*shape, 4))
+    position_m[:, 0, 0], velocity_m_s[:, 0, 1], target[:, 0, 0] = x_m, speed_m_s, target_x_m
+    return Trace(
+        time_s=np.arange(0.0, 5.0 * len(x_m), 5.0),
+        position_m=position_m,
+        velocity_m_s=velocity_m_s,
+        euler_rad=np.zeros((*shape, 3)),
+        target=target,
+        command_rad=np.zeros((*shape, 2)),
+        thrust_acceleration_m_s2=np.full(shape, 9.81),
+        status=np.zeros(shape, np.int64),
+    )
+
+
+FLOWN = trace_of([0.0, 2.5, 3.5, 3.0], [0.0, 5.5, -6.0, 0.0], [0.0, 3.0, 3.0, 3.0])
+
+
+def values(found: LimitMetrics) -> list[float]:
+    """Return the metrics of one flight."""
+    return [float(value[0]) for value in vars(found).values()]
+
+
+def test_metrics_of_a_step_are_those_of_its_samples() -> None:
+    """6 m/s over a limit of 5; half a metre beyond the target; 1.5 m outside; an error of .5 m after 10 s."""
+    assert values(measure_limits(FLOWN, MAMBO, [Scenario(fence_m=2.0)])) == pytest.approx(
+        [0.2, 0.5, 1.5, 0.5]
+    )
+
+
+def test_without_a_fence_nothing_is_past_a_wall() -> None:
+    """And a target that moves at the end has no overshoot."""
+    moving = replace(FLOWN, target=FLOWN.target + np.array([0.0, 0.0, 1.0, 0.0]))
+    assert values(measure_limits(moving, MAMBO, [Scenario()])) == pytest.approx([0.2, 0.0, 0.0, 0.5])
+
+
+def test_a_fence_counts_from_the_first_time_inside() -> None:
+    """A drone outside of a new fence has to come back first; one that never does is outside to the end."""
+    back = trace_of([3.0, 1.5, 2.25, 1.0], [0.0] * 4, [0.0] * 4)
+    late = Scenario(fence_m=2.0, fence_time_s=4.0)
+    assert measure_limits(back, MAMBO, [late]).past_wall_m == pytest.approx([0.25])
+    assert measure_limits(back, MAMBO, [late.model_copy(update={"fence_m": 0.5})]).past_wall_m == [1.75]
+
+
+def test_walls_of_the_settings_are_a_fence_too() -> None:
+    """Along one axis only: there is none along the other."""
+    walled = MAMBO
+    for name, wall in (("y_min_m", -1.0), ("y_max_m", 1.0)):
+        walled = with_option(walled, f"limits.fence.{name}", wall)
+    assert walls_m(MAMBO) is None
+    assert walls_m(walled) == (-np.inf, -1.0, np.inf, 1.0)
+    assert measure_limits(FLOWN, walled, [Scenario()]).past_wall_m == [0.0]
+    beside = replace(FLOWN, position_m=FLOWN.position_m[..., [1, 0, 2]])
+    assert measure_limits(beside, walled, [Scenario()]).past_wall_m == [2.5]
+
+
+def test_a_lost_flight_has_no_metrics() -> None:
+    """NaN, which exceeds every bound."""
+    lost = replace(FLOWN, position_m=np.full_like(FLOWN.position_m, np.nan))
+    lost = replace(lost, velocity_m_s=lost.position_m)
+    for scenario in (Scenario(), Scenario(fence_m=1.0)):
+        assert np.isnan(values(measure_limits(lost, MAMBO, [scenario]))).all()
+
+
+@pytest.mark.parametrize("settings", [MAMBO, ONE_NORM], ids=["quadratic", "1-norm"])
+def test_a_fence_in_flight_has_the_bits_of_python(settings: Settings) -> None:
+    """The drone is outside when it comes, and flies in; the flight without a fence stays outside."""
+    toolchain("gcc")
+    chosen = scenarios(3)
+    flight = flight_of(chosen, settings.horizon.update_period_s)
+    flown = [fenced(CompiledController(settings, 3), settings, chosen, flight) for _ in range(2)]
+    assert is_native(flown[0])
+    trace = fly(flight, flown[0])
+    assert trace.same_bits(loop.fly(flight, flown[1]))
+    outside = np.abs(trace.position_m[-1, :, :2]).max(axis=1)
+    assert outside[0] > 1.5
+    assert (outside[1:] < 1.1).all()
+
+
+def test_flights_without_a_fence_have_their_controller() -> None:
+    """Itself, and no wrapper."""
+    one = scenarios(1)
+    flight, controller = flight_of(one, 0.01), CompiledController(MAMBO, 1)
+    assert fenced(controller, MAMBO, one, flight) is controller
+
+
+def test_a_fence_wants_limits() -> None:
+    """Settings without limits have no nmpc_set_limits."""
+    with pytest.raises(FlightError, match="no limits"):
+        with_limits(presets.preset("table1"), **square_fence(1.0))
