@@ -156,7 +156,7 @@ def test_a_board_that_stays_away_ends_the_flight(elf: Path) -> None:
 
 def test_a_board_that_restarts_with_other_firmware_is_refused(elf: Path, tmp_path: Path) -> None:
     """It would answer every step, with the bits of another controller."""
-    other = build_firmware(with_option(SETTINGS, "limits.tilt_rad", 0.3), "host", tmp_path)
+    other = build_firmware(with_option(SETTINGS, "limits.tilt_rad", 0.34), "host", tmp_path)
     faults = Faults(restarted=frozenset({30}), later=other)
     with (
         serial_line(elf, faults) as line,
