@@ -36,6 +36,9 @@ _INTERFACE.cdef(
     extern setpoint_t host_flown;
     extern int host_pid_calls;
     extern char host_console[1000];
+    extern uint32_t host_time_ms;
+    extern bool host_is_flying;
+    extern float host_variances[2];
     extern const struct variable host_logged[];
     extern const struct variable host_parameters[];
     const struct variable *host_find(const struct variable *table, const char *name);
@@ -58,7 +61,7 @@ def compile_host(source: Path, output: Path, *flags: str) -> Path:
 
 def link(objects: Sequence[Path], output: Path) -> Any:
     """Link objects as a shared library, and load it."""
-    shell(require("gcc", "gcc"), "-shared", *objects, "-o", output)
+    shell(require("gcc", "gcc"), "-shared", *objects, "-lm", "-o", output)
     return _INTERFACE.dlopen(str(output))
 
 
@@ -75,10 +78,14 @@ class Crazyflie:
 
     def __init__(self, library: Any) -> None:
         self.host = library
+        state: Any = _INTERFACE.new("state_t *")
         self.setpoint: Any = _INTERFACE.new("setpoint_t *")
-        self.state: Any = _INTERFACE.new("state_t *")
+        self.state: Any = state
+        self.time_ms = self.ticks = 1000
         self._control, self._sensors = _INTERFACE.new("control_t *"), _INTERFACE.new("sensorData_t *")
-        self.time_ms = 1000
+        state.position.z = 1.0
+        library.host_is_flying = True
+        library.host_variances = [0.0, 0.0]
         library.controllerOutOfTreeInit()
 
     @property
@@ -105,14 +112,20 @@ class Crazyflie:
         found = self.host.host_find(self.host.host_parameters, name.encode())
         self._pointer(found)[0] = value
 
+    def parameter(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        return self._pointer(self.host.host_find(self.host.host_parameters, name.encode()))[0]
+
     def _pointer(self, variable: Any) -> Any:
         kind = _INTERFACE.string(variable.type).decode()  # type: ignore[union-attr] # bytes
         return _INTERFACE.cast(f"{kind} *", variable.address)
 
     def tick(self) -> tuple[float, float]:
         """Call the app for the next millisecond; return roll and pitch of what flies, in degrees."""
-        self.host.controllerOutOfTree(self._control, self.setpoint, self._sensors, self.state, self.time_ms)
+        self.host.host_time_ms = self.time_ms
+        self.host.controllerOutOfTree(self._control, self.setpoint, self._sensors, self.state, self.ticks)
         self.time_ms += 1
+        self.ticks += 1
         return self.flown.attitude.roll, self.flown.attitude.pitch
 
     def place(self, state: FloatArray) -> None:

@@ -2,6 +2,6 @@
 #ifndef FREERTOS_H
 #define FREERTOS_H
 
-#define M2T(milliseconds) ((unsigned int)(milliseconds))
+#define T2M(ticks) ((unsigned int)(ticks))
 
 #endif

@@ -3,16 +3,19 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "app.h"
 #include "controller.h"
 #include "controller_pid.h"
 #include "debug.h"
 #include "log.h"
+#include "supervisor.h"
 #include "task.h"
 
 setpoint_t host_flown;
 int host_pid_calls;
 char host_console[1000];
+uint32_t host_time_ms;
+bool host_is_flying;
+float host_variances[2]; /* of the Kalman filter: position and velocity along x */
 
 void controllerPidInit(void) {}
 bool controllerPidTest(void) { return true; }
@@ -28,7 +31,18 @@ void controllerPid(control_t *control, const setpoint_t *setpoint, const sensorD
     host_pid_calls++;
 }
 
-void vTaskDelay(unsigned int ticks) { (void)ticks; }
+uint32_t xTaskGetTickCount(void) { return host_time_ms; }
+bool supervisorIsFlying(void) { return host_is_flying; }
+
+logVarId_t logGetVarId(const char *group, const char *name)
+{
+    if (strcmp(group, "kalman") != 0) {
+        return 0xffffU;
+    }
+    return (strcmp(name, "varX") == 0) ? 0U : (strcmp(name, "varPX") == 0) ? 1U : 0xffffU;
+}
+
+float logGetFloat(logVarId_t id) { return host_variances[id]; }
 
 int consolePrintf(const char *format, ...)
 {

@@ -4,11 +4,14 @@
 
 #include "log.h"
 
-#define PARAM_UINT8 "uint8_t"
-#define PARAM_FLOAT "float"
+/* The type of a parameter may be `PARAM_FLOAT | PARAM_PERSISTENT`. */
+#define PARAM_UINT8 1
+#define PARAM_FLOAT 2
+#define PARAM_PERSISTENT 0x100
 
 #define PARAM_GROUP_START(group) const struct variable host_parameters[] = { { "group", #group, 0 },
-#define PARAM_ADD(variable_type, variable_name, variable_address) LOG_ADD(variable_type, variable_name, variable_address)
+#define PARAM_ADD(kind, variable_name, variable_address) \
+    { (((kind) & 0xff) == PARAM_FLOAT) ? "float" : "uint8_t", #variable_name, variable_address },
 #define PARAM_GROUP_STOP(group) { 0, #group, 0 } };
 
 #endif

@@ -22,6 +22,13 @@ typedef struct {
 } vector_t;
 
 typedef struct {
+    float x;
+    float y;
+    float z;
+    float w;
+} quaternion_t;
+
+typedef struct {
     vector_t gyro;
 } sensorData_t;
 
@@ -55,6 +62,7 @@ typedef struct {
     uint32_t timestamp;
     attitude_t attitude;
     attitude_t attitudeRate;
+    quaternion_t attitudeQuaternion;
     float thrust;
     vector_t position;
     vector_t velocity;

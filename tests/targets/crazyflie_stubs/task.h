@@ -2,6 +2,8 @@
 #ifndef TASK_H
 #define TASK_H
 
-void vTaskDelay(unsigned int ticks);
+#include <stdint.h>
+
+uint32_t xTaskGetTickCount(void);
 
 #endif

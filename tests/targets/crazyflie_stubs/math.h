@@ -1,0 +1,13 @@
+/* Stub of the C library's header: what an out-of-tree controller uses, also where a compiler comes without a C library. */
+#ifndef MATH_H
+#define MATH_H
+
+#define NAN __builtin_nanf("")
+#define isfinite(value) __builtin_isfinite(value)
+
+float atan2f(float y, float x);
+float fabsf(float value);
+float fmaxf(float a, float b);
+float fminf(float a, float b);
+
+#endif
