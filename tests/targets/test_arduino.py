@@ -119,7 +119,8 @@ def test_keywords_are_the_names_of_the_header(name: str, tmp_path: Path) -> None
     assert {word for word, kind in listed.items() if kind == "KEYWORD2"} == functions
     statuses = set(re.findall(r"\bNMPC_(?:OK|NULL_POINTER|BAD_\w+)(?= =)", header))
     literals = {word for word, kind in listed.items() if kind == "LITERAL1"}
-    assert literals == statuses | {"NMPC_UPDATE_PERIOD_S", "NMPC_TILT_LIMIT_RAD"}
+    limits = set(re.findall(r"#define (NMPC_LIMIT_\w+)", header))
+    assert literals == statuses | limits | {"NMPC_UPDATE_PERIOD_S", "NMPC_TILT_LIMIT_RAD"}
     for word, kind in listed.items():
         assert kind != "KEYWORD1" or re.search(rf"\b{word}\b", header)
 

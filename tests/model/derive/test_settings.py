@@ -72,7 +72,7 @@ def test_a_shipped_drone_flies_well_with_them(name: str) -> None:
         circle = measure(flown(settings, drone, "circle", noisy=noisy))
         assert eight.iae_m_s.max() < most
         assert circle.iae_m_s.max() < 2.0 * most
-        assert max(eight.command_variation_rad.max(), circle.command_variation_rad.max()) < 0.016
+        assert max(eight.command_variation_rad.max(), circle.command_variation_rad.max()) < 0.017
         step = measure(flown(settings, drone, "step", noisy=noisy), start_s=5.0)
         assert step.rms_error_m.max() < (0.35 if noisy and name == "mambo" else 0.02)
 
@@ -160,6 +160,29 @@ def test_the_thrust_of_the_crazyflie_bounds_its_tilt() -> None:
     """0.12 N a motor, as its firmware has it: less than the bound of the model."""
     for name, tilt_rad in (("crazyflie", 0.455), ("crazyflie-l250", 0.418), ("crazyflie-brushless", 0.5)):
         assert settings_for(vehicle_toml.preset(name)).limits.tilt_rad == tilt_rad
+
+
+@pytest.mark.parametrize(
+    ("name", "braking_m_s2"), [("mambo", 2.75), ("crazyflie", 3.57), ("crazyflie-flown", 2.8)]
+)
+def test_the_braking_follows_from_the_tilt_limit(name: str, braking_m_s2: float) -> None:
+    """0.8 of gravity times tilt, gain and acceleration per tilt; the speed is 5 m/s."""
+    limits = settings_for(vehicle_toml.preset(name)).limits
+    assert (limits.speed_m_s, limits.braking_m_s2) == (5.0, braking_m_s2)
+
+
+def test_a_trim_takes_its_share_of_the_braking() -> None:
+    """Along the axis that it hinders, so that the braking is never more than settings allow."""
+    drone = vehicle_toml.preset("crazyflie-flown")
+    trimmed = settings_for(changed(drone, attitude={"roll_trim_rad": 0.05, "pitch_trim_rad": -0.1})).limits
+    share = 1.0 - 0.1 / (0.82 * trimmed.tilt_rad)
+    assert trimmed.braking_m_s2 == pytest.approx(share * settings_for(drone).limits.braking_m_s2, rel=2e-3)
+
+
+def test_a_drone_that_can_hardly_tilt_has_no_limits() -> None:
+    """Where the braking would be less than the least that settings allow."""
+    weak = changed(GENERIC, altitude={"thrust_max_n": 1.0001 * GENERIC.weight_n})
+    assert settings_for(weak).limits.speed_m_s == 0.0
 
 
 def test_optical_flow_lowers_the_tilt_limit() -> None:

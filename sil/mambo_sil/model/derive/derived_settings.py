@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from mambo_codegen import __version__
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings.controller_toml import comment
 from mambo_codegen.settings.key import spell
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
@@ -22,6 +23,11 @@ from mambo_sil.model.derive.step_response import fit_steps
 
 UPDATE_PERIOD_S: Final = 0.01
 RAMP_S: Final = 0.4
+
+SPEED_LIMIT_M_S: Final = 5.0
+BRAKING_SHARE: Final = 0.8
+"""Braking limit over what the tilt limit gives: the rest is left for wind and lag."""
+LEAST_BRAKING_M_S2: Final = 0.1
 
 QUICKEST_RESPONSE_S, SLOWEST_RESPONSE_S = 0.1, 2.0
 MOST_TILT_RAD, MOST_TILT_BY_FLOW_RAD = 0.5, 0.35
@@ -59,7 +65,7 @@ def derive(drone: VehicleFile) -> list[Derived]:
         Derived("cost", "norm", "quadratic", "The exact minimum of the cost, without a search"),
         _response(sum(times_s) / 2.0),
         *_observer(drone),
-        _tilt_limit(drone),
+        *_limits(drone),
         *_thrust_range(drone),
     ]
 
@@ -141,6 +147,27 @@ def _observer(drone: VehicleFile) -> Iterator[Derived]:
         )
         yield Derived("observer", "disturbance_noise", CALM_DISTURBANCE_M_S3, words)
         yield Derived("observer", "velocity_noise", LATE_VELOCITY_M_S, "Likewise")
+
+
+def _limits(drone: VehicleFile) -> Iterator[Derived]:
+    """Yield the limits of tilt and, if the tilt allows some braking, of speed and braking."""
+    tilt = _tilt_limit(drone)
+    yield tilt
+    gain, trim_m_s2 = GRAVITY_M_S2, 0.0
+    if isinstance(drone.attitude, FirstOrderAttitude):
+        attitude = drone.attitude
+        slope = GRAVITY_M_S2 * attitude.acceleration_per_tilt_g
+        gain = slope * min(attitude.roll.gain, attitude.pitch.gain)
+        trim_m_s2 = slope * max(abs(attitude.roll_trim_rad), abs(attitude.pitch_trim_rad))
+    most_m_s2 = gain * float(tilt.value) - trim_m_s2
+    braking_m_s2 = _round(BRAKING_SHARE * most_m_s2)
+    if braking_m_s2 >= LEAST_BRAKING_M_S2:
+        words = "No file says how fast a drone may be; a target farther away is flown to at this speed"
+        yield Derived("limits", "speed_m_s", SPEED_LIMIT_M_S, words)
+        words = (
+            f"{BRAKING_SHARE:g} of {most_m_s2:.3g}, what the tilt limit gives; the rest is for wind and lag"
+        )
+        yield Derived("limits", "braking_m_s2", braking_m_s2, words)
 
 
 def _tilt_limit(drone: VehicleFile) -> Derived:
