@@ -17,6 +17,18 @@ _BESIDE: Final = "reads or writes beside an array passed as a pointer, which no 
 
 REASONS: Final[Mapping[Key, str]] = {
     **{("evaluation.c", "for (i = 0; i < METRICS; i++) {", change): _BESIDE for change in ("< -> <=",)},
+    (
+        "evaluation.c",
+        "safe = safe & ((height_m > <real>) | (low & (height_m <= <real>)));",
+        "zero -> one #1",
+    ): "a height above 0 is safe by the first comparison",
+    **{
+        ("ground.h", line, ">= -> >"): "a drone is at 0 itself, or still, only where the ground has put it"
+        for line in (
+            "const mask_t low = flight->landing & (body[POSITION + 2] >= <real>);",
+            "resting = low & (velocity_m_s[2] >= <real>);",
+        )
+    },
     **{
         ("evaluation.c", "for (i = 0; i < 4; i++) {", change): "writes what the mean square then overwrites"
         for change in ("< -> <=", "4 -> 5")

@@ -76,9 +76,23 @@ def edges() -> Trace:
     return trace
 
 
+def edges_in_space() -> Trace:
+    """Return five flights on the ground, and near it, below targets at the edge of a crash and beyond."""
+    trace = any_trace(8, 5, 5, sensed=False, spatial=True)
+    trace.position_m[..., 2] = -1.0
+    trace.euler_rad[...] = 0.0
+    trace.target[..., 4] = 1.1
+    trace.target[2, :, 4] = [0.5, np.nextafter(0.5, 1.0), 0.0, 0.5, 0.5]
+    trace.position_m[2, :, 2] = [0.0, 0.0, 0.3, -0.0, np.nan]
+    trace.target[2, :, 5] = [9.0, 0.0, 9.0, 9.0, 0.0]
+    trace.target[2, :, 1] = [9.0, 0.0, 9.0, 9.0, 0.0]
+    return trace
+
+
 def traces() -> Iterator[Trace]:
     """Yield the traces on which C and NumPy are compared."""
     yield edges()
+    yield edges_in_space()
     for seed, (samples, flights, lifting) in enumerate([(2, 1, 0), (3, 5, 1), (700, 13, 0), (300, 6, 200)]):
         spatial = seed in (1, 2)
         yield any_trace(seed, samples, flights, sensed=bool(seed % 2), lifting=lifting, spatial=spatial)

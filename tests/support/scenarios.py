@@ -206,6 +206,8 @@ BATCHES: Final = {
     "instruments": INSTRUMENTS,
     "cascade": captured(CRAZYFLIE),
     "limited": captured(LIMITED),
+    "lower": captured(changed(LIMITED, rotors={"mixer": "lower"})),
+    "yaw-last": captured(changed(LIMITED, rotors={"mixer": "yaw-last"})),
     "flown": captured(FLOWN),
     "late": captured(LATE),
     "space": SPACE,
@@ -241,13 +243,14 @@ def drones() -> st.SearchStrategy[VehicleFile]:
         }
     )
     cascades = st.fixed_dictionaries({"rate_hz": tick, "roll": axis, "pitch": axis, "yaw": axis})
+    mixers = st.fixed_dictionaries({"mixer": st.sampled_from(["clip", "lower", "yaw-last"])})
     trim = _within(-0.2, 0.2)
     firsts = st.fixed_dictionaries(
         {"rate_hz": tick, "roll": response, "pitch": response, "roll_trim_rad": trim, "pitch_trim_rad": trim}
     )
     return st.one_of(
         st.sampled_from([vehicle_toml.load(name) for name in vehicle_toml.names()]),
-        st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors),
+        st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors, rotors=mixers),
         st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors),
     )
 

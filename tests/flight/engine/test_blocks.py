@@ -32,7 +32,7 @@ from tests.support.engines import (
     truths,
 )
 from tests.support.faults import SHOWN, any_inputs
-from tests.support.scenarios import LATE, LIMITED
+from tests.support.scenarios import LATE, LIMITED, changed
 
 
 @pytest.fixture(
@@ -77,7 +77,14 @@ def test_sensors_and_estimators(engine: Path, noise_scale: float, derotated: boo
     assert unified(found) == unified(np.moveaxis(expected, -1, 0).reshape(4, TICKS, 12))
 
 
-@pytest.mark.parametrize("drone", [NOMINAL, LIMITED, LATE], ids=lambda drone: drone.attitude.kind)
+LOWERING, YAW_LAST = (changed(LIMITED, rotors={"mixer": mixer}) for mixer in ("lower", "yaw-last"))
+
+
+@pytest.mark.parametrize(
+    "drone",
+    [NOMINAL, LIMITED, LATE, LOWERING, YAW_LAST],
+    ids=["mambo", "cascade", "first_order", "lower", "yaw-last"],
+)
 def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
     """Inner loops, mixer, rotors, rigid body and integrator from states that no flight has."""
     rows = any_states()

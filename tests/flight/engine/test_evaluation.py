@@ -14,7 +14,7 @@ from mambo_sil.flight.engine.engine_library import load
 from mambo_sil.flight.engine.evaluate import evaluate, evaluate_compiled
 from mambo_sil.flight.traces import Trace
 from tests.support.engines import lanes_here
-from tests.support.evaluations import LIMIT_RAD, any_trace, bits, edges, traces
+from tests.support.evaluations import LIMIT_RAD, any_trace, bits, edges, edges_in_space, traces
 from tests.support.tools import toolchain
 
 
@@ -52,6 +52,8 @@ def test_edges_and_long_flights_have_the_results_of_numpy() -> None:
 def test_a_crash_begins_at_its_edge() -> None:
     """A drone crashes when its thrust no longer carries the weight, and on the ground; not a bit earlier."""
     assert evaluate(edges(), LIMIT_RAD, NOMINAL).crashed.tolist() == [False, True, False, True, True]
+    landed = evaluate(edges_in_space(), LIMIT_RAD, NOMINAL).crashed
+    assert landed.tolist() == [False, True, False, False, True]
 
 
 def test_the_drone_and_the_limit_count() -> None:

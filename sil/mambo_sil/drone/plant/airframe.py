@@ -8,6 +8,7 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_sil.drone.plant.arrays import PerFlight
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.drone.vehicles.vehicle_sections import MixerName
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Airframe:
     """Increase of w^2 per unit of motor command in steady state."""
     command_min: float
     command_max: float
+    mixer: MixerName = "clip"
 
     @property
     def rotor_offset_m(self) -> float:
@@ -69,6 +71,7 @@ def airframe_of(drone: VehicleFile) -> Airframe:
         speed_squared_per_command_rad2_s2=rotors.speed_squared_per_command_rad2_s2,
         command_min=rotors.command_min,
         command_max=rotors.command_max,
+        mixer=rotors.mixer,
     )
 
 

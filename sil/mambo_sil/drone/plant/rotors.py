@@ -6,6 +6,7 @@ stock code it is negative upwards.
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -26,6 +27,9 @@ WRENCH_SIGNS = np.array(
 The rows are orthogonal, so the inverse, which the mixer applies, is a quarter of the transpose.
 """
 
+LEAST_YAW: Final = 0.02
+"""Share of the largest command that mixer `yaw-last` keeps for yaw in any case."""
+
 
 def wrench_per_command(nominal: Airframe) -> FloatArray:
     """Return the wrench (4, 1) of four rotors at one unit of command each, if all added to each component."""
@@ -40,8 +44,21 @@ def mix(nominal: Airframe, wrench: FloatArray) -> FloatArray:
 
 
 def distribute(nominal: Airframe, shares: FloatArray) -> FloatArray:
-    """Return the motor commands (4, n) that sum up shares (4, n) of thrust, roll, pitch and yaw, clipped."""
-    commands = np.add.reduce(WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :], axis=0)
+    """Return the motor commands (4, n) that sum up shares (4, n) of thrust, roll, pitch and yaw, in limits.
+
+    Mixer `yaw-last` takes of yaw what thrust, roll and pitch leave, but at least `LEAST_YAW`. Mixers `lower`
+    and `yaw-last` lower all four commands by the excess of the largest one. All of them clip what is left.
+    """
+    signed = WRENCH_SIGNS[:, :, np.newaxis] * shares[:, np.newaxis, :]
+    if nominal.mixer == "yaw-last":
+        others = np.add.reduce(signed[:3], axis=0)
+        above, below = nominal.command_max - others.max(axis=0), others.min(axis=0) - nominal.command_min
+        room = np.maximum(np.minimum(above, below), LEAST_YAW * nominal.command_max)
+        with np.errstate(divide="ignore"):
+            signed[3] *= np.minimum(room / np.abs(shares[3]), 1.0)
+    commands: FloatArray = np.add.reduce(signed, axis=0)
+    if nominal.mixer != "clip":
+        commands = commands - np.maximum(commands.max(axis=0) - nominal.command_max, 0.0)
     return np.asarray(np.clip(commands, nominal.command_min, nominal.command_max))
 
 

@@ -43,6 +43,10 @@ class Body(VehicleSection):
     inertia_z_kg_m2: Inertia | None = Field(None, description="Moment of inertia about the down axis.")
 
 
+MixerName = Literal["clip", "lower", "yaw-last"]
+"""What a mixer does with motor commands beyond their limits."""
+
+
 class RotorFigures(VehicleSection):
     """Four equal rotors in X configuration: thrust = b w^2, torque = k w^2, w^2 in proportion to the command.
 
@@ -62,6 +66,11 @@ class RotorFigures(VehicleSection):
     command_max: Positive = Field(description="Largest motor command.")
     lag_s: Annotated[float, Field(ge=0, le=1)] = Field(
         description="Time constant from commanded to actual rotor speed; 0 for none."
+    )
+    mixer: MixerName = Field(
+        "clip",
+        description="What gives way at command_max: each motor by itself (clip), all by the largest excess "
+        "(lower), or yaw first, then all (yaw-last).",
     )
 
 

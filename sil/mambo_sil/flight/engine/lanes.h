@@ -103,7 +103,7 @@ static inline real_t square_root(real_t value)
     return lanes.real;
 }
 
-/* np.clip, np.maximum: NaN stays NaN. */
+/* np.clip, np.maximum, np.minimum: NaN stays NaN. */
 static inline real_t clip(real_t value, double low, double high)
 {
     return choose(value < low, splat(low), choose(value > high, splat(high), value));
@@ -112,6 +112,11 @@ static inline real_t clip(real_t value, double low, double high)
 static inline real_t maximum(real_t a, real_t b)
 {
     return choose((a > b) | (a != a), a, b);
+}
+
+static inline real_t minimum(real_t a, real_t b)
+{
+    return choose((a < b) | (a != a), a, b);
 }
 
 #endif

@@ -72,6 +72,8 @@ typedef struct {
     double speed_squared_per_command_rad2_s2;
     double command_min;
     double command_max;
+    int64_t mixer;            /* what gives way at command_max, see vehicle.h */
+    double least_yaw;         /* command that YAW_LAST keeps for yaw in any case */
 
     /* Instruments. */
     double imu_transition[4]; /* by rows */

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,17 @@ from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.ground import ROTOR_HEIGHT_M
-from mambo_sil.drone.plant.rotors import wrench_per_command
+from mambo_sil.drone.plant.rotors import LEAST_YAW, wrench_per_command
 from mambo_sil.drone.plant.vehicle import STEP_S
 from mambo_sil.drone.sensors import estimators, instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.drone.vehicles.vehicle_sections import CascadeAttitude, FirstOrderAttitude, MamboAttitude
+from mambo_sil.drone.vehicles.vehicle_sections import (
+    CascadeAttitude,
+    FirstOrderAttitude,
+    MamboAttitude,
+    MixerName,
+)
 from mambo_sil.flight.engine.engine_library import record_type
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
 
@@ -79,6 +84,8 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "speed_squared_per_command_rad2_s2": flight.vehicle.airframe.speed_squared_per_command_rad2_s2,
             "command_min": nominal.command_min,
             "command_max": nominal.command_max,
+            "mixer": get_args(MixerName).index(nominal.mixer),
+            "least_yaw": LEAST_YAW * nominal.command_max,
             "imu_transition": np.ravel(transition),
             "imu_input_gain": input_gain,
             "imu_limits": instruments.IMU_LIMITS[:, 0],

@@ -11,6 +11,10 @@
 #define CASCADE 1
 #define FIRST_ORDER 2
 
+/* Mixers that lower all motors; any other clips each. The second one takes from yaw before. */
+#define LOWER 1
+#define YAW_LAST 2
+
 typedef struct {
     real_t body[STATE_ROWS];
     real_t rotor_speed_rad_s[4];
@@ -73,16 +77,43 @@ static inline void stock_shares(const engine_simulation_t *simulation, const see
     }
 }
 
+static inline real_t largest(const real_t *value)
+{
+    return maximum(maximum(maximum(value[0], value[1]), value[2]), value[3]);
+}
+
+static inline real_t smallest(const real_t *value)
+{
+    return minimum(minimum(minimum(value[0], value[1]), value[2]), value[3]);
+}
+
 /* Steady rotor speeds of the commands that sum up shares of thrust, roll, pitch and yaw. */
 static inline void commanded_speeds(const engine_simulation_t *simulation, const real_t *share, real_t *speeds)
 {
+    const real_t others[4] = { (share[0] + share[1]) + share[2], (share[0] - share[1]) + share[2],
+                               (share[0] - share[1]) - share[2], (share[0] + share[1]) - share[2] };
+    real_t yaw = share[3];
     real_t command[4];
     int i;
 
-    command[0] = ((share[0] + share[1]) + share[2]) - share[3];
-    command[1] = ((share[0] - share[1]) + share[2]) + share[3];
-    command[2] = ((share[0] - share[1]) - share[2]) - share[3];
-    command[3] = ((share[0] + share[1]) - share[2]) + share[3];
+    if (simulation->mixer == YAW_LAST) {
+        const real_t above = simulation->command_max - largest(others);
+        const real_t below = smallest(others) - simulation->command_min;
+        const real_t room = maximum(minimum(above, below), splat(simulation->least_yaw));
+
+        yaw = yaw * minimum(room / magnitude(yaw), splat(1.0));
+    }
+    command[0] = others[0] - yaw;
+    command[1] = others[1] + yaw;
+    command[2] = others[2] - yaw;
+    command[3] = others[3] + yaw;
+    if ((simulation->mixer == LOWER) || (simulation->mixer == YAW_LAST)) {
+        const real_t excess = maximum(largest(command) - simulation->command_max, splat(0.0));
+
+        for (i = 0; i < 4; i++) {
+            command[i] = command[i] - excess;
+        }
+    }
     for (i = 0; i < 4; i++) {
         speeds[i] = square_root(simulation->speed_squared_per_command_rad2_s2
                                 * clip(command[i], simulation->command_min, simulation->command_max));
