@@ -78,7 +78,7 @@ typedef struct {
     nmpc_attitude_t attitude;
     TRACKER_MEMBERS
     nmpc_real_t command_rad[2];
-    unsigned char missed, saturated;
+    unsigned char missed;
     ...;
 } nmpc_t;
 typedef struct {
@@ -95,12 +95,13 @@ void observer_predict(nmpc_observer_t *, const nmpc_real_t *);
 nmpc_real_t observer_disturbance(const nmpc_observer_t *, int);
 void attitude_set_command(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
 void attitude_reset(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
-nmpc_real_t attitude_roll(const nmpc_attitude_t *);
-nmpc_real_t attitude_pitch(const nmpc_attitude_t *);
+void attitude_change_command(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
+nmpc_real_t attitude_roll(nmpc_real_t);
+nmpc_real_t attitude_pitch(nmpc_real_t);
 void attitude_measure(const nmpc_state_t *, nmpc_real_t *);
 void attitude_advance(nmpc_attitude_t *);
-void attitude_turn(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t);
-nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t, unsigned char *);
+void attitude_turn(nmpc_attitude_t *, nmpc_real_t, nmpc_real_t, int);
+nmpc_real_t optimizer_minimize(int, const nmpc_real_t *, nmpc_real_t);
 """
 _TRACKER: Final = {
     "TRACKER_TYPE": "typedef struct { TARGET_VELOCITY nmpc_real_t acceleration_m_step2[2], "

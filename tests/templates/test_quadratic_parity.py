@@ -143,16 +143,20 @@ def test_attitude_model_equals_the_reference(index: int, scalar: str) -> None:
         blocks.put("attitude", **{member: getattr(attitude, name) for name, member in names.items()})
         lib.attitude_advance(its_model)
         compare(attitude := model.advance(attitude))
-        lib.attitude_turn(its_model, sine[1], cosine[1])
-        compare(attitude := model.turn(attitude, sine[1:], cosine[1:]))
-        found = np.array([[lib.attitude_roll(its_model), lib.attitude_pitch(its_model)]], blocks.scalar)
-        assert found.tobytes() == model.command_rad(attitude).tobytes()
+        followed = rng.random(1) < 0.5
+        lib.attitude_turn(its_model, sine[1], cosine[1], int(followed[0]))
+        compare(attitude := model.turn(attitude, sine[1:], cosine[1:], followed))
+        right, forward = attitude.command[0].tolist()
+        found = np.array([[lib.attitude_roll(right), lib.attitude_pitch(forward)]], blocks.scalar)
+        assert found.tobytes() == model.command_rad(attitude.command).tobytes()
 
         angles = blocks.draw(tilt_rad)
         state = np.concatenate([blocks.draw(1.0, 4), angles, blocks.draw(1.0, 1)], axis=1)
         measured = np.zeros((1, 2), blocks.scalar)
         lib.attitude_measure(blocks.pointer("nmpc_state_t", state), blocks.reals(measured))
         assert measured.tobytes() == model.measure(angles).tobytes()
+        lib.attitude_change_command(its_model, *angles[0].tolist())
+        compare(attitude := model.change_command(attitude, angles))
         lib.attitude_set_command(its_model, *angles[0].tolist())
         compare(model.set_command(attitude, angles))
         lib.attitude_reset(its_model, *angles[0].tolist())
@@ -178,10 +182,8 @@ def test_optimizer_equals_the_reference(index: int, scalar: str) -> None:
     for state, moves in zip(states, expected, strict=True):
         for axis in (0, 1):
             numbers = np.ascontiguousarray(state[axis])
-            saturated = blocks.ffi.new("unsigned char *")
-            found = blocks.lib.optimizer_minimize(axis, blocks.reals(numbers), limits[axis], saturated)
+            found = blocks.lib.optimizer_minimize(axis, blocks.reals(numbers), limits[axis])
             assert blocks.scalar(found).tobytes() == moves[axis].tobytes()
-            assert saturated[0] == (abs(moves[axis]) == limits[axis])
             free = law.rows[axis] @ state[axis]
             kinds.add(tuple((np.sign(free) * (np.abs(free) > limits[axis])).tolist()))
     assert len(kinds) == 3**law.moves

@@ -65,7 +65,7 @@ UNPROVEN = {
     ),
     "the command leaves the tilt limit": Fault(
         "take_numbers",
-        Harm(CONTROLLER, r"clamp\((attitude_roll[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"),
+        Harm(CONTROLLER, r"clamp\((self->command_rad\[0\] \+[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"),
         Alarm(DRIVER, "roll_is_within_the_limit", "user assertion"),
     ),
     "a clamp that does not limit": Fault(
@@ -75,8 +75,8 @@ UNPROVEN = {
         "take_numbers",
         Harm(
             CONTROLLER,
-            r"command_rad\[1\] = clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)",
-            "command_rad[1] = command->pitch_rad",
+            r"    pitch_rad = clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)",
+            "    pitch_rad = command->pitch_rad",
         ),
         Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
     ),
@@ -118,7 +118,7 @@ FAULTS: dict[str, tuple[Callable[[Subject], Result], Harm]] = {
         Harm(CONTROLLER, r"\(NMPC_VELOCITY_BY_POSITION", "(NMPC_VELOCITY_BY_VELOCITY"),
     ),
     "another state": (bits.check, Harm(CONTROLLER, r"row\[k\] \* state\[k\]", "row[k] * state[k - 1]")),
-    "a flag that stays": (bits.check, Harm(CONTROLLER, r"    self->saturated = 0U;\n", "")),
+    "a flag that stays": (bits.check, Harm(CONTROLLER, r"    self->has_target = 0U;\n", "")),
     "an outage a step too long": (
         bits.check,
         Harm(CONTROLLER, r"\(NMPC_OUTAGE_STEPS \+ 1U\)", "(NMPC_OUTAGE_STEPS + 2U)"),

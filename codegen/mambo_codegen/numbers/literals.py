@@ -34,14 +34,19 @@ class Spelling:
             return real(value, self._scalar)
         return fixed(value, self._bits[quantity]) if quantity else real(value, "float32")
 
-    def rows(self, values: Iterable[Sequence[float]], quantity: str | Sequence[str] = "") -> str:
+    def rows(
+        self,
+        values: Iterable[Sequence[float]],
+        quantity: str | Sequence[str] = "",
+        indent: int = _INDENT,
+    ) -> str:
         """Spell a two-dimensional table, each row in braces; `quantity` is that of all, or of each column."""
 
         def words(row: Sequence[float]) -> list[str]:
             names = [quantity] * len(row) if isinstance(quantity, str) else quantity
             return [self.real(value, name) for value, name in zip(row, names, strict=True)]
 
-        return ",\n".join(_row(words(row)) for row in values)
+        return ",\n".join(_row(words(row), indent) for row in values)
 
     def row(self, values: Sequence[float], quantity: str = "", indent: int = _INDENT) -> str:
         """Spell a one-dimensional table without its braces."""
@@ -65,8 +70,8 @@ def fixed(value: float, bits: int) -> str:
     return f"{number}LL" if abs(number) > LARGEST else str(number)
 
 
-def _row(words: list[str]) -> str:
-    margin = " " * _INDENT
+def _row(words: list[str], indent: int) -> str:
+    margin = " " * indent
     return f"{margin}{{ {_wrap(words, margin + '  ').lstrip()} }}"
 
 

@@ -191,7 +191,8 @@ class OneNormController:
             tilt_rad=states[:, 4:6],
             has_tilt=np.ones(len(states), np.bool_),
         )
-        new = self.memory = self._after_outage(status, choose(good, new, self.memory))
+        held = replace(self.memory, sent_rad=self.memory.command_rad)  # without the rate feedback
+        new = self.memory = self._after_outage(status, choose(good, new, held))
         to_si = self._numbers.to_si
         return OneNormStep(
             status=status,

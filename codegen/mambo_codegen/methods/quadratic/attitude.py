@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mambo_codegen.methods.inputs import Rows
 from mambo_codegen.methods.math import Real, clamp
 from mambo_codegen.methods.quadratic.arithmetic import QuadraticArithmetic
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
@@ -65,6 +66,12 @@ class AttitudeModel:
         product = self._products.tilt_product(self._command_gain, command_rad - self._trim_command)
         return replace(attitude, command=np.stack([product[:, 0], -product[:, 1]], axis=1))
 
+    def change_command(self, attitude: AttitudeState, change_rad: Real) -> AttitudeState:
+        """Change the last commands by `change_rad` (n, 2), roll and pitch."""
+        product = self._products.tilt_product(self._command_gain, change_rad)
+        change = np.stack([product[:, 0], -product[:, 1]], axis=1)
+        return replace(attitude, command=clamp(attitude.command + change, self._limit))
+
     def command_limit_at(self, tilt_rad: Real, generated_rad: Any) -> Real:
         """Return the largest moves (n, 2) at tilt limits (n,); those of the settings at `generated_rad`."""
         product = self._products.tilt_product(
@@ -92,18 +99,19 @@ class AttitudeModel:
             lagged=self._products.attitude_sum(lagged),
         )
 
-    def turn(self, attitude: AttitudeState, sine: Real, cosine: Real) -> AttitudeState:
-        """Turn tilt and command to the heading with this sine and cosine (n,)."""
+    def turn(self, attitude: AttitudeState, sine: Real, cosine: Real, is_followed: Rows) -> AttitudeState:
+        """Turn tilts to headings of sine and cosine (n,); commands too where a new one follows."""
         by_sine = self._products.sine_difference(sine, attitude.cosine, cosine, attitude.sine)
         by_cosine = self._products.sine_sum(cosine, attitude.cosine, sine, attitude.sine)
 
         def turned(vector: Real) -> Real:
             return rotate(self._products, vector, by_sine, by_cosine)
 
+        command = clamp(turned(attitude.command), self._limit)
         return replace(
             attitude,
             tilt=turned(attitude.tilt),
-            command=clamp(turned(attitude.command), self._limit),
+            command=np.where(is_followed[:, None], command, attitude.command),
             sine=sine,
             cosine=cosine,
         )
@@ -113,9 +121,9 @@ class AttitudeModel:
         product = self._products.tilt_product(self._gain, tilt_rad - self._trim)
         return np.stack([product[:, 0], -product[:, 1]], axis=1)
 
-    def command_rad(self, attitude: AttitudeState) -> Real:
-        """Return roll and pitch (n, 2) that stand for the last commands."""
-        product = self._products.command_product(self._command_rad, attitude.command)
+    def command_rad(self, command: Real) -> Real:
+        """Return roll and pitch (n, 2) that stand for commands (n, 2), right and forward."""
+        product = self._products.command_product(self._command_rad, command)
         roll, pitch = product[:, 0], -product[:, 1]
         if self._trim_command[0] != 0:
             roll = roll + self._trim_command[0]
@@ -125,11 +133,10 @@ class AttitudeModel:
 
     def _admitted(self, limit: Real, tilt_limit: Any) -> Real:
         """Lower move limits (2,) by the last digit until no command exceeds the tilt limit by rounding."""
-        zeros = np.zeros((2, 2), limit.dtype)
         while True:
             moves = np.stack([limit, -limit])
-            state = AttitudeState(zeros, zeros, zeros, self._products.move_acceleration(moves), zeros, zeros)
-            beyond = (np.abs(self.command_rad(state)) > tilt_limit).any(axis=0)
+            angles = self.command_rad(self._products.move_acceleration(moves))
+            beyond = (np.abs(angles) > tilt_limit).any(axis=0)
             if not beyond.any():
                 return limit
             below = limit - 1 if self._numbers.bits else np.nextafter(limit, limit.dtype.type(0))

@@ -25,8 +25,8 @@ REST_M_S: Final = 0.02
 class QuadraticMemory:
     """State of n controllers between two steps.
 
-    tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state, saturated
-    (n,) says whether the last command lies at the tilt limit. Without limits `limits` stays zeros.
+    tilt_rad and command_rad are (n, 2), missed (n,) counts control steps since the last good state. Without
+    limits `limits` stays zeros.
     """
 
     estimate: Estimate
@@ -36,7 +36,6 @@ class QuadraticMemory:
     tilt_rad: Real
     command_rad: Real
     missed: NDArray[np.int64]
-    saturated: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,8 @@ class QuadraticController:
         """
         given, good = self._command(command_rad)
         memory = self.memory
-        new = replace(memory, command_rad=given, attitude=self._model.set_command(memory.attitude, given))
+        attitude = self._model.change_command(memory.attitude, given - memory.command_rad)
+        new = replace(memory, command_rad=given, attitude=attitude)
         self.memory = choose(good, new, memory)
         return np.where(good, Status.OK, Status.BAD_COMMAND)
 
@@ -139,7 +139,7 @@ class QuadraticController:
             status=self._inputs.status(has_state, has_target, has_thrust),
             command_rad=self._numbers.to_si(memory.command_rad, *COMMAND),
             missed=memory.missed,
-            saturated=memory.saturated,
+            saturated=self.saturated,
             stored=self._numbers.to_si(self.stored, *self._constants.stored),
             active=memory.limits.active if self._limits else None,
         )
@@ -175,7 +175,6 @@ class QuadraticController:
             tilt_rad=zeros,
             command_rad=command_rad,
             missed=np.full(n, self._at_rest),
-            saturated=np.zeros(n, np.bool_),
         )
 
     def _advance(
@@ -186,7 +185,9 @@ class QuadraticController:
         attitude = model.advance(memory.attitude)
         sine, cosine = self._products.sine_cosine(state[:, 6])
         measured = choose(
-            none_yet, replace(attitude, sine=sine, cosine=cosine), model.turn(attitude, sine, cosine)
+            none_yet,
+            replace(attitude, sine=sine, cosine=cosine),
+            model.turn(attitude, sine, cosine, allows_command),
         )
         attitude = choose(has_state, measured, attitude)
         feedback = np.zeros_like(memory.command_rad)
@@ -224,13 +225,14 @@ class QuadraticController:
         limit = limits.command_limit if self._limits else model.command_limit
         moves = self._minimize(attitude, estimate, motion, target, tilt, limit=limit)
         moved = replace(attitude, command=self._products.move_acceleration(moves))
-        command = model.command_rad(moved)
+        command, held = model.command_rad(moved.command), memory.command_rad
         if self._feedback is not None:  # the C adds none where its factor is 0: a sum with 0 has no sign -0
             command = np.where(self._feedback != 0, command + feedback, command)
-        command = np.where(commands[:, None], clamp(command, self._tilt_limit()), memory.command_rad)
+            without = clamp(model.command_rad(attitude.command), self._tilt_limit())
+            held = np.where((self._feedback != 0) & (memory.missed == 0)[:, None], without, held)
+        command = np.where(commands[:, None], clamp(command, self._tilt_limit()), held)
         level = np.zeros_like(command)
         attitude = choose(commands, moved, attitude)
-        at_limit = np.any((moves >= limit) | (moves <= -limit), axis=1)
         self.memory = QuadraticMemory(
             estimate=self._observer.predict(estimate, world),
             attitude=choose(rests, model.set_command(attitude, level), attitude),
@@ -239,7 +241,6 @@ class QuadraticController:
             tilt_rad=np.where(has_state[:, None], state[:, 4:6], memory.tilt_rad),
             command_rad=np.where(rests[:, None], level, command),
             missed=np.where(rests, self._at_rest, missed),
-            saturated=np.where(commands, at_limit, memory.saturated & ~rests),
         )
 
     def _minimize(
@@ -283,12 +284,24 @@ class QuadraticController:
         return rotate(self._products, world[:, ::-1], attitude.sine, attitude.cosine)
 
     @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """Whether roll or pitch (n,) of the last command is that of the largest move, or beyond."""
+        limit = self.memory.limits.command_limit if self._limits else self._model.command_limit
+        one, other = (
+            self._model.command_rad(self._products.move_acceleration(np.atleast_2d(moves)))
+            for moves in (limit, -limit)
+        )
+        command = self.memory.command_rad
+        is_largest = (command >= np.maximum(one, other)) | (command <= np.minimum(one, other))
+        return np.asarray(np.any(is_largest, axis=1))
+
+    @property
     def outcome(self) -> dict[str, NDArray[Any]]:
         """What the last call left, in the numbers of the C."""
         memory = self.memory
         return {
             "missed": memory.missed,
-            "saturated": memory.saturated,
+            "saturated": self.saturated,
             "command_rad": memory.command_rad,
             "stored": self.stored,
         } | ({"active": memory.limits.active} if self._limits else {})

@@ -90,7 +90,7 @@ class Quadratic(QuadraticConstants, Method):
     def instance_bytes(self) -> int:
         """The size of nmpc_t: its numbers and single bytes, with padding."""
         number_bytes, _ = self.numbers.bytes
-        flags = 2 + (self.tracker is not None) + (self.limiting is not None)
+        flags = 1 + (self.tracker is not None) + (self.limiting is not None)
         return (len(self.stored) * number_bytes) + (-(-flags // number_bytes) * number_bytes)
 
     @property
