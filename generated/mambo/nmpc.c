@@ -108,12 +108,6 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
     return NMPC_MAGNITUDE_BITS(value) <= NMPC_MAGNITUDE_BITS(limit);
 }
-
-/* 1 if |`value`| >= `limit`, else 0. */
-NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
-{
-    return NMPC_MAGNITUDE_BITS(value) >= NMPC_MAGNITUDE_BITS(limit);
-}
 #else
 /* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. Each comparison has a variable of its own, so that a
  * proof by abstract interpretation can conclude that NaN is excluded. */
@@ -130,12 +124,6 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
     return between(value, -limit, limit);
 }
-
-/* 1 if |`value`| >= `limit`, else 0. */
-NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
-{
-    return (value >= limit) || (value <= -limit);
-}
 #endif
 
 /* Saturate `value` at +/- `limit`. */
@@ -148,7 +136,6 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
     }
     return clamped;
 }
-
 
 /* ---- Inputs ---------------------------------------------------------------------------------------------------------
  *
@@ -264,8 +251,13 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
  *     roll                                              0.2300     0.0450      1.0000
  *     pitch                                             0.1540     0.0600      0.7700
  *
- * u is held over a control step; the rows below are the exact solution. a, i and u are limited, beyond what any command
- * within the limit makes them; c is a weighted mean of c and u.
+ * The lag of roll is the setting, 0.28 s, less what rate feedback takes off it, 0.05 s (see the chapter step).
+ * The leak of i, with 1000 s, is slower than anything in flight: it only gives i a bound.
+ *
+ * u is held over a control step; the rows below are the exact solution. a, i and u are limited, so that what is stored
+ * is bounded. No command within the tilt limit reaches that limit: it is the acceleration of the tilt limit times the
+ * largest sum of an absolute impulse response from u to a, i and c, doubled for headings that turn. c, a weighted mean
+ * of c and u, needs no limit.
  */
 
 #define NMPC_RIGHT 0
@@ -279,7 +271,7 @@ NMPC_INLINE void sine_cosine(nmpc_real_t angle_rad, nmpc_real_t *sine, nmpc_real
 #define NMPC_ROLL_PER_ACCELERATION 1019.368f
 #define NMPC_PITCH_PER_ACCELERATION 1019.368f
 
-/* The largest |u| that a move may have, and the largest |a|, |i| and |c|, and |u| when it turns. */
+/* The largest |u| of a move: that of the tilt limit. And the largest |a| and |i|, and |u| when it turns. */
 #define NMPC_RIGHT_LIMIT_M_STEP2 0.00034335f
 #define NMPC_FORWARD_LIMIT_M_STEP2 0.00034335f
 #define NMPC_ATTITUDE_LIMIT_M_STEP2 0.0009053068f
@@ -298,6 +290,7 @@ static const nmpc_real_t lagged_rows[2][2] = {
     { 0.84648174f, 0.15351827f }
 };
 
+/* The next a or i of an axis. */
 NMPC_INLINE nmpc_real_t attitude_next(const nmpc_real_t row[NMPC_ATTITUDE_STATES],
                                       const nmpc_real_t state[NMPC_ATTITUDE_STATES])
 {
@@ -340,9 +333,10 @@ NMPC_INLINE void attitude_turn_vector(nmpc_real_t vector_m_step2[2], nmpc_real_t
     vector_m_step2[NMPC_FORWARD] = (forward * cosine) + (right * sine);
 }
 
-/* Turn tilt and command of the model to the heading with this sine and cosine. The integral part and the dead time
- * live in the axes of the body and stay. */
-NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine)
+/* Turn the model to the heading with this sine and cosine. The drone yaws, and its tilt stays where it is in the world;
+ * i, c and u are those of the attitude loops, which turn with the body. If a new command follows in this control step,
+ * u turns too: the cost counts the change of the commanded acceleration in the world. A held command stays. */
+NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc_real_t cosine, int is_followed)
 {
     /* Sine and cosine of the change of the heading. */
     const nmpc_real_t sine_change =
@@ -351,10 +345,13 @@ NMPC_INLINE void attitude_turn(nmpc_attitude_t *attitude, nmpc_real_t sine, nmpc
         (cosine * attitude->cosine) + (sine * attitude->sine);
 
     attitude_turn_vector(attitude->tilt_m_step2, sine_change, cosine_change);
-    attitude_turn_vector(attitude->command_m_step2, sine_change, cosine_change);
-    attitude->command_m_step2[NMPC_RIGHT] = clamp(attitude->command_m_step2[NMPC_RIGHT], NMPC_ATTITUDE_LIMIT_M_STEP2);
-    attitude->command_m_step2[NMPC_FORWARD] =
-        clamp(attitude->command_m_step2[NMPC_FORWARD], NMPC_ATTITUDE_LIMIT_M_STEP2);
+    if (is_followed != 0) {
+        attitude_turn_vector(attitude->command_m_step2, sine_change, cosine_change);
+        attitude->command_m_step2[NMPC_RIGHT] =
+            clamp(attitude->command_m_step2[NMPC_RIGHT], NMPC_ATTITUDE_LIMIT_M_STEP2);
+        attitude->command_m_step2[NMPC_FORWARD] =
+            clamp(attitude->command_m_step2[NMPC_FORWARD], NMPC_ATTITUDE_LIMIT_M_STEP2);
+    }
     attitude->sine = sine;
     attitude->cosine = cosine;
 }
@@ -366,15 +363,15 @@ NMPC_INLINE void attitude_measure(const nmpc_state_t *state, nmpc_real_t tilt_m_
     tilt_m_step2[NMPC_FORWARD] = -(NMPC_GAIN_M_STEP2_RAD * state->pitch_rad);
 }
 
-/* The command, in rad, that stands for u; within the tilt limit for a move within its limit. */
-NMPC_INLINE nmpc_real_t attitude_roll(const nmpc_attitude_t *attitude)
+/* The commands, in rad, of u to the right and of u forward; within the tilt limit for a move within its limit. */
+NMPC_INLINE nmpc_real_t attitude_roll(nmpc_real_t right_m_step2)
 {
-    return NMPC_ROLL_PER_ACCELERATION * attitude->command_m_step2[NMPC_RIGHT];
+    return NMPC_ROLL_PER_ACCELERATION * right_m_step2;
 }
 
-NMPC_INLINE nmpc_real_t attitude_pitch(const nmpc_attitude_t *attitude)
+NMPC_INLINE nmpc_real_t attitude_pitch(nmpc_real_t forward_m_step2)
 {
-    return -(NMPC_PITCH_PER_ACCELERATION * attitude->command_m_step2[NMPC_FORWARD]);
+    return -(NMPC_PITCH_PER_ACCELERATION * forward_m_step2);
 }
 
 /* Set the last command of the model, u. */
@@ -384,6 +381,20 @@ static void attitude_set_command(nmpc_attitude_t *attitude, nmpc_real_t roll_rad
         NMPC_ROLL_GAIN_M_STEP2_RAD * roll_rad;
     attitude->command_m_step2[NMPC_FORWARD] =
         -(NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_rad);
+}
+
+/* Change the last command of the model, u, by what was sent in its place less what it was. */
+static void attitude_change_command(nmpc_attitude_t *attitude, nmpc_real_t roll_change_rad,
+                                    nmpc_real_t pitch_change_rad)
+{
+    attitude->command_m_step2[NMPC_RIGHT] =
+        clamp(attitude->command_m_step2[NMPC_RIGHT]
+                  + (NMPC_ROLL_GAIN_M_STEP2_RAD * roll_change_rad),
+              NMPC_ATTITUDE_LIMIT_M_STEP2);
+    attitude->command_m_step2[NMPC_FORWARD] =
+        clamp(attitude->command_m_step2[NMPC_FORWARD]
+                  - (NMPC_PITCH_GAIN_M_STEP2_RAD * pitch_change_rad),
+              NMPC_ATTITUDE_LIMIT_M_STEP2);
 }
 
 /* Set the model to the steady attitude of a command. */
@@ -507,11 +518,11 @@ static void observer_clear(nmpc_observer_t *observer)
 /* ---- Target tracker -------------------------------------------------------------------------------------------------
  *
  * The target's acceleration and its rate, estimated by an alpha-beta filter (not in the paper). Index k counts control
- * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target, A_T = tau^2 a_T its
- * acceleration, and J_T the change of A_T from one control step to the next: the jerk. In every control step the
- * measured acceleration M, the predicted one P and the new estimates are
+ * steps, which are T_s = 0.01 s apart. Along one axis, x or y, let Tv_k be the velocity of the target,
+ * A_T = T_s^2 a_T its acceleration, and J_T the change of A_T from one control step to the next: the jerk. In every
+ * control step the measured acceleration M, the predicted one P and the new estimates are
  *
- *     M = tau^2/T_s (Tv_k - Tv_k-1)          P = A_T(k-1) + J_T(k-1)
+ *     M = T_s (Tv_k - Tv_k-1)                P = A_T(k-1) + J_T(k-1)
  *     A_T(k) = (1 - alpha) P + alpha M       J_T(k) = J_T(k-1) + beta (M - P)
  *
  * with alpha = 0.5 and beta = alpha^2 / (2 - alpha) (T. R. Benedict, G. W. Bordner, Synthesis of an optimal set of
@@ -523,7 +534,7 @@ static void observer_clear(nmpc_observer_t *observer)
  */
 
 #define NMPC_TARGET_CHANGE_LIMIT_M_S 0.0515025f /* of Tv in T_s: 1.5 g times the tilt limit, or less */
-#define NMPC_STEP_SQUARED_PER_UPDATE_S 0.01f /* tau^2/T_s */
+#define NMPC_STEP_SQUARED_PER_UPDATE_S 0.01f /* T_s */
 #define NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE 5.15025e-05f /* of J_T: a tenth of that */
 #define NMPC_TRACKER_GAIN 0.5f /* alpha */
 #define NMPC_TRACKER_REST 0.5f /* 1 - alpha */
@@ -552,8 +563,8 @@ NMPC_INLINE void tracker_correct(nmpc_tracker_t *tracker, int axis, nmpc_real_t 
                                           + (NMPC_TRACKER_GAIN * measured_m_step2);
     tracker->jerk_m_step2_update[axis] =
         clamp(tracker->jerk_m_step2_update[axis]
-                       + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
-                   NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
+                  + (NMPC_TRACKER_JERK_GAIN * difference_m_step2),
+              NMPC_TARGET_JERK_LIMIT_M_STEP2_UPDATE);
 }
 
 /* Take the target's velocity of this control step into the estimates. */
@@ -583,12 +594,13 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
  * The exact minimum of the quadratic cost (not in the paper).
  *
  * Along one axis of the heading, right or forward, let e and v be the errors of position and velocity, w the
- * disturbance less the target's acceleration, j the target's jerk, and a, i, c, u the attitude model's states.
+ * disturbance, drag less the target's acceleration, j the target's jerk, and a, i, c, u the attitude model's states.
  * In seconds and metres
  *
- *     e' = v,   v' = a + w,   w' = -j,   j' = -j / 1 s,
+ *     e' = v,   v' = a + w,   w' = -j - w / 1000 s,   j' = -j / 1 s,
  *
- * and the cost is the sum over all control steps to come of
+ * where a jerk fades within a second, so that a corner of the target's path is not continued for ever, and the slow
+ * decay of w gives the cost of a lasting one a bound. The cost is the sum over all control steps to come of
  *
  *     e^2 + (velocity_weight v)^2 + (response_time^3 (u(k+i) - u(k+i-1)) / T_s)^2.
  *
@@ -608,22 +620,23 @@ NMPC_INLINE void tracker_update(nmpc_t *self, const nmpc_real_t velocity_m_s[2])
 /* U1 and U2 from e, v, w, j, a, i, c, u, for right and forward. */
 static const nmpc_real_t move_rows[2][2][NMPC_STATES] = {
     {
-    { -0.00015450605f, -0.009620338f, -0.28908563f, 4.440467f, -0.1321711f, -0.14134839f, -0.023668297f,
-      0.86670667f },
-    { -0.0005871076f, -0.055458635f, -2.6105266f, 64.8076f, -0.77071905f, -1.4504563f, -0.14396101f,
-      -0.69664025f }
+        { -0.00015450605f, -0.009620338f, -0.28908563f, 4.440467f, -0.1321711f, -0.14134839f, -0.023668297f,
+          0.86670667f },
+        { -0.0005871076f, -0.055458635f, -2.6105266f, 64.8076f, -0.77071905f, -1.4504563f, -0.14396101f,
+          -0.69664025f }
     },
     {
-    { -0.00015500613f, -0.0092341965f, -0.2645419f, 3.8503215f, -0.09659703f, -0.15462872f, -0.033424035f,
-      0.86543876f },
-    { -0.0005847064f, -0.053673804f, -2.4546027f, 59.541954f, -0.55721337f, -1.5712584f, -0.20387267f,
-      -0.69424224f }
+        { -0.00015500613f, -0.0092341965f, -0.2645419f, 3.8503215f, -0.09659703f, -0.15462872f, -0.033424035f,
+          0.86543876f },
+        { -0.0005847064f, -0.053673804f, -2.4546027f, 59.541954f, -0.55721337f, -1.5712584f, -0.20387267f,
+          -0.69424224f }
     }
 };
 
 /* H12/H11 of the second derivatives H of the cost by U1 and U2, for right and forward. */
 static const nmpc_real_t move_ratios[2] = { 0.31660557f, 0.3174149f };
 
+/* A row times the state. */
 NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const nmpc_real_t state[NMPC_STATES])
 {
     nmpc_sum_t sum = row[0] * state[0];
@@ -636,22 +649,9 @@ NMPC_INLINE nmpc_real_t optimizer_row(const nmpc_real_t row[NMPC_STATES], const 
     return sum;
 }
 
-/* Return `move_m_step2` within +/- `limit_m_step2`; at the limit or beyond it, set `saturated` to 1. */
-NMPC_INLINE nmpc_real_t optimizer_limit(nmpc_real_t move_m_step2, nmpc_real_t limit_m_step2, unsigned char *saturated)
-{
-    nmpc_real_t limited_m_step2 = move_m_step2;
-
-    if (reaches(move_m_step2, limit_m_step2) != 0) {
-        limited_m_step2 = (move_m_step2 < (nmpc_real_t)0) ? -limit_m_step2 : limit_m_step2;
-        *saturated = 1U;
-    }
-    return limited_m_step2;
-}
-
 /* Return the first free move along `axis` that minimises the cost from `state`, which is e (m), v (m/step), and
- * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`; set `saturated` to 1 if it is reached. */
-NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2,
-                                           unsigned char *saturated)
+ * w, j, a, i, c, u (m/step^2). The moves lie within +/- `limit_m_step2`. */
+NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMPC_STATES], nmpc_real_t limit_m_step2)
 {
     nmpc_real_t move_m_step2 = optimizer_row(move_rows[axis][0], state);
     const nmpc_real_t second_m_step2 = optimizer_row(move_rows[axis][1], state);
@@ -662,7 +662,7 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
 
         move_m_step2 = move_m_step2 - (move_ratios[axis] * change_m_step2);
     }
-    return optimizer_limit(move_m_step2, limit_m_step2, saturated);
+    return clamp(move_m_step2, limit_m_step2);
 }
 
 /* ---- Limits ---------------------------------------------------------------------------------------------------------
@@ -804,7 +804,7 @@ NMPC_INLINE nmpc_real_t limits_half_width(const nmpc_bounds_t *bounds, int axis)
 
 /* Set `desired_m_s` to v_d within the limits. Returns which limits act. */
 NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t knee_m, const nmpc_real_t position_m[2],
-                          const nmpc_target_t *target, nmpc_real_t desired_m_s[2])
+                                      const nmpc_target_t *target, nmpc_real_t desired_m_s[2])
 {
     nmpc_real_t place_m[2];
     nmpc_real_t error_m[2];
@@ -871,7 +871,7 @@ NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t k
 /* Set `limited` to the target within the limits for a drone at `position_m`. Returns which limits act; if
  * 0, `limited` is not one. */
 NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m[2], const nmpc_target_t *target,
-                               nmpc_target_t *limited)
+                                      nmpc_target_t *limited)
 {
     nmpc_bounds_t *const bounds = &self->bounds;
     const nmpc_real_t knee_m = NMPC_KNEE_S2 * bounds->braking_m_s2;
@@ -946,8 +946,12 @@ static void limits_set(nmpc_t *self, const nmpc_limits_t *limits)
  *
  *     e = R (p - Tp),   v = R (v - T_s Tv),   w = R (d - drag v - A_T),   j = R J_T
  *
- * with R the rotation from x and y to right and forward. Rate feedback adds to the commands the changes of the measured
- * angles since the last step, times constants.
+ * with R the rotation from x and y to right and forward. The observer is driven by the measured tilt, and by that of
+ * the model, a, while there is no good state; the optimizer starts from that of the model.
+ *
+ * Rate feedback adds to a command the change of the measured angle since the last step, times a constant. Its sign is
+ * positive: it takes damping off an attitude loop that has more than it needs, and so shortens its lag. It is added
+ * behind the minimum, and a command that is held has none.
  */
 
 /* `missed` while the model brakes after an outage; and before the first good state, and when the model is at rest. */
@@ -971,9 +975,10 @@ NMPC_INLINE void turn_to_heading(const nmpc_attitude_t *attitude, nmpc_real_t x,
 }
 
 /* Set the next command of the model to the minimum of the cost along both axes; `tilt_m_step2` is the acceleration of
- * the tilt, right and forward. Set `saturated` to whether a move lies at its limit. */
-NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *observer, const nmpc_tracker_t *tracker, const nmpc_bounds_t *bounds,
-                          const nmpc_target_t *target, const nmpc_real_t tilt_m_step2[2], unsigned char *saturated)
+ * the tilt, right and forward. */
+NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *observer,
+                          const nmpc_tracker_t *tracker, const nmpc_bounds_t *bounds, const nmpc_target_t *target,
+                          const nmpc_real_t tilt_m_step2[2])
 {
     nmpc_real_t state[2][NMPC_STATES];
     nmpc_real_t error[3][2]; /* e, v and w along x and y */
@@ -987,7 +992,6 @@ NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *obse
         error[1][axis] = observer->velocity_m_step[axis]
                          - (NMPC_UPDATE_STEP_S * target->velocity_m_s[axis]);
         error[2][axis] = observer_disturbance(observer, axis) - tracker->acceleration_m_step2[axis];
-        state[axis][3] = (nmpc_real_t)0;
         state[axis][4] = tilt_m_step2[axis];
         state[axis][5] = attitude->integral_m_step2[axis];
         state[axis][6] = attitude->lagged_m_step2[axis];
@@ -1000,9 +1004,8 @@ NMPC_INLINE void minimize(nmpc_attitude_t *attitude, const nmpc_observer_t *obse
     }
     turn_to_heading(attitude, tracker->jerk_m_step2_update[0], tracker->jerk_m_step2_update[1],
                     &state[NMPC_RIGHT][3], &state[NMPC_FORWARD][3]);
-    *saturated = 0U;
-    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], bounds->command_m_step2[NMPC_RIGHT], saturated);
-    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], bounds->command_m_step2[NMPC_FORWARD], saturated);
+    right_m_step2 = optimizer_minimize(NMPC_RIGHT, state[NMPC_RIGHT], bounds->command_m_step2[NMPC_RIGHT]);
+    forward_m_step2 = optimizer_minimize(NMPC_FORWARD, state[NMPC_FORWARD], bounds->command_m_step2[NMPC_FORWARD]);
     attitude->command_m_step2[NMPC_RIGHT] = right_m_step2;
     attitude->command_m_step2[NMPC_FORWARD] = forward_m_step2;
 }
@@ -1020,7 +1023,6 @@ NMPC_INLINE const nmpc_target_t *end_outage(nmpc_t *self, nmpc_attitude_t *attit
         self->command_rad[0] = (nmpc_real_t)0;
         self->command_rad[1] = (nmpc_real_t)0;
         attitude_set_command(attitude, (nmpc_real_t)0, (nmpc_real_t)0);
-        self->saturated = 0U;
         self->limited = 0U;
         *missed = NMPC_AT_REST;
     } else {
@@ -1032,9 +1034,16 @@ NMPC_INLINE const nmpc_target_t *end_outage(nmpc_t *self, nmpc_attitude_t *attit
     return aim;
 }
 
+/* Hold the last command, without the rate feedback that it has if a good state came with it: the rate passes. */
+NMPC_INLINE void hold(nmpc_t *self, const nmpc_attitude_t *attitude)
+{
+    if (self->missed == 0U) {
+        self->command_rad[0] = clamp(attitude_roll(attitude->command_m_step2[NMPC_RIGHT]), self->bounds.tilt_rad);
+    }
+}
+
 /* Take a control step. A null `state` stands for one that is not good, a null `target` for inputs that allow no new
- * command. The model and the estimates are copied, so that the compiler can keep them
- * in registers. */
+ * command. The model and the estimates are copied, so that the compiler can keep them in registers. */
 NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target)
 {
     nmpc_attitude_t own_attitude = self->attitude;
@@ -1058,7 +1067,7 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
             attitude->sine = sine;
             attitude->cosine = cosine;
         } else {
-            attitude_turn(attitude, sine, cosine);
+            attitude_turn(attitude, sine, cosine, target != NULL);
         }
         attitude_measure(state, tilt_m_step2);
     } else {
@@ -1092,12 +1101,14 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
         aim = (limits_apply(self, position_m, target, &limited) != 0U) ? &limited : target;
         tracker_update(self, aim->velocity_m_s);
     } else {
-        /* The command holds. */
+        hold(self, attitude);
     }
     if (aim != NULL) {
-        minimize(attitude, observer, &self->tracker, &self->bounds, aim, attitude->tilt_m_step2, &self->saturated);
-        self->command_rad[0] = clamp(attitude_roll(attitude) + feedback_rad[0], self->bounds.tilt_rad);
-        self->command_rad[1] = clamp(attitude_pitch(attitude), self->bounds.tilt_rad);
+        minimize(attitude, observer, &self->tracker, &self->bounds, aim, attitude->tilt_m_step2);
+        self->command_rad[0] =
+            clamp(attitude_roll(attitude->command_m_step2[NMPC_RIGHT]) + feedback_rad[0], self->bounds.tilt_rad);
+        self->command_rad[1] =
+            clamp(attitude_pitch(attitude->command_m_step2[NMPC_FORWARD]), self->bounds.tilt_rad);
     }
     observer_predict(observer, world_m_step2);
     self->attitude = own_attitude;
@@ -1118,7 +1129,6 @@ static void restart(nmpc_t *self, nmpc_real_t roll_rad, nmpc_real_t pitch_rad)
     self->tilt_rad[0] = (nmpc_real_t)0;
     self->tilt_rad[1] = (nmpc_real_t)0;
     self->missed = NMPC_AT_REST;
-    self->saturated = 0U;
     attitude_reset(&self->attitude, roll_rad, pitch_rad);
     observer_clear(&self->observer);
     tracker_clear(self);
@@ -1198,6 +1208,9 @@ nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command)
 
 nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command)
 {
+    nmpc_real_t roll_rad;
+    nmpc_real_t pitch_rad;
+
     if ((self == NULL) || (command == NULL)) {
         return NMPC_NULL_POINTER;
     }
@@ -1205,9 +1218,11 @@ nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command)
         return NMPC_BAD_COMMAND;
     }
 
-    self->command_rad[0] = clamp(command->roll_rad, self->bounds.tilt_rad);
-    self->command_rad[1] = clamp(command->pitch_rad, self->bounds.tilt_rad);
-    attitude_set_command(&self->attitude, self->command_rad[0], self->command_rad[1]);
+    roll_rad = clamp(command->roll_rad, self->bounds.tilt_rad);
+    pitch_rad = clamp(command->pitch_rad, self->bounds.tilt_rad);
+    attitude_change_command(&self->attitude, roll_rad - self->command_rad[0], pitch_rad - self->command_rad[1]);
+    self->command_rad[0] = roll_rad;
+    self->command_rad[1] = pitch_rad;
     return NMPC_OK;
 }
 
@@ -1251,7 +1266,14 @@ nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_targ
 
 int nmpc_is_saturated(const nmpc_t *self)
 {
-    return (int)self->saturated;
+    /* The largest moves; with a trim their commands lie closer to level on one side. */
+    const nmpc_real_t right_m_step2 = self->bounds.command_m_step2[NMPC_RIGHT];
+    const nmpc_real_t forward_m_step2 = self->bounds.command_m_step2[NMPC_FORWARD];
+
+    return (self->command_rad[0] >= attitude_roll(right_m_step2))
+           || (self->command_rad[0] <= attitude_roll(-right_m_step2))
+           || (self->command_rad[1] >= attitude_pitch(-forward_m_step2))
+           || (self->command_rad[1] <= attitude_pitch(forward_m_step2));
 }
 
 nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate)

@@ -20,6 +20,8 @@
  * Memory: one nmpc_t, owned by the caller. No heap, no globals, no recursion; every loop has a constant bound. Of
  * the C library at most memset and memcpy are needed, where the compiler inserts calls of them.
  * Threads: a function accesses only the nmpc_t that it is given.
+ * Compiler: build with -ffp-contract=off. Without it a compiler may fuse a product and a sum, which are then rounded
+ * once: commands differ in their last digits, this is not the tested controller, and nmpc_self_test() fails.
  *
  * MISRA C:2012: departs from rule 2.5, for the reason in deviations.txt.
  *
@@ -97,7 +99,8 @@ typedef float nmpc_sum_t;
 /* Control steps with a bad state over which the controller flies on by its estimate. */
 #define NMPC_OUTAGE_STEPS 50U
 
-/* Commands of roll and pitch per change of the measured angle in a control step. */
+/* Rate feedback: what is added to the commands of roll and pitch per change of the measured angle in a control step. A
+ * positive one takes damping off the attitude loop. */
 #define NMPC_ROLL_FEEDBACK_STEPS 5.0f
 #define NMPC_PITCH_FEEDBACK_STEPS 0.0f
 
@@ -201,8 +204,9 @@ void nmpc_init(nmpc_t *self);
 nmpc_status_t nmpc_reset(nmpc_t *self, const nmpc_command_t *command);
 
 /* Tell the controller that `command` was sent in place of that of the last step, each angle clamped to the tilt
- * limit, so that its model answers what really flew. Call it between two steps. Returns NMPC_BAD_COMMAND, and changes
- * nothing, if an angle exceeds NMPC_ATTITUDE_RANGE_RAD or is NaN. */
+ * limit, so that its model answers what really flew. Call it between two steps; the very command of the last step
+ * changes nothing. Returns NMPC_BAD_COMMAND, and changes nothing, if an angle exceeds NMPC_ATTITUDE_RANGE_RAD or is
+ * NaN. */
 nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command);
 
 /* Compute the command of this control step; call it every NMPC_UPDATE_PERIOD_S. `thrust_acceleration_m_s2` is the
@@ -212,16 +216,19 @@ nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command);
  *
  * Any input may be passed. If one is NaN, infinite or out of range, the status names it. With a bad state the
  * controller flies on by its estimate for NMPC_OUTAGE_STEPS control steps, and then brakes to a stop by the model's
- * velocity and commands level attitude; with a bad target or thrust it repeats the last command. The next good state is processed as usual; after an outage longer than
- * that the estimate starts anew from it.
+ * velocity and commands level attitude; with a bad target or thrust it repeats the last command,
+ * without its rate feedback.
+ * The next good state is processed as usual; after an outage longer than that position and velocity are estimated anew
+ * from it, and the disturbance is kept.
+ * With a null state or target the last command is returned, no control step is made, and the model does not advance.
  * The target's acceleration is estimated from target->velocity_m_s of successive steps, taken to be
  * NMPC_UPDATE_PERIOD_S apart: after refused inputs one estimate is too large, or the change counts as a jump.
  * Work: without iterations; somewhat more where a limit acts. */
 nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
                         nmpc_real_t thrust_acceleration_m_s2, nmpc_command_t *command);
 
-/* 1 if a command of the last step that computed one lies at the tilt limit: the target may ask for more than the
- * limit gives. `self` must not be null. */
+/* 1 if the last command, new, held or set, lies at the tilt limit, in roll or in pitch: the target may ask for more
+ * than the limit gives; else 0. `self` must not be null. */
 int nmpc_is_saturated(const nmpc_t *self);
 
 /* Set `estimate`. Returns NMPC_NULL_POINTER if an argument is null. */
@@ -290,7 +297,6 @@ struct nmpc_controller {
     nmpc_real_t tilt_rad[NMPC_ANGLES];    /* roll and pitch of the last good state */
     nmpc_real_t command_rad[NMPC_ANGLES]; /* the last command */
     unsigned char missed;                 /* control steps since the last good state */
-    unsigned char saturated;              /* 1 if the last command lies at the tilt limit */
     unsigned char has_target;             /* 1 once the tracker has seen a target */
     unsigned char limited;                /* the limits that act, but NMPC_LIMIT_TILT */
 };

@@ -109,7 +109,6 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
     return NMPC_MAGNITUDE_BITS(value) <= NMPC_MAGNITUDE_BITS(limit);
 }
-
 /* 1 if |`value`| >= `limit`, else 0. */
 NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
 {
@@ -131,7 +130,6 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
     return between(value, -limit, limit);
 }
-
 /* 1 if |`value`| >= `limit`, else 0. */
 NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
 {
@@ -150,7 +148,6 @@ NMPC_INLINE nmpc_real_t clamp(nmpc_real_t value, nmpc_real_t limit)
     return clamped;
 }
 
-
 /* ---- Signs ----------------------------------------------------------------------------------------------------------
  *
  * RPROP and the 1-norm read signs; without an FPU, reading the sign's bit takes far fewer instructions than a
@@ -163,10 +160,12 @@ NMPC_INLINE int sign_of(nmpc_sum_t value)
     return (value > (nmpc_sum_t)0) ? 1 : ((value < (nmpc_sum_t)0) ? -1 : 0);
 }
 
-/* One bit per prediction step, the first step in the most significant bit, the last in bit 0. Steps count from 0
- * to NMPC_LAST_STEP, in the paper from 1 to N_p: step i has bit NMPC_LAST_STEP - i. */
+/* One bit per prediction step, the last step in bit 0. Steps count from 0 to NMPC_LAST_STEP, in the paper from 1 to
+ * N_p: step i has bit NMPC_LAST_STEP - i. More than 32 steps take an unsigned long long. */
 typedef unsigned long nmpc_steps_t;
 #define NMPC_LAST_STEP 9U
+
+typedef char nmpc_assert_every_step_has_a_bit[((8U * sizeof(nmpc_steps_t)) > NMPC_LAST_STEP) ? 1 : -1];
 
 /* The sign bit: 1 for negative values and -0, else 0. */
 NMPC_INLINE nmpc_steps_t is_negative(nmpc_real_t value)
@@ -356,7 +355,7 @@ static const nmpc_real_t response_sum[NMPC_HORIZON_PREDICTION][NMPC_RESPONSES] =
 
 /* Apply a change of the moves of roll and pitch to the roll-out along one axis: the terms with dA. */
 NMPC_INLINE void predictor_change_tilt(nmpc_rollout_t *rollout, const nmpc_real_t gain_m_step2_rad[NMPC_ANGLES],
-                                              nmpc_real_t roll_change_rad, nmpc_real_t pitch_change_rad)
+                                       nmpc_real_t roll_change_rad, nmpc_real_t pitch_change_rad)
 {
     const nmpc_real_t roll_m_step2 = gain_m_step2_rad[NMPC_ROLL] * roll_change_rad;
     const nmpc_real_t pitch_m_step2 = gain_m_step2_rad[NMPC_PITCH] * pitch_change_rad;
@@ -369,8 +368,8 @@ NMPC_INLINE void predictor_change_tilt(nmpc_rollout_t *rollout, const nmpc_real_
 
 /* Apply the moves of step `i` of the control horizon: their change from the moves before, or from the initial tilt. */
 NMPC_INLINE void predictor_apply_moves(const nmpc_prediction_t *prediction,
-                                              const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_rollout_t *x,
-                                              nmpc_rollout_t *y)
+                                       const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_rollout_t *x,
+                                       nmpc_rollout_t *y)
 {
     const nmpc_real_t *move_rad = &moves_rad[NMPC_ANGLES * i];
     const nmpc_real_t *previous_rad = (i > 0) ? &moves_rad[NMPC_ANGLES * (i - 1)] : prediction->tilt_rad;
@@ -397,7 +396,7 @@ static void start_rollout(nmpc_rollout_t *rollout, nmpc_real_t error_m, nmpc_rea
 
 /* Evaluate eq 8 at the present yaw and thrust, and start the roll-out along x and along y. */
 static void predictor_prepare(const nmpc_state_t *state, const nmpc_target_t *target,
-                            nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
+                              nmpc_real_t thrust_acceleration_m_s2, nmpc_prediction_t *prediction)
 {
     const nmpc_real_t thrust_m_step2 = thrust_acceleration_m_s2 * NMPC_PREDICTION_STEP_SQUARED_S2;
     nmpc_real_t sine;
@@ -655,7 +654,6 @@ static void set_plan(nmpc_t *self)
         self->plan_rad[k] = self->command_rad[k % NMPC_ANGLES];
     }
 }
-
 
 /* Take a control step with good inputs. */
 static void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,

@@ -28,6 +28,8 @@
  * Memory: one nmpc_t, owned by the caller. No heap, no globals, no recursion; every loop has a constant bound. Of
  * the C library at most memset and memcpy are needed, where the compiler inserts calls of them.
  * Threads: a function accesses only the nmpc_t that it is given.
+ * Compiler: build with -ffp-contract=off. Without it a compiler may fuse a product and a sum, which are then rounded
+ * once: commands differ in their last digits, this is not the tested controller, and nmpc_self_test() fails.
  *
  * MISRA C:2012: departs from rule 2.5, for the reason in deviations.txt.
  *
@@ -188,8 +190,8 @@ nmpc_status_t nmpc_set_weights(nmpc_t *self, const nmpc_weights_t *weights);
  * Time is not measured: a call counts as one update period, however late it is.
  *
  * Any input may be passed. If one is NaN, infinite or out of range, the status names it and the command repeats
- * the last one: that of the last good step or of nmpc_reset(); level after nmpc_init(). The next good input is
- * processed as usual.
+ * the last one: that of the last good step or of nmpc_reset(); level after nmpc_init(). The next good
+ * input is processed as usual. A null state or target is refused like one, and no control step is made.
  * Work: NMPC_ITERATIONS evaluations of the cost, of NMPC_HORIZON_PREDICTION prediction steps each, for every
  * good input; bad input returns before them. */
 nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
