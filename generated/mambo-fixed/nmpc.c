@@ -1040,10 +1040,9 @@ NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t k
         error_m[axis] = clamp(aim_m, half_width_m) - place_m[axis];
         desired_m_s[axis] = velocity_m_s;
         if (within(aim_m, half_width_m) == 0) {
-            const int leads_out = (aim_m > (nmpc_real_t)0) ? (velocity_m_s > (nmpc_real_t)0) : (velocity_m_s < (nmpc_real_t)0);
-
-            if (leads_out != 0) {
-                desired_m_s[axis] = (nmpc_real_t)0;
+            if (((aim_m > (nmpc_real_t)0) && (velocity_m_s > (nmpc_real_t)0))
+                || ((aim_m < (nmpc_real_t)0) && (velocity_m_s < (nmpc_real_t)0))) {
+                desired_m_s[axis] = (nmpc_real_t)0; /* it leads out */
             }
             fence = NMPC_LIMIT_FENCE;
         }
@@ -1297,7 +1296,9 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
     world_m_step2[1] = sine_product(tilt_m_step2[NMPC_RIGHT], attitude->cosine)
                        + sine_product(tilt_m_step2[NMPC_FORWARD], attitude->sine);
     if (state == NULL) {
-        missed = (missed < NMPC_NO_ESTIMATE) ? (missed + 1U) : missed;
+        if (missed < NMPC_NO_ESTIMATE) {
+            missed = missed + 1U;
+        }
     } else {
         if (missed >= NMPC_NO_ESTIMATE) {
             observer_start(observer, state);

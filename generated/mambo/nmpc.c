@@ -823,10 +823,9 @@ NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t k
         error_m[axis] = clamp(aim_m, half_width_m) - place_m[axis];
         desired_m_s[axis] = velocity_m_s;
         if (within(aim_m, half_width_m) == 0) {
-            const int leads_out = (aim_m > (nmpc_real_t)0) ? (velocity_m_s > (nmpc_real_t)0) : (velocity_m_s < (nmpc_real_t)0);
-
-            if (leads_out != 0) {
-                desired_m_s[axis] = (nmpc_real_t)0;
+            if (((aim_m > (nmpc_real_t)0) && (velocity_m_s > (nmpc_real_t)0))
+                || ((aim_m < (nmpc_real_t)0) && (velocity_m_s < (nmpc_real_t)0))) {
+                desired_m_s[axis] = (nmpc_real_t)0; /* it leads out */
             }
             fence = NMPC_LIMIT_FENCE;
         }
@@ -894,10 +893,12 @@ NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m
 /* 1 if every limit may be set; 0 if one is NaN. */
 static int limits_are_good(const nmpc_limits_t *limits)
 {
+    /* Not negative, as the bounds of between() must be; a negative tilt limit gives no braking. */
+    const nmpc_real_t most_m_s2 = larger((NMPC_BRAKING_PER_TILT_M_S2_RAD * limits->tilt_rad), (nmpc_real_t)0);
     int is_good = between(limits->speed_m_s, NMPC_SMALLEST_SPEED_LIMIT_M_S, NMPC_VELOCITY_RANGE_M_S)
                   && within(limits->tilt_rad, NMPC_TILT_LIMIT_RAD)
                   && between(limits->braking_m_s2, NMPC_SMALLEST_BRAKING_LIMIT_M_S2,
-                             (NMPC_BRAKING_PER_TILT_M_S2_RAD * limits->tilt_rad));
+                             most_m_s2);
     int axis;
 
     for (axis = 0; axis < 2; axis++) {
@@ -1046,8 +1047,8 @@ NMPC_INLINE void hold(nmpc_t *self, const nmpc_attitude_t *attitude)
  * command. The model and the estimates are copied, so that the compiler can keep them in registers. */
 NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target)
 {
-    nmpc_attitude_t own_attitude = self->attitude;
-    nmpc_observer_t own_observer = self->observer;
+    nmpc_attitude_t own_attitude;
+    nmpc_observer_t own_observer;
     nmpc_attitude_t *const attitude = &own_attitude;
     nmpc_observer_t *const observer = &own_observer;
     nmpc_real_t tilt_m_step2[2];
@@ -1057,6 +1058,8 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
     nmpc_target_t limited = { { (nmpc_real_t)0, (nmpc_real_t)0 }, { (nmpc_real_t)0, (nmpc_real_t)0 } };
     const nmpc_target_t *aim = NULL;
 
+    own_attitude = self->attitude;
+    own_observer = self->observer;
     attitude_advance(attitude);
     if (state != NULL) {
         nmpc_real_t sine;
@@ -1079,7 +1082,9 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
     world_m_step2[1] = (tilt_m_step2[NMPC_RIGHT] * attitude->cosine)
                        + (tilt_m_step2[NMPC_FORWARD] * attitude->sine);
     if (state == NULL) {
-        missed = (missed < NMPC_NO_ESTIMATE) ? (missed + 1U) : missed;
+        if (missed < NMPC_NO_ESTIMATE) {
+            missed = missed + 1U;
+        }
     } else {
         if (missed >= NMPC_NO_ESTIMATE) {
             observer_start(observer, state);

@@ -173,6 +173,11 @@ class Method(Constants):
         return self.float_proofs if self.limiting is None else with_limits(self.float_proofs)
 
     @property
+    def assumed_contracts(self) -> tuple[str, ...]:
+        """Functions of the C whose contracts no proof proves: tests compute them for every float."""
+        return ("inverse_root",) if self.limiting and self.numbers.formats is None else ()
+
+    @property
     def linear_law(self) -> LinearLaw | None:
         """The law in control terms; None for a method whose commands are not linear in the state."""
         return None

@@ -95,8 +95,9 @@ def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array
     """Draw limits (n, 7) in the order of nmpc_limits_t; a quarter of them are bad."""
     ranges, most_rad = settings.ranges, settings.limits.tilt_rad
     speed = np.exp(rng.uniform(np.log(0.05), np.log(1.2 * ranges.velocity_m_s), n))
-    tilt = most_rad * rng.choice([1.0, 0.7, 0.4, 1.01, np.nan], n, p=[0.5, 0.25, 0.15, 0.05, 0.05])
-    braking = rng.uniform(0.05, 0.11 + (9.0 * np.nan_to_num(tilt)))
+    share = rng.choice([1.0, 0.7, 0.4, 1.01, -0.7, np.nan], n, p=[0.5, 0.25, 0.1, 0.05, 0.05, 0.05])
+    tilt = most_rad * share
+    braking = rng.uniform(0.05, 0.11 + (9.0 * np.abs(np.nan_to_num(tilt))))
     low = rng.uniform(-3, 1, (n, 2))
     high = low + rng.choice([0.5, 2.0, 8.0, -1.0], (n, 2), p=[0.3, 0.3, 0.38, 0.02])
     is_open, reach_m = rng.random((n, 2)) < 0.2, ranges.position_m
