@@ -4,8 +4,6 @@
 
 void run(const float state[16], float moves[2])
 {
-    unsigned char saturated = 0U;
-
-    moves[0] = optimizer_minimize(NMPC_RIGHT, &state[0], NMPC_RIGHT_LIMIT_M_STEP2, &saturated);
-    moves[1] = optimizer_minimize(NMPC_FORWARD, &state[8], NMPC_FORWARD_LIMIT_M_STEP2, &saturated);
+    moves[0] = optimizer_minimize(NMPC_RIGHT, &state[0], NMPC_RIGHT_LIMIT_M_STEP2);
+    moves[1] = optimizer_minimize(NMPC_FORWARD, &state[8], NMPC_FORWARD_LIMIT_M_STEP2);
 }

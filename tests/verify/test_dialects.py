@@ -11,7 +11,7 @@ from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
 HARMS = {
-    "a conversion that loses digits": Harm("nmpc.c", r"count = \(nmpc_real_t\)quadrant", "count = quadrant"),
+    "a conversion that loses digits": Harm("nmpc.c", r"\+ \(nmpc_real_t\)absolute\(", "+ (double)absolute("),
     "a declaration inside for": Harm("nmpc.c", r"    for \(k = 0;", "    for (int k = 0;"),
 }
 
