@@ -58,4 +58,11 @@ REASONS: Final[tuple[Reason, ...]] = (
         "branch 0 never taken",
         holds=lambda settings: settings.horizon.control == 1,
     ),
+    *reasons(
+        "nmpc.c",
+        "if (self->missed == NMPC_OUTAGE_STEPS) {",
+        "an outage of one control step is over at once",
+        "branch 1 never taken",
+        holds=lambda settings: settings.horizon.update_period_s > 0.33,
+    ),
 )

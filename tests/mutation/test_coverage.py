@@ -86,8 +86,8 @@ def test_a_dead_line_and_its_branch_are_gaps(tmp_path: Path) -> None:
 def test_every_reason_is_of_a_line_that_is_generated() -> None:
     """A row whose line is gone is removed."""
     bundles = [
-        render(with_option(presets.load(name), "code.scalar", scalar, "test"), with_digest=False)
-        for name in presets.names()
+        render(with_option(settings, "code.scalar", scalar, "test"), with_digest=False)
+        for settings in (*map(presets.load, presets.names()), SETTINGS["case 7"])
         for scalar in SCALARS
     ]
     for reason in REASONS:

@@ -101,12 +101,13 @@ def random_limits(settings: Settings, n: int, rng: np.random.Generator) -> Array
     low = rng.uniform(-3, 1, (n, 2))
     high = low + rng.choice([0.5, 2.0, 8.0, -1.0], (n, 2), p=[0.3, 0.3, 0.38, 0.02])
     is_open, reach_m = rng.random((n, 2)) < 0.2, ranges.position_m
+    ends_m = reach_m * rng.choice([1.0, 1.1], (2, n, 2), p=[0.95, 0.05])
     return np.column_stack(
         [
             speed,
             braking,
-            np.where(is_open, -reach_m, np.clip(low, -reach_m, reach_m)),
-            np.where(is_open, reach_m, np.clip(high, -reach_m, reach_m)),
+            np.where(is_open, -ends_m[0], np.clip(low, -reach_m, reach_m)),
+            np.where(is_open, ends_m[1], np.clip(high, -reach_m, reach_m)),
             tilt,
         ]
     )
@@ -161,6 +162,7 @@ def _nulls(settings: Settings, rng: np.random.Generator) -> Iterator[Tape]:
         (ApiFunction.RESET, NULL_SELF | NULL_FIRST),
         (ApiFunction.SET_WEIGHTS, NULL_SELF | NULL_FIRST),
         (ApiFunction.INIT, NULL_SELF),
+        *([(ApiFunction.SET_LIMITS, NULL_SELF | NULL_FIRST)] if method_of(settings).limiting else []),
     ):
         for nulls in range(pointers + 1):
             made = calls(settings, function, np.array([[0.1, 0.2]]), nulls)

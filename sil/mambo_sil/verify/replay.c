@@ -89,7 +89,7 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
     nmpc_replay_write(self, NMPC_STORED_NUMBERS * sizeof(nmpc_real_t));
 #ifdef NMPC_LIMIT_SPEED
     {
-        const int32_t active = (int32_t)self->limited;
+        const int32_t active = (int32_t)(nmpc_limits_active(self) & ~NMPC_LIMIT_TILT);
 
         nmpc_replay_write(&active, sizeof(active));
     }
@@ -110,7 +110,7 @@ static void nmpc_replay_outcome(const nmpc_t *self, int32_t status, const nmpc_c
     nmpc_replay_write(self->plan_rad, sizeof(self->plan_rad));
 #ifdef NMPC_LIMIT_SPEED
     {
-        const int32_t left[2] = { (int32_t)self->missed, (int32_t)self->limited };
+        const int32_t left[2] = { (int32_t)self->missed, (int32_t)(nmpc_limits_active(self) & ~NMPC_LIMIT_TILT) };
 
         nmpc_replay_write(&self->bounds, sizeof(self->bounds));
         nmpc_replay_write(left, sizeof(left));
@@ -131,6 +131,26 @@ static void nmpc_replay_call(nmpc_t *self, const uint8_t *bytes)
         status = (int32_t)nmpc_fuzz_make(self, &call, &command);
     }
     nmpc_replay_outcome(self, status, &command);
+}
+
+/* nmpc_init() starts with what follows from the limits of nmpc_default_limits(), which sets nothing through null. */
+static int starts_with_its_limits(nmpc_t *self)
+{
+    int is_good = 1;
+#ifdef NMPC_LIMIT_SPEED
+    nmpc_limits_t limits;
+    nmpc_t other;
+
+    nmpc_default_limits(NULL);
+    nmpc_default_limits(&limits);
+    nmpc_init(self);
+    nmpc_init(&other);
+    is_good = (nmpc_set_limits(&other, &limits) == NMPC_OK)
+              && (memcmp(&self->bounds, &other.bounds, sizeof(other.bounds)) == 0) && (nmpc_limits_active(self) == 0U);
+#else
+    (void)self;
+#endif
+    return is_good;
 }
 
 static int passes_self_test(nmpc_t *self)
@@ -315,7 +335,8 @@ static int passes_floats(nmpc_t *self)
 }
 #endif
 
-/* Returns 0, 2 if the file cannot be read or the output not written, 3 if the self-test or the one of floats fails. */
+/* Returns 0, 2 if the file cannot be read or the output not written, 3 if the self-test, that of the limits or that of
+ * floats fails. */
 int main(int count, char **arguments)
 {
     static nmpc_t self;
@@ -338,5 +359,8 @@ int main(int count, char **arguments)
         nmpc_replay_call(&self, bytes);
     }
     (void)fclose(file);
-    return ((nmpc_version()[0] != '\0') && passes_self_test(&self) && passes_floats(&self)) ? 0 : 3;
+    return ((nmpc_version()[0] != '\0') && starts_with_its_limits(&self) && passes_self_test(&self)
+            && passes_floats(&self))
+               ? 0
+               : 3;
 }
