@@ -29,6 +29,11 @@ REASONS: Final[Mapping[Key, str]] = {
             "resting = low & (velocity_m_s[2] >= <real>);",
         )
     },
+    (
+        "ground.h",
+        "const real_t ratio = radius_m / (<real> * rotor_height_m);",
+        "negative",
+    ): "only its square counts",
     **{
         ("evaluation.c", "for (i = 0; i < 4; i++) {", change): "writes what the mean square then overwrites"
         for change in ("< -> <=", "4 -> 5")
@@ -73,6 +78,7 @@ REASONS: Final[Mapping[Key, str]] = {
             (_CLIP, "< -> <="),
             (_CLIP, "> -> >="),
             ("return choose((a > b) | (a != a), a, b);", "> -> >="),
+            ("return choose((a < b) | (a != a), a, b);", "< -> <="),
         )
     },
     ("loop.c", "return (value == value) ? value : NAN;", "left out"): "the value is in the register anyway",

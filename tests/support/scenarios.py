@@ -110,6 +110,10 @@ LIMITED: Final = changed(
     sensors={"position_rate_hz": 200, "position_delay_s": 0.02, "velocity_filter_s": 0.0},
 )
 """A cascade at all its limits; motion capture at every tick, without a filter."""
+HEAVY: Final = changed(
+    CRAZYFLIE, body={"mass_kg": 0.052}, altitude={"thrust_max_n": 0.55}, rotors={"mixer": "yaw-last"}
+)
+"""A drone whose weight leaves its motors little for the heading, which its mixer takes from first."""
 LATE: Final = changed(
     FLOWN,
     body={"drag_1_s": 0.4},
@@ -191,6 +195,21 @@ SPACE: Final = (
 )
 """Courses with heights among level ones, with vertical gusts and ground effect; one falls to the ground, one
 begins there."""
+TOUCHING: Final = tuple(
+    Scenario(
+        vehicle=CRAZYFLIE,
+        duration_s=0.3,
+        sensors="mocap",
+        seed=7,
+        trajectory="take-off-and-landing",
+        size_m=0.6,
+        start_offset_m=(0.0, 0.0, z_m),
+        start_velocity_m_s=velocity_m_s,
+        start_tilt_rad=(0.0, 0.3),
+    )
+    for z_m, velocity_m_s in ((-0.01, (1.0, 0.5, 0.4)), (0.02, (2.0, 0.0, -0.3)), (-0.01, (-1.0, 0.3, 0.2)))
+)
+"""Tilted drones that move sideways touch the ground; the second rises from below it."""
 FLOWN_IN_SPACE: Final = tuple(
     one.model_copy(
         update={"vehicle": FLOWN} | {key: getattr(Scenario(vehicle=FLOWN), key) for key in OF_THE_VEHICLE}
@@ -207,10 +226,11 @@ BATCHES: Final = {
     "cascade": captured(CRAZYFLIE),
     "limited": captured(LIMITED),
     "lower": captured(changed(LIMITED, rotors={"mixer": "lower"})),
-    "yaw-last": captured(changed(LIMITED, rotors={"mixer": "yaw-last"})),
+    "yaw-last": captured(HEAVY),
     "flown": captured(FLOWN),
     "late": captured(LATE),
     "space": SPACE,
+    "touching": TOUCHING,
     "flown in space": FLOWN_IN_SPACE,
 }
 
