@@ -174,6 +174,14 @@ def test_active_limits_are_named() -> None:
     ]
 
 
+def test_a_tilt_limit_that_can_hardly_brake_has_no_limits() -> None:
+    """The braking that follows from it could not be set; one that is given may be as small."""
+    tilted = {"tilt_rad": 0.0127, "speed_m_s": 2.0}
+    with pytest.raises(ValidationError, match=r"tilt_rad\n  must give a deceleration of 0.125 m/s"):
+        Settings.model_validate({"limits": tilted})
+    assert Settings.model_validate({"limits": tilted | {"braking_m_s2": 0.11}}).limits.braking_m_s2 == 0.11
+
+
 @pytest.mark.parametrize("base", BASES)
 def test_bad_limits_change_nothing(base: str) -> None:
     """Limits that are not finite, out of range or against each other get BAD_LIMITS."""

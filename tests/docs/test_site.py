@@ -32,7 +32,7 @@ def test_it_has_the_pages_that_the_code_writes(site: Path) -> None:
     from mambo_nmpc import __all__ as names  # noqa: PLC0415 - beside what they are compared with
 
     settings = (site / "reference" / "settings.html").read_text("utf-8")
-    assert [path for path in KEYS if f"<code>{path.split('.')[1]}</code>" not in settings] == []
+    assert [path for path in KEYS if f"<code>{path.rpartition('.')[2]}</code>" not in settings] == []
     commands = (site / "reference" / "command-line.html").read_text("utf-8")
     assert re.findall(r'<h2 id="([\w-]+)"', commands)[:4] == ["init", "doctor", "playground", "presets"]
     python = (site / "reference" / "python-api.html").read_text("utf-8")

@@ -87,7 +87,7 @@ def _random_settings(
     if 0 < lags[0] < 0.001 + document["damping"]["roll_rate_feedback_s"]:
         document["damping"] = {}
     document["horizon"]["update_period_s"] = float(10.0 ** rng.uniform(-3, 0))
-    if rng.random() < 0.5:
+    if rng.random() < 0.5 and document["limits"]["tilt_rad"] > 0.013:
         document["limits"] |= limits_of(rng, document["limits"]["tilt_rad"], document["ranges"])
     return Settings.model_validate(document)
 

@@ -247,7 +247,11 @@ def case_values(index: int) -> Values:
             * min(0.2, 0.9 * gain * tilt_rad)
             * rng.uniform(-1, 1),
         }
-    if rng.random() < 0.5:
+    tilted_rad = min(
+        values[f"model.{a}_gain"] * tilt_rad - abs(values[f"model.{a}_trim_rad"]) for a in ANGLES
+    )
+    can_brake = 0.8 * 9.81 * values["model.acceleration_per_tilt"] * tilted_rad > 0.1
+    if rng.random() < 0.5 and can_brake:
         ranges = {name: values[f"ranges.{name}"] for name in ("position_m", "velocity_m_s")}
         drawn = limits_of(rng, 0.05 * tilt_rad, ranges)
         fence = {f"limits.fence.{name}": wall for name, wall in drawn.pop("fence").items()}

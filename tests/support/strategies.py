@@ -186,12 +186,14 @@ WIDE: Values = {"limits.tilt_rad": 1.2, "ranges.position_m": 10000.0, "ranges.ve
 def limits(draw: st.DrawFn, tilt_rad: float, most_braking_m_s2: float) -> Values:
     """Draw limits of speed, braking and place that go with a tilt limit and the braking that it gives."""
     none = st.just(0.0)
+    can_brake = 0.8 * most_braking_m_s2 > 0.1
     reach_m, speed_m_s = draw(numbers("ranges.position_m")), draw(numbers("ranges.velocity_m_s"))
-    braking = none
-    if most_braking_m_s2 > 0.1:
+    speed = braking = none
+    if can_brake:
+        speed = none | numbers("limits.speed_m_s", low=0.1, high=speed_m_s)
         braking = none | numbers("limits.braking_m_s2", low=0.1, high=0.999 * most_braking_m_s2)
     fence: Values = {}
-    for axis in draw(st.sampled_from(["", "x", "y", "xy"])):
+    for axis in draw(st.sampled_from(["", "x", "y", "xy"])) if can_brake else "":
         walls = st.lists(st.floats(-reach_m, reach_m), min_size=2, max_size=2, unique=True)
         low, high = sorted(draw(walls.filter(lambda pair: min(pair) < 9999 and max(pair) > -9999)))
         fence |= {f"limits.fence.{axis}_min_m": low, f"limits.fence.{axis}_max_m": high}
@@ -201,7 +203,7 @@ def limits(draw: st.DrawFn, tilt_rad: float, most_braking_m_s2: float) -> Values
         | fence
         | {
             "limits.tilt_rad": tilt_rad,
-            "limits.speed_m_s": draw(none | numbers("limits.speed_m_s", low=0.1, high=speed_m_s)),
+            "limits.speed_m_s": draw(speed),
             "limits.braking_m_s2": draw(braking),
             "ranges.position_m": reach_m,
             "ranges.velocity_m_s": speed_m_s,

@@ -51,7 +51,7 @@ UNPROVEN = {
     "a refused target is used": Fault(
         "refuse_nan",
         Harm(CONTROLLER, r"(NMPC_BAD_TARGET;\n)            good_target = NULL;\n", r"\1"),
-        Alarm(CONTROLLER, "optimizer_minimize(", "precondition of optimizer_minimize"),
+        Alarm(CONTROLLER, "limits_are_free(", "precondition of limits_are_free"),
     ),
     "a null pointer is followed": Fault(
         "refuse_nan",
@@ -65,7 +65,7 @@ UNPROVEN = {
     ),
     "the command leaves the tilt limit": Fault(
         "take_numbers",
-        Harm(CONTROLLER, r"clamp\((self->command_rad\[0\] \+[^;]*), NMPC_TILT_LIMIT_RAD\)", r"\1"),
+        Harm(CONTROLLER, r"clamp\((attitude_roll\([^;]*feedback_rad\[0\]), self->bounds\.tilt_rad\)", r"\1"),
         Alarm(DRIVER, "roll_is_within_the_limit", "user assertion"),
     ),
     "a clamp that does not limit": Fault(
@@ -75,7 +75,7 @@ UNPROVEN = {
         "take_numbers",
         Harm(
             CONTROLLER,
-            r"    pitch_rad = clamp\(command->pitch_rad, NMPC_TILT_LIMIT_RAD\)",
+            r"    pitch_rad = clamp\(command->pitch_rad, self->bounds\.tilt_rad\)",
             "    pitch_rad = command->pitch_rad",
         ),
         Alarm(DRIVER, "pitch_is_within_the_limit", "user assertion"),
@@ -93,7 +93,7 @@ UNPROVEN = {
     "the model starts uninitialised": Fault(
         "take_numbers",
         Harm(CONTROLLER, r"    attitude->cosine = NMPC_ONE;\n", ""),
-        Alarm(CONTROLLER, "self->attitude.cosine", "initialization"),
+        Alarm(CONTROLLER, "* attitude->cosine)", "initialization"),
     ),
     "a bad input leaves the command unset": Fault(
         "take_numbers",

@@ -23,7 +23,6 @@ FAULTS = {
         "for (k = 0; k < NMPC_MOVES; k++) {\n        self->plan_rad[k] = self->command_rad",
         "for (k = 0; k <= NMPC_MOVES; k++) {\n        self->plan_rad[k] = self->command_rad",
     ),
-    "a wild heading converted": ("nmpc.c", "within(state->yaw_rad, NMPC_YAW_RANGE_RAD)", "1"),
 }
 
 

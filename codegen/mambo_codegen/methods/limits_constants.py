@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mambo_codegen.numbers.fixed_point import fractional_bits
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings.fields import SMALLEST_LIMIT
 from mambo_codegen.settings.key import Refusal
 from mambo_codegen.settings.sections import DEFAULTS, Sections
 
@@ -115,6 +116,13 @@ def refusals(settings: Sections, tilted: TiltAcceleration) -> list[Refusal]:
             f"limits.tilt_rad = {limits.tilt_rad:g}"
         )
         refused.append(Refusal("limits", "braking_m_s2", rule))
+    least_m_s2 = SMALLEST_LIMIT / BRAKING_SHARE
+    if has_limits(settings) and not limits.braking_m_s2 and most_m_s2 < least_m_s2:
+        rule = (
+            f"must give a deceleration of {least_m_s2:g} m/s^2 to limit speed, braking or place, and gives "
+            f"{most_m_s2:.3g}"
+        )
+        refused.append(Refusal("limits", "tilt_rad", rule))
     for name, value in limits.fence.model_dump().items():
         if abs(value) > ranges.position_m:
             rule = f"must lie in {-ranges.position_m!r}..{ranges.position_m!r} (ranges.position_m)"

@@ -72,7 +72,7 @@ void nmpc_host_limits_active(const nmpc_t *controllers, int n, int *active)
 
 #ifdef NMPC_ANGLE_BITS
 /* Nearest number, ties away from zero; the largest number for NaN and for what overflows. */
-static nmpc_real_t quantize(double value, int bits)
+static nmpc_real_t number_of(double value, int bits)
 {
     const double scaled = value * (double)((nmpc_sum_t)1 << bits);
     nmpc_real_t number = 2147483647;
@@ -83,7 +83,7 @@ static nmpc_real_t quantize(double value, int bits)
     }
     return number;
 }
-#define NUMBER(value, quantity) quantize(value, NMPC_##quantity##_BITS)
+#define NUMBER(value, quantity) number_of(value, NMPC_##quantity##_BITS)
 #define ANGLE_RAD(number) ((double)(number) / (double)((nmpc_sum_t)1 << NMPC_ANGLE_BITS))
 #else
 #define NUMBER(value, quantity) ((nmpc_real_t)(value))
