@@ -11,6 +11,7 @@ import pytest
 import unicorn
 
 from mambo_codegen.bundle.render import render
+from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import GUEST, EmulatedController, build_guest
@@ -217,9 +218,9 @@ def test_a_tick_can_be_repeated_with_the_plan_that_it_had(crazyflie: Path) -> No
     """Whatever was stepped since, the same state costs the same; the instance of the first tick differs."""
     controller = fly_counted(crazyflie, 20)
     first, last = controller.steps[0], controller.steps[-1]
-    controller.retry(last, last.state + 0.3)
-    assert controller.retry(last, last.state).by_function == last.by_function
-    assert controller.retry(first, first.state).by_function == first.by_function
+    controller.retry(last, last.state + 0.3, last.target)
+    assert controller.retry(last, last.state, last.target).by_function == last.by_function
+    assert controller.retry(first, first.state, first.target).by_function == first.by_function
     assert first.before != last.before
     assert len(controller.steps) == 20
 
@@ -231,6 +232,14 @@ def test_the_search_never_returns_less_than_the_flight(crazyflie: Path) -> None:
     assert found[0].most_met < found[2].most_met
     assert len({(one.least, one.mean) for one in found}) == 1
     assert counted(MAMBO, crazyflie, 20, 60) == found[2]
+
+
+def test_the_search_finds_steps_in_which_a_limit_acts(tmp_path: Path) -> None:
+    """They take half as much again as any of the flight, whose target is within the limits."""
+    settings = presets.load("mambo")
+    elf = build_guest(settings, board_builder("crazyflie"), tmp_path)
+    flight, searched = (counted(settings, elf, 30, steps) for steps in (0, 60))
+    assert searched.most_met > 1.4 * flight.most_met
 
 
 def test_refused_ticks_are_not_counted(tmp_path: Path) -> None:

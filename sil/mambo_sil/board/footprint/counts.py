@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from mambo_codegen.boards import FlashWait
+from mambo_codegen.methods import method_of
 from mambo_codegen.methods.one_norm.controller import OneNormStep
 from mambo_codegen.settings.model import Settings
 from mambo_sil.board.emulated import EmulatedController
@@ -153,10 +154,10 @@ class CountingController:
         """Say whether an address of code or of its constants is not the harness's."""
         return self._name_of(address) not in HARNESS
 
-    def retry(self, step: CountedStep, state: FloatArray) -> CountedStep:
-        """Repeat an earlier step from the instance before it, with another state (1, 7)."""
+    def retry(self, step: CountedStep, state: FloatArray, target: FloatArray) -> CountedStep:
+        """Repeat an earlier step from the instance before it, with another state (1, 7) and target (1, 4)."""
         self._emulated.restore(step.before)
-        self.step(state, step.target, step.thrust)
+        self.step(state, target, step.thrust)
         return self.steps.pop()
 
 
@@ -187,7 +188,7 @@ def count_instructions(
         raise FlightError("the controller refuses every tick of the flight, which is beyond its [ranges]")
     totals = [step.instructions for step in flown]
     sums = sum((step.by_function for step in flown), Counter[str]())
-    searched = _search(controller, flown, search_steps)
+    searched = _search(controller, flown, search_steps, limited=method_of(settings).limiting is not None)
     cycles, further = ([one.cycles for one in steps if one.cycles] for steps in (flown, searched))
     return InstructionCounts(
         ticks=len(flown),
@@ -201,20 +202,25 @@ def count_instructions(
 
 
 def _search(
-    controller: CountingController, flown: Sequence[CountedStep], search_steps: int
+    controller: CountingController, flown: Sequence[CountedStep], search_steps: int, *, limited: bool
 ) -> list[CountedStep]:
     """Return the accepted steps of a search for more instructions from the most expensive tick on.
 
     Hill climbing: each step starts from the controller's instance at that tick, with its plan, and changes
-    one component of the state; a change that costs at least as much is kept.
+    one component of the state; a change that costs at least as much is kept. With limits, which act for far
+    and fast targets only, it may be a component of the target instead.
     """
     rng = np.random.default_rng(0)
     best = max(flown, key=lambda step: step.instructions)
     searched = []
     for _ in range(search_steps):
-        state = best.state.copy()
-        state[0, rng.integers(7)] += rng.normal() * 10.0 ** rng.uniform(-4, 0)
-        tried = controller.retry(best, state)
+        state, target = best.state.copy(), best.target.copy()
+        index = rng.integers(11 if limited else 7)
+        if index < 7:
+            state[0, index] += rng.normal() * 10.0 ** rng.uniform(-4, 0)
+        else:
+            target[0, index - 7] += rng.normal() * 10.0 ** rng.uniform(-1, 1)
+        tried = controller.retry(best, state, target)
         if tried.accepted:
             searched.append(tried)
             if tried.instructions >= best.instructions:
