@@ -811,8 +811,8 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   3. Fence: towards a wall at distance d the component of v_d is at most f(d). Outside, it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
- * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and v_d for
- * v_T.
+ * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
+ * v_d for v_T.
  *
  * An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start that a shift of the bits gives.
  */
@@ -1085,7 +1085,7 @@ NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t k
 }
 
 /* Set `limited` to the target within the limits for a drone at `position_m`. Returns which limits act; if
- * 0, `limited` is not one. */
+ * 0, the target stays as it is, and `limited` is not to be used. */
 NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m[2], const nmpc_target_t *target,
                                       nmpc_target_t *limited)
 {
@@ -1253,7 +1253,7 @@ NMPC_INLINE const nmpc_target_t *end_outage(nmpc_t *self, nmpc_attitude_t *attit
     return aim;
 }
 
-/* Hold the last command, without the rate feedback that it has if a good state came with it: the rate passes. */
+/* Hold the last command, less its rate feedback: that is for the rate of one control step only. */
 NMPC_INLINE void hold(nmpc_t *self, const nmpc_attitude_t *attitude)
 {
     if (self->missed == 0U) {

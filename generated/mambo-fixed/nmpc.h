@@ -198,8 +198,8 @@ typedef struct {
 typedef struct {
     nmpc_real_t speed_m_s;      /* NMPC_SMALLEST_SPEED_LIMIT_M_S to NMPC_VELOCITY_RANGE_M_S */
     nmpc_real_t braking_m_s2;   /* NMPC_SMALLEST_BRAKING_LIMIT_M_S2 to what the tilt limit gives; has NMPC_BRAKING_BITS */
-    nmpc_real_t fence_min_m[2]; /* walls behind and on the left, x and y, */
-    nmpc_real_t fence_max_m[2]; /* and ahead and on the right; all within +/- NMPC_POSITION_RANGE_M */
+    nmpc_real_t fence_min_m[2]; /* the walls at the least x and y, */
+    nmpc_real_t fence_max_m[2]; /* and at the largest; all within +/- NMPC_POSITION_RANGE_M */
     nmpc_real_t tilt_rad;       /* at most NMPC_TILT_LIMIT_RAD */
 } nmpc_limits_t;
 
@@ -267,9 +267,9 @@ nmpc_status_t nmpc_last_estimate(const nmpc_t *self, nmpc_estimate_t *estimate);
 void nmpc_default_limits(nmpc_limits_t *limits);
 
 /* Replace the limits, from the next step on; nmpc_init() sets those of the settings, nmpc_reset() leaves them. Returns
- * NMPC_BAD_LIMITS, and changes nothing, if a member is NaN or out of range, a wall does not lie before the other, or
- * the braking limit is more than the tilt limit gives. May be called between any two steps: a drone outside a new
- * fence flies back in. */
+ * NMPC_BAD_LIMITS, and changes nothing, if a member is NaN or out of range, a minimum of the fence is not less than
+ * the maximum, or the braking limit is more than the tilt limit gives. May be called between any two steps: a drone
+ * outside a new fence flies back in. */
 nmpc_status_t nmpc_set_limits(nmpc_t *self, const nmpc_limits_t *limits);
 
 /* Which limits changed what the last step that computed a command aimed at, or cut its command off: NMPC_LIMIT_SPEED,

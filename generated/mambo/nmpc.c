@@ -68,7 +68,7 @@ typedef char nmpc_assert_numbers_come_first[(offsetof(nmpc_t, missed) == (NMPC_S
 
 /* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
- * Comparisons, limits with the same bits on every board.
+ * Comparisons and limits with the same bits on every board.
  */
 
 /* The bits of a value; the most significant one is its sign. Without an FPU, reading bits takes far fewer
@@ -188,8 +188,9 @@ static int is_good_command(const nmpc_command_t *command)
 #define NMPC_SINE_TERMS 3
 #define NMPC_COSINE_TERMS 3
 
-/* 2/pi; 1.5 over the precision: a sum with it is rounded to a whole number, whose lowest bits are those of the sum; and
- * pi/2 in two parts, of which the first has so few bits that its products with the quarter turns are exact. */
+/* 2/pi; 1.5 over the machine epsilon: a number to which it is added is rounded to a whole one, and its lowest bits are
+ * the lowest ones of the sum; and pi/2 in two parts, of which the first has so few bits that its products with the
+ * quarter turns are exact. */
 #define NMPC_QUARTER_TURNS_PER_RAD 0.63661975f
 #define NMPC_ROUNDING 1.2582912e+07f
 #define NMPC_QUARTER_TURN_RAD 1.5707397f
@@ -683,8 +684,8 @@ NMPC_INLINE nmpc_real_t optimizer_minimize(int axis, const nmpc_real_t state[NMP
  *   3. Fence: towards a wall at distance d the component of v_d is at most f(d). Outside, it leads back in by f.
  *   4. Speed: if |v_d| > V, a factor makes it V. The direction stays.
  *
- * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and v_d for
- * v_T.
+ * If none of these changes v_d, the target is used as it is, in every bit. Else the controller is given p for p_T and
+ * v_d for v_T.
  *
  * An inverse square root takes products alone: Newton's y (3 - x y^2)/2, from a start that a shift of the bits gives.
  */
@@ -743,13 +744,13 @@ NMPC_ASIDE nmpc_root_t inverse_root(nmpc_square_t x)
     return root;
 }
 
-/* The root of the square of a speed. */
+/* A speed, from its square. */
 static nmpc_real_t braking_speed(nmpc_square_t square)
 {
     return square * inverse_root(square);
 }
 
-/* 1 if a positive speed is at most the root of the square of a speed. */
+/* 1 if a positive speed is at most that with this square. */
 static int is_slower(nmpc_real_t speed_m_s, nmpc_square_t square)
 {
     return (speed_m_s * speed_m_s) <= square;
@@ -868,7 +869,7 @@ NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t k
 }
 
 /* Set `limited` to the target within the limits for a drone at `position_m`. Returns which limits act; if
- * 0, `limited` is not one. */
+ * 0, the target stays as it is, and `limited` is not to be used. */
 NMPC_INLINE unsigned int limits_apply(nmpc_t *self, const nmpc_real_t position_m[2], const nmpc_target_t *target,
                                       nmpc_target_t *limited)
 {
@@ -1035,7 +1036,7 @@ NMPC_INLINE const nmpc_target_t *end_outage(nmpc_t *self, nmpc_attitude_t *attit
     return aim;
 }
 
-/* Hold the last command, without the rate feedback that it has if a good state came with it: the rate passes. */
+/* Hold the last command, less its rate feedback: that is for the rate of one control step only. */
 NMPC_INLINE void hold(nmpc_t *self, const nmpc_attitude_t *attitude)
 {
     if (self->missed == 0U) {

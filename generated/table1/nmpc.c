@@ -69,7 +69,7 @@ typedef char nmpc_assert_horizons[((NMPC_HORIZON_CONTROL >= 1)
 
 /* ---- Numbers --------------------------------------------------------------------------------------------------------
  *
- * Comparisons, limits with the same bits on every board.
+ * Comparisons and limits with the same bits on every board.
  */
 
 /* The bits of a value; the most significant one is its sign. Without an FPU, reading bits takes far fewer
@@ -109,6 +109,7 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
     return NMPC_MAGNITUDE_BITS(value) <= NMPC_MAGNITUDE_BITS(limit);
 }
+
 /* 1 if |`value`| >= `limit`, else 0. */
 NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
 {
@@ -130,6 +131,7 @@ NMPC_INLINE int within(nmpc_real_t value, nmpc_real_t limit)
 {
     return between(value, -limit, limit);
 }
+
 /* 1 if |`value`| >= `limit`, else 0. */
 NMPC_INLINE int reaches(nmpc_real_t value, nmpc_real_t limit)
 {
@@ -260,8 +262,9 @@ static int is_good_command(const nmpc_command_t *command)
 #define NMPC_SINE_TERMS 3
 #define NMPC_COSINE_TERMS 3
 
-/* 2/pi; 1.5 over the precision: a sum with it is rounded to a whole number, whose lowest bits are those of the sum; and
- * pi/2 in two parts, of which the first has so few bits that its products with the quarter turns are exact. */
+/* 2/pi; 1.5 over the machine epsilon: a number to which it is added is rounded to a whole one, and its lowest bits are
+ * the lowest ones of the sum; and pi/2 in two parts, of which the first has so few bits that its products with the
+ * quarter turns are exact. */
 #define NMPC_QUARTER_TURNS_PER_RAD 0.63661975f
 #define NMPC_ROUNDING 1.2582912e+07f
 #define NMPC_QUARTER_TURN_RAD 1.5707397f
@@ -366,7 +369,8 @@ NMPC_INLINE void predictor_change_tilt(nmpc_rollout_t *rollout, const nmpc_real_
     rollout->acceleration_m_step2 = rollout->acceleration_m_step2 + change_m_step2;
 }
 
-/* Apply the moves of step `i` of the control horizon: their change from the moves before, or from the initial tilt. */
+/* Apply the moves of step `i` of the control horizon: their change from the moves before, or from the initial
+ * tilt, which is 0: without a lag a command is the tilt. */
 NMPC_INLINE void predictor_apply_moves(const nmpc_prediction_t *prediction,
                                        const nmpc_real_t moves_rad[NMPC_MOVES], int i, nmpc_rollout_t *x,
                                        nmpc_rollout_t *y)
