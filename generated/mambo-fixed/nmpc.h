@@ -251,7 +251,7 @@ nmpc_status_t nmpc_set_command(nmpc_t *self, const nmpc_command_t *command);
  * With a null state or target the last command is returned, no control step is made, and the model does not advance.
  * The target's acceleration is estimated from target->velocity_m_s of successive steps, taken to be
  * NMPC_UPDATE_PERIOD_S apart: after refused inputs one estimate is too large, or the change counts as a jump.
- * Work: without iterations; somewhat more where a limit acts. */
+ * Work: without iterations; half as much again where a limit acts. */
 nmpc_status_t nmpc_step(nmpc_t *self, const nmpc_state_t *state, const nmpc_target_t *target,
                         nmpc_real_t thrust_acceleration_m_s2, nmpc_command_t *command);
 
