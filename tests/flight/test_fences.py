@@ -1,6 +1,7 @@
 """Fences set in flight, and metrics of limits."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.engine.native import is_native
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.fences import LimitMetrics, fenced, measure_limits, square_fence, walls_m, with_limits
+from mambo_sil.flight.flight_plots import draw_flights
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.traces import Trace
 from tests.support.tools import toolchain
@@ -85,6 +87,17 @@ def test_walls_of_the_settings_are_a_fence_too() -> None:
     assert measure_limits(FLOWN, walled, [Scenario()]).past_wall_m == [0.0]
     beside = replace(FLOWN, position_m=FLOWN.position_m[..., [1, 0, 2]])
     assert measure_limits(beside, walled, [Scenario()]).past_wall_m == [2.5]
+
+
+def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
+    """One line for each wall, and none without a fence."""
+    trace = trace_of([0.0, 1.0], [0.0, 0.0], [0.0, 1.0])
+    fences = {"nothing": None, "two": (-np.inf, -1.0, np.inf, 1.0), "four": walls_m(MAMBO, 2.0)}
+    dashes = []
+    for name, walls in fences.items():
+        draw_flights({name: trace}, tmp_path / name, walls)
+        dashes.append((tmp_path / f"{name}.svg").read_text("utf-8").count("stroke-dasharray"))
+    assert dashes == [0, 2, 4]
 
 
 def test_a_lost_flight_has_no_metrics() -> None:

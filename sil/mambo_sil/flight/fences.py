@@ -17,6 +17,9 @@ from mambo_sil.flight.metrics import TRANSIENT_S, horizontal_error_m
 from mambo_sil.flight.scenario import Scenario
 from mambo_sil.flight.traces import Trace
 
+Walls = tuple[float, float, float, float]
+"""x_min, y_min, x_max, y_max of a fence, m; infinity for no wall."""
+
 LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
 """The numbers of nmpc_limits_t, in their order."""
 
@@ -83,8 +86,10 @@ def measure_limits(trace: Trace, settings: Settings, scenarios: Sequence[Scenari
     )
 
 
-def walls_m(settings: Settings) -> tuple[float, float, float, float] | None:
-    """Return the fence of settings as x_min, y_min, x_max, y_max; None without, infinity for no wall."""
+def walls_m(settings: Settings, fence_m: float = 0.0) -> Walls | None:
+    """Return the fence of a flight: +/- `fence_m` if that is set, else that of the settings, if any."""
+    if fence_m:
+        return -fence_m, -fence_m, fence_m, fence_m
     fence = settings.limits.fence
     if not (fence.x_min_m < fence.x_max_m or fence.y_min_m < fence.y_max_m):
         return None
@@ -117,13 +122,10 @@ def _overshoot_m(trace: Trace) -> FloatArray:
 
 
 def _past_wall_m(trace: Trace, row: int, settings: Settings, scenario: Scenario) -> float:
-    if scenario.fence_m:
-        low, high = np.full(2, -scenario.fence_m), np.full(2, scenario.fence_m)
-    else:
-        walls = walls_m(settings)
-        if walls is None:
-            return 0.0 * float(trace.position_m[-1, row, 0])
-        low, high = np.array(walls[:2]), np.array(walls[2:])
+    walls = walls_m(settings, scenario.fence_m)
+    if walls is None:
+        return 0.0 * float(trace.position_m[-1, row, 0])
+    low, high = np.array(walls[:2]), np.array(walls[2:])
     since = trace.time_s >= (scenario.fence_time_s if scenario.fence_m else -np.inf)
     position_m = trace.position_m[since, row, :2]
     outside_m = np.maximum(np.maximum(low - position_m, position_m - high).max(axis=1), 0.0)

@@ -3,6 +3,7 @@
 Where a course has a height, the path is shown from the side, too, and the height over time.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -13,10 +14,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mambo_sil.flight.animation import animate
+from mambo_sil.flight.fences import Walls
 from mambo_sil.flight.metrics import horizontal_error_m
 from mambo_sil.flight.traces import Trace
 from mambo_sil.results.pictures import inline, save
-from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, TARGET, THIN, style
+from mambo_sil.results.style import BROAD, COLUMN_INCHES, COMMAND, FLOWN, INK, TARGET, THIN, style
 
 _LEVEL: Final = {"y (east), m": 1.9, "error, m": 1.0, "roll, rad": 1.0, "pitch, rad": 1.0}
 _SPATIAL: Final = {
@@ -30,8 +32,8 @@ _SPATIAL: Final = {
 """Labels of the axes of a column, and their heights relative to each other."""
 
 
-def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
-    """Draw the first flight of each trace as one column with the same scales in all columns.
+def draw_flights(flights: Mapping[str, Trace], stem: Path, walls: Walls | None = None) -> tuple[Path, Path]:
+    """Draw the first flight of each trace as one column with the same scales in all columns, and the fence.
 
     Writes stem.png and stem.svg.
     """
@@ -44,6 +46,8 @@ def draw_flights(flights: Mapping[str, Trace], stem: Path) -> tuple[Path, Path]:
         rows = figure.subplots(len(labels), len(flights), squeeze=False, sharey="row", height_ratios=ratios)
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
             _draw_column(column, trace, title)
+            if walls is not None:
+                _draw_walls(column[0], walls)
         _share_scales(rows[0])
         rows[0, 0].invert_yaxis()  # shared: seen from above, with north to the right
         _label_column(rows[:, 0], labels)
@@ -76,6 +80,16 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
         )
         axes.plot(trace.time_s, trace.euler_rad[:, 0, axis], color=FLOWN, linewidth=THIN, label="flown")
     angles[-1].set_xlabel("time, s")
+
+
+def _draw_walls(path: Axes, walls: Walls) -> None:
+    """Draw the walls of a fence in a path seen from above."""
+    look: dict[str, Any] = {"color": INK, "linestyle": "--", "linewidth": THIN}
+    for x_m, y_m in (walls[:2], walls[2:]):
+        if math.isfinite(x_m):
+            path.axvline(x_m, **look)
+        if math.isfinite(y_m):
+            path.axhline(y_m, **look)
 
 
 def _draw_heights(axes: Sequence[Axes], trace: Trace) -> None:

@@ -26,6 +26,7 @@ from mambo_sil.errors import FlightError, TrajectoryError
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
+from mambo_sil.flight.fences import Walls, walls_m
 from mambo_sil.flight.flight_report import FlightSummary, FlySummary, flight_text, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.names import PD_TITLES, SIZED, TIMED
@@ -66,7 +67,7 @@ def fly_once(course: Course, conditions: Conditions, runner: Runner, output: Out
         same_bits = None
         if runner.on is not None:
             same_bits = trace.same_bits(simulate(flight, _controller(runner, settings, flight)))
-        write_flight(trace, runner, output, folder)
+        write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
         summary = FlySummary(**fields | judge(trace, settings, drone) | {"same_bits_as_host": same_bits})
         summary.write(folder)
@@ -159,12 +160,12 @@ def written(output: Output) -> tuple[str, ...]:
     return FLIGHT_FILES if output.pictures else TRACE_FILES
 
 
-def write_flight(trace: Trace, runner: Runner, output: Output, folder: Path) -> None:
+def write_flight(trace: Trace, runner: Runner, settings: Settings, output: Output, folder: Path) -> None:
     """Write the files of `written`."""
     write_trace(trace, folder)
     if output.pictures:
         title = PD_TITLES.get(runner.controller, f"NMPC, {echo(named_source(runner))}")
-        draw_flight(trace, title, folder)
+        draw_flight(trace, title, folder, walls_m(settings))
 
 
 def write_trace(trace: Trace, folder: Path) -> None:
@@ -173,11 +174,11 @@ def write_trace(trace: Trace, folder: Path) -> None:
     write_npz(trace, folder / "trace.npz")
 
 
-def draw_flight(trace: Trace, title: str, folder: Path) -> None:
-    """Write the pictures of `FLIGHT_FILES`."""
+def draw_flight(trace: Trace, title: str, folder: Path, walls: Walls | None) -> None:
+    """Write the pictures of `FLIGHT_FILES`, with the fence, if there is one."""
     from mambo_sil.flight.flight_plots import draw_flights  # matplotlib is slow to import
 
-    draw_flights({title: trace}, folder / "flight")
+    draw_flights({title: trace}, folder / "flight", walls)
 
 
 def finish(summary: FlightSummary, text: str, output: Output, files: tuple[str, ...]) -> None:

@@ -65,7 +65,7 @@ def fly_on_port(course: Course, conditions: Conditions, runner: Runner, output: 
             controller = (TimedController if runner.real_time else BoardController)(settings, board)
             with progress_bar("flying") as progress:
                 trace = simulate(flight, controller, progress)
-        write_flight(trace, runner, output, folder)
+        write_flight(trace, runner, settings, output, folder)
         fields = summary_fields(course, conditions, runner, flight, settings)
         fields |= judge(trace, settings, drone) | board_fields(board, controller)
         fields |= {"baud": runner.baud or BAUD} | _emulated(settings, board.greeting.board)

@@ -13,7 +13,7 @@ from mambo_sil.errors import FlightError
 from mambo_sil.experiment.campaign.campaign_records import campaign_record
 from mambo_sil.flight.controllers.inner_steps import WatchedController, write_inner_steps
 from mambo_sil.flight.controllers.pd import pd_controller
-from mambo_sil.flight.fences import fenced
+from mambo_sil.flight.fences import fenced, walls_m
 from mambo_sil.flight.flight_report import RepeatSummary, flight_text, judge
 from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.loop import fly as simulate
@@ -48,7 +48,7 @@ def fly_again(file: Path, output: Output, context: typer.Context) -> None:
             trace = simulate(flight, controller, progress)
         write_trace(trace, folder)
         if output.pictures:
-            draw_flight(trace, file.name, folder)
+            draw_flight(trace, file.name, folder, walls_m(record.settings, record.scenario.fence_m))
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
