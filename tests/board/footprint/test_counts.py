@@ -122,12 +122,8 @@ def counted(settings: Settings, elf: Path, ticks: int, searched: int) -> Instruc
     return count_instructions(settings, elf, "cortex-m4", ticks, searched)
 
 
-@pytest.mark.first_is_quick
-@pytest.mark.parametrize("name", CORES)
-def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
-    """The count of a known function is exact: loop, long block, jump over data, conditional instructions."""
-    skipped = SKIPPED.get(name, ())
-    assembly = ASSEMBLY.format(**WORDS.get(name, THUMB), skipped="\n".join(skipped))
+def known_function(name: str, assembly: str, folder: Path) -> Path:
+    """Build a program for a board in which the function nmpc_known of the assembly takes the step's place."""
     declared = (
         '#include "nmpc.h"\nnmpc_status_t nmpc_known(nmpc_t *self, const nmpc_state_t *state,'
         "const nmpc_target_t *target, nmpc_real_t thrust, nmpc_command_t *command);\n"
@@ -135,17 +131,58 @@ def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) 
     )
     glue = batch_source()
     assert glue.count("nmpc_step(") == 1
-    elf = board_builder(name).guest(
-        render(MAMBO, with_digest=False),
-        declared + glue.replace("nmpc_step(", "nmpc_known("),
-        GUEST,
-        tmp_path,
-    )
+    stepped = glue.replace("nmpc_step(", "nmpc_known(")
+    return board_builder(name).guest(render(MAMBO, with_digest=False), declared + stepped, GUEST, folder)
+
+
+@pytest.mark.first_is_quick
+@pytest.mark.parametrize("name", CORES)
+def test_a_function_counted_by_hand_is_counted_right(name: str, tmp_path: Path) -> None:
+    """The count of a known function is exact: loop, long block, jump over data, conditional instructions."""
+    skipped = SKIPPED.get(name, ())
+    assembly = ASSEMBLY.format(**WORDS.get(name, THUMB), skipped="\n".join(skipped))
+    elf = known_function(name, assembly, tmp_path)
     controller = CountingController(MAMBO, elf, CORES[name])
     for _ in range(2):
         controller.step(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
         assert controller.steps[-1].accepted
         assert controller.steps[-1].by_function == Counter({"nmpc_known": KNOWN + len(skipped)})
+
+
+PAGE_AFTER_IT = """
+    .text
+    .balign 1024
+    .global nmpc_known
+    .syntax unified
+    .thumb
+    .type nmpc_known, %function
+    .thumb_func
+nmpc_known:
+    b.w 1f
+3:  .word 5
+    .space 1002
+1:  cmp r0, r0
+    ite ne
+    ldrne.w r2, 3b
+    ldreq.w r2, 3b
+    cmp r2, #5
+    bne.w 2f
+    movs r0, #0
+    bx lr
+2:  movs r0, #1
+    bx lr
+    .size nmpc_known, . - nmpc_known
+"""
+"""The first wide branch begins a page of 1 KiB, and its basic block has loads in an IT block before that."""
+
+
+def test_loads_in_an_it_block_before_a_page_are_counted_right(tmp_path: Path) -> None:
+    """Unicorn passes on the conditions of the block, in which a wide branch is no valid instruction."""
+    elf = known_function("crazyflie", PAGE_AFTER_IT, tmp_path)
+    controller = CountingController(MAMBO, elf, "cortex-m4")
+    controller.step(np.zeros((1, 7)), np.zeros((1, 4)), np.array([9.81]))
+    assert controller.steps[-1].accepted
+    assert controller.steps[-1].by_function == Counter({"nmpc_known": 9})
 
 
 def it_blocks(image: Image) -> dict[int, list[int]]:

@@ -29,6 +29,8 @@ _RAM_ADDRESS: Final = 0x20000000
 _STACK_BYTES: Final = 0x10000
 _STACK_TOP: Final = _RAM_ADDRESS + _STACK_BYTES
 _ALIGNMENT: Final = 16
+_IT_BITS: Final = 0x0600FC00
+"""Of the program status register of a Cortex-M: which instructions of an IT block are left."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +144,21 @@ class UnicornMachine:
     def _record_block(self, _engine: Any, address: int, size: int, _data: Any) -> None:
         self._blocks.append((address, size))
 
-    def _record_read(self, _engine: Any, _access: int, address: int, *_: Any) -> None:
+    def _record_read(self, engine: Any, _access: int, address: int, *_: Any) -> None:
         self._flash_reads.append(address)
+        if self._core.thumb:
+            self._end_it_block(engine)
+
+    @staticmethod
+    def _end_it_block(engine: Any) -> None:
+        """Clear the IT bits that Unicorn 2.1 leaves behind when a hook is called in an IT block.
+
+        The conditions of the block are in the translated code. A translation that ends before the end of its
+        basic block, at a page of 1 KiB, would pass the bits on to the next one.
+        """
+        status = engine.reg_read(arm_const.UC_ARM_REG_XPSR)
+        if status & _IT_BITS:
+            engine.reg_write(arm_const.UC_ARM_REG_XPSR, status & ~_IT_BITS)
 
     def call(self, function: str, *arguments: int) -> int:
         """Call `function` with arguments of 32 bits; returns an unsigned long.
