@@ -37,7 +37,7 @@ def measure_once(board: str, preset: str = "mambo", steps: int = 300) -> Footpri
 
 
 def test_the_crazyflie_keeps_its_promises() -> None:
-    """Preset mambo in 5 KiB of flash, 160 B of RAM, 192 B of stack and 900 instructions."""
+    """Preset mambo: 5 KiB of flash, 160 B of RAM, 192 B of stack, 660 instructions, 1100 with a limit."""
     footprint = measure_once("crazyflie")
     assert footprint.added.flash.total <= 5120
     assert footprint.added.ram.total <= 160
@@ -47,15 +47,16 @@ def test_the_crazyflie_keeps_its_promises() -> None:
     assert footprint.stack is not None
     assert footprint.stack.bytes <= 192
     assert footprint.counts is not None
-    assert footprint.counts.most_met <= 900
+    assert footprint.counts.mean <= 660
+    assert footprint.counts.most_met <= 1100
     assert footprint.counts.ticks == 300
     assert footprint.fits
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize(("preset", "spread"), [("mambo", 1.35), ("mambo-1norm", 1.25), ("table1", 1.15)])
+@pytest.mark.parametrize(("preset", "spread"), [("mambo", 2.05), ("mambo-1norm", 1.25), ("table1", 1.15)])
 def test_the_work_of_a_step_hardly_depends_on_its_input(preset: str, spread: float) -> None:
-    """Most instructions met over least, on the Cortex-M4F; the first step of a flight is the cheapest."""
+    """Most instructions met over least, on the Cortex-M4F; where a limit acts, as in mambo, it does."""
     counts = measure_once("crazyflie", preset).counts
     assert counts is not None
     assert counts.most_met <= spread * counts.least
@@ -199,9 +200,9 @@ def test_wider_arithmetic_is_reported_with_its_caller(
 
 
 @pytest.mark.first_is_quick
-@pytest.mark.parametrize(("preset", "most"), [("mambo", 1300), ("mambo-1norm", 5100), ("table1", 4400)])
+@pytest.mark.parametrize(("preset", "most"), [("mambo", 2000), ("mambo-1norm", 5100), ("table1", 4400)])
 def test_fixed_point_keeps_its_promises(preset: str, most: int) -> None:
-    """A step takes a tenth of the instructions of float32 on the Mambo, and at most 420 B of stack."""
+    """A tenth of the instructions of float32 on the Mambo, where a limit acts a seventh; 420 B of stack."""
     settings = with_option(presets.load(preset), "code.scalar", "fixed")
     board_builder("mambo")
     footprint = measure_footprint(settings, boards.load("mambo"), counted_ticks=150)
