@@ -34,6 +34,7 @@ NOT_RUN = {
     "how-to/identify.md": ("needs a Crazyflie",),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
     "how-to/measure.md": ("needs a board, or QEMU with its firmware",),
+    "how-to/offboard.md": ("needs a Crazyflie",),
     "how-to/pil.md": (
         "needs a board; tests of their own fly it in QEMU",
         "needs a board; tests of their own fly it in QEMU",

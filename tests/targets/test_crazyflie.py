@@ -3,7 +3,6 @@
 import itertools
 import math
 import re
-import runpy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from mambo_codegen.bundle.render import render_target
 from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.controller_toml import to_toml, with_option
 from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
@@ -26,6 +25,7 @@ from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place
+from tests.support.command import run
 from tests.support.crazyflie import FIRMWARE_FLAGS, STUBS, Crazyflie, Fleet, compile_host, link
 from tests.support.one_norm import ONE_NORM
 from tests.support.shell import shell
@@ -321,7 +321,9 @@ def test_a_build_with_other_bits_fails_its_self_test_by_name(built: Built, tmp_p
     assert wrong != text
     header.write_text(wrong, "utf-8")
     broken = build(folder).app()
+    assert broken.parameter("selfTest") == -1, "it did not run yet"
     assert not broken.host.controllerOutOfTreeTest()
+    assert broken.parameter("selfTest") > 0
     assert re.search(r"NMPC: self-test: step \d+ differs; .*-ffp-contract=off", broken.console)
 
 
@@ -676,17 +678,49 @@ def test_an_update_period_that_the_firmware_cannot_keep_is_refused() -> None:
         render_target(settings, TARGETS["crazyflie"])
 
 
-@pytest.mark.parametrize("figure", ["hover", "eight", "circle"])
-def test_the_script_s_figures_can_be_flown(figure: str, built: Built) -> None:
-    """Velocity and acceleration are those of the position, within the limits; they begin and end at rest."""
-    script = runpy.run_path(str(built.folder / "fly.py"))
-    end_s = script["DURATION_S"]
-    for time_s in np.linspace(0.0, end_s, 200):
-        position, velocity, acceleration = script["motion"](figure, time_s)
-        before, after = (np.array(script["position_m"](figure, time_s + step)) for step in (-1e-3, 1e-3))
-        assert np.allclose((after - before) / 2e-3, velocity, atol=2e-3)
-        assert np.hypot(*acceleration) < 0.5 * 9.81 * SETTINGS.limits.tilt_rad
-        assert np.hypot(*position) <= 1.2
-    for time_s in (0.0, end_s):
-        position, velocity, _ = script["motion"](figure, time_s)
-        assert np.allclose([*position, *velocity], 0.0, atol=1e-3)
+USER_C = """#include "nmpc_app.h"
+
+void nmpc_app_hook(const nmpc_state_t *state, nmpc_target_t *wanted)
+{
+    wanted->position_m[0] = state->position_m[0] + 0.25f;
+}
+"""
+
+
+def test_a_file_of_the_user_s_own_stays_and_is_called(tmp_path: Path) -> None:
+    """`generate` neither writes nor removes src/user.c; Kbuild lists it, and its hook changes the target."""
+    folder = tmp_path / "app"
+    generate = ("generate", "crazyflie", "--for", "crazyflie", "-o", str(folder))
+    run(*generate)
+    assert "user.o" not in listed_by_kbuild(folder)
+    user = folder / "src" / "user.c"
+    user.write_text(USER_C, "utf-8")
+    assert "user.o" in listed_by_kbuild(folder)
+    settings = with_option(SETTINGS, "limits.tilt_rad", 0.4)
+    (tmp_path / "other.toml").write_text(to_toml(settings), "utf-8")
+    run("generate", str(tmp_path / "other.toml"), *generate[2:])
+    run("generate", str(tmp_path / "other.toml"), *generate[2:], "--check")
+    assert user.read_text("utf-8") == USER_C
+    sources = [*(folder / "src").glob("*.c"), STUBS / "host.c"]
+    objects = [compile_host(source, folder / f"{source.stem}.o", "-ffp-contract=off") for source in sources]
+    app = Crazyflie(link(objects, folder / "app.so"))
+    app.modes("modeAbs")
+    send(app, 3.0)
+    app.update(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert app.logged("targetX") == 0.75
+
+
+def listed_by_kbuild(folder: Path) -> list[str]:
+    """Return the objects that src/Kbuild lists, as make reads it."""
+    text = f"OOT := {folder}\ninclude {folder}/src/Kbuild\n$(info $(obj-y))\nall:\n"
+    makefile = folder.parent / "kbuild.mk"
+    makefile.write_text(text, "utf-8")
+    return shell(require("make", "make"), "-s", "-f", makefile).split()
+
+
+def test_parameters_tell_a_script_what_it_flies(built: Built) -> None:
+    """The settings' digest, its first eight digits, and 0 if the self-test passed."""
+    app = built.app()
+    assert app.parameter("settings") == int(SETTINGS.short_digest[:8], 16)
+    assert app.host.controllerOutOfTreeTest()
+    assert app.parameter("selfTest") == 0

@@ -1,0 +1,171 @@
+"""The script that flies a Crazyflie from the desk: its calls to cflib, and its flights through a radio."""
+
+import importlib.util
+import math
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings import presets
+from mambo_nmpc import Controller
+from tests.support.bundles import place
+from tests.support.offboard import Flown, Radio, fly_offboard
+from tests.support.radio import ARMED, CAN_FLY, Clock, Drone, install
+
+SETTINGS = presets.preset("crazyflie")
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "offboard.md"
+STATE = {"x": 1.0, "y": -0.5, "z": 0.1, "vx": 0.0, "vy": 0.0, "roll": 0.0, "pitch": 0.0, "yaw": 0.0}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the target."""
+    files = render_target(SETTINGS, TARGETS["crazyflie"], with_digest=False)
+    return place(files, tmp_path_factory.mktemp("app"))
+
+
+@pytest.fixture
+def drone() -> Drone:
+    """Return a drone at rest."""
+    logged = {f"stateEstimate.{name}": value for name, value in STATE.items()}
+    return Drone(Clock(), {**logged, "supervisor.info": ARMED | CAN_FLY}, {})
+
+
+@pytest.fixture
+def script(folder: Path, drone: Drone, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return the script, with the drone behind cflib and its clock."""
+    install(drone, monkeypatch)
+    spec = importlib.util.spec_from_file_location("offboard", folder / "offboard.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    vars(module)["time"] = drone.clock
+    monkeypatch.setattr(sys, "argv", ["offboard.py", "radio://0/80/2M/E7E7E7E7E7"])
+    return module
+
+
+def test_it_sends_angles_and_height_a_hundred_times_a_second(
+    script: ModuleType, drone: Drone, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From the floor up, along the circle, and down; then the motors stop."""
+    script.main()
+    assert capsys.readouterr().out == "landed\n"
+    assert drone.names() == ["arm", "zdistance", "stop_setpoint", "notify", "close"]
+    sent = drone.of("zdistance")
+    times_s = [time_s for time_s, _ in sent]
+    assert np.diff(times_s) == pytest.approx(0.01, abs=1e-6)
+    heights = np.array([arguments[3] for _, arguments in sent])
+    assert (heights[0], heights.max(), heights[-1]) == pytest.approx((0.1, 0.9, 0.1))
+    assert np.abs(np.diff(heights)).max() < 0.005
+    tilts = np.array([arguments[:2] for _, arguments in sent])
+    assert 1.0 < np.abs(tilts).max() <= math.degrees(SETTINGS.limits.tilt_rad) + 1e-4
+    assert {arguments[2] for _, arguments in sent} == {0.0}
+
+
+def test_ctrl_c_descends_where_it_is(script: ModuleType, drone: Drone) -> None:
+    """Within the time of a climb."""
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    drone.clock.events.append((9.0, interrupt))
+    script.main()
+    sent = drone.of("zdistance")
+    assert sent[-1][0] == pytest.approx(9.0 + script.CLIMB_S + 0.5, abs=0.1)
+    assert sent[-1][1][3] == pytest.approx(0.1)
+
+
+def test_a_drone_that_sends_no_state_does_not_fly(
+    script: ModuleType, drone: Drone, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It says so."""
+    drone.clock.sleeping.clear()
+    script.main()
+    assert capsys.readouterr().out == "no flight: the drone sends no state\n"
+    assert not drone.of("zdistance")
+
+
+def test_the_state_of_the_radio_s_log_is_read_in_the_order_of_its_names(
+    script: ModuleType, drone: Drone
+) -> None:
+    """With the time at which it came; one block of no more bytes than a packet takes."""
+    drone.logged.update({f"stateEstimate.{name}": float(k) for k, name in enumerate(script.NAMES)})
+    drone.is_open = True
+    newest = script.state_of_radio(sys.modules["cflib.crazyflie"].Crazyflie(rw_cache="./cache"))
+    drone.clock.sleep(3.0)
+    assert newest() == ([float(k) for k in range(8)], 3.0)
+
+
+RADIOS = {
+    ("10 ms", "0"): Radio(0.01, 0.01),
+    ("10 ms", "50 %"): Radio(0.01, 0.01, 0.5),
+    ("80 ms", "0"): Radio(0.08, 0.08),
+}
+"""Three of the radios of the page's table, by its first two columns."""
+
+
+def flown(script: ModuleType, radio: Radio, source: Callable[..., Any] | None = None) -> Flown:
+    """Fly the script on our plant."""
+    return fly_offboard(script, Controller(SETTINGS), radio, source)
+
+
+def test_it_flies_the_circle_through_a_radio_with_losses(script: ModuleType) -> None:
+    """A short flight: within 2 cm at a delay of 10 ms each way, every tenth packet lost."""
+    vars(script).update({"FLIGHT_S": 3.0, "CLIMB_S": 1.0})
+    found = flown(script, Radio(0.01, 0.01, 0.1))
+    assert found.end == "landed"
+    assert found.error_m[found.time_s < 4.0].max() < 0.02
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", RADIOS)
+def test_delays_and_losses_cost_what_the_page_says(row: tuple[str, str], script: ModuleType) -> None:
+    """The loop stands a delay of 144 ms; beyond it swings up."""
+    cells = re.search(rf"\| {row[0]} \| {row[1]} \| (\S+) \| (\S+) \|", PAGE.read_text("utf-8"))
+    assert cells is not None
+    vars(script)["FLIGHT_S"] = 15.0
+    found = flown(script, RADIOS[row])
+    circle_cm = 100.0 * found.error_m[(found.time_s > 7.0) & (found.time_s < 17.0)]
+    assert found.end == "landed"
+    told_cm = (float(cells[1]), float(cells[2]))
+    assert (circle_cm.mean(), circle_cm.max()) == pytest.approx(told_cm, rel=0.06, abs=0.05)
+
+
+def test_nothing_is_sent_while_the_state_is_old(script: ModuleType) -> None:
+    """From 0.1 s on; the drone levels out meanwhile, and flies on when the state comes back."""
+    vars(script).update({"FLIGHT_S": 4.0, "CLIMB_S": 1.0})
+    found = flown(script, Radio(0.01, 0.01, silent_s=(4.0, 5.0)))
+    assert found.end == "landed"
+    times_s = np.array([time_s for time_s, _ in found.sent])
+    (gap,) = np.flatnonzero(np.diff(times_s) > 0.05)
+    assert times_s[gap : gap + 2] == pytest.approx([4.1, 5.0], abs=0.03)
+    assert found.error_m[found.time_s < 5.0].max() < 0.11
+
+
+def test_it_ends_when_the_state_stays_away(script: ModuleType) -> None:
+    """After 2 s, when the firmware has stopped the motors."""
+    vars(script).update({"FLIGHT_S": 3.0, "CLIMB_S": 1.0})
+    found = flown(script, Radio(silent_s=(2.5, math.inf)))
+    assert found.end == "no state for 2 s: the firmware has stopped the motors"
+    assert found.sent[-1][0] == pytest.approx(2.6, abs=0.03)
+
+
+def test_the_page_s_motion_capture_flies_as_well(script: ModuleType) -> None:
+    """Its function makes velocities of positions."""
+    block = re.search(r'```python title="mocap.py"\n(.*?)```', PAGE.read_text("utf-8"), re.DOTALL)
+    assert block is not None
+    names: dict[str, Any] = {}
+    exec(block[1], names)
+    vars(script).update({"FLIGHT_S": 3.0, "CLIMB_S": 1.0})
+    found = flown(script, Radio(0.0, 0.01), names["state_of_mocap"])
+    assert found.end == "landed"
+    assert found.error_m[found.time_s < 4.0].max() < 0.02
