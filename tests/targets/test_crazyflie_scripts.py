@@ -383,9 +383,10 @@ def test_wrong_arguments_are_named(
     [
         (("circle", "--rate", "2"), "the figure needs 4.6 m/s^2, and half of the tilt limit gives 2.5"),
         (("goto", "--size", "2", "--rate", "0.7"), "the figure needs 1.4 m/s, and the speed limit is 1.2"),
+        (("hover", "--log", "none/flight.csv"), "--log none/flight.csv: there is no such folder"),
     ],
 )
-def test_a_figure_that_is_too_fast_is_refused(
+def test_a_figure_that_is_too_fast_or_has_no_log_is_refused(
     arguments: tuple[str, ...],
     message: str,
     scripts: dict[str, ModuleType],
