@@ -121,7 +121,8 @@ __attribute__((noinline)) static nmpc_sum_t wide_product(nmpc_real_t a, nmpc_rea
     const nmpc_real_t a_high = a >> 16;
     const nmpc_real_t b_high = b >> 16;
     const nmpc_real_t one = ((nmpc_real_t)a_low * b_high) + (nmpc_real_t)((a_low * b_low) >> 16);
-    const nmpc_real_t other = (a_high * (nmpc_real_t)b_low) + (nmpc_real_t)((unsigned int)one & 0xFFFFU);
+    const unsigned int one_low = (unsigned int)one & 0xFFFFU;
+    const nmpc_real_t other = (a_high * (nmpc_real_t)b_low) + (nmpc_real_t)one_low;
     const nmpc_real_t high = ((a_high * b_high) + (one >> 16)) + (other >> 16);
     const unsigned int low = (unsigned int)a * (unsigned int)b;
 
@@ -896,7 +897,9 @@ NMPC_ASIDE nmpc_root_t inverse_root(nmpc_square_t x)
 
 static nmpc_square_t squared(nmpc_real_t value)
 {
-    return (nmpc_square_t)((nmpc_sum_t)value * value);
+    const nmpc_sum_t product = (nmpc_sum_t)value * value;
+
+    return (nmpc_square_t)product;
 }
 
 static nmpc_square_t square_sum(nmpc_real_t a, nmpc_real_t b)
@@ -914,6 +917,17 @@ static nmpc_square_t length(nmpc_root_t root)
 static nmpc_real_t at_most(nmpc_square_t value, nmpc_real_t limit)
 {
     return (value < (nmpc_square_t)limit) ? (nmpc_real_t)value : limit;
+}
+
+/* A distance less half the knee, and no less than that, by rounding. */
+static nmpc_square_t beyond(nmpc_square_t distance_m, nmpc_square_t half_m)
+{
+    nmpc_square_t beyond_m = half_m;
+
+    if (distance_m > (half_m + half_m)) {
+        beyond_m = distance_m - half_m;
+    }
+    return beyond_m;
 }
 
 /* Speed over distance, and speed over speed, given 1/sqrt of the square of the second. */
@@ -1053,7 +1067,7 @@ NMPC_ASIDE unsigned int limits_desire(const nmpc_bounds_t *bounds, nmpc_real_t k
         const nmpc_square_t half_m = (nmpc_square_t)(halved(knee_m));
         const nmpc_square_t distance_m = length(root);
         /* Not less than at the knee, by rounding. */
-        const nmpc_square_t beyond_m = (distance_m > (half_m + half_m)) ? (distance_m - half_m) : half_m;
+        const nmpc_square_t beyond_m = beyond(distance_m, half_m);
         const nmpc_real_t speed_m_s = braking_speed(braking_product(bounds->braking_m_s2, beyond_m));
 
         ratio_1_s = approach_ratio(speed_m_s, root);
@@ -1271,9 +1285,14 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
     nmpc_real_t world_m_step2[2];
     nmpc_real_t feedback_rad[2] = { (nmpc_real_t)0, (nmpc_real_t)0 };
     unsigned int missed = self->missed;
-    nmpc_target_t limited = { { (nmpc_real_t)0, (nmpc_real_t)0 }, { (nmpc_real_t)0, (nmpc_real_t)0 } };
+    nmpc_target_t limited;
     const nmpc_target_t *aim = NULL;
 
+    /* One by one: of an initialiser compilers make a call. */
+    limited.position_m[0] = (nmpc_real_t)0;
+    limited.position_m[1] = (nmpc_real_t)0;
+    limited.velocity_m_s[0] = (nmpc_real_t)0;
+    limited.velocity_m_s[1] = (nmpc_real_t)0;
     attitude_advance(attitude);
     if (state != NULL) {
         nmpc_real_t sine;

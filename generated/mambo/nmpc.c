@@ -1056,11 +1056,16 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
     nmpc_real_t world_m_step2[2];
     nmpc_real_t feedback_rad[2] = { (nmpc_real_t)0, (nmpc_real_t)0 };
     unsigned int missed = self->missed;
-    nmpc_target_t limited = { { (nmpc_real_t)0, (nmpc_real_t)0 }, { (nmpc_real_t)0, (nmpc_real_t)0 } };
+    nmpc_target_t limited;
     const nmpc_target_t *aim = NULL;
 
     own_attitude = self->attitude;
     own_observer = self->observer;
+    /* One by one: of an initialiser compilers make a call. */
+    limited.position_m[0] = (nmpc_real_t)0;
+    limited.position_m[1] = (nmpc_real_t)0;
+    limited.velocity_m_s[0] = (nmpc_real_t)0;
+    limited.velocity_m_s[1] = (nmpc_real_t)0;
     attitude_advance(attitude);
     if (state != NULL) {
         nmpc_real_t sine;

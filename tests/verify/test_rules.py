@@ -13,6 +13,7 @@ from mambo_sil.verify.check import CheckOutcome, Result, Subject
 from mambo_sil.verify.rules import check, deviations
 from tests.support.cases import settings_case
 from tests.support.one_norm import ONE_NORM
+from tests.support.quadratic import quadratic_case
 from tests.support.subjects import Harm, subject
 from tests.support.tools import require
 
@@ -20,6 +21,10 @@ SETTINGS = (
     {name: presets.load(name) for name in presets.names() if name != "table1-printed"}  # table1 but two signs
     | {f"case {index}": settings_case(index, ("float32", "float64")[index % 2]) for index in (0, 3, 9)}
     | {f"{steps} steps": with_option(ONE_NORM, "horizon.prediction", steps, "test") for steps in (2, 33)}
+    | {
+        f"quadratic case {index}": quadratic_case(index, scalar)
+        for index, scalar in ((1, "fixed"), (4, "fixed"), (2, "float32"))
+    }
 )
 HARMS = {
     "15.1 goto": Harm("nmpc.c", r"    return status;\n\}", "    goto end;\nend:\n    return status;\n}"),
