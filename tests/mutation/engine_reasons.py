@@ -144,6 +144,11 @@ REASONS: Final[Mapping[Key, str]] = {
     },
     ("first_order.h", "real_t nodes_rad[3][3];", "3 -> 4"): _LONGER,
     (
+        "first_order.h",
+        "for (i = 0; i < (LATE_TICKS_MAX + 2); i++) {",
+        "0 -> 1",
+    ): "the first tick writes that entry",
+    (
         "mocap.h",
         "for (k = 1; k <= simulation->mocap_delay_ticks; k++) {",
         "1 -> 0",

@@ -92,7 +92,7 @@ void run_suite(const engine_simulation_t *simulation, const engine_flight_t *fli
     }
 }
 
-/* A tick from any state; without motors the last commands were all the same two. */
+/* A tick from any state; without motors the last commands were all the same two, the last demands one. */
 void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flight, double *rows, int n)
 {
     int i;
@@ -122,9 +122,14 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
             for (k = 0; k < LATE_TICKS_MAX + 2; k++) {
                 late.sent_rad[k][0] = row[16];
                 late.sent_rad[k][1] = row[17];
+                late.demanded_n[k] = row[19];
             }
+            late.thrust_n = row[18];
             advance(simulation, flight, &around, row[32], row[27], row[28], 3, &row[25], &r, &late,
                     state.body);
+            if (simulation->thrust_lags) {
+                state.memory[2] = late.thrust_n;
+            }
         } else {
             if (simulation->attitude == CASCADE) {
                 cascade_shares(simulation, &seen, &row[25], row[27], row[28], state.memory, shares);

@@ -89,7 +89,7 @@ def changed(drone: VehicleFile, **sections: Any) -> VehicleFile:
 
     def merge(old: Any, new: Any) -> Any:
         return (
-            old | {key: merge(old[key], value) for key, value in new.items()}
+            old | {key: merge(old.get(key, {}), value) for key, value in new.items()}
             if isinstance(new, dict)
             else new
         )
@@ -128,6 +128,8 @@ LATE: Final = changed(
     sensors={"position_rate_hz": 50, "position_delay_s": 0.006},
 )
 """Two different angles with trims, whose dead times are no multiples of a tick."""
+LAGGING: Final = changed(LATE, thrust={"gain": 0.9, "lag_s": 0.06, "dead_time_s": 0.0151})
+"""The same, with a thrust that lags."""
 
 
 FELT: Final = VehicleFile.model_validate(
@@ -229,6 +231,7 @@ BATCHES: Final = {
     "yaw-last": captured(HEAVY),
     "flown": captured(FLOWN),
     "late": captured(LATE),
+    "lagging": captured(LAGGING),
     "space": SPACE,
     "touching": TOUCHING,
     "flown in space": FLOWN_IN_SPACE,
@@ -272,6 +275,7 @@ def drones() -> st.SearchStrategy[VehicleFile]:
         st.sampled_from([vehicle_toml.load(name) for name in vehicle_toml.names()]),
         st.builds(changed, st.just(CRAZYFLIE), attitude=cascades, sensors=sensors, rotors=mixers),
         st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors),
+        st.builds(changed, st.just(FLOWN), attitude=firsts, sensors=sensors, thrust=response),
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from mambo_sil.drone.plant.airframe import airframe_of
 from mambo_sil.drone.plant.vehicle import Moment, Seen, Vehicle, VehicleState, truth
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from tests.support.scenarios import FLOWN, LATE, changed
@@ -110,6 +111,23 @@ def test_a_negative_demand_is_no_thrust() -> None:
     """Rotors do not pull down: the drone falls freely."""
     state = fly(FLOWN, (0.0, 0.0), 100, thrust=-1.0)[-1]
     assert truth(state).velocity_m_s[2, 0] == pytest.approx(9.81 * 0.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("dead_time_s", [0.0, 0.02, 0.0151])
+def test_the_thrust_has_its_gain_lag_and_dead_time(dead_time_s: float) -> None:
+    """At rest, then asked for twice the weight: gain weight (2 - exp(-(t - dead time) / lag)), integrated."""
+    response = {"gain": 0.9, "lag_s": 0.06, "dead_time_s": dead_time_s}
+    drone = changed(LATE, attitude={"roll_trim_rad": 0.0, "pitch_trim_rad": 0.0}, thrust=response)
+    vehicle = Vehicle.of(drone)
+    state = vehicle.at_rest(np.zeros((3, 1)), 0.0, airframe_of(drone).hover_command)
+    down_m_s = []
+    for _ in range(100):
+        state = vehicle.step(state, np.zeros((2, 1)), np.array([2.0 * drone.weight_n]), 0.0, seen=UNSEEN)
+        down_m_s.append(truth(state).velocity_m_s[2, 0])
+    time_s = drone.step_s * np.arange(1, 101)
+    acting_s = np.maximum(time_s - dead_time_s, 0.0)
+    risen_s = acting_s - 0.06 * (1.0 - np.exp(-acting_s / 0.06))
+    np.testing.assert_allclose(down_m_s, 9.81 * (time_s - 0.9 * (time_s + risen_s)), atol=1e-5)
 
 
 def test_the_body_rates_are_those_of_the_angles() -> None:

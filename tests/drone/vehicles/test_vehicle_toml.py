@@ -99,7 +99,8 @@ FAULTS: dict[str, tuple[str, list[str]]] = {
         [
             "body = 3 must be a section; write [body] and its keys below",
             "attitude = 4 must be a section; write [attitude] and its keys below",
-            "mambo is not a section; there are body, rotors, attitude, altitude, sensors, uncertainty",
+            "mambo is not a section; "
+            "there are body, rotors, attitude, altitude, thrust, sensors, uncertainty",
         ],
     ),
     "torques without rotors": (
@@ -120,6 +121,12 @@ FAULTS: dict[str, tuple[str, list[str]]] = {
         changed("mass_kg = 0.1", "mass_kg = 0.1\ninertia_x_kg_m2 = 1e-5"),
         [
             'body.inertia_x_kg_m2 = 1e-05 must be left out: attitude.kind = "first_order" has no torques',
+        ],
+    ),
+    "a response of the thrust with rotors": (
+        VEHICLES.text("crazyflie") + "[thrust]\nlag_s = 0.05\n",
+        [
+            'attitude.kind = "cascade" has rotors, whose thrust lags by rotors.lag_s: leave out [thrust]',
         ],
     ),
     "too weak": (

@@ -32,7 +32,7 @@ from tests.support.engines import (
     truths,
 )
 from tests.support.faults import SHOWN, any_inputs
-from tests.support.scenarios import LATE, LIMITED, changed
+from tests.support.scenarios import LAGGING, LATE, LIMITED, changed
 
 
 @pytest.fixture(
@@ -82,8 +82,8 @@ LOWERING, YAW_LAST = (changed(LIMITED, rotors={"mixer": mixer}) for mixer in ("l
 
 @pytest.mark.parametrize(
     "drone",
-    [NOMINAL, LIMITED, LATE, LOWERING, YAW_LAST],
-    ids=["mambo", "cascade", "first_order", "lower", "yaw-last"],
+    [NOMINAL, LIMITED, LATE, LAGGING, LOWERING, YAW_LAST],
+    ids=["mambo", "cascade", "first_order", "lagging", "lower", "yaw-last"],
 )
 def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
     """Inner loops, mixer, rotors, rigid body and integrator from states that no flight has."""
@@ -92,8 +92,14 @@ def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
         rows.T, [12, 16, 25, 27, 28, 29, 30, 32]
     )
     vehicle, push_m_s2, lift_m_s2 = Vehicle.of(drone), (0.5, -0.2), 0.7
-    first_order = isinstance(vehicle.loop, FirstOrderDrone)
-    known = np.resize(memory[:2], (vehicle.loop.rows, TICKS)) if first_order else memory[: vehicle.loop.rows]
+    known, thrusts = memory[: vehicle.loop.rows], 0
+    if isinstance(vehicle.loop, FirstOrderDrone):
+        decay = vehicle.loop.thrust_decay
+        thrusts = 0 if decay is None else decay.late_ticks + 3
+        known = np.resize(memory[:2], (vehicle.loop.rows, TICKS))
+        if thrusts:
+            known[-thrusts:] = memory[3]
+            known[-thrusts] = memory[2]
     before = VehicleState(body, rotors, known)
     with np.errstate(all="ignore"):
         seen = truth(before)
@@ -103,8 +109,10 @@ def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
             drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
         )
     kept = memory.copy()
-    if not first_order:
+    if not isinstance(vehicle.loop, FirstOrderDrone):
         kept[: vehicle.loop.rows] = after.memory
+    elif thrusts:
+        kept[2] = after.memory[-thrusts]
     expected = np.concatenate(
         [after.body, after.rotor_speed_rad_s, kept, demanded_n[np.newaxis], seen.velocity_m_s]
     )

@@ -5,7 +5,8 @@
     vertical acceleration = g - that of the thrust
 
 with k the acceleration per tilt: the angles are those that the drone reports, and its thrust need not point
-along them. The thrust is the demanded one. The angles are solved in closed form, the motion is integrated.
+along them. The thrust is the demanded one, or follows gain x demand(t - dead time) with a first-order lag.
+Angles and thrust are solved in closed form, the motion is integrated.
 """
 
 import math
@@ -19,12 +20,12 @@ from mambo_sil.drone.plant.elementary import exponential, sine_cosine
 from mambo_sil.drone.plant.integrator import NODES, bogacki_shampine
 from mambo_sil.drone.plant.rigid_body import EULER, POSITION, RATES, VELOCITY, to_body, to_world
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
-from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude, Response
+from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude, Response, ThrustResponse
 
 
 @dataclass(frozen=True, eq=False)
 class Decay:
-    """How one angle follows its command within a tick, in which the command that acts changes once.
+    """How an angle or a thrust follows its command within a tick; the command that acts changes once in it.
 
     `late_ticks` is the number of whole ticks in the dead time; the command before acts in the rest of it.
     `before` and `after` are the shares of the error that remain while each of the two acts, at the second and
@@ -36,8 +37,8 @@ class Decay:
     after: FloatArray
 
 
-def decay_of(response: Response, step_s: float) -> Decay:
-    """Return how an angle with this response follows its command."""
+def decay_of(response: Response | ThrustResponse, step_s: float) -> Decay:
+    """Return how an angle or a thrust with this response follows its command."""
     late_ticks = math.floor(response.dead_time_s / step_s + 1e-9)
     rest_s = max(response.dead_time_s - late_ticks * step_s, 0.0)
     nodes_s = step_s * np.append(NODES[1:], 1.0)
@@ -48,9 +49,13 @@ def decay_of(response: Response, step_s: float) -> Decay:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Forces on n drones during one tick, each one value or (n,)."""
+    """Demanded thrust and forces on n drones during one tick, each one value or (n,)."""
 
-    thrust_acceleration_m_s2: PerFlight
+    demand_n: FloatArray
+    """Demanded thrust (n,), not negative: rotors do not pull down."""
+    thrust_share: PerFlight
+    """Thrust over that of a nominal drone with a fresh battery."""
+    mass_kg: PerFlight
     drag_1_s: PerFlight
     push_m_s2: tuple[PerFlight, PerFlight]
     air_m_s: tuple[PerFlight, PerFlight]
@@ -58,7 +63,11 @@ class Surroundings:
 
 
 class FirstOrderDrone:
-    """The drone as a whole; its memory is the commands of the last ticks, the latest first, in pairs."""
+    """The drone as a whole.
+
+    Its memory is the commands of the last ticks, the latest first, in pairs; then, with a response of the
+    thrust, the thrust and its demands in N, the latest first.
+    """
 
     def __init__(self, drone: VehicleFile, attitude: FirstOrderAttitude) -> None:
         self._step_s, self._attitude = drone.step_s, attitude
@@ -67,7 +76,18 @@ class FirstOrderDrone:
         self.decays = tuple(decay_of(response, drone.step_s) for response in self._responses)
         nodes_s = drone.step_s * np.append(NODES[1:], 1.0)
         self.yaw_decay = exponential(-nodes_s / attitude.yaw_lag_s)
-        self.rows = 2 * (max(decay.late_ticks for decay in self.decays) + 2)
+        self._commands = 2 * (max(decay.late_ticks for decay in self.decays) + 2)
+        self._thrust = drone.thrust
+        self.thrust_decay = None if drone.thrust is None else decay_of(drone.thrust, drone.step_s)
+        self.rows = self._commands + (0 if self.thrust_decay is None else self.thrust_decay.late_ticks + 3)
+
+    def at_rest(self, demand_n: FloatArray) -> FloatArray:
+        """Return the memory (rows, n) of drones that were level, with a steady demand (n,) of thrust."""
+        memory = np.zeros((self.rows, len(demand_n)))
+        if self._thrust is not None:
+            memory[self._commands :] = demand_n
+            memory[self._commands] = self._thrust.gain * demand_n
+        return memory
 
     def advance(
         self,
@@ -78,9 +98,13 @@ class FirstOrderDrone:
         around: Surroundings,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the state (12, n), with the rows of the rigid body, and the memory one tick later."""
-        memory = np.concatenate([command_rad, memory[:-2]])
-        nodes, slopes = self._angles(body[EULER], memory, yaw_reference_rad)
-        forced = [self._acceleration(angles, around) for angles in (body[EULER], nodes[0], nodes[1])]
+        commands = np.concatenate([command_rad, memory[: self._commands - 2]])
+        nodes, slopes = self._angles(body[EULER], commands, yaw_reference_rad)
+        thrusts_n, thrust_memory = self._thrusts(around.demand_n, memory[self._commands :])
+        forced = [
+            self._acceleration(angles, thrust, around)
+            for angles, thrust in zip((body[EULER], *nodes[:2]), thrusts_n, strict=True)
+        ]
 
         def derivative(motion: FloatArray, acceleration: FloatArray) -> FloatArray:
             rate = np.empty_like(motion)
@@ -99,7 +123,21 @@ class FirstOrderDrone:
         after[EULER] = nodes[2]
         after[VELOCITY] = to_body(nodes[2], motion[3:])
         after[RATES] = _body_rates(nodes[2], slopes)
-        return after, memory
+        return after, np.concatenate([commands, thrust_memory])
+
+    def _thrusts(
+        self, demand_n: FloatArray, memory: FloatArray
+    ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """Return the thrusts (n,) in N at the nodes, and the thrust's part of the memory one tick later."""
+        if self._thrust is None or self.thrust_decay is None:
+            return (demand_n, demand_n, demand_n), memory
+        decay, demands = self.thrust_decay, np.concatenate([demand_n[np.newaxis], memory[1:-1]])
+        now, before = (self._thrust.gain * demands[decay.late_ticks + ticks] for ticks in (0, 1))
+        nodes = []
+        for node in range(3):
+            reached = before + (memory[0] - before) * decay.before[node]
+            nodes.append(now + (reached - now) * decay.after[node])
+        return (memory[0], nodes[0], nodes[1]), np.concatenate([nodes[2][np.newaxis], demands])
 
     def _angles(
         self, start_rad: FloatArray, memory: FloatArray, yaw_reference_rad: PerFlight
@@ -119,10 +157,10 @@ class FirstOrderDrone:
         slopes[2] = (yaw_reference_rad - nodes[2][2]) / self._attitude.yaw_lag_s
         return nodes, slopes
 
-    def _acceleration(self, angles_rad: FloatArray, around: Surroundings) -> FloatArray:
-        """Return the acceleration (3, n) in the world by thrust, push, gravity and lift."""
+    def _acceleration(self, angles_rad: FloatArray, thrust_n: FloatArray, around: Surroundings) -> FloatArray:
+        """Return the acceleration (3, n) in the world by thrust (n,), push, gravity and lift."""
         thrust = np.zeros_like(angles_rad)
-        thrust[2] = -around.thrust_acceleration_m_s2
+        thrust[2] = -(around.thrust_share * thrust_n / around.mass_kg)
         acceleration = to_world(*sine_cosine(angles_rad - self._trim_rad), thrust)
         for axis in range(2):
             acceleration[axis] = (

@@ -165,7 +165,11 @@ class Vehicle:
         body[8] = yaw_rad
         commands = np.broadcast_to(motor_command, (4, flights))
         speed = self.rotors.commanded_speed_rad_s(commands)
-        return VehicleState(body, speed, np.zeros((self.loop.rows, flights)))
+        loop = self.loop
+        if isinstance(loop, FirstOrderDrone):
+            thrust_n = 4.0 * commands[0] * airframe_of(self.drone).thrust_per_command_n
+            return VehicleState(body, speed, loop.at_rest(thrust_n))
+        return VehicleState(body, speed, np.zeros((loop.rows, flights)))
 
     def apply_impulse(
         self, state: VehicleState, impulse_n_s: FloatArray, payload_kg: PerFlight
@@ -201,11 +205,11 @@ class Vehicle:
         return VehicleState(*self.integrate(state, motor_command, moment), memory)
 
     def _surroundings(self, thrust_n: FloatArray, moment: Moment) -> Surroundings:
-        """Return the forces on drones whose thrust is the demanded one (n,)."""
-        share = moment.thrust_share * self.airframe.thrust_factor_n_s2
-        mass_kg = self.airframe.mass_kg + moment.payload_kg
+        """Return the forces on drones without rotors, with their demanded thrust (n,)."""
         return Surroundings(
-            share * np.maximum(thrust_n, 0.0) / mass_kg,
+            np.maximum(thrust_n, 0.0),
+            moment.thrust_share * self.airframe.thrust_factor_n_s2,
+            self.airframe.mass_kg + moment.payload_kg,
             self.drag_1_s,
             moment.push_m_s2,
             moment.air_m_s or (0.0, 0.0),

@@ -19,6 +19,7 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MocapSensors,
     NoSensors,
     RotorFigures,
+    ThrustResponse,
     Uncertainty,
     VehicleSection,
 )
@@ -40,6 +41,9 @@ class VehicleFile(VehicleSection):
     rotors: RotorFigures | None = Field(None, description="Four equal rotors in X configuration.")
     attitude: AnyAttitude = Field(description="The attitude loop, with yaw.")
     altitude: AltitudeGains = Field(description="The altitude loop.")
+    thrust: ThrustResponse | None = Field(
+        None, description="The response of the thrust of a drone without rotors."
+    )
     sensors: AnySensors = Field(NoSensors(), description="The sensors that --sensors switches on.")
     uncertainty: Uncertainty | None = Field(None, description="How well a log has shown these values.")
 
@@ -82,6 +86,10 @@ class VehicleFile(VehicleSection):
                     yield self._fault("body", key, f"must be left out: {kind} has no torques")
             if self.rotors is not None:
                 yield self._fault("attitude", "kind", "has no rotors: leave out [rotors]")
+        elif self.thrust is not None:
+            yield self._fault(
+                "attitude", "kind", "has rotors, whose thrust lags by rotors.lag_s: leave out [thrust]"
+            )
         if self.rotors is not None and self.rotors.command_min >= self.rotors.command_max:
             least = f"{self.rotors.command_min:g} (rotors.command_min)"
             yield self._fault("rotors", "command_max", f"must be more than {least}")

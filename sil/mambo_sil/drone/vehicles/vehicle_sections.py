@@ -157,6 +157,16 @@ class AltitudeGains(VehicleSection):
     thrust_max_n: Positive = Field(description="Largest total thrust; more than the weight.")
 
 
+class ThrustResponse(VehicleSection):
+    """The response of the thrust to its demand: thrust = gain x demand, late and with a lag."""
+
+    gain: Annotated[float, Field(ge=0.1, le=3)] = Field(
+        1.0, description="Steady thrust over the demanded one."
+    )
+    lag_s: Lag = Field(description="Time constant of the first-order lag.")
+    dead_time_s: Delay = Field(0.0, description="Time before a new demand has any effect.")
+
+
 class Uncertainty(VehicleSection):
     """Half-widths of the 95 % intervals of the values that a log has shown; no flight reads them."""
 

@@ -10,10 +10,25 @@
 /* 0.2 s of 2000 ticks a second. */
 #define LATE_TICKS_MAX 400
 
-/* Commands that have not acted yet. */
+/* Commands and demands of thrust that have not acted yet, and the thrust. */
 typedef struct {
     real_t sent_rad[LATE_TICKS_MAX + 2][2];
+    real_t demanded_n[LATE_TICKS_MAX + 2];
+    real_t thrust_n;
 } late_t;
+
+/* Commands of level flight, and a steady demand of thrust. */
+static inline void late_start(const engine_simulation_t *simulation, real_t demanded_n, late_t *late)
+{
+    int i;
+
+    for (i = 0; i < (LATE_TICKS_MAX + 2); i++) {
+        late->sent_rad[i][0] = splat(0.0);
+        late->sent_rad[i][1] = splat(0.0);
+        late->demanded_n[i] = demanded_n;
+    }
+    late->thrust_n = simulation->thrust_gain * demanded_n;
+}
 
 /* The angles at the later nodes and the end of the tick, and their rates of change there. */
 static inline void follow(const engine_simulation_t *simulation, int64_t tick, const real_t *start_rad,
@@ -41,11 +56,34 @@ static inline void follow(const engine_simulation_t *simulation, int64_t tick, c
     slopes_rad_s[2] = (heading_rad - nodes_rad[2][2]) / simulation->yaw_lag_s;
 }
 
+/* The thrust at the nodes and at the end of the tick. */
+static inline void deliver(const engine_simulation_t *simulation, int64_t tick, real_t demanded_n, late_t *late,
+                           real_t *nodes_n)
+{
+    const int64_t newest = (tick - simulation->thrust_late_ticks) + (LATE_TICKS_MAX + 2);
+    real_t now;
+    real_t before;
+    int node;
+
+    late->demanded_n[tick % (LATE_TICKS_MAX + 2)] = demanded_n;
+    now = simulation->thrust_gain * late->demanded_n[newest % (LATE_TICKS_MAX + 2)];
+    before = simulation->thrust_gain * late->demanded_n[(newest - 1) % (LATE_TICKS_MAX + 2)];
+    nodes_n[0] = simulation->thrust_lags ? late->thrust_n : demanded_n;
+    for (node = 0; node < 3; node++) {
+        const real_t reached = before + ((nodes_n[0] - before) * simulation->thrust_decay_before[node]);
+
+        nodes_n[1 + node] = simulation->thrust_lags ? (now + ((reached - now) * simulation->thrust_decay_after[node]))
+                                                    : demanded_n;
+    }
+    late->thrust_n = nodes_n[3];
+}
+
 /* Acceleration in the world by thrust, push, gravity and lift. */
 static inline void accelerate(const engine_simulation_t *simulation, const engine_flight_t *flight,
-                              const surroundings_t *around, real_t thrust_acceleration_m_s2, const real_t *angles_rad, real_t *acceleration_m_s2)
+                              const surroundings_t *around, real_t share, real_t thrust_n, const real_t *angles_rad,
+                              real_t *acceleration_m_s2)
 {
-    const real_t thrust[3] = { splat(0.0), splat(0.0), -thrust_acceleration_m_s2 };
+    const real_t thrust[3] = { splat(0.0), splat(0.0), -((share * thrust_n) / around->mass_kg) };
     const real_t trimmed_rad[3] = { angles_rad[0] - simulation->trim_rad[0],
                                     angles_rad[1] - simulation->trim_rad[1], angles_rad[2] };
     const rotation_t r = rotation(trimmed_rad);
@@ -81,8 +119,8 @@ static inline void advance(const engine_simulation_t *simulation, const engine_f
     const double half_s = simulation->step_s / 2.0;
     const double three_quarters_s = (3.0 * simulation->step_s) / 4.0;
     const double ninth_s = simulation->step_s / 9.0;
-    const real_t share_n = (thrust_share * flight->thrust_factor_n_s2) * maximum(thrust_n, splat(0.0));
-    const real_t thrust_acceleration_m_s2 = share_n / around->mass_kg;
+    const real_t share = thrust_share * flight->thrust_factor_n_s2;
+    real_t thrusts_n[4];
     real_t nodes_rad[3][3];
     real_t slopes_rad_s[3];
     real_t motion[6];
@@ -97,22 +135,23 @@ static inline void advance(const engine_simulation_t *simulation, const engine_f
     late->sent_rad[tick % (LATE_TICKS_MAX + 2)][0] = command_rad[0];
     late->sent_rad[tick % (LATE_TICKS_MAX + 2)][1] = command_rad[1];
     follow(simulation, tick, body + EULER, heading_rad, late, nodes_rad, slopes_rad_s);
+    deliver(simulation, tick, maximum(thrust_n, splat(0.0)), late, thrusts_n);
     for (i = 0; i < 3; i++) {
         motion[i] = body[POSITION + i];
     }
     to_world(r, body + VELOCITY, motion + 3);
 
-    accelerate(simulation, flight, around, thrust_acceleration_m_s2, body + EULER, acceleration_m_s2);
+    accelerate(simulation, flight, around, share, thrusts_n[0], body + EULER, acceleration_m_s2);
     motion_derivative(flight, around, motion, acceleration_m_s2, first);
     for (i = 0; i < 6; i++) {
         inner[i] = motion[i] + (half_s * first[i]);
     }
-    accelerate(simulation, flight, around, thrust_acceleration_m_s2, nodes_rad[0], acceleration_m_s2);
+    accelerate(simulation, flight, around, share, thrusts_n[1], nodes_rad[0], acceleration_m_s2);
     motion_derivative(flight, around, inner, acceleration_m_s2, second);
     for (i = 0; i < 6; i++) {
         inner[i] = motion[i] + (three_quarters_s * second[i]);
     }
-    accelerate(simulation, flight, around, thrust_acceleration_m_s2, nodes_rad[1], acceleration_m_s2);
+    accelerate(simulation, flight, around, share, thrusts_n[2], nodes_rad[1], acceleration_m_s2);
     motion_derivative(flight, around, inner, acceleration_m_s2, third);
     for (i = 0; i < 6; i++) {
         motion[i] = motion[i] + (ninth_s * (((2.0 * first[i]) + (3.0 * second[i])) + (4.0 * third[i])));

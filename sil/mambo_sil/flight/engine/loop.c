@@ -136,7 +136,6 @@ static inline real_t height_reference_m(const engine_simulation_t *simulation, i
 void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
                   flying_t *flying)
 {
-    const late_t late = { { { splat(0.0) } } };
     const wire_t wire = { { { splat(0.0) } } };
     vehicle_state_t state;
     int i;
@@ -160,7 +159,7 @@ void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *
         take(draws->gusts, (simulation->updates * simulation->ticks_per_update) + 1, 0, 3, drawn);
         flying->gusts = gusts_start(drawn);
     }
-    flying->late = late;
+    late_start(simulation, flight->thrust_start_n, &flying->late);
     flying->wire = wire;
     flying->command_rad[0] = splat(0.0);
     flying->command_rad[1] = splat(0.0);

@@ -57,6 +57,11 @@ typedef struct {
     double yaw_decay[3];
     double acceleration_per_tilt_g;
     double trim_rad[2];
+    int64_t thrust_lags;      /* whether the thrust has a response of its own */
+    double thrust_gain;
+    int64_t thrust_late_ticks;
+    double thrust_decay_before[3];
+    double thrust_decay_after[3];
 
     /* Altitude loop. */
     double altitude_p_n_m;
@@ -115,6 +120,7 @@ typedef struct {
 typedef struct {
     real_t body_start[12];
     real_t rotor_start_rad_s[4];
+    real_t thrust_start_n;    /* the steady demand before the start, of a drone without rotors */
     real_t yaw_rad;
     real_t yaw_rate_rad_s;
     whole_t landing;          /* all bits if the ground carries the drone, else 0 */

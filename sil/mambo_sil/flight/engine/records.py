@@ -14,7 +14,7 @@ from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.first_order import FirstOrderDrone
 from mambo_sil.drone.plant.ground import ROTOR_HEIGHT_M
 from mambo_sil.drone.plant.rotors import LEAST_YAW, wrench_per_command
-from mambo_sil.drone.plant.vehicle import STEP_S
+from mambo_sil.drone.plant.vehicle import STEP_S, Vehicle
 from mambo_sil.drone.sensors import estimators, instruments, mocap
 from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
@@ -38,6 +38,7 @@ _FIRST_ORDER: Final = (
     *("response_gain", "response_lag_s", "late_ticks", "decay_before", "decay_after"),
     *("yaw_lag_s", "yaw_decay", "acceleration_per_tilt_g", "trim_rad"),
 )
+_THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "thrust_decay_after")
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
@@ -51,6 +52,7 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
         "engine_simulation_t",
         1,
         _attitude(drone)
+        | _thrust(flight.vehicle)
         | _mocap(sensors, step_s)
         | {
             "flights": flight.flights,
@@ -132,6 +134,7 @@ def flight_records(flight: Flight, first_target: FloatArray) -> Record:
         {
             "body_start": start.body.T,
             "rotor_start_rad_s": start.rotor_speed_rad_s.T,
+            "thrust_start_n": start.memory[-1] if vehicle.drone.thrust is not None else 0.0,
             "yaw_rad": flight.yaw_rad,
             "yaw_rate_rad_s": flight.yaw_rate_rad_s,
             "landing": -flight.landing.astype(np.int64),
@@ -203,6 +206,16 @@ def _attitude(drone: VehicleFile) -> dict[str, Any]:
                 [first_order.roll_trim_rad, first_order.pitch_trim_rad],
             )
             return values | {"attitude": 2} | dict(zip(_FIRST_ORDER, follows, strict=True))
+
+
+def _thrust(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the members of the response of the thrust, 0 without."""
+    response, loop = vehicle.drone.thrust, vehicle.loop
+    if response is None or not isinstance(loop, FirstOrderDrone) or loop.thrust_decay is None:
+        return dict.fromkeys(("thrust_lags", *_THRUST), 0)
+    decay = loop.thrust_decay
+    found = response.gain, decay.late_ticks, decay.before, decay.after
+    return {"thrust_lags": 1} | dict(zip(_THRUST, found, strict=True))
 
 
 def _mocap(sensors: instruments.Sensors | MotionCapture | None, step_s: float) -> dict[str, Any]:
