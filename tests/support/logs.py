@@ -119,6 +119,49 @@ def fly(truth: Truth, flown: Flown, seeds: int, seed: int = 1) -> list[dict[str,
     ]
 
 
+@dataclass(frozen=True)
+class Lifting:
+    """A drone that is moved up and down, and how it is measured."""
+
+    hover_command: float = 33550.0
+    """Command that carries the weight at first; the thrust is in proportion."""
+    lag_s: float = 0.07
+    delay_s: float = 0.01
+    battery_sag_1_s: float = 0.0
+    step_m: float = 0.25
+    """Height above and below the middle, by turns; 0 is hover."""
+    duration_s: float = 20.0
+    noise_m: float = 0.001
+    gusts_m_s2: float = 0.03
+
+
+def lift(truth: Lifting, seed: int = 1) -> dict[str, Array]:
+    """Move a level drone up and down by a PD controller; return the columns of a log."""
+    random = default_rng(seed)
+    tick_s, ticks = 0.002, 5
+    rows = round(truth.duration_s / (ticks * tick_s))
+    time_s = ticks * tick_s * np.arange(rows, dtype=np.float64)
+    keep, share = np.exp(-tick_s / truth.lag_s), 1.0 / truth.hover_command
+    queue = [truth.hover_command] * (round(truth.delay_s / tick_s) + 1)
+    draws = random.normal(size=(rows, 1 + ticks))
+    height, climb, thrust, gust = 1.0, 0.0, 1.0, 0.0
+    table = np.empty((rows, 2))
+    for row, (noise, *pushes) in enumerate(draws.tolist()):
+        target = 1.0 + truth.step_m * np.sign(np.sin(2.0 * np.pi * time_s[row] / 3.1))
+        wanted = 1.0 + (15.0 * (target - height) - 7.0 * climb) / G
+        sent = truth.hover_command * min(max(wanted, 0.2), 1.8)
+        table[row] = sent, height + truth.noise_m * noise
+        for tick, push in enumerate(pushes):
+            queue = [sent, *queue[:-1]]
+            fresh = 1.0 - truth.battery_sag_1_s * (time_s[row] + tick * tick_s)
+            thrust = keep * thrust + (1.0 - keep) * share * queue[-1]
+            gust += truth.gusts_m_s2 * np.sqrt(tick_s) * push - 0.5 * tick_s * gust
+            climb += tick_s * (G * (fresh * thrust - 1.0) + gust)
+            height += tick_s * climb
+    level = dict.fromkeys(NAMES[:4], np.zeros(rows))
+    return {"time_s": time_s} | level | {"thrust_command": table[:, 0], "z_m": -table[:, 1]}
+
+
 def _eight(times_s: Array, flown: Flown) -> Array:
     """Return position, velocity and acceleration (k, 3, 2, 1) on the figure of eight."""
     a, b, w = flown.size_m, flown.height * flown.size_m, flown.rate_rad_s

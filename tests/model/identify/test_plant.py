@@ -18,7 +18,7 @@ from mambo_sil.model.identify.identify_record import IdentifySummary
 from mambo_sil.model.identify.manoeuvre import SINES_HZ, waypoints_csv
 from mambo_sil.model.identify.response import FittedResponse
 from mambo_sil.model.identify.segments import PERIOD_S, HeldCommand, Segment
-from mambo_sil.model.identify.signals import COMMANDS, FlightLog, Signal
+from mambo_sil.model.identify.signals import COMMANDS, THRUST_COMMAND, FlightLog, Signal
 
 Array = NDArray[np.float64]
 
@@ -112,7 +112,7 @@ def test_a_short_log_does_not_lose_the_integrator(trace: Path, begin_s: float, e
 @pytest.mark.long
 def test_the_drag_of_the_plant_is_identified(trace: Path) -> None:
     """From the true motion: 0.067 1/s, and g per radian."""
-    columns = {name: Column(name) for name in KNOWN if name not in COMMANDS}
+    columns = {name: Column(name) for name in KNOWN if name not in (*COMMANDS, THRUST_COMMAND)}
     motion = identify(*read_logs([trace], columns))[0].motion
     assert motion is not None
     assert abs(motion.acceleration_per_tilt.value - 1.0) < 0.001

@@ -182,6 +182,8 @@ class Uncertainty(VehicleSection):
     )
     roll_trim_rad: HalfWidth | None = Field(None, description="That of attitude.roll_trim_rad.")
     pitch_trim_rad: HalfWidth | None = Field(None, description="That of attitude.pitch_trim_rad.")
+    thrust_gain: HalfWidth | None = Field(None, description="That of thrust.gain.")
+    thrust_lag_s: HalfWidth | None = Field(None, description="That of thrust.lag_s.")
 
 
 class NoSensors(VehicleSection):

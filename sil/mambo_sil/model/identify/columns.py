@@ -51,6 +51,11 @@ KNOWN: Final[dict[str, tuple[Column, ...]]] = {
     "vx_m_s": (Column("seen_vx_m_s"), Column("vx_m_s"), Column("stateEstimate.vx")),
     "vy_m_s": (Column("seen_vy_m_s"), Column("vy_m_s"), Column("stateEstimate.vy", -1.0)),
     "thrust_acceleration_m_s2": (Column("thrust_acceleration_m_s2"),),
+    "thrust_command": (
+        Column("thrust_command"),
+        Column("controller.cmd_thrust"),
+        Column("stabilizer.thrust"),
+    ),
 }
 """Known columns of each signal, the first one that a file has is read: those of trace.csv, where the estimate
 (seen_) is what a real drone would log, and those of the Crazyflie, whose y, z and yaw have the other sign."""

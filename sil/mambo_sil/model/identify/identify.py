@@ -19,6 +19,7 @@ from mambo_sil.model.identify.identify_record import AxisResult, IdentifySummary
 from mambo_sil.model.identify.motion import Motion, explained, fit_motion
 from mambo_sil.model.identify.segments import SHORTEST_S, Segment, cut, duration_s, tumbled
 from mambo_sil.model.identify.signals import POSITION, TILTS, VELOCITY, FlightLog
+from mambo_sil.model.identify.thrust import fit_thrust
 from mambo_sil.model.identify.ulog import read_ulog
 
 SHARES: Final = (0.4, 1.5)
@@ -83,6 +84,7 @@ def identify(logs: Sequence[FlightLog], left_out: Sequence[str] = ()) -> tuple[I
         roll=results[0],
         pitch=results[1],
         motion=motion,
+        thrust=fit_thrust(segments),
         noise=Noise(_white_noise(logs, POSITION), _white_noise(logs, VELOCITY)),
         model=model,
         remarks=remarks,

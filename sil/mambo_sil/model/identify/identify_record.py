@@ -46,6 +46,30 @@ class AxisResult:
 
 
 @dataclass(frozen=True)
+class ThrustResult:
+    """The response of the thrust; without `gain` if the logs do not show it."""
+
+    verdict: Verdict
+    reasons: list[str]
+    """Why the verdict is not "good"."""
+    command_change: Number
+    """Standard deviation of the command, behind the lag, over its mean."""
+    held_out_r2: Number
+    gain: Interval | None
+    """Acceleration in m/s^2 per unit of the command, at the beginning of the logs."""
+    lag_s: Interval | None
+    """Lag with dead time and the age of the measured height."""
+    hover_command: Number
+    """Command that carries the weight, at the beginning of the logs."""
+    battery_sag_1_s: Interval | None
+    """Share of the thrust at the beginning that is lost per second."""
+    weight_g: Number
+    """The weight as the heights show it: 1 if the thrust is in proportion to its command."""
+    scaled: bool
+    """Whether the command is thrust over mass in m/s^2; else it has a unit of its own."""
+
+
+@dataclass(frozen=True)
 class LogResult:
     """One log: time in usable stretches, and the column of each signal, with sign and factor."""
 
@@ -74,6 +98,8 @@ class IdentifySummary(ReportedSummary):
     roll: AxisResult
     pitch: AxisResult
     motion: Motion | None
+    thrust: ThrustResult | None = None
+    """None where no log has both height and thrust."""
     noise: Noise
     model: dict[str, float]
     """The keys of section [model] that follow; empty if an axis is refused."""
@@ -103,7 +129,8 @@ class IdentifySummary(ReportedSummary):
         content = {
             "heads": AXIS_ROWS,
             "axes": [(name, axis, axis_cells(axis)) for name, axis in self.axes.items()],
-            "facts": dict([*motion_rows(self), *noise_rows(self)]),
+            "facts": dict([*motion_rows(self), *thrust_rows(self), *noise_rows(self)]),
+            "thrust": self.thrust,
             "logs": self.logs,
             "remarks": self.remarks,
             "picture": fit_panel(curves, self.split_s, self.verdicts) if there else None,
@@ -139,6 +166,21 @@ def motion_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
         ("trim of roll, pitch", f"{trim} degrees"),
         ("lag of the velocity", f"{_plus_minus(motion.velocity_lag_s, 1e3, 0)} ms"),
         ("motion explained", f"R2 {motion.r2:.3f}; rms left {motion.disturbance_m_s2:.3f} m/s^2"),
+    ]
+
+
+def thrust_rows(summary: IdentifySummary) -> list[tuple[str, str]]:
+    """Return name and value of each parameter of the thrust."""
+    thrust = summary.thrust
+    if thrust is None or thrust.gain is None or thrust.lag_s is None or thrust.battery_sag_1_s is None:
+        return []
+    gain, lag, sag = thrust.gain, thrust.lag_s, thrust.battery_sag_1_s
+    return [
+        ("thrust per command", f"{three_digits(gain.value)} +- {three_digits(gain.within)} m/s^2"),
+        ("lag of the thrust", f"{_plus_minus(lag, 1e3, 0)} ms"),
+        ("thrust command of hover", three_digits(thrust.hover_command)),
+        ("sag of the battery", f"{_plus_minus(sag, 100.0, 3)} % of the thrust per second"),
+        ("height explained", f"R2 {thrust.held_out_r2:.3f}; weight {thrust.weight_g:.2f} g"),
     ]
 
 

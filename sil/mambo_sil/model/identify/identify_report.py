@@ -9,8 +9,10 @@ from mambo_sil.model.identify.identify_record import (
     finding,
     motion_rows,
     noise_rows,
+    thrust_rows,
 )
 from mambo_sil.model.identify.response import Interval
+from mambo_sil.results.number_format import three_digits
 
 ADVICE: Final = (
     "what to fly: mambo-nmpc identify --manoeuvre eight.py writes a script that flies and logs a figure of "
@@ -24,10 +26,12 @@ def identify_text(summary: IdentifySummary) -> str:
     cells = zip(*(axis_cells(axis) for axis in summary.axes.values()), strict=True)
     rows = zip(AXIS_ROWS, cells, strict=True)
     lines += [f"{words:28}" + "".join(f"{cell:20}" for cell in row) for words, row in rows]
-    facts = [*motion_rows(summary), *noise_rows(summary)]
+    facts = [*motion_rows(summary), *thrust_rows(summary), *noise_rows(summary)]
     lines += [f"{words:28}{value}" for words, value in facts]
     for name, axis in summary.axes.items():
         lines += [f"{name} is {axis.verdict}: {reason}" for reason in axis.reasons]
+    if summary.thrust is not None:
+        lines += [f"thrust is {summary.thrust.verdict}: {reason}" for reason in summary.thrust.reasons]
     for log in summary.logs:
         renamed = [f"{signal} = {column}" for signal, column in log.columns.items() if column != signal]
         lines.append(
@@ -77,6 +81,8 @@ def vehicle_text(summary: IdentifySummary) -> str:
         values = ", ".join(f"{key} = {_round(each.value)}" for key, each in found.items())
         responses.append(f"{name} = {{ {values} }}")
         within |= {f"{name}_{key}": each for key, each in found.items()}
+    thrust, vertical = _thrust_lines(summary)
+    within |= vertical
     lines = [
         *_heading(summary),
         "",
@@ -89,11 +95,33 @@ def vehicle_text(summary: IdentifySummary) -> str:
         f"acceleration_per_tilt_g = {share}",
         *trims,
         *responses,
+        *thrust,
         "",
         "[uncertainty]  # half-widths of the 95 % intervals; no flight reads them",
         *(f"{key} = {float(f'{each.within:.2g}')!r}" for key, each in within.items()),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _thrust_lines(summary: IdentifySummary) -> tuple[list[str], dict[str, Interval]]:
+    """Return the section [thrust], and its values by their keys in [uncertainty]; nothing if not known.
+
+    A command in a unit of its own is one of 9.81 m/s^2 at hover, with which the gain is 1.
+    """
+    thrust = summary.thrust
+    if thrust is None or thrust.gain is None or thrust.lag_s is None:
+        return [], {}
+    gain, unit = thrust.gain, "thrust over mass"
+    if not thrust.scaled:
+        gain = Interval(1.0, gain.within / gain.value)
+        unit = f"one that is {three_digits(thrust.hover_command)} at hover"
+    lines = [
+        "",
+        f"[thrust]  # of the command in the logs, {unit}",
+        f"gain = {_round(gain.value)}",
+        f"lag_s = {_round(thrust.lag_s.value)}  # with dead time and the age of the height",
+    ]
+    return lines, {"thrust_gain": gain, "thrust_lag_s": thrust.lag_s}
 
 
 def _heading(summary: IdentifySummary) -> list[str]:

@@ -15,6 +15,7 @@ from mambo_sil.model.identify.signals import (
     HEIGHT,
     POSITION,
     THRUST,
+    THRUST_COMMAND,
     TILTS,
     VELOCITY,
     YAW,
@@ -78,6 +79,14 @@ class Segment:
     """(2, m); None where the log has neither velocity nor position."""
     thrust_m_s2: FloatArray | None
     """Thrust over mass (m,); None where the log has none."""
+    height_m: FloatArray | None = None
+    """(m,), up positive; None where the log has none."""
+    thrust: HeldCommand | None = None
+    """The commanded thrust; None where the log has none."""
+    thrust_in_m_s2: bool = False
+    """Whether `thrust` is over mass; else it has a unit of its own."""
+    begun_s: float = 0.0
+    """Time at which the log begins."""
 
     def command_means(self, axis: int, delay_s: float = 0.0) -> FloatArray:
         """Return the command (m,) of an axis, as the grid's period means, `delay_s` late."""
@@ -122,6 +131,8 @@ def _cut_stretch(
     yaw = _onto(time_s, log.signals[YAW], turn=True) if YAW in log.signals else np.zeros_like(time_s)
     thrust = log.signals.get(THRUST)
     thrust_m_s2 = None if thrust is None else _onto(time_s, thrust)
+    height_m = -_onto(time_s, log.signals[HEIGHT]) if HEIGHT in log.signals else None
+    sent = log.signals.get(THRUST_COMMAND, thrust)
     return [
         Segment(
             log.name,
@@ -131,6 +142,10 @@ def _cut_stretch(
             yaw[a:b],
             None if velocity is None else velocity[:, a:b],
             None if thrust_m_s2 is None else thrust_m_s2[a:b],
+            None if height_m is None else height_m[a:b],
+            None if sent is None else HeldCommand.of(sent),
+            THRUST_COMMAND not in log.signals,
+            float(log.signals[COMMANDS[0]].time_s[0]),
         )
         for a, b in _runs(flown)
         if (b - a) * PERIOD_S >= SHORTEST_S
@@ -169,11 +184,11 @@ def _gapless(signals: Sequence[Signal]) -> list[tuple[float, float]]:
 
 
 def _grounded(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:
-    """Return when (m,) the drone is near the ground or its thrust too small to fly, as far as logged."""
+    """Return when (m,) the drone is near the ground, or without a height its thrust too small to fly."""
     grounded = np.zeros(len(time_s), np.bool_)
     if HEIGHT in log.signals:
         grounded |= _onto(time_s, log.signals[HEIGHT]) > -LOWEST_FLIGHT_M
-    if THRUST in log.signals:
+    elif THRUST in log.signals:
         grounded |= _onto(time_s, log.signals[THRUST]) < 0.3 * GRAVITY_M_S2
     return grounded
 

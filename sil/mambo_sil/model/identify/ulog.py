@@ -14,7 +14,7 @@ from mambo_codegen.errors import echo
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import LogError
 from mambo_sil.model.identify.csv_log import LARGEST_FILE_BYTES, demand_one_clock
-from mambo_sil.model.identify.signals import FlightLog, Signal
+from mambo_sil.model.identify.signals import THRUST_COMMAND, FlightLog, Signal
 
 SETPOINT, ATTITUDE, MOTION = "vehicle_attitude_setpoint", "vehicle_attitude", "vehicle_local_position"
 TRAJECTORY: Final = "trajectory_setpoint"
@@ -29,6 +29,8 @@ _TARGET: Final[dict[str, tuple[str, ...]]] = {
 }
 """Fields of the target, since PX4 1.14 and before; NaN where PX4 was not given the quantity."""
 _ANGLES: Final = ("roll", "pitch", "yaw")
+_THRUST: Final = "thrust_body[2]"
+"""Commanded thrust along z of the body, which points down."""
 _CLOCK: Final = "timestamp"
 _FASTER: Final = "log at 50 Hz or more (SDLOG_PROFILE, high rate)"
 
@@ -54,6 +56,7 @@ def read_ulog(path: Path) -> FlightLog:
     for angle, values in zip(_ANGLES, _euler_rad([attitude[f"q[{i}]"] for i in range(4)]), strict=True):
         values = np.unwrap(values) if angle == "yaw" else values  # noqa: PLW2901 - the same angle
         signals[f"{angle}_rad"] = _signal(attitude, values, f"{ATTITUDE}.q")
+    signals |= _thrust(command)
     motion = topics.get(MOTION, {})
     for signal, field in _MOTION.items():
         if field in motion:
@@ -100,6 +103,14 @@ def _commands(setpoint: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         return {angle: each for angle, each in zip(_ANGLES, direct, strict=False) if each is not None}
     parts = [setpoint.get(f"q_d[{i}]", np.full_like(setpoint[_CLOCK], np.nan)) for i in range(4)]
     return dict(zip(_ANGLES[:2], _euler_rad(parts)[:2], strict=True))
+
+
+def _thrust(setpoint: Mapping[str, FloatArray]) -> dict[str, Signal]:
+    """Return the commanded thrust, up positive, if there is one."""
+    values = setpoint.get(_THRUST)
+    if values is None or not np.isfinite(values).any():
+        return {}
+    return {THRUST_COMMAND: _signal(setpoint, -values, f"-{SETPOINT}.{_THRUST}")}
 
 
 def _euler_rad(q: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
