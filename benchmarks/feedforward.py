@@ -15,10 +15,10 @@ whose error is at most `SLACK` times the least one, that with the smallest comma
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
@@ -41,6 +41,11 @@ from mambo_sil.flight.loop import Flight, PositionController
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.scenario import flight_of
 from mambo_sil.flight.traces import SensedTrace
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Gains = TypeVar("Gains", bound="DataclassInstance")
 
 CURVES: Final[dict[str, dict[str, Any]]] = {
     "bernoulli": {"size_m": {"uniform": [1.0, 2.0]}, "rate_rad_s": {"uniform": [0.25, 0.75]}},
@@ -68,21 +73,24 @@ SLACK: Final = 1.1
 
 @dataclass(frozen=True)
 class Judged:
-    """How a controller flies: median seen IAE and median command variation by curve, and crashes of all."""
+    """How a controller flies: median error and median variation of its output by curve, and crashes of all.
 
-    iae_m_s: tuple[float, ...]
-    variation_rad: tuple[float, ...]
+    Here the error is the seen IAE in m s, and the output the commanded tilt in rad.
+    """
+
+    errors: tuple[float, ...]
+    variations: tuple[float, ...]
     crashes: int
 
     @property
-    def error_m_s(self) -> float:
-        """The geometric mean of the IAE over the curves."""
-        return math.prod(self.iae_m_s) ** (1.0 / len(self.iae_m_s))
+    def error(self) -> float:
+        """The geometric mean of the errors over the curves."""
+        return math.prod(self.errors) ** (1.0 / len(self.errors))
 
     @property
-    def mean_variation_rad(self) -> float:
-        """The geometric mean of the command variation over the curves."""
-        return math.prod(self.variation_rad) ** (1.0 / len(self.variation_rad))
+    def variation(self) -> float:
+        """The geometric mean of the variations over the curves."""
+        return math.prod(self.variations) ** (1.0 / len(self.variations))
 
 
 def drawn_flights(count: int = FLIGHTS, vehicle: str = vehicle_toml.DEFAULT) -> list[Flight]:
@@ -122,8 +130,8 @@ def judge(flights: list[Flight], gains: PdGains | None) -> Judged:
 
 
 def search(
-    first: PdGains, judge_gains: Callable[[PdGains], Judged], most_crashes: int
-) -> Iterator[tuple[PdGains, Judged]]:
+    first: Gains, judge_gains: Callable[[Gains], Judged], most_crashes: int
+) -> Iterator[tuple[Gains, Judged]]:
     """Search from `first`; yield every candidate that crashes at most `most_crashes` times."""
     rng = np.random.default_rng(0)
     best, least = first, math.inf
@@ -135,24 +143,26 @@ def search(
             judged = judge_gains(gains)
             if judged.crashes <= most_crashes:
                 yield gains, judged
-                if judged.error_m_s < least:
-                    best, least = gains, judged.error_m_s
+                if judged.error < least:
+                    best, least = gains, judged.error
 
 
-def choose(found: dict[PdGains, Judged]) -> PdGains:
-    """Return the gains with the smallest command variation among those with nearly the least error."""
-    most = SLACK * min(judged.error_m_s for judged in found.values())
-    near = [gains for gains, judged in found.items() if judged.error_m_s <= most]
-    return min(near, key=lambda gains: found[gains].mean_variation_rad)
+def choose(found: dict[Gains, Judged]) -> Gains:
+    """Return the gains with the smallest variation among those with nearly the least error."""
+    most = SLACK * min(judged.error for judged in found.values())
+    near = [gains for gains, judged in found.items() if judged.error <= most]
+    return min(near, key=lambda gains: found[gains].variation)
 
 
-def row(name: str, gains: PdGains | None, judged: Judged) -> dict[str, str]:
-    """Return a row of the printed table."""
-    curves = zip(CURVES, judged.iae_m_s, judged.variation_rad, strict=True)
+def row(
+    name: str, gains: "DataclassInstance | None", judged: Judged, names: Iterable[str] = CURVES
+) -> dict[str, str]:
+    """Return a row of the printed table; `names` are those of the curves."""
+    curves = zip(names, judged.errors, judged.variations, strict=True)
     return {
         "": name,
-        **{curve: f"{iae_m_s:.3g} ({variation:.2g})" for curve, iae_m_s, variation in curves},
-        "mean": f"{judged.error_m_s:.3g}",
+        **{curve: f"{error:.3g} ({variation:.2g})" for curve, error, variation in curves},
+        "mean": f"{judged.error:.3g}",
         "crashed": str(judged.crashes),
         "gains": ""
         if gains is None
@@ -169,7 +179,7 @@ def main() -> None:
     for gains, judged in search(FIRST[law], lambda gains: judge(flights, gains), stock.crashes):
         found[gains] = judged
         print(f"{astuple(gains)}: {judged}", flush=True)
-    chosen, closest = choose(found), min(found, key=lambda gains: found[gains].error_m_s)
+    chosen, closest = choose(found), min(found, key=lambda gains: found[gains].error)
     rows = [row("the paper's PD", None, stock)]
     rows += [row(name, gains, found[gains]) for name, gains in (("least error", closest), ("chosen", chosen))]
     print(f"\nmedian IAE as seen, m s (command variation, rad); {len(found)} candidates\n\n{table(rows)}")

@@ -33,7 +33,7 @@ def test_the_search_is_repeatable_and_closes_in() -> None:
     assert STOCK in found
     assert len(found) <= 1 + 3 * DRAWS_PER_GAIN * len(STEPS)
     assert all(gains.velocity_rad_s_m <= 0.35 for gains in found)
-    assert min(judged.error_m_s for judged in found.values()) < 1.05
+    assert min(judged.error for judged in found.values()) < 1.05
 
 
 def test_all_gains_of_the_pid_are_searched() -> None:
@@ -59,7 +59,7 @@ def test_the_flights_are_those_of_a_campaign() -> None:
     flights = drawn_flights(2)
     assert len({flight.seeds for flight in flights}) == 1
     assert all(flight.sensors is not None and flight.disturbances.windy for flight in flights)
-    errors_m_s = [judge(flights, gains).error_m_s for gains in (None, GAINS, pid_gains()["mambo"])]
+    errors_m_s = [judge(flights, gains).error for gains in (None, GAINS, pid_gains()["mambo"])]
     assert errors_m_s == sorted(errors_m_s, reverse=True)
 
 

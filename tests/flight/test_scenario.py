@@ -229,6 +229,7 @@ def test_by_default_nothing_disturbs_a_flight() -> None:
         "thrust_factor_n_s2": MAMBO_AIRFRAME.thrust_factor_n_s2,
         "torque_factor_n_m_s2": MAMBO_AIRFRAME.torque_factor_n_m_s2,
         "drag_1_s": Vehicle.drag_1_s,
+        "altitude_loop": "stock",
         "sensors": "none",
         "noise_scale": 1.0,
     }

@@ -101,6 +101,7 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
     for (i = 0; i < n; i += LANES) {
         surroundings_t around;
         vehicle_state_t state;
+        vertical_t wanted;
         late_t late;
         real_t row[33];
         real_t shares[4];
@@ -140,7 +141,10 @@ void run_tick(const engine_simulation_t *simulation, const engine_flight_t *flig
             integrate(simulation, flight, &around, row[32], &r, steady_rad_s, &state);
         }
         memcpy(row, &state, sizeof state);
-        row[25] = altitude_thrust_n(simulation, splat(simulation->height_reference_m), &seen);
+        wanted.z_m = splat(simulation->height_reference_m);
+        wanted.climb_m_s = row[26];
+        wanted.acceleration_m_s2 = row[28];
+        row[25] = altitude_thrust_n(simulation, &wanted, &seen, &row[29]);
         for (k = 0; k < 3; k++) {
             row[26 + k] = seen.velocity_m_s[k];
         }
@@ -296,17 +300,17 @@ def estimates(path: Path, flight: Flight, truths: FloatArray, draws: FloatArray)
 
 
 def ticked(path: Path, flight: Flight, rows: FloatArray) -> FloatArray:
-    """Return what a tick makes of `any_states` in the engine at `path`, as (k, 29).
+    """Return what a tick makes of `any_states` in the engine at `path`, as (k, 30).
 
-    The columns are body, rotor speeds, memory, and before the tick the thrust that the altitude loop demands
-    and the velocity in the world.
+    The columns are body, rotor speeds, memory, and before the tick the thrust that the altitude loop demands,
+    the velocity in the world, and the integral of the altitude loop, which was the payload.
     """
     found = rows.copy()
     records = _records(path, flight)
     engine: Any = _INTERFACE.dlopen(str(path))
     pointers = (pointer("void *", record) for record in records)
     engine.run_tick(*pointers, pointer("double *", found), len(found))
-    return found[:, :29]
+    return found[:, :30]
 
 
 def any_states() -> FloatArray:

@@ -219,6 +219,12 @@ FLOWN_IN_SPACE: Final = tuple(
     for one in SPACE[2:5]
 )
 
+ALTITUDES: Final = {
+    law: tuple(one.model_copy(update={"altitude_loop": law}) for one in SPACE[:5])
+    for law in ("feedforward", "pid")
+}
+"""The same with other altitude loops."""
+
 BATCHES: Final = {
     "truth": TRUTH,
     "sensed": SENSED,
@@ -235,6 +241,7 @@ BATCHES: Final = {
     "space": SPACE,
     "touching": TOUCHING,
     "flown in space": FLOWN_IN_SPACE,
+    **ALTITUDES,
 }
 
 

@@ -111,6 +111,7 @@ class FlySummary(FlightSummary):
     push_m_s2: tuple[float, float]
     wind_speed_m_s: float
     sensors: str
+    altitude_loop: str = "stock"
     seed: int
     motor_lag_s: float
     start: str
@@ -133,6 +134,7 @@ class FlySummary(FlightSummary):
             **_course(self),
             "controller": _controller(self, f" of {self.source}"),
             "start": f"{self.start}, heading {self.yaw_rad:g} rad",
+            "altitude loop": self.altitude_loop,
             "disturbances": "push {:g}, {:g} m/s²".format(*self.push_m_s2)
             + f"; wind with gusts {self.wind_speed_m_s:g} m/s; motor lag {self.motor_lag_s:g} s",
         }

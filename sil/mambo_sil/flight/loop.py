@@ -30,8 +30,8 @@ from mambo_sil.drone.plant.vehicle import STEP_S, Seen, Vehicle, VehicleState, t
 from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import Sensors
 from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
-from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.errors import FlightError
+from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 from mambo_sil.flight.names import Start
 from mambo_sil.flight.traces import AXES, SensedTrace, Trace
@@ -117,6 +117,8 @@ class Flight:
     link: Link = field(default_factory=Link)
     sensors: Sensors | MotionCapture | None = None
     """Sensors behind the estimates that position controller and stock loops receive; None: the true state."""
+    altitude: AltitudeLaw = field(default_factory=AltitudeLaw)
+    """What holds the height."""
 
     def __post_init__(self) -> None:
         step_s = self.vehicle.drone.step_s
@@ -214,6 +216,8 @@ def fly(
     seeds = flight.seeds or (0,) * flight.flights
     vehicle, state = flight.vehicle, start_state(flight, targets[0])
     drone, step_s = vehicle.drone, vehicle.drone.step_s
+    altitude = AltitudeLoop(flight.altitude, drone, flight.flights)
+    take_off_n = np.full(flight.flights, loops.take_off_thrust_n(drone))
     world = World(flight.disturbances, vehicle, seeds, -HEIGHT_REFERENCE_M)
     suite = suite_of(flight, seeds, truth(state))
     wire = Wire(flight.link, flight.flights)
@@ -228,13 +232,13 @@ def fly(
         state = _mark_lost(state)
         lifting = update < lifting_until
         heading_rad = flight.yaw_rad + flight.yaw_rate_rad_s * max(float(time_s), 0.0)
-        reference_m = height_reference_m(targets[update])
+        wanted = vertical_target(targets[update])
         for tick in range(flight.ticks_per_update):
             with np.errstate(all="ignore"):
                 state, moment = world.tick(state, time_s + step_s * tick)
                 true = truth(state)
                 seen = true if suite is None else suite.estimate(true)
-                thrust_n = _thrust_n(drone, reference_m, seen, lifting)
+                thrust_n = take_off_n if lifting else altitude.thrust_n(wanted, seen)
             if tick == 0:
                 caller.call(update, true, seen, thrust_n)
             command_rad = wire.carry(caller.command_rad)
@@ -272,7 +276,7 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     nominal = airframe_of(flight.vehicle.drone)
     command: PerFlight = nominal.command_min
     if flight.start == "hover":
-        position_m[2] = height_reference_m(first_target)
+        position_m[2] = vertical_target(first_target).z_m
         command = np.where(position_m[2] < 0.0, nominal.hover_command, nominal.command_min)
     state = flight.vehicle.at_rest(position_m, flight.yaw_rad, command)
     if flight.offset is None:
@@ -287,16 +291,12 @@ def start_state(flight: Flight, first_target: FloatArray) -> VehicleState:
     return state
 
 
-def height_reference_m(target: FloatArray) -> PerFlight:
-    """Return the reference of the altitude loop, z down, for targets (n, 6) or (n, 9)."""
-    return HEIGHT_REFERENCE_M if target.shape[1] < HEIGHT.stop else 0.0 - target[:, HEIGHT.start]
-
-
-def _thrust_n(drone: VehicleFile, reference_m: PerFlight, seen: Seen, lifting: bool) -> FloatArray:
-    """Return the demanded total thrust (n,) in N: constant while lifting, then from the altitude loop."""
-    if lifting:
-        return np.full(seen.position_m.shape[1], loops.take_off_thrust_n(drone))
-    return loops.altitude_thrust(drone, reference_m, seen.position_m[2], seen.velocity_m_s[2])
+def vertical_target(target: FloatArray) -> Vertical:
+    """Return what the altitude loop is to follow, for targets (n, 6) or (n, 9)."""
+    if target.shape[1] < HEIGHT.stop:
+        return Vertical(HEIGHT_REFERENCE_M)
+    height_m, climb_m_s, acceleration_m_s2 = target[:, HEIGHT].T
+    return Vertical(0.0 - height_m, climb_m_s, acceleration_m_s2)
 
 
 def _mark_lost(state: VehicleState) -> VehicleState:

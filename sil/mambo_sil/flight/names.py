@@ -31,6 +31,9 @@ PdName = Literal["pd", "pd-feedforward", "pid-feedforward"]
 acceleration, and the PID with feed-forward, low-pass and feedback of the tilt."""
 ControllerName = Literal["nmpc", PdName, "reference"]
 """The generated C, one of the laws without a model, or the reference in Python."""
+AltitudeName = Literal["stock", "feedforward", "pid"]
+"""The loop that holds the height: the vehicle's own, that with feed-forward of the target's climb and
+acceleration and compensation of the tilt, or a PID with these."""
 EngineName = Literal["c", "numpy"]
 """What computes a simulation; the bits are the same."""
 

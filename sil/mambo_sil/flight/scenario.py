@@ -34,8 +34,9 @@ from mambo_sil.drone.sensors.mocap import MotionCapture
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import MamboSensors, MocapSensors
 from mambo_sil.errors import FlightError, ScenarioError
+from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.loop import Flight, Offset
-from mambo_sil.flight.names import SENSORS_OF, ControllerName, CurveName, SensorsName, Start
+from mambo_sil.flight.names import SENSORS_OF, AltitudeName, ControllerName, CurveName, SensorsName, Start
 from mambo_sil.flight.trajectories import CURVES, Trajectories
 
 FORMAT: Final = 2
@@ -129,6 +130,9 @@ class Scenario(_Record):
     dropped_share: float = Field(0.0, ge=0.0, le=1.0)
     """Probability that an update of the position controller is dropped; its last command is held."""
 
+    altitude_loop: AltitudeName = "stock"
+    """What holds the height: the vehicle's loop, that with feed-forward, or a PID with feed-forward."""
+
     sensors: SensorsName = "none"
     noise_scale: float = Field(1.0, ge=0.0, le=1000.0)
     """Factor on the standard deviation of all sensor noise."""
@@ -155,7 +159,7 @@ class Scenario(_Record):
         return self
 
 
-SHARED_KEYS: Final = ("vehicle", "duration_s", "start", "sensors")
+SHARED_KEYS: Final = ("vehicle", "duration_s", "start", "sensors", "altitude_loop")
 """Keys that must be equal in all flights of one simulation."""
 
 
@@ -200,6 +204,7 @@ def flight_of(scenarios: Sequence[Scenario], update_period_s: float) -> Flight:
         disturbances=Disturbances(**common(Disturbances)),
         link=Link(delay_ticks=delays, **common(Link)),
         sensors=choose_sensors(first.sensors, drone, **common(Sensors)),
+        altitude=AltitudeLaw(first.altitude_loop),
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mambo_sil.drone.plant import elementary, loops
+from mambo_sil.drone.plant import elementary
 from mambo_sil.drone.plant.airframe import NOMINAL
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.disturbances import Disturbances
@@ -16,8 +16,10 @@ from mambo_sil.drone.sensors.estimators import Suite
 from mambo_sil.drone.sensors.instruments import NOISES, Sensors
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.experiment.faults.injection import Applied, FaultyController
+from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
 from mambo_sil.flight.engine.engine_library import LANES, texts
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, Flight
+from mambo_sil.flight.names import AltitudeName
 from mambo_sil.flight.trajectories import Hover
 from tests.support.engines import (
     NUMBERS,
@@ -81,11 +83,18 @@ LOWERING, YAW_LAST = (changed(LIMITED, rotors={"mixer": mixer}) for mixer in ("l
 
 
 @pytest.mark.parametrize(
-    "drone",
-    [NOMINAL, LIMITED, LATE, LAGGING, LOWERING, YAW_LAST],
+    ("drone", "law"),
+    [
+        (NOMINAL, "stock"),
+        (LIMITED, "feedforward"),
+        (LATE, "pid"),
+        (LAGGING, "stock"),
+        (LOWERING, "pid"),
+        (YAW_LAST, "stock"),
+    ],
     ids=["mambo", "cascade", "first_order", "lagging", "lower", "yaw-last"],
 )
-def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
+def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile, law: AltitudeName) -> None:
     """Inner loops, mixer, rotors, rigid body and integrator from states that no flight has."""
     rows = any_states()
     body, rotors, memory, command, thrust_n, heading, payload, air, share = np.split(
@@ -105,19 +114,24 @@ def test_a_tick_of_the_vehicle(engine: Path, drone: VehicleFile) -> None:
         seen = truth(before)
         moment = Moment(share[0], payload[0], (air[0], air[1]), push_m_s2, lift_m_s2)
         after = vehicle.step(before, command, thrust_n[0], heading[0], seen=seen, moment=moment)
-        demanded_n = loops.altitude_thrust(
-            drone, HEIGHT_REFERENCE_M, seen.position_m[2], seen.velocity_m_s[2]
-        )
+        altitude = AltitudeLoop(AltitudeLaw(law), drone, TICKS)
+        altitude.integral_n = payload[0]
+        demanded_n = altitude.thrust_n(Vertical(HEIGHT_REFERENCE_M, command[1], heading[0]), seen)
     kept = memory.copy()
     if not isinstance(vehicle.loop, FirstOrderDrone):
         kept[: vehicle.loop.rows] = after.memory
     elif thrusts:
         kept[2] = after.memory[-thrusts]
     expected = np.concatenate(
-        [after.body, after.rotor_speed_rad_s, kept, demanded_n[np.newaxis], seen.velocity_m_s]
+        [
+            *(after.body, after.rotor_speed_rad_s, kept, demanded_n[np.newaxis], seen.velocity_m_s),
+            altitude.integral_n[np.newaxis],
+        ]
     )
     disturbances = Disturbances(wind_speed_m_s=1.0, push_m_s2=push_m_s2, vertical_gust_m_s2=lift_m_s2)
-    flight = Flight(Hover(), duration_s=1.0, vehicle=vehicle, disturbances=disturbances)
+    flight = Flight(
+        Hover(), duration_s=1.0, vehicle=vehicle, disturbances=disturbances, altitude=AltitudeLaw(law)
+    )
     assert unified(ticked(engine, flight, rows)) == unified(expected.T)
 
 

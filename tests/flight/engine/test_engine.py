@@ -4,7 +4,7 @@ import re
 import subprocess
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given, settings
@@ -23,7 +23,7 @@ from mambo_sil.flight.engine.engine_library import FLAGS, LANES, LIBRARIES, SOUR
 from mambo_sil.flight.engine.evaluate import evaluate_compiled
 from mambo_sil.flight.engine.simulate import fly, fly_compiled
 from mambo_sil.flight.loop import Flight
-from mambo_sil.flight.names import PD_NAMES, SENSORS_OF
+from mambo_sil.flight.names import PD_NAMES, SENSORS_OF, AltitudeName
 from mambo_sil.flight.scenario import Scenario, flight_of
 from mambo_sil.flight.trajectories import Bernoulli
 from mambo_sil.results.shared_library import LIBRARY_FLAGS
@@ -84,6 +84,7 @@ def test_any_flight_has_the_bits_of_numpy(data: st.DataObject) -> None:
         "vehicle": drone,
         "sensors": data.draw(st.sampled_from(SENSORS_OF[drone.sensors.kind])),
         "start": "take-off" if data.draw(st.integers(0, 9)) == 0 else "hover",
+        "altitude_loop": data.draw(st.sampled_from(get_args(AltitudeName))),
     }
     batch = data.draw(st.lists(scenarios(**shared), min_size=1, max_size=9))
     assert_same_bits(flight_of(batch, PERIOD_S), data.draw(st.sampled_from([*PD_NAMES, *SCALARS])))

@@ -10,7 +10,7 @@ import typer
 
 from mambo_sil.cli.command import AsJson, Scalar, complete_presets
 from mambo_sil.cli.options import Baud, Drone, PortName, Results, complete_boards
-from mambo_sil.flight.names import CURVE_NAMES, ControllerName, SensorsName, Start
+from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, ControllerName, SensorsName, Start
 
 SIZE_M: Final = 2.0
 RATE_RAD_S: Final = 0.5
@@ -55,6 +55,13 @@ class Conditions:
             "motion capture."
         ),
     ] = "none"
+    altitude_loop: Annotated[
+        AltitudeName,
+        typer.Option(
+            help="What holds the height: the vehicle's loop, that with feed-forward of the target's motion, "
+            "or a PID with it."
+        ),
+    ] = "stock"
     push: Annotated[
         str,
         typer.Option(help="Steady acceleration along x (north), y (east), in m/s^2.", metavar="X,Y"),

@@ -23,6 +23,7 @@ from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import FirstOrderAttitude
 from mambo_sil.errors import FlightError, TrajectoryError
+from mambo_sil.flight.altitude_loops import AltitudeLaw
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.engine.simulate import fly as simulate
@@ -110,6 +111,7 @@ def described_flight(
             seeds=(conditions.seed,),
             disturbances=disturbances,
             sensors=sensors,
+            altitude=AltitudeLaw(conditions.altitude_loop),
         )
     except FlightError as error:
         source = echo(named_source(runner))

@@ -39,7 +39,16 @@ from mambo_sil.experiment.campaign.parameters import (
     draw,
     scenario_values,
 )
-from mambo_sil.flight.names import IN_SPACE, PD_NAMES, RENAMED, SENSORS_OF, PdName, SensorsName, Start
+from mambo_sil.flight.names import (
+    IN_SPACE,
+    PD_NAMES,
+    RENAMED,
+    SENSORS_OF,
+    AltitudeName,
+    PdName,
+    SensorsName,
+    Start,
+)
 from mambo_sil.flight.scenario import Scenario, choose_sensors, flight_of
 
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -84,6 +93,8 @@ class FlightSection(FileSection):
     """A shipped drone, or its vehicle.toml."""
     sensors: SensorsName | None = None
     """None: the vehicle's own."""
+    altitude_loop: AltitudeName = "stock"
+    """What holds the height."""
 
 
 _DRAWN: Final[dict[str, Any]] = {

@@ -116,21 +116,29 @@ static inline void take(const double *numbers, int64_t rows, int64_t row, int wi
     }
 }
 
-/* Reference of the altitude loop, z down, from the targets of an update. */
-static inline real_t height_reference_m(const engine_simulation_t *simulation, int64_t index, int64_t update,
-                                        const double *targets)
+/* What the altitude loop is to follow, from the targets of an update. */
+static inline vertical_t vertical_target(const engine_simulation_t *simulation, int64_t index, int64_t update,
+                                         const double *targets)
 {
-    lanes_t reference_m = { splat(simulation->height_reference_m) };
+    lanes_t z_m = { splat(simulation->height_reference_m) };
+    lanes_t climb_m_s = { splat(0.0) };
+    lanes_t acceleration_m_s2 = { splat(0.0) };
+    vertical_t wanted;
     int lane;
 
     if (simulation->target_columns == SPATIAL_COLUMNS) {
         for (lane = 0; (lane < LANES) && ((index + lane) < simulation->flights); lane++) {
-            const int64_t row = ((index + lane) * simulation->updates) + update;
+            const double *target = targets + (SPATIAL_COLUMNS * (((index + lane) * simulation->updates) + update));
 
-            reference_m.lane[lane] = 0.0 - targets[(SPATIAL_COLUMNS * row) + HEIGHT_COLUMN];
+            z_m.lane[lane] = 0.0 - target[HEIGHT_COLUMN];
+            climb_m_s.lane[lane] = target[HEIGHT_COLUMN + 1];
+            acceleration_m_s2.lane[lane] = target[HEIGHT_COLUMN + 2];
         }
     }
-    return reference_m.real;
+    wanted.z_m = z_m.real;
+    wanted.climb_m_s = climb_m_s.real;
+    wanted.acceleration_m_s2 = acceleration_m_s2.real;
+    return wanted;
 }
 
 void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *flight, const engine_draws_t *draws,
@@ -163,6 +171,7 @@ void engine_begin(const engine_simulation_t *simulation, const engine_flight_t *
     flying->wire = wire;
     flying->command_rad[0] = splat(0.0);
     flying->command_rad[1] = splat(0.0);
+    flying->altitude_integral_n = splat(0.0);
     flying->ticks = 0;
 }
 
@@ -173,7 +182,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
 {
     const int64_t rows = simulation->updates * simulation->ticks_per_update;
     const real_t heading_rad = flight->yaw_rad + (flight->yaw_rate_rad_s * maximum(splat(times_s[update]), splat(0.0)));
-    const real_t reference_m = height_reference_m(simulation, index, update, targets);
+    const vertical_t wanted = vertical_target(simulation, index, update, targets);
     vehicle_state_t *state = &flying->state;
     int64_t tick;
 
@@ -218,7 +227,7 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             seen = estimate(simulation, flight, &truth_now, &r, drawn, &flying->suite);
         }
         if (update >= simulation->lifting_updates) {
-            thrust_n = altitude_thrust_n(simulation, reference_m, &seen);
+            thrust_n = altitude_thrust_n(simulation, &wanted, &seen, &flying->altitude_integral_n);
         }
         if (tick == 0) {
             call(simulation, flight, index, update, targets, draws, controller, self, stride, &truth_now, &seen,

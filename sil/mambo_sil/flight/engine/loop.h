@@ -21,6 +21,7 @@ typedef struct {
     gusts_t gusts;
     wire_t wire;
     real_t command_rad[2];
+    real_t altitude_integral_n;
     int64_t ticks;
 } flying_t;
 

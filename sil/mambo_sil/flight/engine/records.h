@@ -68,6 +68,12 @@ typedef struct {
     double altitude_d_n_s_m;
     double weight_n;
     double thrust_limit_n;
+    int64_t altitude_law;     /* see vehicle.h; the members below are in use with FEEDFORWARD and PID */
+    double altitude_i_n_m_s;
+    double altitude_mass_kg;
+    double least_level;       /* cosine of the tilt */
+    double integrated_error_m;
+    double integral_limit_n;
     double take_off_thrust_n;
 
     /* Mixer: the wrench that one unit of command of all rotors gives. */

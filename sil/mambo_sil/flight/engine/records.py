@@ -24,8 +24,10 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
     MamboAttitude,
     MixerName,
 )
+from mambo_sil.flight import altitude_loops
 from mambo_sil.flight.engine.engine_library import record_type
 from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
+from mambo_sil.flight.names import AltitudeName
 
 Record = NDArray[Any]
 
@@ -75,8 +77,7 @@ def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
             "height_reference_m": HEIGHT_REFERENCE_M,
             "rotor_height_m": ROTOR_HEIGHT_M,
             "gust_across": gusts.ACROSS_GAINS,
-            "altitude_p_n_m": drone.altitude.p_n_m,
-            "altitude_d_n_s_m": drone.altitude.d_n_s_m,
+            **_altitude(flight),
             "weight_n": drone.weight_n,
             "thrust_limit_n": drone.altitude.thrust_max_n,
             "take_off_thrust_n": loops.take_off_thrust_n(drone),
@@ -206,6 +207,23 @@ def _attitude(drone: VehicleFile) -> dict[str, Any]:
                 [first_order.roll_trim_rad, first_order.pitch_trim_rad],
             )
             return values | {"attitude": 2} | dict(zip(_FIRST_ORDER, follows, strict=True))
+
+
+def _altitude(flight: Flight) -> dict[str, Any]:
+    """Return the members of the altitude loop."""
+    drone, law = flight.vehicle.drone, flight.altitude
+    mass_kg, gains = drone.body.mass_kg, law.gains_for(drone)
+    stock = law.name == "stock"
+    return {
+        "altitude_law": get_args(AltitudeName).index(law.name),
+        "altitude_p_n_m": drone.altitude.p_n_m if stock else mass_kg * gains.height_1_s2,
+        "altitude_d_n_s_m": drone.altitude.d_n_s_m if stock else mass_kg * gains.climb_1_s,
+        "altitude_i_n_m_s": mass_kg * gains.integral_1_s3,
+        "altitude_mass_kg": mass_kg,
+        "least_level": altitude_loops.LEAST_LEVEL,
+        "integrated_error_m": altitude_loops.INTEGRATED_ERROR_M,
+        "integral_limit_n": altitude_loops.INTEGRAL_SHARE * drone.weight_n,
+    }
 
 
 def _thrust(vehicle: Vehicle) -> dict[str, Any]:

@@ -15,6 +15,16 @@
 #define LOWER 1
 #define YAW_LAST 2
 
+/* Altitude loops; any other has feed-forward. */
+#define STOCK 0
+
+/* What the altitude loop is to follow: z points down, climb and acceleration up. */
+typedef struct {
+    real_t z_m;
+    real_t climb_m_s;
+    real_t acceleration_m_s2;
+} vertical_t;
+
 typedef struct {
     real_t body[STATE_ROWS];
     real_t rotor_speed_rad_s[4];
@@ -43,13 +53,38 @@ static inline seen_t truth(const vehicle_state_t *state, const rotation_t *r)
     return seen;
 }
 
-static inline real_t altitude_thrust_n(const engine_simulation_t *simulation, real_t reference_m, const seen_t *seen)
+static inline real_t altitude_thrust_n(const engine_simulation_t *simulation, const vertical_t *wanted,
+                                       const seen_t *seen, real_t *integral_n)
 {
-    const real_t error_m = reference_m - seen->position_m[2];
-    const real_t thrust_n = (simulation->weight_n - (simulation->altitude_p_n_m * error_m))
-                            + (simulation->altitude_d_n_s_m * seen->velocity_m_s[2]);
+    const double most_n = simulation->thrust_limit_n;
+    real_t thrust_n;
 
-    return clip(thrust_n, -simulation->thrust_limit_n, simulation->thrust_limit_n);
+    if (simulation->altitude_law == STOCK) {
+        thrust_n = (simulation->weight_n - (simulation->altitude_p_n_m * (wanted->z_m - seen->position_m[2])))
+                   + (simulation->altitude_d_n_s_m * seen->velocity_m_s[2]);
+    } else {
+        const real_t error_m = seen->position_m[2] - wanted->z_m;
+        const real_t climb_error_m_s = wanted->climb_m_s + seen->velocity_m_s[2];
+        const real_t upwards_n = (((simulation->weight_n + (simulation->altitude_p_n_m * error_m))
+                                   + (simulation->altitude_d_n_s_m * climb_error_m_s))
+                                  + (simulation->altitude_mass_kg * wanted->acceleration_m_s2))
+                                 + *integral_n;
+        const real_t grown_n = *integral_n + (simulation->step_s * (simulation->altitude_i_n_m_s * error_m));
+        const mask_t near = magnitude(error_m) < simulation->integrated_error_m;
+        real_t sine;
+        real_t cos_roll;
+        real_t cos_pitch;
+        mask_t free;
+
+        sine_cosine(seen->euler_rad[0], &sine, &cos_roll);
+        sine_cosine(seen->euler_rad[1], &sine, &cos_pitch);
+        thrust_n = upwards_n / maximum(cos_roll * cos_pitch, splat(simulation->least_level));
+        free = magnitude(thrust_n) < most_n;
+        free = free & near;
+        *integral_n = choose(free, clip(grown_n, -simulation->integral_limit_n, simulation->integral_limit_n),
+                             *integral_n);
+    }
+    return clip(thrust_n, -most_n, most_n);
 }
 
 /* Shares of thrust, roll, pitch and yaw in the motor commands, by the stock loop; the integrals grow by a period. */
