@@ -9,7 +9,11 @@ from typing import Any, Final
 import cffi
 import numpy as np
 
+from mambo_codegen.bundle.render import render_target
+from mambo_codegen.bundle.targets import TARGETS
+from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray, IntArray
+from tests.support.bundles import place
 from tests.support.shell import shell
 from tests.support.tools import require
 
@@ -20,6 +24,10 @@ FIRMWARE_FLAGS: Final = (
     *("-Wall", "-Wdouble-promotion", "-Werror"),
 )
 """Flags of the firmware that any gcc takes."""
+
+APP: Final = "src/nmpc_app.c"
+LIBRARY: Final = ("nmpc", "nmpc_self_test")
+"""Sources beside the app's."""
 
 TICKS_PER_UPDATE: Final = 10
 """Ticks of the firmware's loop, 1 ms each, in an update period."""
@@ -182,3 +190,45 @@ class Fleet:
         self._updates += 1
         commands = [app.update(one) for app, one in zip(self.apps, state, strict=True)]
         return Answer(np.array(commands) / DEGREES, np.array([app.logged("status") for app in self.apps]))
+
+
+@dataclass(frozen=True)
+class Built:
+    """A folder of the target, with the objects that do not change with the app, and the app."""
+
+    folder: Path
+    objects: tuple[Path, ...]
+    host: Any
+
+    def app(self) -> Crazyflie:
+        """Return a drone with the app as it is."""
+        return Crazyflie(self.host)
+
+    def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
+        """Return a drone with an app in which `right` reads `wrong`."""
+        text = (self.folder / APP).read_text("utf-8")
+        assert text.count(right) == 1, f"the template moved on: {right}"
+        source = self.folder / "src" / f"{name.replace(' ', '_')}.c"
+        source.write_text(text.replace(right, wrong), "utf-8")
+        return Crazyflie(linked(source, self.objects))
+
+
+def linked(source: Path, objects: tuple[Path, ...]) -> Any:
+    """Compile an app, link it with `objects`, and load it."""
+    compiled = compile_host(source, source.with_suffix(".o"), "-ffp-contract=off")
+    return link((compiled, *objects), source.with_suffix(".so"))
+
+
+def build(folder: Path) -> Built:
+    """Compile the target in `folder`."""
+    library = [
+        compile_host(folder / "src" / f"{name}.c", folder / f"{name}.o", "-ffp-contract=off")
+        for name in LIBRARY
+    ]
+    objects = (*library, compile_host(STUBS / "host.c", folder / "host.o"))
+    return Built(folder, objects, linked(folder / APP, objects))
+
+
+def folder_of(settings: Settings, folder: Path) -> Path:
+    """Write the target for `settings` into `folder`."""
+    return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)

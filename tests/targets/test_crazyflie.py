@@ -3,6 +3,7 @@
 import itertools
 import math
 import re
+import runpy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,28 +27,37 @@ from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Circle
 from tests.support.bundles import place
 from tests.support.command import run
-from tests.support.crazyflie import FIRMWARE_FLAGS, STUBS, Crazyflie, Fleet, compile_host, link
+from tests.support.crazyflie import (
+    FIRMWARE_FLAGS,
+    LIBRARY,
+    STUBS,
+    Built,
+    Crazyflie,
+    Fleet,
+    build,
+    compile_host,
+    folder_of,
+    link,
+)
 from tests.support.one_norm import ONE_NORM
 from tests.support.shell import shell
 from tests.support.tools import require
 
 SETTINGS = presets.preset("crazyflie")
-APP = "src/nmpc_app.c"
-LIBRARY = ("nmpc", "nmpc_self_test")
 ARM = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fconserve-stack")
 LARGEST_STACK_BYTES = 400
 
 # Each wrong line, in the place of what it is in the app.
 FRAME_MUTANTS = {
-    "x": ("= state->position.x;\n    measured", "= -state->position.x;\n    measured"),
-    "y": ("= -state->position.y", "= state->position.y"),
+    "x": ("= state->position.x + (shift_s *", "= -state->position.x + (shift_s *"),
+    "y": ("= -(state->position.y +", "= (state->position.y +"),
     "vx": ("= state->velocity.x", "= -state->velocity.x"),
     "vy": ("= -state->velocity.y", "= state->velocity.y"),
     "roll": ("roll_rad = RAD_PER_DEG * state", "roll_rad = -RAD_PER_DEG * state"),
     "pitch": ("pitch_rad = RAD_PER_DEG * state", "pitch_rad = -RAD_PER_DEG * state"),
     "yaw": ("yaw_rad = -RAD_PER_DEG * state", "yaw_rad = RAD_PER_DEG * state"),
-    "target x": ("position_m[0] = angles.position.x +", "position_m[0] = -angles.position.x +"),
-    "target y": ("= -(angles.position.y +", "= (angles.position.y +"),
+    "target x": ("target.position_m[0] = x;", "target.position_m[0] = -x;"),
+    "target y": ("target.position_m[1] = -y;", "target.position_m[1] = y;"),
     "target vx": ("velocity_m_s[0] = rests ? 0.0f : vx", "velocity_m_s[0] = rests ? 0.0f : -vx"),
     "target vy": ("velocity_m_s[1] = rests ? 0.0f : -vy", "velocity_m_s[1] = rests ? 0.0f : vy"),
     "command roll": (": (DEG_PER_RAD * (float)command.roll", ": (-DEG_PER_RAD * (float)command.roll"),
@@ -56,59 +66,17 @@ FRAME_MUTANTS = {
 # What carries a set-point on until the next one, 100 ms later.
 AGE_MUTANTS = {
     "no age": ("0.001f * (float)((age_ms", "0.0f * (float)((age_ms"),
-    "acceleration x": ("velocity.x + (age_s *", "velocity.x - (age_s *"),
-    "acceleration y": ("velocity.y + (age_s *", "velocity.y - (age_s *"),
-    "half": ("(0.5f * age_s * (angles.velocity.x", "(age_s * (angles.velocity.x"),
+    "acceleration x": ("angles.velocity.x + (0.5f * age_s *", "angles.velocity.x - (0.5f * age_s *"),
+    "acceleration y": ("angles.velocity.y + (0.5f * age_s *", "angles.velocity.y - (0.5f * age_s *"),
+    "velocity x": ("(age_s * (angles.velocity.x +", "(2.0f * age_s * (angles.velocity.x +"),
 }
 
 
 # The acceleration where the settings let the caller give it.
 GIVEN_MUTANTS = {
-    "given x": ("rests ? 0.0f : acceleration[0]", "rests ? 0.0f : -acceleration[0]"),
-    "given y": ("rests ? 0.0f : -acceleration[1]", "rests ? 0.0f : acceleration[1]"),
+    "given x": ("rests ? 0.0f : ax", "rests ? 0.0f : -ax"),
+    "given y": ("rests ? 0.0f : -ay", "rests ? 0.0f : ay"),
 }
-
-
-@dataclass(frozen=True)
-class Built:
-    """A folder of the target, with the objects that do not change with the app, and the app."""
-
-    folder: Path
-    objects: tuple[Path, ...]
-    host: Any
-
-    def app(self) -> Crazyflie:
-        """Return a drone with the app as it is."""
-        return Crazyflie(self.host)
-
-    def mutant(self, name: str, right: str, wrong: str) -> Crazyflie:
-        """Return a drone with an app in which `right` reads `wrong`."""
-        text = (self.folder / APP).read_text("utf-8")
-        assert text.count(right) == 1, f"the template moved on: {right}"
-        source = self.folder / "src" / f"{name.replace(' ', '_')}.c"
-        source.write_text(text.replace(right, wrong), "utf-8")
-        return Crazyflie(linked(source, self.objects))
-
-
-def linked(source: Path, objects: tuple[Path, ...]) -> Any:
-    """Compile an app, link it with `objects`, and load it."""
-    compiled = compile_host(source, source.with_suffix(".o"), "-ffp-contract=off")
-    return link((compiled, *objects), source.with_suffix(".so"))
-
-
-def build(folder: Path) -> Built:
-    """Compile the target in `folder`."""
-    library = [
-        compile_host(folder / "src" / f"{name}.c", folder / f"{name}.o", "-ffp-contract=off")
-        for name in LIBRARY
-    ]
-    objects = (*library, compile_host(STUBS / "host.c", folder / "host.o"))
-    return Built(folder, objects, linked(folder / APP, objects))
-
-
-def folder_of(settings: Settings, folder: Path) -> Path:
-    """Write the target for `settings` into `folder`."""
-    return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)
 
 
 @pytest.fixture(scope="module")

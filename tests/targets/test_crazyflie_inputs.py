@@ -1,0 +1,137 @@
+"""Inputs of the Crazyflie app's steps: where the drone is now, where the target is, and what the log says."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mambo_codegen.settings import presets
+from mambo_codegen.settings.controller_toml import with_option
+from mambo_sil.drone.plant.vehicle import Vehicle
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.loop import Flight, fly
+from mambo_sil.flight.trajectories import Circle
+from mambo_sil.model.replay.log_replay import replay_log
+from tests.support.crazyflie import Answer, Built, Crazyflie, Fleet, build, folder_of
+
+SETTINGS = with_option(presets.preset("crazyflie"), "target.acceleration", "given")
+LOGGED = (
+    *("takeOvers", "x", "y", "vx", "vy", "inRoll", "inPitch", "inYaw", "targetX", "targetY", "targetVx"),
+    *("targetVy", "targetAx", "targetAy", "outRoll", "outPitch"),
+)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """Return the target, compiled."""
+    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+
+
+def filtered(app: Crazyflie, time_ms: int, delay_ms: int) -> None:
+    """Tick with the estimate of a drone at 1 m/s: predicted every 10 ms, and measured `delay_ms` later."""
+    variance = 1.001 * app.host.host_variances[0]
+    app.state.velocity.x = 1.0
+    if time_ms % 10 == 0:
+        app.state.position.x = 0.001 * (time_ms + delay_ms) - 0.001
+    if time_ms % 10 == delay_ms:
+        app.state.position.x = 0.001 * (time_ms - time_ms % 10 + delay_ms)
+        variance = 1e-4
+    app.host.host_variances = [variance, variance]
+    app.tick()
+
+
+@pytest.mark.parametrize("delay_ms", [0, 3, 7])
+def test_the_position_is_that_of_now_whenever_the_filter_predicts_and_measures(
+    delay_ms: int, built: Built
+) -> None:
+    """Between predictions the filter holds it, and a measurement 7 ms after one makes it 7 ms too new."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.zeros(6))
+    for offset_ms in range(10):
+        app.ticks += 10  # another controller flew: the next tick takes over
+        for time_ms in range(offset_ms, 1000):
+            filtered(app, time_ms, delay_ms)
+            app.setpoint.timestamp = app.time_ms
+        step_ms = max(time_ms for time_ms in range(990, 1000) if (time_ms - offset_ms) % 10 == 0)
+        assert app.logged("x") == pytest.approx(0.001 * step_ms, abs=0.0016)
+
+
+def test_an_estimate_without_variances_is_taken_as_it_is(built: Built) -> None:
+    """That of another estimator, whatever its position does."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.zeros(6))
+    app.state.velocity.x = 1.0
+    for time_ms in range(200):
+        app.state.position.x = 0.01 * (time_ms // 10)
+        app.tick()
+    assert app.logged("x") == pytest.approx(0.19)
+
+
+def test_a_slow_stream_of_set_points_is_carried_on_by_its_jerk(built: Built) -> None:
+    """Five set-points a second on a circle: the target stays within 1 cm, without jerk it does not."""
+    app = built.app()
+    without = built.mutant("no jerk", "acceleration[0] + (age_s * jerk[0])", "acceleration[0]")
+    circle, worst = Circle(1.0, 1.8), []
+    for one in (app, without):
+        one.modes("modeAbs")
+        errors = []
+        for update in range(300):
+            time_s = 0.01 * update
+            if update % 20 == 0:
+                one.aim(np.concatenate([circle.target(time_s), circle.acceleration(time_s)]))
+            one.update(np.zeros(7))
+            errors.append(abs(one.logged("targetX") - circle.target(time_s)[0]))
+        worst.append(max(errors[100:]))
+    assert worst[0] < 0.01
+    assert worst[1] > 1.3 * worst[0]
+
+
+def test_a_jump_of_the_acceleration_is_no_jerk(built: Built) -> None:
+    """A millisecond after the high-level commander's set-point at rest one comes that accelerates."""
+    app = built.app()
+    app.modes("modeAbs")
+    app.aim(np.zeros(6))
+    app.place(np.zeros(7))
+    app.tick()
+    app.aim(np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0]))
+    for _ in range(200):
+        app.tick()
+    assert app.logged("targetAx") == pytest.approx(2.0, abs=0.05)
+
+
+class Logging:
+    """A fleet of one app that keeps what it logs of every step."""
+
+    def __init__(self, app: Crazyflie) -> None:
+        self.fleet, self.app = Fleet([app], 3), app
+        self.rows: list[list[float]] = []
+
+    def step(self, *inputs: np.ndarray) -> Answer:
+        """Make a step, and log it."""
+        if len(self.rows) == 150:
+            self.app.ticks += 10  # another controller flew
+        answer = self.fleet.step(*inputs)
+        self.rows.append([self.app.logged(name) for name in LOGGED])
+        return answer
+
+
+def test_a_replay_of_the_app_s_log_is_equal_in_every_bit(built: Built, tmp_path: Path) -> None:
+    """Through a second take-over in the flight, with set-points that are carried on."""
+    app = built.app()
+    logging = Logging(app)
+    drone = Vehicle.of(vehicle_toml.load("crazyflie"))
+    fly(Flight(Circle(1.0, 1.2), duration_s=3.0, flights=1, yaw_rad=0.8, vehicle=drone), logging)
+    path = tmp_path / "flight.csv"
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["Timestamp", *(f"nmpc.{name}" for name in LOGGED)])
+        writer.writerows([[10 * k, *map(repr, row)] for k, row in enumerate(logging.rows)])
+    replay = replay_log(path, {}, SETTINGS)
+    assert len(replay.time_s) == len(logging.rows) >= 300
+    assert np.array_equal(replay.replayed_rad, replay.logged_rad)
+    assert math.isfinite(replay.logged_rad.sum())
+    assert np.ptp(replay.logged_rad, axis=0).min() > 0.1
