@@ -154,7 +154,7 @@ def test_a_given_acceleration_is_read_from_a_table() -> None:
     Path("flight.csv").write_text("\n".join(lines), "utf-8")
     summary = replayed("flight.csv", "given.toml")
     assert summary["equal_steps"] == summary["steps"] == 401
-    message = "has no column for target_ax_m_s2 (target_ax_m_s2, ctrltarget.ax); name it"
+    message = "has no column for target_ax_m_s2 (target_ax_m_s2, nmpc.targetAx, ctrltarget.ax); name it"
     assert message in run("replay", "flight/trace.csv", "given.toml", code=2)[1]
 
 
@@ -193,7 +193,7 @@ def test_a_log_of_another_rate_is_interpolated() -> None:
         (["none.csv"], "none.csv: there is no such file"),
         (
             ["short.csv"],
-            "short.csv: has no column for target_x_m (target_x_m, ctrltarget.x); name it: --columns",
+            "short.csv: has no column for target_x_m (target_x_m, nmpc.targetX, ctrltarget.x); name it",
         ),
         (["flight.ulg"], "flight.ulg: is no ULog"),
         (["short.csv", "--columns", "targt_x_m=x"], "must begin with target_x_m"),

@@ -22,7 +22,9 @@ THRUST_COMMAND: Final = "thrust_command"
 """The commanded thrust in any unit; where a log has none, its `THRUST` is taken."""
 TARGET: Final = ("target_x_m", "target_y_m", "target_vx_m_s", "target_vy_m_s")
 TARGET_ACCELERATION: Final = ("target_ax_m_s2", "target_ay_m_s2")
-OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND)
+TAKE_OVERS: Final = "take_overs"
+"""How often the controller has begun anew, at the present attitude."""
+OPTIONAL: Final = (YAW, *POSITION, HEIGHT, *VELOCITY, THRUST, THRUST_COMMAND, TAKE_OVERS)
 """Optional signals; all signals are in SI units, the world frame is NED, roll is positive to the right and
 pitch is positive with the nose up."""
 

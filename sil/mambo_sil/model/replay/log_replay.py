@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mambo_codegen.errors import echo
 from mambo_codegen.numbers.gravity import GRAVITY_M_S2
@@ -19,6 +20,7 @@ from mambo_sil.model.identify.csv_log import read_csv
 from mambo_sil.model.identify.signals import (
     COMMANDS,
     DEGREE,
+    TAKE_OVERS,
     TARGET,
     TARGET_ACCELERATION,
     THRUST,
@@ -28,7 +30,26 @@ from mambo_sil.model.identify.signals import (
 from mambo_sil.model.identify.ulog import MOTION, TRAJECTORY, read_ulog
 
 STATE: Final = ("x_m", "y_m", "vx_m_s", "vy_m_s", "roll_rad", "pitch_rad", "yaw_rad")
-SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
+_APP: Final = {
+    "x_m": Column("nmpc.x"),
+    "y_m": Column("nmpc.y", -1.0),
+    "vx_m_s": Column("nmpc.vx"),
+    "vy_m_s": Column("nmpc.vy", -1.0),
+    "roll_rad": Column("nmpc.inRoll"),
+    "pitch_rad": Column("nmpc.inPitch"),
+    "yaw_rad": Column("nmpc.inYaw", -1.0),
+    "target_x_m": Column("nmpc.targetX"),
+    "target_y_m": Column("nmpc.targetY", -1.0),
+    "target_vx_m_s": Column("nmpc.targetVx"),
+    "target_vy_m_s": Column("nmpc.targetVy", -1.0),
+    "target_ax_m_s2": Column("nmpc.targetAx"),
+    "target_ay_m_s2": Column("nmpc.targetAy", -1.0),
+    "roll_command_rad": Column("nmpc.outRoll"),
+    "pitch_command_rad": Column("nmpc.outPitch"),
+    TAKE_OVERS: Column("nmpc.takeOvers"),
+}
+"""What the app of the Crazyflie logs of each step."""
+_OTHER: Final[dict[str, tuple[Column, ...]]] = {
     **KNOWN,
     "target_x_m": (Column("target_x_m"), Column("ctrltarget.x")),
     "target_y_m": (Column("target_y_m"), Column("ctrltarget.y", -1.0)),
@@ -38,9 +59,18 @@ SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
     "target_ay_m_s2": (Column("target_ay_m_s2"), Column("ctrltarget.ay", -1.0)),
     "roll_command_rad": (Column("roll_command_rad"), Column("nmpc.roll", DEGREE)),
     "pitch_command_rad": (Column("pitch_command_rad"), Column("nmpc.pitch", DEGREE)),
+    TAKE_OVERS: (Column(TAKE_OVERS),),
 }
-"""Known columns of each signal: those of trace.csv, and of the Crazyflie, whose y has the other sign. The
-commands are those of the controller itself."""
+SIGNALS: Final[dict[str, tuple[Column, ...]]] = {
+    name: (
+        *(column for column in columns if "." not in column.name),
+        *((_APP[name],) if name in _APP else ()),
+        *(column for column in columns if "." in column.name),
+    )
+    for name, columns in _OTHER.items()
+}
+"""Known columns of each signal, the first one that a file has is read: those of trace.csv, of the app's
+steps, and of the Crazyflie, whose y has the other sign. The commands are those of the controller itself."""
 
 AXES: Final = ("roll", "pitch")
 CURVE_COLUMNS: Final = ("time_s", *(f"{axis}_{kind}_rad" for kind in ("logged", "replayed") for axis in AXES))
@@ -67,7 +97,8 @@ class LogReplay:
 def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) -> LogReplay:
     """Replay the log at `path`; `columns` has those that the user named.
 
-    The controller starts level, without an estimate, as after nmpc_init(). Raises LogError.
+    The controller starts level, without an estimate, as after nmpc_init(). If the log counts take-overs, it
+    is reset to the present roll and pitch at the beginning and at each of them. Raises LogError.
     """
     is_given = settings.target.acceleration == "given"
     wanted = (*TARGET, *TARGET_ACCELERATION) if is_given else TARGET
@@ -81,7 +112,12 @@ def replay_log(path: Path, columns: Mapping[str, Column], settings: Settings) ->
         _held(log, (THRUST,), time_s) if THRUST in log.signals else np.full((len(time_s), 1), GRAVITY_M_S2)
     )
     controller = CompiledController(settings)
-    steps = [controller.step(state[k : k + 1], target[k : k + 1], thrust_m_s2[k]) for k in range(len(time_s))]
+    begins = _take_overs(log, time_s)
+    steps = []
+    for k in range(len(time_s)):
+        if begins[k]:
+            controller.reset(state[k : k + 1, 4:6])
+        steps.append(controller.step(state[k : k + 1], target[k : k + 1], thrust_m_s2[k]))
     return LogReplay(
         time_s,
         _held(log, COMMANDS, time_s),
@@ -125,6 +161,14 @@ def _updates(log: FlightLog, period_s: float) -> tuple[FloatArray, bool]:
     if abs(float(np.median(np.diff(time_s))) - period_s) <= _SAME_PERIOD * period_s:
         return time_s[(time_s >= begin_s) & (time_s <= end_s)], False
     return begin_s + period_s * np.arange(1 + int((end_s - begin_s) / period_s)), True
+
+
+def _take_overs(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:
+    """Return whether the controller begins anew at times (k,)."""
+    if TAKE_OVERS not in log.signals:
+        return np.zeros(len(time_s), bool)
+    count = _held(log, (TAKE_OVERS,), time_s)[:, 0]
+    return np.diff(count, prepend=np.nan) != 0.0
 
 
 def _held(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
