@@ -3,8 +3,6 @@
 import itertools
 import math
 import re
-import runpy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
-from mambo_codegen.settings.model import Settings
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
@@ -25,7 +22,6 @@ from mambo_sil.flight.loop import Flight, fly
 from mambo_sil.flight.metrics import measure
 from mambo_sil.flight.traces import Trace
 from mambo_sil.flight.trajectories import Circle
-from tests.support.bundles import place
 from tests.support.command import run
 from tests.support.crazyflie import (
     FIRMWARE_FLAGS,

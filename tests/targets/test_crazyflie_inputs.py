@@ -135,3 +135,19 @@ def test_a_replay_of_the_app_s_log_is_equal_in_every_bit(built: Built, tmp_path:
     assert np.array_equal(replay.replayed_rad, replay.logged_rad)
     assert math.isfinite(replay.logged_rad.sum())
     assert np.ptp(replay.logged_rad, axis=0).min() > 0.1
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_velocity_of_the_target_does_not_jump_at_a_set_point(given: bool, built: Built) -> None:
+    """At five set-points a second, with and without acceleration, it changes by no more than it must."""
+    app, circle = built.app(), Circle(1.0, 1.5)
+    app.modes("modeAbs")
+    speeds = []
+    for update in range(400):
+        time_s = 0.01 * update
+        if update % 20 == 0:
+            acceleration = circle.acceleration(time_s) if given else np.zeros(2)
+            app.aim(np.concatenate([circle.target(time_s), acceleration]))
+        app.update(np.zeros(7))
+        speeds.append(app.logged("targetVx"))
+    assert np.abs(np.diff(speeds[100:])).max() < 2.0 * 0.01 * 1.5**2

@@ -168,7 +168,8 @@ def _take_overs(log: FlightLog, time_s: FloatArray) -> NDArray[np.bool_]:
     if TAKE_OVERS not in log.signals:
         return np.zeros(len(time_s), bool)
     count = _held(log, (TAKE_OVERS,), time_s)[:, 0]
-    return np.diff(count, prepend=np.nan) != 0.0
+    begins: NDArray[np.bool_] = np.diff(count, prepend=np.nan) != 0.0
+    return begins
 
 
 def _held(log: FlightLog, names: tuple[str, ...], time_s: FloatArray) -> FloatArray:
