@@ -42,6 +42,7 @@ class Item:
     tables:      return Markdown of figures, by the name of the file in docs/evidence/data.
     pictures:    files of the results, by their name in docs/evidence.
     draw:        draws pictures that no command draws, into the folder of the results.
+    variable:    environment variable that the commands want; without it the item is made only by its name.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Item:
     tables: Mapping[str, Callable[[Figures], str]]
     pictures: Mapping[str, str] = field(default_factory=dict)
     draw: Callable[[Path], None] | None = None
+    variable: str = ""
 
     @property
     def stamp(self) -> Path:

@@ -10,9 +10,13 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from mambo_codegen.bundle.render import render
+from mambo_codegen.bundle.render import render, render_target
+from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.settings import presets
-from mambo_codegen.settings.controller_toml import with_option
+from mambo_codegen.settings.controller_toml import parse, with_option
+from mambo_codegen.settings.model import Settings
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.model.derive.derived_settings import controller_text
 
 ROOT: Final = Path(__file__).parents[2]
 
@@ -24,23 +28,46 @@ _NAMES_OF_A_BUNDLE: Final = re.compile(
 """Lines with version and settings digest, which a new key with its default changes as well."""
 
 
+_DESIGN: Final = "design "
+_IN_A_TARGET: Final = ("nmpc_app.h", "nmpc_app.c")
+
+
 def plain_c(source: str) -> str:
     """Return C without comments, blank lines and the spaces between words."""
     bare = _C_TOKEN.sub(lambda found: found[0] if found[0].startswith('"') else " ", source)
     return "\n".join(" ".join(line.split()) for line in bare.splitlines() if line.strip())
 
 
+def _settings(source: str) -> Settings:
+    """Return the settings of a preset, a file, or `design DRONE`."""
+    if source.startswith(_DESIGN):
+        drone = source.removeprefix(_DESIGN)
+        return parse(controller_text(vehicle_toml.load(drone), drone), source)
+    return presets.load(source if source in presets.names() else str(ROOT / source))
+
+
 @cache
 def generated(controller: str) -> str:
-    """Return update period and C of a preset or a file, as `mambo --scalar fixed`, without its names."""
-    source, _, scalar = controller.partition(" --scalar ")
-    settings = presets.load(source if source in presets.names() else str(ROOT / source))
+    """Return update period and C of settings, without their names.
+
+    `controller` is a preset, a file, or `design DRONE`, with `--scalar TYPE`, or with `--for TARGET`: then the C is
+    that of the firmware target.
+    """
+    source, _, target = controller.partition(" --for ")
+    source, _, scalar = source.partition(" --scalar ")
+    settings = _settings(source)
     if scalar:
         settings = with_option(settings, "code.scalar", scalar)
+    files = (
+        render_target(settings, TARGETS[target], with_digest=False)
+        if target
+        else render(settings, with_digest=False)
+    )
+    names = ("nmpc.h", "nmpc.c", *(_IN_A_TARGET if target else ()))
     flown = [
         _NAMES_OF_A_BUNDLE.sub("", plain_c(text))
-        for path, text in sorted(render(settings, with_digest=False).items())
-        if path in ("nmpc.h", "nmpc.c")
+        for path, text in sorted(files.items())
+        if path.rpartition("/")[2] in names
     ]
     return "\n".join([repr(settings.horizon.update_period_s), *flown])
 

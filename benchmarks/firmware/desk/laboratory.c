@@ -1,0 +1,131 @@
+#include "laboratory.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "board.h"
+#include "commander.h"
+#include "drone.h"
+#include "estimator.h"
+#include "estimator_kalman.h"
+#include "stabilizer.h"
+#include "tasks.h"
+#include "variables.h"
+
+#define START_MS 10000
+#define DEGREES 57.295779513082323
+#define GRAVITY_M_S2 9.81
+#define GYROSCOPE_NOISE_RAD_S 0.003
+#define ACCELEROMETER_NOISE_G 0.02
+#define CAMERA_DEVIATION_M 0.01f /* that the firmware assumes */
+#define HISTORY_MS 64
+
+static laboratory_flight_t flight;
+static drone_parameters_t parameters;
+static drone_t drone;
+static double history[HISTORY_MS][3]; /* of positions */
+static uint64_t elapsed_ms;
+static bool is_camera_on = true;
+static uint64_t random_state;
+
+/* Marsaglia's xorshift64; in [0, 1). */
+static double uniform(void)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 7;
+    random_state ^= random_state << 17;
+    return (double)(random_state >> 11) * 0x1p-53;
+}
+
+/* Box and Muller. */
+static double normal(void) { return sqrt(-2.0 * log(1.0 - uniform())) * cos(2.0 * M_PI * uniform()); }
+
+bool laboratory_start(const laboratory_flight_t *wanted)
+{
+    bool is_good;
+
+    flight = *wanted;
+    parameters = (drone_parameters_t){ flight.mass_kg, flight.rotor_lag_s, flight.drag_1_s, { flight.wind_m_s[0], flight.wind_m_s[1] } };
+    random_state = 0x9E3779B97F4A7C15ULL * (flight.seed + 1ULL);
+    drone_place(&drone, flight.place_m, flight.heading_rad);
+    for (int k = 0; k < HISTORY_MS; k++) {
+        memcpy(history[k], drone.position_m, sizeof history[k]);
+    }
+
+    tasks_advance_clock(START_MS);
+    commanderInit();
+    estimatorKalmanTaskInit();
+    variables_set("kalman.initialX", flight.place_m[0]);
+    variables_set("kalman.initialY", flight.place_m[1]);
+    variables_set("kalman.initialYaw", flight.heading_rad);
+    stabilizerInit(StateEstimatorTypeKalman);
+    is_good = stabilizerTest();
+    variables_set("stabilizer.controller", flight.controller);
+    tasks_run();
+    return is_good;
+}
+
+static void measure(void)
+{
+    double rates_deg_s[3], force_g[3];
+
+    for (int k = 0; k < 3; k++) {
+        rates_deg_s[k] = DEGREES * (drone.rates_rad_s[k] + (GYROSCOPE_NOISE_RAD_S * normal()));
+        force_g[k] = (drone.specific_force_m_s2[k] / GRAVITY_M_S2) + (ACCELEROMETER_NOISE_G * normal());
+    }
+    board_measure(rates_deg_s, force_g);
+}
+
+static void look(void)
+{
+    const double *const seen = history[(elapsed_ms - (uint64_t)flight.camera_delay_ms) % HISTORY_MS];
+    positionMeasurement_t measured = { .stdDev = CAMERA_DEVIATION_M };
+
+    for (int k = 0; k < 3; k++) {
+        measured.pos[k] = (float)(seen[k] + (flight.camera_noise_m * normal()));
+    }
+    estimatorEnqueuePosition(&measured);
+}
+
+void laboratory_run(int milliseconds)
+{
+    for (int k = 0; k < milliseconds; k++) {
+        double thrusts[4];
+
+        board_thrusts(thrusts);
+        drone_advance(&drone, &parameters, thrusts);
+        tasks_advance_clock(1);
+        elapsed_ms++;
+        memcpy(history[elapsed_ms % HISTORY_MS], drone.position_m, sizeof history[0]);
+
+        measure();
+        if (is_camera_on && (flight.camera_period_ms > 0) &&
+            (((elapsed_ms + (uint64_t)flight.camera_offset_ms) % (uint64_t)flight.camera_period_ms) == 0)) {
+            look();
+        }
+        if (uniform() >= flight.lost_ticks) {
+            board_wake_stabilizer();
+            tasks_run();
+        }
+    }
+}
+
+void laboratory_send(int port, int channel, const uint8_t *data, int bytes)
+{
+    board_receive(port, channel, data, bytes);
+    tasks_run();
+}
+
+void laboratory_switch_camera(bool is_on) { is_camera_on = is_on; }
+
+void laboratory_state(double state[13])
+{
+    memcpy(&state[0], drone.position_m, sizeof drone.position_m);
+    memcpy(&state[3], drone.velocity_m_s, sizeof drone.velocity_m_s);
+    drone_angles(&drone, &state[6]);
+    board_thrusts(&state[9]);
+}
+
+double laboratory_log(const char *name) { return variables_log(name); }
+bool laboratory_set(const char *name, double value) { return variables_set(name, value); }
+const char *laboratory_console(void) { return board_console(); }

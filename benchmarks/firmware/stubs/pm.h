@@ -1,0 +1,6 @@
+#ifndef PM_H
+#define PM_H
+
+float pmGetBatteryVoltage(void);
+
+#endif

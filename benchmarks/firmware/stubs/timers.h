@@ -1,0 +1,6 @@
+#ifndef TIMERS_H
+#define TIMERS_H
+
+#include "FreeRTOS.h"
+
+#endif
