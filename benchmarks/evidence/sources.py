@@ -50,8 +50,8 @@ def _settings(source: str) -> Settings:
 def generated(controller: str) -> str:
     """Return update period and C of settings, without their names.
 
-    `controller` is a preset, a file, or `design DRONE`, with `--scalar TYPE`, or with `--for TARGET`: then the C is
-    that of the firmware target.
+    `controller` is a preset, a file, or `design DRONE`, with `--scalar TYPE`, or with `--for TARGET`: then
+    the C is that of the firmware target.
     """
     source, _, target = controller.partition(" --for ")
     source, _, scalar = source.partition(" --scalar ")

@@ -19,7 +19,7 @@ DESIGN: Final = "design"
 
 
 @dataclass(frozen=True)
-class Contender:
+class FirmwareController:
     """A controller, and the firmware that it is in."""
 
     name: str
@@ -33,13 +33,13 @@ def app_settings() -> dict[str, Settings]:
     return {PRESET: presets.preset("crazyflie"), DESIGN: parse(derived, "design crazyflie")}
 
 
-def contenders(firmware: Path) -> list[Contender]:
+def contenders(firmware: Path) -> list[FirmwareController]:
     """Return all controllers, the app's first; raises as `build`."""
     libraries = {name: build(firmware, settings) for name, settings in app_settings().items()}
     others = [number for number in ControllerNumber if number is not ControllerNumber.APP]
     return [
-        *(Contender(name, ControllerNumber.APP, library) for name, library in libraries.items()),
-        *(Contender(number.name.lower(), number, libraries[PRESET]) for number in others),
+        *(FirmwareController(name, ControllerNumber.APP, library) for name, library in libraries.items()),
+        *(FirmwareController(number.name.lower(), number, libraries[PRESET]) for number in others),
     ]
 
 
@@ -55,7 +55,7 @@ _CLOCKS: Final = {
 """What stands where the app dates the estimated position."""
 
 
-def clocks(firmware: Path) -> list[Contender]:
+def clocks(firmware: Path) -> list[FirmwareController]:
     """Return the app with the preset, as generated and with other ways to meet the estimator's clock."""
     app = render_target(app_settings()[PRESET], TARGETS["crazyflie"], with_digest=False)
     source = app["src/nmpc_app.c"]
@@ -63,7 +63,7 @@ def clocks(firmware: Path) -> list[Contender]:
         message = f"the app has {source.count(_DATED)} lines {_DATED.strip()}"
         raise ValueError(message)
     return [
-        Contender(
+        FirmwareController(
             name,
             ControllerNumber.APP,
             link(firmware, {**app, "src/nmpc_app.c": source.replace(_DATED, line)}),

@@ -38,7 +38,7 @@ class ControllerNumber(IntEnum):
 
 
 @dataclass(frozen=True)
-class Conditions:
+class LaboratoryConditions:
     """Drone, camera and clocks of a flight.
 
     camera_offset_ms: of the camera's clock against the estimator's.
@@ -73,7 +73,7 @@ class Laboratory:
     """The firmware, started on the floor. It can be started once in a process."""
 
     def __init__(
-        self, library: Path, controller: ControllerNumber, conditions: Conditions, place: Place
+        self, library: Path, controller: ControllerNumber, conditions: LaboratoryConditions, place: Place
     ) -> None:
         self._library: Any = _INTERFACE.dlopen(str(library))
         self._state = np.zeros(13)

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from benchmarks.firmware.laboratory import Conditions, ControllerNumber, Laboratory, Place
+from benchmarks.firmware.laboratory import ControllerNumber, Laboratory, LaboratoryConditions, Place
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import Trajectory, vertical_of
 
@@ -16,7 +16,7 @@ TAKE_OFF_MS: Final = 8000
 """Until a drone rests at the height of the flight."""
 
 
-class Offset(NamedTuple):
+class ClockOffset(NamedTuple):
     """Of the clocks of camera, app and radio against the estimator's, in ms."""
 
     camera_ms: int
@@ -25,7 +25,7 @@ class Offset(NamedTuple):
 
 
 OFFSETS: Final = tuple(
-    Offset(camera_ms, app_ms, number)
+    ClockOffset(camera_ms, app_ms, number)
     for number, (camera_ms, app_ms) in enumerate((c, a) for a in (0, 3, 7) for c in (0, 3, 7))
 )
 
@@ -62,11 +62,11 @@ class Job:
     library: Path
     controller: ControllerNumber
     stream: Stream
-    conditions: Conditions
-    offset: Offset
+    conditions: LaboratoryConditions
+    offset: ClockOffset
 
 
-class Flown(NamedTuple):
+class StreamedFlight(NamedTuple):
     """What a flight was.
 
     crashed:     tumbled, or more than 50 m away.
@@ -121,7 +121,7 @@ def ready(job: Job, *, take_off: bool = True) -> Laboratory:
     return laboratory
 
 
-def fly(job: Job) -> Flown:
+def fly(job: Job) -> StreamedFlight:
     """Fly a stream of set-points. It can be called once in a process."""
     laboratory, stream = ready(job), job.stream
     random = np.random.default_rng(job.offset.radio_ms)
@@ -147,13 +147,13 @@ def fly(job: Job) -> Flown:
     return judge(times_s[1:], states, motion[1:, 0], crashed=False)
 
 
-def judge(times_s: FloatArray, states: FloatArray, target_m: FloatArray, *, crashed: bool) -> Flown:
+def judge(times_s: FloatArray, states: FloatArray, target_m: FloatArray, *, crashed: bool) -> StreamedFlight:
     """Return the measures of times (n,), states (n, 13) and targets (n, 3)."""
     distance = np.hypot(*(states[:, :2] - target_m[:, :2]).T)
     height = states[:, 2] - target_m[:, 2]
     late = times_s > 5.0
     away = np.flatnonzero(distance > SETTLED_M)
-    return Flown(
+    return StreamedFlight(
         crashed=crashed,
         iae_m_s=float(distance.sum() * 0.001 * SAMPLE_MS),
         largest_m=float(distance[late].max(initial=0.0)),

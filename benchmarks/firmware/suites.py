@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.firmware import events
-from benchmarks.firmware.contenders import Contender, app_settings, clocks, contenders
+from benchmarks.firmware.contenders import FirmwareController, app_settings, clocks, contenders
 from benchmarks.firmware.events import Event, Happened
 from benchmarks.firmware.flight_log import write_log
-from benchmarks.firmware.laboratory import Conditions, ControllerNumber
+from benchmarks.firmware.laboratory import ControllerNumber, LaboratoryConditions
 from benchmarks.firmware.one_process import each_in_a_process
-from benchmarks.firmware.stream import OFFSETS, Flown, Job, Stream, fly
+from benchmarks.firmware.stream import OFFSETS, Job, Stream, StreamedFlight, fly
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import Bernoulli, Circle, Hover, PositionStep
 from mambo_sil.model.replay.log_replay import replay_log
@@ -22,7 +22,7 @@ from mambo_sil.model.replay.replay_report import summarise
 
 EIGHT: Final = Stream(Bernoulli(2.0, 0.5))
 CIRCLE: Final = Stream(Circle(1.0, 1.5))
-STANDARD: Final = Conditions()
+STANDARD: Final = LaboratoryConditions()
 
 CURVES: Final = {
     "eight": EIGHT,
@@ -31,7 +31,7 @@ CURVES: Final = {
     "fast eight": Stream(Bernoulli(2.0, 0.8)),
     "step": Stream(PositionStep(1.0, 0.0), duration_s=10.0),
 }
-"""Flown by every controller."""
+"""StreamedFlight by every controller."""
 
 SET_POINTS: Final = {
     "every 150 ms": replace(CIRCLE, period_ms=150),
@@ -53,7 +53,7 @@ CONDITIONS: Final = {
 }
 """The circle under other conditions."""
 
-EVENTS: Final[dict[str, tuple[Event, Conditions]]] = {
+EVENTS: Final[dict[str, tuple[Event, LaboratoryConditions]]] = {
     **{f"wall {speed}": (events.through_wall(speed), STANDARD) for speed in (1.0, 2.0, 3.0)},
     "fence switched on": (events.fence_switched_on(2.0), STANDARD),
     "far": (events.far_set_point, STANDARD),
@@ -80,12 +80,14 @@ Paths = dict[tuple[str, str], FloatArray]
 Say = Callable[[str], None]
 
 
-def _is_app(contender: Contender) -> bool:
+def _is_app(contender: FirmwareController) -> bool:
     return contender.number is ControllerNumber.APP
 
 
 def fly_streams(
-    streams: Mapping[str, tuple[Stream, Conditions]], flown_by: Iterable[Contender], say: Say
+    streams: Mapping[str, tuple[Stream, LaboratoryConditions]],
+    flown_by: Iterable[FirmwareController],
+    say: Say,
 ) -> tuple[Figures, Paths]:
     """Return the measures at each offset, by stream and controller, and the paths."""
     figures: Figures = {}
@@ -97,7 +99,7 @@ def fly_streams(
             jobs = [
                 Job(contender.library, contender.number, stream, conditions, offset) for offset in OFFSETS
             ]
-            flights: list[Flown] = each_in_a_process(fly, jobs)
+            flights: list[StreamedFlight] = each_in_a_process(fly, jobs)
             figures[title][contender.name] = {
                 "crashed": sum(flight.crashed for flight in flights),
                 **{name: [float(getattr(flight, name)) for flight in flights] for name in MEASURES},
@@ -110,7 +112,7 @@ def _happen(title: str, job: Job) -> Happened:
     return EVENTS[title][0](job)
 
 
-def fly_events(flown_by: Iterable[Contender], say: Say) -> tuple[Figures, Paths]:
+def fly_events(flown_by: Iterable[FirmwareController], say: Say) -> tuple[Figures, Paths]:
     """Return the measures of each event at each offset, by event, controller and measure, and the paths."""
     figures: Figures = {}
     paths: Paths = {}
@@ -134,7 +136,7 @@ def fly_events(flown_by: Iterable[Contender], say: Say) -> tuple[Figures, Paths]
     return figures, paths
 
 
-def replay_all(apps: Iterable[Contender]) -> Figures:
+def replay_all(apps: Iterable[FirmwareController]) -> Figures:
     """Return by settings how many commands of a log a replay repeats in every bit, and how many there are."""
     found = {}
     with tempfile.TemporaryDirectory() as folder:
