@@ -1,15 +1,16 @@
-/* Pointer, keyboard, buttons, sliders and table. */
-const NEAR_PX = 24, STEP_M = 0.25, DRAG_N_S_M = 0.05, MOST_N_S = 0.1;
+/* Keyboard, buttons, sliders and table. */
+const STEP_M = 0.25, AWAY_M = 30, LEAST_FENCE_M = 0.5, FENCE_M = 1;
 const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
 const WAYS = { "1,0": "right", "-1,0": "left", "0,1": "down", "0,-1": "up" };
 const find = (id) => document.getElementById(id);
+const titles = (drones) => drones.map((drone) => drone.entry.title).join(", ");
 const say = (text) => { find("status").textContent = text; };
 
 class Controls {
   constructor(world, field, player) {
     Object.assign(this, { world, field, player });
     this.rows = [...document.querySelectorAll(".standing tbody tr")];
-    this.pointer();
+    this.pointer = new Pointer(this);
     this.keyboard();
     this.buttons();
     world.data.dials.forEach((dial, index) => {
@@ -49,7 +50,12 @@ class Controls {
       document.querySelector(`output[for="${dial.key}"]`).textContent = words;
     });
     this.rows.forEach((row, index) => { row.querySelector("input").checked = world.drones[index].shown; });
+    this.fenceButton();
     this.numbers();
+  }
+
+  fenceButton() {
+    find("fence").textContent = this.world.fence ? "Remove the fence" : this.field.drawing ? "Cancel the fence" : "Draw a fence";
   }
 
   /* The table's figures. */
@@ -63,6 +69,32 @@ class Controls {
       put(".mean", Number.isFinite(mean) ? `${mean.toFixed(2)} m` : "\u2013");
       put(".tilt", Number.isFinite(error) ? `${tiltOf(now, index).toFixed(0)}\u00b0` : "\u2013");
     });
+    const limited = drones.filter((drone) => drone.limited), without = titles(drones.filter((drone) => !drone.limited));
+    const speeds = limited.map((drone) => `${drone.entry.title} ${drone.speedWords}`);
+    find("limits").textContent = [...speeds, ...(without ? [`without limits: ${without}`] : [])].join("; ");
+  }
+
+  /* Puts a fence between two corners, in m; null removes it. */
+  enclose(from, to) {
+    const { world, field } = this, corners = from && [0, 1].map((axis) => [from[axis], to[axis]].sort((a, b) => a - b));
+    field.drawing = false;
+    if (corners && corners.some(([least, most]) => most - least < LEAST_FENCE_M)) {
+      say(`A fence has sides of ${LEAST_FENCE_M} m or more: drag from corner to corner.`);
+    } else {
+      const [[left, right], [top, bottom]] = corners ?? [[], []];
+      const words = world.enclose(corners ? [left, top, right, bottom].map((value) => Number(value.toFixed(2))) : null);
+      say(corners ? `Fence of ${(right - left).toFixed(1)} by ${(bottom - top).toFixed(1)} m. ${words}` : "The fence is removed.");
+    }
+    this.changed();
+  }
+
+  /* Removes the fence, or lets the pointer draw one, or not. */
+  fence() {
+    const { field } = this;
+    if (this.world.fence) return this.enclose(null);
+    field.drawing = !field.drawing;
+    this.fenceButton();
+    return say(field.drawing ? "Drag from corner to corner of the fence." : "No fence.");
   }
 
   push(impulse, words) {
@@ -85,6 +117,14 @@ class Controls {
       }
       this.changed();
     });
+    find("fence").addEventListener("click", () => this.fence());
+    find("away").addEventListener("click", () => {
+      const { target } = this.world, x = target.now[0] > AWAY_M / 2 ? 0 : AWAY_M;
+      target.drag(x, 0);
+      target.release();
+      this.changed();
+      say(`Target at x ${x} m, y 0 m.`);
+    });
     find("link").addEventListener("click", async () => {
       try {
         await navigator.clipboard.writeText(location.href);
@@ -98,7 +138,11 @@ class Controls {
   keyboard() {
     this.field.canvas.addEventListener("keydown", (event) => {
       const way = ARROWS[event.key], { target } = this.world;
-      if (event.key === " ") this.player.play(!this.player.playing);
+      if (event.key === "f" && !event.ctrlKey && !event.metaKey) {
+        const [x, y] = target.now;
+        if (this.world.fence) this.enclose(null);
+        else this.enclose([x - FENCE_M, y - FENCE_M], [x + FENCE_M, y + FENCE_M]);
+      } else if (event.key === " ") this.player.play(!this.player.playing);
       else if (!way) return;
       else if (event.shiftKey) this.push(way.map((part) => part * IMPULSE_N_S), `${WAYS[way]} `);
       else {
@@ -109,45 +153,5 @@ class Controls {
       }
       event.preventDefault();
     });
-  }
-
-  /* Whether the pointer takes a drone: one that is near, and nearer than the target. */
-  takes(point) {
-    const now = this.world.history.at(-1);
-    const away = (x, y) => Math.hypot(x - point[0], y - point[1]) * this.field.scale;
-    const drones = this.world.drones.map((drone, index) =>
-      drone.shown ? away(now[3 + PER_DRONE * index], now[4 + PER_DRONE * index]) : Infinity);
-    const nearest = Math.min(...drones.filter(Number.isFinite));
-    return nearest < NEAR_PX && nearest < away(now[1], now[2]) - 1;
-  }
-
-  pointer() {
-    const { canvas } = this.field, { world, field } = this;
-    const place = (event) => field.metres(event.offsetX, event.offsetY);
-    canvas.addEventListener("pointerdown", (event) => {
-      if (!event.isPrimary) return;
-      canvas.setPointerCapture(event.pointerId);
-      const point = place(event);
-      if (this.takes(point)) field.arrow = [point, point];
-      else world.target.drag(...point);
-      this.held = true;
-      this.player.redraw();
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      if (!this.held || !event.isPrimary) return;
-      if (field.arrow) field.arrow = [field.arrow[0], place(event)];
-      else world.target.drag(...place(event));
-      this.player.redraw();
-    });
-    const release = (event) => {
-      if (!this.held || !event.isPrimary) return;
-      this.held = false;
-      if (!field.arrow) return this.changed();
-      const [[x, y], [u, v]] = field.arrow;
-      field.arrow = null;
-      if (event.type === "pointerup") this.push(atMost(MOST_N_S, [DRAG_N_S_M * (u - x), DRAG_N_S_M * (v - y)]), "");
-    };
-    canvas.addEventListener("pointerup", release);
-    canvas.addEventListener("pointercancel", release);
   }
 }

@@ -1,4 +1,6 @@
 /* One drone on the field: a module and its flight, update by update. */
+const LIMITS = 7, FENCE_AT = 2; /* numbers of nmpc_limits_t; the first of its fence: least x and y, largest x and y */
+const LIMIT_NAMES = ["speed", "braking", "fence", "tilt"]; /* the bits of nmpc_limits_active */
 const KINDS = { float32: Float32Array, float64: Float64Array, fixed: Int32Array };
 
 class Drone {
@@ -13,10 +15,11 @@ class Drone {
     const arrays = TRACE_AXES.map((axes) => module.space(8 * axes));
     this.trace = module.pointers(...arrays);
     this.weights = module.space(2 * this.real.BYTES_PER_ELEMENT);
+    this.limits = module.space(LIMITS * this.real.BYTES_PER_ELEMENT);
     this.status = module.space(4);
     this.curve = module.space(48);
     /* What is read and written at every update; memory must not grow from here on. */
-    [this.position, , this.angles] = arrays.slice(0, 3).map((address) => module.at(address, 3));
+    [this.position, this.velocity, this.angles] = arrays.slice(0, 3).map((address) => module.at(address, 3));
     this.answer = module.at(arrays[5], 1, BigInt64Array);
     this.inputs = [this.time, this.target, this.sensors, this.gusts].map((address, index) =>
       module.at(address, [1, 6, 6 * data.ticks, 3 * (data.ticks + 1)][index]));
@@ -35,6 +38,33 @@ class Drone {
     this.module.calls.nmpc_host_set_weights(this.module.self, 1, this.weights, this.status);
   }
 
+  get limited() {
+    return this.entry.metre !== null;
+  }
+
+  /* Replaces the fence, in m, null by that of the settings; returns whether the controller takes it. */
+  enclose(fence) {
+    const { calls, self } = this.module, numbers = this.module.at(this.limits, LIMITS, this.real);
+    calls.nmpc_default_limits(this.limits);
+    if (fence) numbers.set(fence.map((value) => value * this.entry.metre), FENCE_AT);
+    calls.nmpc_host_set_limits(self, 1, this.limits, this.status);
+    return this.module.at(this.status, 1, Int32Array)[0] === 0;
+  }
+
+  /* The names of the limits that act. */
+  get active() {
+    if (!this.limited) return [];
+    this.module.calls.nmpc_host_limits_active(this.module.self, 1, this.status);
+    const bits = this.module.at(this.status, 1, Int32Array)[0];
+    return LIMIT_NAMES.filter((_, place) => bits >> place & 1);
+  }
+
+  /* Speed, and which limits act. */
+  get speedWords() {
+    const { active } = this, speed = `${Math.hypot(this.velocity[0], this.velocity[1]).toFixed(1)} m/s`;
+    return active.length ? `${speed}, limit: ${active.join(", ")}` : speed;
+  }
+
   /* With sensors from now on, or with the true state. */
   sense(sensed) {
     const members = { sensed: [Number(sensed)], captured: [Number(sensed)] };
@@ -51,6 +81,7 @@ class Drone {
     this.setMembers("flight", { impulse_tick: [-1] }, BigInt64Array);
     this.inputs[3].set(draws);
     this.position.set([target[0], target[1], 0]);
+    this.velocity.fill(0);
     this.angles.fill(0);
     this.module.calls.engine_begin(this.simulation, this.flight, this.draws, this.flying);
   }

@@ -1,5 +1,5 @@
 /* The field seen from above: target, trails and drones. A line from each drone shows where, and how much, it tilts. */
-const VIEW_M = 5.6, TRAIL_S = 3, RADIUS_PX = 10, TILT_M_RAD = 1.6, EDGE_PX = 14;
+const TRAIL_S = 3, RADIUS_PX = 10, TILT_M_RAD = 1.6, EDGE_PX = 14, GRIDS_M = [1, 2, 5, 10, 20], GRID_PX = 48;
 
 /* Resizes a canvas to its place on the page; returns its context, in CSS pixels, and its size. */
 function fit(canvas) {
@@ -23,21 +23,18 @@ function colours() {
 }
 
 class Field {
+  /* What the pointer draws: `arrow` of a push, `corners` of a fence, which it does after `drawing`. */
   constructor(canvas, world) {
-    Object.assign(this, { canvas, world, arrow: null });
-  }
-
-  get scale() {
-    return this.canvas.clientWidth / VIEW_M;
-  }
-
-  /* From pixels of the canvas to m. */
-  metres(x, y) {
-    return [(x - this.canvas.clientWidth / 2) / this.scale, (y - this.canvas.clientHeight / 2) / this.scale];
+    Object.assign(this, { canvas, world, view: new View(canvas, world), arrow: null, corners: null, drawing: false, held: false });
   }
 
   pixels(x, y) {
-    return [x * this.scale + this.canvas.clientWidth / 2, y * this.scale + this.canvas.clientHeight / 2];
+    return this.view.pixels(x, y);
+  }
+
+  /* Follows what there is to see, unless a pointer is on the field. */
+  follow(seconds) {
+    if (!this.held) this.view.follow(seconds);
   }
 
   draw(palette) {
@@ -54,6 +51,15 @@ class Field {
     };
     stroke(rows.map((row) => [row[1], row[2]]), palette.target, 4);
     this.target(context, palette, now);
+    const corners = this.corners ?? (world.fence && [world.fence.slice(0, 2), world.fence.slice(2)]);
+    if (corners) {
+      const [[x, y], [u, v]] = corners;
+      stroke([[x, y], [u, y], [u, v], [x, v], [x, y]], palette.ink, 2, [8, 6]);
+    }
+    const { target } = world;
+    if (target.kind === "hand" && (this.held || target.goal.some((value, axis) => Math.abs(value - now[1 + axis]) > 0.05))) {
+      stroke([[now[1], now[2]], target.goal], palette.quiet, 1.5, [2, 6]);
+    }
     const recent = rows.filter((row) => row[0] > now[0] - TRAIL_S);
     const shown = world.drones.map((drone, index) => index).filter((index) => world.drones[index].shown).reverse();
     for (const index of shown) { /* the first one on top */
@@ -68,15 +74,28 @@ class Field {
     Object.assign(context, { strokeStyle: palette.line, lineWidth: 1, fillStyle: palette.quiet, font: "12px system-ui, sans-serif" });
     context.setLineDash([]);
     context.beginPath();
-    for (let metre = -4; metre <= 4; metre++) {
-      const [x, y] = this.pixels(metre, metre);
-      context.moveTo(x, 0);
-      context.lineTo(x, height);
-      context.moveTo(0, y);
-      context.lineTo(width, y);
+    const { scale } = this.view, step = GRIDS_M.find((one) => one * scale >= GRID_PX) ?? GRIDS_M.at(-1);
+    const [left, top] = this.view.metres(0, 0).map((value) => Math.ceil(value / step) * step);
+    for (let metre = left; this.pixels(metre, 0)[0] < width; metre += step) {
+      context.moveTo(this.pixels(metre, 0)[0], 0);
+      context.lineTo(this.pixels(metre, 0)[0], height);
+    }
+    for (let metre = top; this.pixels(0, metre)[1] < height; metre += step) {
+      context.moveTo(0, this.pixels(0, metre)[1]);
+      context.lineTo(width, this.pixels(0, metre)[1]);
     }
     context.stroke();
-    context.fillText("grid 1 m", 8, height - 8);
+    this.bar(context, height, palette, step);
+  }
+
+  /* The scale bar, one step of the grid long, in the lower left corner. */
+  bar(context, height, palette, step) {
+    const [left, y, right] = [10, height - 12, 10 + step * this.view.scale];
+    Object.assign(context, { strokeStyle: palette.ink, fillStyle: palette.ink, lineWidth: 2 });
+    context.beginPath();
+    [[left, y - 5], [left, y], [right, y], [right, y - 5]].forEach((point) => context.lineTo(...point));
+    context.stroke();
+    context.fillText(`${step} m`, left + 4, y - 5);
   }
 
   /* An arrow with the mean wind, in the upper left corner. */
@@ -115,8 +134,8 @@ class Field {
   drone(context, palette, now, index, stroke) {
     const [x, y, roll, pitch] = now.slice(3 + PER_DRONE * index, 3 + PER_DRONE * (index + 1));
     if (!Number.isFinite(x)) return;
-    const colour = palette.hues[this.world.drones[index].entry.hue];
-    stroke([[x, y], [x - TILT_M_RAD * Math.sin(pitch), y + TILT_M_RAD * Math.sin(roll)]], colour, 3);
+    const one = this.world.drones[index], colour = palette.hues[one.entry.hue], length = TILT_M_RAD * this.view.width / VIEW_M;
+    stroke([[x, y], [x - length * Math.sin(pitch), y + length * Math.sin(roll)]], colour, 3);
     const inside = (value, size) => Math.min(Math.max(value, EDGE_PX), size - EDGE_PX);
     const [px, py] = this.pixels(x, y);
     const [cx, cy] = [inside(px, this.canvas.clientWidth), inside(py, this.canvas.clientHeight)];
@@ -128,5 +147,15 @@ class Field {
     Object.assign(context, { fillStyle: palette.paper, textAlign: "center", textBaseline: "middle" });
     context.fillText(index + 1, cx, cy + 0.5);
     Object.assign(context, { textAlign: "start", textBaseline: "alphabetic" });
+    if (one.active.length) this.label(context, palette, one.speedWords, cx, cy);
+  }
+
+  /* Words beside a drone, on the side where there is room. */
+  label(context, palette, words, x, y) {
+    const room = x + 18 + context.measureText(words).width < this.canvas.clientWidth;
+    Object.assign(context, { fillStyle: palette.ink, strokeStyle: palette.paper, lineWidth: 4, textAlign: room ? "left" : "right" });
+    context.strokeText(words, x + (room ? 18 : -18), y - 18);
+    context.fillText(words, x + (room ? 18 : -18), y - 18);
+    context.textAlign = "start";
   }
 }

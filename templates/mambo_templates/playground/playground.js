@@ -11,7 +11,9 @@ class Player {
     addEventListener("resize", () => this.redraw());
   }
 
+  /* Draws all; what stands still, or moves without motion, is looked at where it is. */
   redraw() {
+    if (!this.playing || still.matches) this.views[0].follow(Infinity);
     this.views.forEach((view) => view.draw(this.palette));
   }
 
@@ -34,6 +36,7 @@ class Player {
     this.world.advance(updates);
     if (!still.matches || now - this.drawn >= 1000) {
       this.drawn = now;
+      this.views[0].follow(passed);
       this.redraw();
     }
     if (now - this.told >= 1000 * (still.matches ? 1 : TABLE_S)) {

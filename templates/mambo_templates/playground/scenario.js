@@ -8,6 +8,7 @@ function fragmentOf(world) {
   data.dials.forEach((dial, index) => {
     if (world.dials[index] !== dial.start) words.set(dial.key, dial.values[world.dials[index]]);
   });
+  if (world.fence) words.set("fence", world.fence.join(","));
   const hidden = world.drones.flatMap((drone, index) => (drone.shown ? [] : [index + 1]));
   if (hidden.length) words.set("without", hidden.join(","));
   return words.toString();
@@ -21,6 +22,9 @@ function restore(world, fragment) {
   target.goal = [0, 0];
   if (words.get("target") === "hand" && at.length === 2 && at.every(Number.isFinite)) target.drag(...at);
   else if (words.get("target") !== "hand" && CURVES.includes(words.get("target"))) target.kind = words.get("target");
+  const fence = (words.get("fence") || "").split(",").map(Number), [left, top, right, bottom] = fence;
+  const good = fence.length === 4 && fence.every((value) => Math.abs(value) <= MOST_VIEW_M) && left < right && top < bottom;
+  world.fence = good ? fence : null;
   world.dials = data.dials.map((dial) => {
     const place = words.has(dial.key) ? dial.values.indexOf(Number(words.get(dial.key))) : -1;
     return place < 0 ? dial.start : place;

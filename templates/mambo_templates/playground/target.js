@@ -1,5 +1,5 @@
-/* The target: on a curve, or on its way to where it was dragged, with a speed and an acceleration that drones have. */
-const SPEED_M_S = 2, ACCELERATION_M_S2 = 2.5, APPROACH_1_S = 1.25, ADJUST_1_S = 5, REACH_M = [2.6, 1.5];
+/* The target: on a curve, or where it was dragged: far away at once, else with a speed and an acceleration that drones have. */
+const SPEED_M_S = 2, ACCELERATION_M_S2 = 2.5, APPROACH_1_S = 1.25, ADJUST_1_S = 5, REACH_M = 30, FAR_M = 4;
 
 /* Shortens a vector to a length; without Math.hypot, which may differ between browsers. */
 function atMost(length, [x, y]) {
@@ -42,6 +42,12 @@ class Target {
 
   drag(x, y) {
     this.kind = "hand";
-    this.goal = [x, y].map((value, axis) => Math.min(Math.max(value, -REACH_M[axis]), REACH_M[axis]));
+    this.goal = [x, y].map((value) => Math.min(Math.max(value, -REACH_M), REACH_M));
+  }
+
+  /* When the pointer leaves it: stands at a goal that is far at once; glides to one that is near. */
+  release() {
+    const [x, y] = this.goal;
+    if (Math.abs(x - this.now[0]) > FAR_M || Math.abs(y - this.now[1]) > FAR_M) this.now.set([x, y, 0, 0, 0, 0]);
   }
 }

@@ -19,7 +19,7 @@ function normals(seed) {
 
 class World {
   constructor(drones, data) {
-    Object.assign(this, { drones, data, dials: data.dials.map((dial) => dial.start) });
+    Object.assign(this, { drones, data, fence: null, dials: data.dials.map((dial) => dial.start) });
     this.target = new Target(drones[0], data.curves, data.period_s);
     this.begin();
   }
@@ -32,6 +32,7 @@ class World {
       drone.begin(this.target.now, [...first, ...new Float64Array(3 * this.data.ticks)]);
     }
     this.dials.forEach((place, index) => this.turn(index, place));
+    this.enclose(this.fence);
     this.record();
   }
 
@@ -48,6 +49,17 @@ class World {
       drone.setMembers("flight", Object.fromEntries(rows));
       if (dial.key === "noise") drone.sense(dial.values[place] > 0);
     }
+  }
+
+  /* Puts a fence (least x and y, largest x and y, in m; null: none) around those that have limits; tells who has it not. */
+  enclose(fence) {
+    const { drones } = this, without = drones.filter((drone) => !drone.limited);
+    this.fence = fence;
+    const refused = drones.filter((drone) => drone.limited && !drone.enclose(fence));
+    return [
+      ...(without.length ? [`Without limits, so without a fence: ${titles(without)}.`] : []),
+      ...(refused.length ? [`Refused by ${titles(refused)}.`] : []),
+    ].join(" ");
   }
 
   /* Pushes every drone with the same impulse, in N s, at the next update. */

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from mambo_codegen.methods import method_of
@@ -23,8 +24,8 @@ from mambo_sil.results.summary import Summary
 
 STYLES: Final = ("style.css", "playground.css")
 SCRIPTS: Final = (
-    *("module.js", "proof.js", "drone.js", "target.js", "world.js", "scenario.js"),
-    *("field.js", "plots.js", "controls.js", "playground.js"),
+    *("module.js", "proof.js", "drone.js", "target.js", "world.js", "scenario.js", "view.js"),
+    *("field.js", "plots.js", "pointer.js", "controls.js", "playground.js"),
 )
 """The files of the page's script, in their order."""
 _PD_HUES: Final = {"pd": 1, "pd-feedforward": 2, "pid-feedforward": 3}
@@ -107,11 +108,16 @@ def _sliders(flight: Flight, found: Sequence[PageController]) -> list[Dial]:
 
 
 def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
-    """Return title, type of the C's numbers, and in base64 the record of a law without a model."""
+    """Return title, type of the C's numbers, and in base64 the record of a law without a model.
+
+    `metre` is 1 m in the numbers of the C's limits; None: the controller has none.
+    """
     if isinstance(one.kind, Settings):
-        return {"title": one.title, "scalar": one.kind.code.scalar, "constants": None}
+        method = method_of(one.kind)
+        metre = method.numbers.quantize(np.ones(1), ("position",)).item() if method.limiting else None
+        return {"title": one.title, "scalar": one.kind.code.scalar, "constants": None, "metre": metre}
     constants = pd_function(pd_controller(one.kind, flight))[1]
-    return {"title": one.title, "scalar": "float64", "constants": _text(bytes(ffi.buffer(constants)))}
+    return {"title": one.title, "scalar": "float64", "constants": _text(bytes(ffi.buffer(constants))), "metre": None}
 
 
 def _simulation(flight: Flight) -> dict[str, Any]:

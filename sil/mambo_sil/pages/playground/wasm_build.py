@@ -26,6 +26,8 @@ ENGINE_CALLS: Final = (
 """What the page calls in every module; it puts its records behind __heap_base."""
 CONTROLLER_CALLS: Final = ("nmpc_batch_init", "nmpc_batch_instance_bytes")
 """What it calls besides in one with generated C; with a 1-norm also nmpc_host_set_weights."""
+LIMIT_CALLS: Final = ("nmpc_default_limits", "nmpc_host_set_limits", "nmpc_host_limits_active")
+"""What it calls besides in one whose settings have limits."""
 
 _FLAGS: Final = (*COMPILE_FLAGS, "--target=wasm32", "-ffreestanding", "-nostdlib", "-Wl,--no-entry")
 _UNUSED: Final = ("evaluation.c", "faults.c")
@@ -77,7 +79,8 @@ def program(one: PageController) -> tuple[dict[str, str], tuple[str, ...], str]:
     bundle = render(with_default_prefix(controller), with_digest=False)
     files |= c_files(bundle) | glue()
     weights = ("nmpc_host_set_weights",) if method_of(controller).weight_limits else ()
-    return files, (*ENGINE_CALLS, *CONTROLLER_CALLS, *weights), "nmpc_host_step"
+    limits = LIMIT_CALLS if method_of(controller).limiting else ()
+    return files, (*ENGINE_CALLS, *CONTROLLER_CALLS, *weights, *limits), "nmpc_host_step"
 
 
 def _text(room: str, name: str) -> str:
