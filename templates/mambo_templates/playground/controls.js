@@ -3,6 +3,7 @@ const STEP_M = 0.25, AWAY_M = 30, LEAST_FENCE_M = 0.5, FENCE_M = 1;
 const ARROWS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowDown: [0, 1], ArrowUp: [0, -1] };
 const WAYS = { "1,0": "right", "-1,0": "left", "0,1": "down", "0,-1": "up" };
 const find = (id) => document.getElementById(id);
+const metres = (value) => `${value.toFixed(value < 9.995 ? 2 : 1)} m`;
 const titles = (drones) => drones.map((drone) => drone.entry.title).join(", ");
 const say = (text) => { find("status").textContent = text; };
 
@@ -65,8 +66,8 @@ class Controls {
       const mean = history.reduce((sum, one) => sum + errorOf(one, index), 0) / history.length;
       const put = (name, text) => { row.querySelector(name).textContent = text; };
       const error = errorOf(now, index);
-      put(".error", !Number.isFinite(error) ? "lost" : drones[index].answer[0] > 0n ? "refused" : `${error.toFixed(2)} m`);
-      put(".mean", Number.isFinite(mean) ? `${mean.toFixed(2)} m` : "\u2013");
+      put(".error", !Number.isFinite(error) ? "lost" : drones[index].answer[0] > 0n ? "refused" : metres(error));
+      put(".mean", Number.isFinite(mean) ? metres(mean) : "\u2013");
       put(".tilt", Number.isFinite(error) ? `${tiltOf(now, index).toFixed(0)}\u00b0` : "\u2013");
     });
     const limited = drones.filter((drone) => drone.limited), without = titles(drones.filter((drone) => !drone.limited));

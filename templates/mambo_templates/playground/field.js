@@ -153,6 +153,7 @@ class Field {
   /* Words beside a drone, on the side where there is room. */
   label(context, palette, words, x, y) {
     const room = x + 18 + context.measureText(words).width < this.canvas.clientWidth;
+    context.setLineDash([]);
     Object.assign(context, { fillStyle: palette.ink, strokeStyle: palette.paper, lineWidth: 4, textAlign: room ? "left" : "right" });
     context.strokeText(words, x + (room ? 18 : -18), y - 18);
     context.fillText(words, x + (room ? 18 : -18), y - 18);

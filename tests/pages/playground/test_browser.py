@@ -127,6 +127,12 @@ def test_other_drones_and_scalar_types_have_the_same_bits(
     assert "The same bits" in other.text("#proof")
     other.advance(8.0)
     assert other.error_m(0) < 0.15
+    other.find("page.world.target.drag(0, 0)")
+    other.find(
+        "(page.world.begin(), page.world.enclose([-0.5, -0.5, 0.5, 0.5]), page.world.target.drag(1.2, 0))"
+    )
+    other.advance(5.0)
+    assert float(other.find("page.world.drones[0].position[0]")) == pytest.approx(0.5, abs=0.02)
     assert tab.complaints == []
 
 
@@ -177,6 +183,76 @@ def test_a_dragged_target_is_followed(made: tuple[Path, Any], tab: Browser, widt
     assert errors[-1] < 0.02
     assert page.error_m(FEEDFORWARD) < 0.1
     assert tab.find('document.getElementById("target").value') == "hand"
+
+
+def test_a_target_30_m_away_is_reached_at_the_speed_limit(page: Page, tab: Browser) -> None:
+    """It steps there; the view follows, and the page says the speed and what limits it."""
+    tab.find('document.getElementById("away").click()')
+    assert page.target() == [30.0, 0.0]
+    page.advance(3.0)
+    assert page.text("#limits").startswith("mambo 5.0 m/s, limit: speed; without limits: mambo-1norm,")
+    width, height = page.find(
+        "[page.player.views[0].canvas.clientWidth, page.player.views[0].canvas.clientHeight].join()"
+    ).split(",")
+    for point in ("30, 0", f"...page.world.drones[{MAMBO}].position.slice(0, 2)"):
+        x, y = page.find(f"page.player.views[0].pixels({point}).join()").split(",")
+        assert 0.0 < float(x) < float(width)
+        assert 0.0 < float(y) < float(height)
+    speed = f"(page.world.advance(1), Math.hypot(...page.world.drones[{MAMBO}].velocity.slice(0, 2)))"
+    speeds = page.find(f"Array.from({{ length: 900 }}, () => {speed})")
+    assert 4.9 < max(speeds) < 5.3
+    assert page.error_m(MAMBO) < 0.05
+    assert tab.complaints == []
+
+
+@pytest.mark.parametrize("width_px", [PHONE_PX, DESK_PX])
+def test_a_pointer_at_the_edge_takes_the_target_far(
+    made: tuple[Path, Any], tab: Browser, width_px: int
+) -> None:
+    """The view grows while it is held there; the target steps to where it is let go, at most 30 m away."""
+    page = Page(tab, made[0], width_px)
+    field = "page.player.views[0]"
+    pointer, canvas = "page.player.controls.pointer", f"{field}.canvas"
+    page.find(f"{pointer}.begin([{canvas}.clientWidth - 5, {canvas}.clientHeight / 2])")
+    page.find(f"(() => {{ for (let n = 0; n < 40; n++) {pointer}.hold({pointer}.before + 50); }})()")
+    page.find(f"{pointer}.end(true)")
+    assert page.target() == [30.0, pytest.approx(0.0, abs=0.2)]
+    assert page.find(f"{field}.pixels(30, 0)[0] < {field}.canvas.clientWidth")
+
+
+def test_a_drawn_fence_keeps_the_drone_inside(made: tuple[Path, Any], tab: Browser) -> None:
+    """The target is beyond it; the others have no limits, as the page says; removed, the drone leaves."""
+    page = Page(tab, made[0], DESK_PX, "#target=hand&at=0,0")
+    tab.find('document.getElementById("fence").click()')
+    tab.drag(page.pixels(-1.0, -1.0), page.pixels(1.0, 1.0))
+    assert page.find("page.world.fence") == pytest.approx([-1.0, -1.0, 1.0, 1.0], abs=0.02)
+    assert page.text("#fence") == "Remove the fence"
+    assert "without a fence: mambo-1norm, PD-feedforward, PD." in page.text("#status")
+    fragment = tab.find("location.hash")
+    page.find("(page.world.target.drag(2.5, 2.0), page.world.target.release())")
+    place = f"(page.world.advance(1), Math.max(...page.world.drones[{MAMBO}].position.slice(0, 2)))"
+    assert 0.95 < max(page.find(f"Array.from({{ length: 600 }}, () => {place})")) < 1.02
+    assert page.error_m(FEEDFORWARD) < 0.1
+    page.advance(0.1)
+    assert "limit: fence" in page.text("#limits")
+    tab.find('document.getElementById("fence").click()')
+    assert page.find("page.world.fence") is None
+    page.advance(6.0)
+    assert page.error_m(MAMBO) < 0.05
+    other = Page(tab, made[0], PHONE_PX, fragment)
+    assert other.find("page.world.fence") == pytest.approx([-1.0, -1.0, 1.0, 1.0], abs=0.02)
+    assert tab.complaints == []
+
+
+def test_the_keyboard_fences_the_target(page: Page, tab: Browser) -> None:
+    """F puts the fence, and removes it."""
+    page.find("page.world.target.drag(0, 0)")
+    page.find("page.world.begin()")
+    tab.find('document.getElementById("field").focus()')
+    tab.press("f", 70, "f")
+    assert page.find("page.world.fence") == [-1.0, -1.0, 1.0, 1.0]
+    tab.press("f", 70, "f")
+    assert page.find("page.world.fence") is None
 
 
 def test_a_dragged_drone_pushes_all(page: Page, tab: Browser) -> None:
@@ -245,7 +321,9 @@ def test_the_fragment_restores_the_scenario(made: tuple[Path, Any], page: Page, 
     assert other.find("JSON.stringify(page.world.history)") == flown
 
 
-@pytest.mark.parametrize("fragment", ["#target=moon&wind=9999&at=x,y&without=7", "#target=hand&at=1", "#%%%"])
+@pytest.mark.parametrize(
+    "fragment", ["#target=moon&wind=9999&at=x,y&without=7", "#target=hand&at=1", "#fence=1,1,0,0", "#%%%"]
+)
 def test_a_wrong_fragment_is_ignored(made: tuple[Path, Any], tab: Browser, fragment: str) -> None:
     """What it does not understand stays at the start."""
     page = Page(tab, made[0], DESK_PX, fragment)

@@ -117,7 +117,12 @@ def _drone(one: PageController, flight: Flight) -> dict[str, Any]:
         metre = method.numbers.quantize(np.ones(1), ("position",)).item() if method.limiting else None
         return {"title": one.title, "scalar": one.kind.code.scalar, "constants": None, "metre": metre}
     constants = pd_function(pd_controller(one.kind, flight))[1]
-    return {"title": one.title, "scalar": "float64", "constants": _text(bytes(ffi.buffer(constants))), "metre": None}
+    return {
+        "title": one.title,
+        "scalar": "float64",
+        "constants": _text(bytes(ffi.buffer(constants))),
+        "metre": None,
+    }
 
 
 def _simulation(flight: Flight) -> dict[str, Any]:
