@@ -155,6 +155,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
     scalar = settings.code.scalar
     return (
         products(fixed=numbers.formats is not None)
+        | {"height": None}
         | method.context
         | {
             "settings": settings,
@@ -184,6 +185,7 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "tracker": method.tracker,
             "limiting": method.limiting,
             **limits_context(method),
+            "level_columns": len(method.level_target),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
             "given": method.tracker is not None and method.tracker.is_given,

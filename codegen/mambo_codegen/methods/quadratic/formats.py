@@ -39,6 +39,9 @@ _ATTITUDE_STATES: Final = ("a", "i", "c", "u")
 _SUM_BITS: Final = 62
 """Most bits of a sum of products without its sign: one less than the type has, as rounding adds to it."""
 
+RECIPROCAL_BITS: Final = 28
+"""Format of reciprocals, which are less than 8."""
+
 _COARSEST_POSITION_BITS: Final = 10
 """Fewest fractional bits of a position: its resolution is 1 mm or better."""
 
@@ -148,6 +151,8 @@ def _formats(*sections: Any) -> QuadraticFormats:
 
 def refusals(settings: Sections) -> list[Refusal]:
     """Return which values of `settings` fixed point cannot represent."""
+    if settings.height is not None:
+        return [Refusal("code", "scalar", 'must be "float32" or "float64" with [height]')]
     found = formats(settings)
     command_rad = math.ldexp(np.max(attitude_constants(settings).command_rad_step2_m), -found.bits["move"])
     unused = {name for name in ("feedback", "ratio") if not found.bits[name]}

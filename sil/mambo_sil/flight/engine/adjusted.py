@@ -53,7 +53,7 @@ class AdjustedController:
 
     def step(self, state: FloatArray, target: FloatArray, thrust_acceleration_m_s2: FloatArray) -> Outcome:
         """Set what is due at this update, and step."""
-        for setter, quantities in SETTERS.items():
+        for setter in SETTERS:
             due = [
                 index
                 for index, one in enumerate(self._adjustments)
@@ -61,8 +61,9 @@ class AdjustedController:
             ]
             if due:
                 rows = [self._adjustments[index].row for index in due]
-                values = np.full((self._n, len(quantities)), np.nan)
-                values[rows] = [self._adjustments[index].values for index in due]
+                given = [self._adjustments[index].values for index in due]
+                values = np.full((self._n, len(given[0])), np.nan)
+                values[rows] = given
                 self._status[due] = getattr(self.controller, setter)(values)[rows]
         self._update += 1
         outcome: Outcome = self.controller.step(state, target, thrust_acceleration_m_s2)
