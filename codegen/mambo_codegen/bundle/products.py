@@ -43,7 +43,7 @@ _FORMS: Final = (
             "reach_product",
             "gravity_product",
             "step2_product",
-            "reciprocal_product",
+            "factor_product",
         ),
         "{} * {}",
     )
@@ -58,6 +58,7 @@ _FORMS: Final = (
             "attitude_sum",
             "row_sum",
             "to_move",
+            "to_factor",
         ),
         "{}",
     )

@@ -241,6 +241,6 @@ def _powers(numbers: Representation, sign: int) -> dict[str, str]:
     bits = numbers.bits or {}
     return {
         name: literals.real(math.ldexp(1.0, sign * bits[name]), "float32")
-        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance", "braking")
+        for name in (*STATE, *THRUST, *WEIGHTS, "cost", "disturbance", "braking", "factor")
         if name in bits
     }

@@ -10,7 +10,8 @@ import numpy as np
 
 from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
-from mambo_codegen.methods.quadratic.formats import RECIPROCAL_BITS, QuadraticFormats
+from mambo_codegen.methods.quadratic.formats import QuadraticFormats
+from mambo_codegen.methods.quadratic.height_formats import FACTOR_BITS, GAIN_CHANGE
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
 from mambo_codegen.numbers.trigonometry import FixedTrigonometry, Trigonometry
@@ -111,8 +112,11 @@ class QuadraticArithmetic(Protocol):
     def thrust_product(self, per_s2: Any, thrust_m_step2: Real) -> Real:
         """Return thrust over mass / T_s^2, m/s^2."""
 
-    def reciprocal_product(self, value: Real, reciprocal: Real) -> Real:
-        """Return value * reciprocal, in the format of the value."""
+    def factor_product(self, value: Real, factor: Real) -> Real:
+        """Return value * factor, in the format of the value."""
+
+    def to_factor(self, cosine: Real) -> Real:
+        """Return a cosine in the format of factors."""
 
 
 class QuadraticFloatArithmetic:
@@ -160,6 +164,9 @@ class QuadraticFloatArithmetic:
     def angle_square(self, angle_rad: Real) -> Real:
         return angle_rad * angle_rad
 
+    def to_factor(self, cosine: Real) -> Real:
+        return cosine
+
     def _product(self, a: Any, b: Real) -> Real:
         return a * b
 
@@ -168,7 +175,7 @@ class QuadraticFloatArithmetic:
 
     sine_product = target_product = tracker_product = drag_product = aged_position = aged_velocity = _product
     tilt_product = command_product = feedback_product = ratio_product = _product
-    gravity_product = reciprocal_product = reach_product = step2_product = thrust_product = _product
+    gravity_product = factor_product = reach_product = step2_product = thrust_product = _product
     position_correction = velocity_correction = disturbance_correction = gain_correction = _correction
 
 
@@ -254,7 +261,9 @@ class QuadraticFixedArithmetic:
         return self._rounded(ratio * move_m_step2, "ratio_product")
 
     def gain_correction(self, gain: Any, by_m: Real, other_gain: Any, by_m_step: Real) -> Real:
-        return self._rounded((gain * by_m) + (other_gain * by_m_step), "gain_correction")
+        change = self._rounded((gain * by_m) + (other_gain * by_m_step), "gain_correction")
+        most = round(GAIN_CHANGE * 2**FACTOR_BITS)
+        return np.clip(change, -most, most)
 
     def reach_product(self, steps: Any, velocity_m_step: Real) -> Real:
         return self._rounded(steps * velocity_m_step, "reach_product")
@@ -271,8 +280,11 @@ class QuadraticFixedArithmetic:
     def thrust_product(self, per_s2: Any, thrust_m_step2: Real) -> Real:
         return self._rounded(per_s2 * thrust_m_step2, "thrust_product")
 
-    def reciprocal_product(self, value: Real, reciprocal: Real) -> Real:
-        return rounded(value * reciprocal, RECIPROCAL_BITS)
+    def factor_product(self, value: Real, factor: Real) -> Real:
+        return rounded(value * factor, FACTOR_BITS)
+
+    def to_factor(self, cosine: Real) -> Real:
+        return rounded(cosine, SINE_BITS - FACTOR_BITS)
 
     def _rounded(self, product: Real, name: str) -> Real:
         return rounded(product, self._shifts[name])

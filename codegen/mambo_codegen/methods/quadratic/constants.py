@@ -76,8 +76,8 @@ class QuadraticConstants(Constants):
         """The quantity of each number in nmpc_height_t, in their order."""
         if self.height is None:
             return ()
-        learnt = {"gain": ["sine"], "acceleration": ["acceleration"], "none": []}[self.height.learn]
+        learnt = {"gain": ["factor"], "acceleration": ["acceleration"], "none": []}[self.height.learn]
         tracker = ["acceleration"] * 2 if self.tracker else []
         if self.tracker and not self.tracker.is_given:
             tracker = ["velocity", *tracker]
-        return ("position", "speed", *learnt, *["acceleration"] * 3, "sine", "thrust", *tracker)
+        return ("position", "speed", *learnt, *["acceleration"] * 3, "factor", "thrust", *tracker)

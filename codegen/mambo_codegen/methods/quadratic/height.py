@@ -85,7 +85,7 @@ class HeightAxis:
             for row in found.rows
         ]
         self._ratio = constant(found.ratio, "ratio")
-        self._one = constant(1.0, "sine")
+        self._one, self._cosine_one = constant(1.0, "factor"), constant(1.0, "sine")
         self._half, self._fourth = (constant(term, "sine") for term in COSINE_TERMS)
         self._steepest, self._least_cosine = constant(STEEPEST_RAD, "angle"), constant(LEAST_COSINE, "sine")
         self._gravity = constant(found.gravity_m_step2, "acceleration")
@@ -99,7 +99,7 @@ class HeightAxis:
             constant(value, "thrust") for value in (height.thrust_min_m_s2, height.thrust_max_m_s2)
         ]
         self._limit = constant(found.limit_m_step2, "acceleration")
-        self._learn_limit = constant(found.learn_limit, "sine" if found.learns_gain else "acceleration")
+        self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
         self._tracker = Tracker(found.tracker, products) if found.tracker else None
@@ -113,7 +113,7 @@ class HeightAxis:
         self._steps2 = constant(found.steps2_per_s2, "per_step2")
         self._lines = {
             name: (
-                *(constant(value, "reciprocal") for value in (line.start, line.slope, line.two, 2.0)),
+                *(constant(value, "factor") for value in (line.start, line.slope, line.two, 2.0)),
                 line.steps,
             )
             for name, line in (("thrust", found.thrust_inverse), ("weight", found.weight_inverse))
@@ -146,7 +146,7 @@ class HeightAxis:
     def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
         """Return the height of drones with a steady thrust (n,) and the attitude of commands (n, 2)."""
         zeros = np.zeros_like(thrust_m_s2)
-        share = self._cosine(command_rad)
+        share = self._products.to_factor(self._cosine(command_rad))
         command = self._accelerated(share, thrust_m_s2)
         return HeightState(
             height_m=zeros,
@@ -168,7 +168,7 @@ class HeightAxis:
     def set_thrust(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
         """Change the last thrusts to `thrust_m_s2` (n,), within the limits."""
         change = self._products.step2_product(self._step2, thrust_m_s2 - state.thrust_m_s2)
-        command = state.command + self._products.sine_product(change, state.share)
+        command = state.command + self._products.factor_product(change, state.share)
         return replace(state, command=clamp(command, self._limit), thrust_m_s2=thrust_m_s2)
 
     def advance(self, state: HeightState) -> HeightState:
@@ -194,7 +194,9 @@ class HeightAxis:
         found = choose(none_yet, started, self._correct(state, measured, step))
         corrected = choose(has_state, choose(lies, lying, found), state)
         cosine = self._cosine(tilt_rad)
-        share = self._products.sine_product(cosine, corrected.gain) if self._found.learns_gain else cosine
+        share = self._products.to_factor(cosine)
+        if self._found.learns_gain:
+            share = self._products.sine_product(corrected.gain, cosine)
         return replace(corrected, share=share), lies
 
     def aim(
@@ -222,7 +224,7 @@ class HeightAxis:
             up = confine(bounds.ceiling_m - state.height_m, -bounds.down_m, bounds.up_m)
             down = confine(state.height_m - bounds.floor_m, -bounds.up_m, bounds.down_m)
         limited = confine(error, lead - up, lead + down)
-        least, most = (products.sine_product(thrust, state.share) - self._gravity for thrust in self._thrusts)
+        least, most = (products.factor_product(thrust, state.share) - self._gravity for thrust in self._thrusts)
         values = [
             *(limited, state.velocity_m_step - climb, disturbance, jerk),
             *(state.thrust, state.lagged, state.command),
@@ -231,7 +233,7 @@ class HeightAxis:
         rests = (measured[:, 2] != 0) & (goal - measured[:, 0] <= self._margin)
         command = np.where(rests, least, command)
         inverse = self._inverse("thrust", state.share)
-        thrust = products.reciprocal_product(self._gravity + command, inverse)
+        thrust = products.factor_product(self._gravity + command, inverse)
         thrust = products.thrust_product(self._steps2, thrust)
         new = replace(state, command=command, target=motion, thrust_m_s2=self.limited(thrust))
         return new, limited != error
@@ -260,28 +262,27 @@ class HeightAxis:
 
     def over_weight(self, acceleration: Real, weight: Real) -> Real:
         """Return accelerations (n, 2) over weights (n,), never too small by rounding."""
-        return self._products.reciprocal_product(acceleration, self._inverse("weight", weight)[:, None])
+        return self._products.factor_product(acceleration, self._inverse("weight", weight)[:, None])
 
     def _inverse(self, name: str, value: Real) -> Real:
         """Return 1/value from products, as `Reciprocal` has it."""
-        products, (start, slope, two_last, two, steps) = self._products, self._lines[name]
-        found: Real = start - products.sine_product(slope, value)
+        product, (start, slope, two_last, two, steps) = self._products.factor_product, self._lines[name]
+        found: Real = start - product(slope, value)
         for step in range(steps):
-            rest = (two_last if step == steps - 1 else two) - products.sine_product(found, value)
-            found = products.reciprocal_product(found, rest)
+            found = product(found, (two_last if step == steps - 1 else two) - product(found, value))
         return found
 
     def _cosine(self, tilt_rad: Real) -> Real:
         """Return cos roll cos pitch (n,) of angles (n, 2), at least LEAST_COSINE."""
         product = self._products.sine_product
         square = self._products.angle_square(clamp(tilt_rad, self._steepest))
-        cosine = self._one - product(square, self._half - product(square, self._fourth))
+        cosine = self._cosine_one - product(square, self._half - product(square, self._fourth))
         both = product(cosine[:, 0], cosine[:, 1])
         return np.where(both < self._least_cosine, self._least_cosine, both)
 
     def _accelerated(self, share: Real, thrust_m_s2: Real) -> Real:
         """Return the acceleration of the thrust less gravity, m/step^2, (n,)."""
-        product = self._products.sine_product(self._products.step2_product(self._step2, thrust_m_s2), share)
+        product = self._products.factor_product(self._products.step2_product(self._step2, thrust_m_s2), share)
         return clamp(product - self._gravity, self._limit)
 
     def _correct(self, state: HeightState, measured: Real, step: Real) -> HeightState:
@@ -315,7 +316,7 @@ class HeightAxis:
         change = gain - state.gain
 
         def more(acceleration: Real) -> Real:
-            product = self._products.sine_product(self._gravity + acceleration, change)
+            product = self._products.factor_product(self._gravity + acceleration, change)
             return clamp(acceleration + product, self._limit)
 
         return replace(

@@ -7,7 +7,7 @@ The model, the cost and the observer are those of right and forward, with the th
 where g + u is the commanded thrust over mass along the vertical. `height.c.j2` has the equations.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -52,6 +52,7 @@ class Reciprocal:
     """1/x from products: y = start - slope x, and `steps` of y (2 - x y), of which the last has `two` for 2.
 
     The relative error of each step is the square of that before: at most `error` in the end, and of one sign.
+    `most` is more than any y.
     """
 
     start: float
@@ -59,6 +60,7 @@ class Reciprocal:
     steps: int
     two: float
     error: float
+    most: float
 
 
 @dataclass(frozen=True)
@@ -237,10 +239,10 @@ def _reciprocal(low: float, high: float) -> Reciprocal:
     error, steps = (start * middle / 4) - 1, 0
     while error > RECIPROCAL_ERROR:
         error, steps = error * error, steps + 1
-    return Reciprocal(start, start / middle, steps, 2.0, error)
+    return Reciprocal(start, start / middle, steps, 2.0, error, 1.01 / low)
 
 
 def _never_too_small(found: Reciprocal) -> Reciprocal:
     """Return the reciprocal that errs upwards: the last step rounds up by more than the error."""
     margin = found.error + 1e-5
-    return Reciprocal(found.start, found.slope, found.steps, 2 + margin, margin)
+    return replace(found, two=2 + margin, error=margin)

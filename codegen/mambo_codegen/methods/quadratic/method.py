@@ -15,6 +15,7 @@ from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.height_constants import height_context
+from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.numbers.representation import COMMAND, THRUST
@@ -129,6 +130,7 @@ class Quadratic(QuadraticConstants, Method):
             "observer": self.observer,
             "law": self.law,
             **height_context(self.height),
+            "gain_change": GAIN_CHANGE,
             "stored_numbers": len(self.stored),
             "stored_quantities": self.stored,
             "row_quantities": ROW,
@@ -195,6 +197,10 @@ def _plain_products(constants: QuadraticConstants) -> list[str]:
         "aged_velocity": bool(constants.observer.age_steps),
         "feedback_product": constants.feedback_steps is not None,
         "ratio_product": constants.law.moves > 1,
+        **dict.fromkeys(
+            ("reach_product", "gravity_product", "step2_product", "thrust_product", "factor_product"),
+            constants.has_height,
+        ),
         "target_product": constants.tracker is not None,
         "tracker_product": constants.tracker is not None,
     }
