@@ -75,7 +75,8 @@ def clamp(values: Real, limit: Any) -> Real:
 
 def confine(values: Real, low: Any, high: Any) -> Real:
     """Saturate `values` at `low` and `high`, with the comparisons of the C."""
-    confined: Real = np.where(values > high, high, np.where(values < low, low, values))
+    limited = np.where(values > high, high, values)
+    confined: Real = np.where(limited < low, low, limited)
     return confined
 
 

@@ -59,7 +59,10 @@ class EmulatedController:
         self._instance_bytes = self.machine.call("nmpc_batch_instance_bytes")
         sizes = [
             self._instance_bytes,
-            *(width * np.dtype(self.scalar).itemsize for width in (7, len(self._method.target), 1)),
+            *(
+                width * np.dtype(self.scalar).itemsize
+                for width in (len(self._method.state), len(self._method.target), 1)
+            ),
         ]
         sizes += [values.nbytes for values in one.values()]
         overhead = len(sizes) * (self.machine.word_bytes + _MAX_PADDING) + _MAX_PADDING  # pointers, alignment
@@ -79,17 +82,17 @@ class EmulatedController:
         for batch in self._batches():
             self._run_batch(batch, "nmpc_batch_init")
 
-    def step(self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike) -> Any:
-        """Compute the next commands from state (n, 7), target (n, k) and thrust_acceleration_m_s2 (n,).
-
-        `CompiledController.step` explains k.
+    def step(
+        self, state: ArrayLike, target: ArrayLike, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> Any:
+        """Compute the next commands; the inputs are those of `CompiledController.step`.
 
         Returns the `step_type` of the method.
         """
         inputs = as_arrays(self._method, self._n, state, target, thrust_acceleration_m_s2)
         outcome = self._empty_outcome(self._n)
         for batch in self._batches():
-            for address, values in zip(self._inputs, inputs, strict=True):
+            for address, values in zip(self._inputs, inputs, strict=False):  # with a height without thrust
                 self.machine.write(address, values[batch].tobytes())
             self._run_batch(batch, "nmpc_batch_step", *self._inputs, self._outcome)
             for name, values in outcome.items():

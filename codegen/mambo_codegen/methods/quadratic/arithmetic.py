@@ -8,9 +8,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mambo_codegen.methods.math import Real, fixed_sine_cosine, rounded, sine_cosine
+from mambo_codegen.methods.math import Real, clamp, fixed_sine_cosine, rounded, sine_cosine
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.formats import QuadraticFormats
+from mambo_codegen.methods.quadratic.height_constants import STEEPEST_RAD
 from mambo_codegen.methods.quadratic.height_formats import FACTOR_BITS, GAIN_CHANGE
 from mambo_codegen.numbers.fixed_point import SINE_BITS
 from mambo_codegen.numbers.representation import Representation
@@ -104,7 +105,7 @@ class QuadraticArithmetic(Protocol):
         """Return an acceleration in units of g."""
 
     def angle_square(self, angle_rad: Real) -> Real:
-        """Return the square of an angle of at most 1.4 rad."""
+        """Return the square of an angle; in fixed point of at most STEEPEST_RAD."""
 
     def step2_product(self, s2: Any, thrust_m_s2: Real) -> Real:
         """Return T_s^2 * thrust over mass, m/step^2."""
@@ -187,6 +188,7 @@ class QuadraticFixedArithmetic:
         self._shifts = formats.shifts
         self._trigonometry: FixedTrigonometry = constants.trigonometry
         self._update_period_s = self.numbers.constant(constants.settings.horizon.update_period_s, "step")
+        self._steepest = self.numbers.constant(STEEPEST_RAD, "angle")
 
     def sine_cosine(self, yaw_rad: Real) -> tuple[Real, Real]:
         return fixed_sine_cosine(yaw_rad, self._trigonometry)
@@ -272,7 +274,8 @@ class QuadraticFixedArithmetic:
         return self._rounded(per_gravity * acceleration_m_step2, "gravity_product")
 
     def angle_square(self, angle_rad: Real) -> Real:
-        return self._rounded(angle_rad * angle_rad, "angle_square")
+        limited = clamp(angle_rad, self._steepest)
+        return self._rounded(limited * limited, "angle_square")
 
     def step2_product(self, s2: Any, thrust_m_s2: Real) -> Real:
         return self._rounded(s2 * thrust_m_s2, "step2_product")

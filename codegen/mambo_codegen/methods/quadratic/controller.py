@@ -245,7 +245,9 @@ class QuadraticController:
 
     def _weight(self, height: HeightState | None) -> Real | None:
         """Return by how much more tilts (n,) count than in hover; None without a height."""
-        return None if self._height is None or height is None else self._height.weight(height.command)
+        if self._height is None or height is None:
+            return None
+        return self._height.weight(self._height.lift(height, height.command))
 
     def _lift(self, state: Real, has_state: Rows, none_yet: Rows) -> _Lift | None:
         """Return the height after the measurement; None without a height."""
@@ -256,7 +258,7 @@ class QuadraticController:
         height, lies = self._height.measure(
             self._height.advance(memory.height), state[:, 7:10], tilt_rad, has_state, none_yet
         )
-        return _Lift(height, lies, self._height.weight(height.thrust))
+        return _Lift(height, lies, self._height.weight(self._height.lift(height, height.thrust)))
 
     def _aim_height(
         self, lift: _Lift | None, target: Real, state: Real, commands: Rows

@@ -17,7 +17,6 @@ from mambo_codegen.methods.quadratic.height_constants import (
     LEAST_COSINE,
     LEAST_WEIGHT,
     ROW_STATES,
-    STEEPEST_RAD,
     HeightConstants,
 )
 from mambo_codegen.methods.tracker import TargetMotion, Tracker, unknown_motion
@@ -30,9 +29,9 @@ class HeightState:
     """The height of n controllers, (n,) each; up is positive.
 
     height_m, velocity_m_step, disturbance_m_step2, gain: estimates; of the last two the settings choose one.
-    thrust, lagged, command: a, c, u of the model of the thrust in nmpc.c, m/step^2.
+    thrust, lagged, command: sa, sc, su of the model of the thrust in nmpc.c, m/step^2.
     target:      the motion of the target, (n, 1).
-    share:       what the thrust is multiplied by: the gain, and the cosine of the tilt.
+    share:       of the thrust that acts vertically: the cosine of the tilt.
     thrust_m_s2: the last command.
     """
 
@@ -87,7 +86,7 @@ class HeightAxis:
         self._ratio = constant(found.ratio, "ratio")
         self._one, self._cosine_one = constant(1.0, "factor"), constant(1.0, "sine")
         self._half, self._fourth = (constant(term, "sine") for term in COSINE_TERMS)
-        self._steepest, self._least_cosine = constant(STEEPEST_RAD, "angle"), constant(LEAST_COSINE, "sine")
+        self._least_cosine = constant(LEAST_COSINE, "sine")
         self._gravity = constant(found.gravity_m_step2, "acceleration")
         self._per_gravity = constant(found.per_gravity, "per_gravity")
         self._least = constant((LEAST_WEIGHT - 1) * found.gravity_m_step2, "acceleration")
@@ -98,7 +97,6 @@ class HeightAxis:
         self._thrusts_m_s2 = [
             constant(value, "thrust") for value in (height.thrust_min_m_s2, height.thrust_max_m_s2)
         ]
-        self._limit = constant(found.limit_m_step2, "acceleration")
         self._learn_limit = constant(found.learn_limit, "factor" if found.learns_gain else "acceleration")
         self._reach = constant(found.reach_steps, "reach")
         self._margin = constant(FLOOR_MARGIN_M, "position")
@@ -146,8 +144,8 @@ class HeightAxis:
     def steady(self, thrust_m_s2: Real, command_rad: Real) -> HeightState:
         """Return the height of drones with a steady thrust (n,) and the attitude of commands (n, 2)."""
         zeros = np.zeros_like(thrust_m_s2)
-        share = self._products.to_factor(self._cosine(command_rad))
-        command = self._accelerated(share, thrust_m_s2)
+        share = self._cosine(command_rad)
+        command = self._vertical(share, thrust_m_s2)
         return HeightState(
             height_m=zeros,
             velocity_m_step=zeros,
@@ -167,18 +165,14 @@ class HeightAxis:
 
     def set_thrust(self, state: HeightState, thrust_m_s2: Real) -> HeightState:
         """Change the last thrusts to `thrust_m_s2` (n,), within the limits."""
-        change = self._products.step2_product(self._step2, thrust_m_s2 - state.thrust_m_s2)
-        command = state.command + self._products.factor_product(change, state.share)
-        return replace(state, command=clamp(command, self._limit), thrust_m_s2=thrust_m_s2)
+        return replace(state, command=self._vertical(state.share, thrust_m_s2), thrust_m_s2=thrust_m_s2)
 
     def advance(self, state: HeightState) -> HeightState:
         """Let the model of the thrust answer the last command over one control step."""
         row, total = self._thrust_row, self._products.attitude_sum
         thrust = ((row[0] * state.thrust) + (row[1] * state.lagged)) + (row[2] * state.command)
         lagged = (self._lagged_row[0] * state.lagged) + (self._lagged_row[1] * state.command)
-        return replace(
-            state, thrust=clamp(total(thrust), self._limit), lagged=clamp(total(lagged), self._limit)
-        )
+        return replace(state, thrust=total(thrust), lagged=total(lagged))
 
     def measure(
         self, state: HeightState, measured: Real, tilt_rad: Real, has_state: Rows, none_yet: Rows
@@ -187,17 +181,16 @@ class HeightAxis:
 
         tilt_rad (n, 2) compensates the thrust. Returns also which drones (n,) lie on the floor.
         """
-        lies = has_state & (measured[:, 2] != 0) & (state.thrust + state.disturbance_m_step2 <= 0)
+        lies = has_state & (measured[:, 2] != 0) & (self._acceleration(state) <= 0)
         step = self._products.speed_product(measured[:, 1])
+        first, share = has_state & none_yet, self._cosine(tilt_rad)
         started = replace(state, height_m=measured[:, 0], velocity_m_step=step)
         lying = replace(started, velocity_m_step=np.zeros_like(step))
         found = choose(none_yet, started, self._correct(state, measured, step))
         corrected = choose(has_state, choose(lies, lying, found), state)
-        cosine = self._cosine(tilt_rad)
-        share = self._products.to_factor(cosine)
-        if self._found.learns_gain:
-            share = self._products.sine_product(corrected.gain, cosine)
-        return replace(corrected, share=share), lies
+        flown = self._vertical(share, state.thrust_m_s2)
+        steady = replace(corrected, thrust=flown, lagged=flown, command=flown)
+        return replace(choose(first, steady, corrected), share=share), lies
 
     def aim(
         self, state: HeightState, target: Real, measured: Real, follows: Rows, bounds: HeightBounds | None
@@ -224,24 +217,26 @@ class HeightAxis:
             up = confine(bounds.ceiling_m - state.height_m, -bounds.down_m, bounds.up_m)
             down = confine(state.height_m - bounds.floor_m, -bounds.up_m, bounds.down_m)
         limited = confine(error, lead - up, lead + down)
-        least, most = (products.factor_product(thrust, state.share) - self._gravity for thrust in self._thrusts)
+        share = state.share
+        if self._found.learns_gain:
+            share = products.factor_product(share, state.gain)
+        least, most = (products.factor_product(thrust, share) - self._gravity for thrust in self._thrusts)
         values = [
             *(limited, state.velocity_m_step - climb, disturbance, jerk),
-            *(state.thrust, state.lagged, state.command),
+            *(self.lift(state, thrust) for thrust in (state.thrust, state.lagged, state.command)),
         ]
         command = self._minimize(values, least, most)
         rests = (measured[:, 2] != 0) & (goal - measured[:, 0] <= self._margin)
         command = np.where(rests, least, command)
-        inverse = self._inverse("thrust", state.share)
-        thrust = products.factor_product(self._gravity + command, inverse)
-        thrust = products.thrust_product(self._steps2, thrust)
-        new = replace(state, command=command, target=motion, thrust_m_s2=self.limited(thrust))
-        return new, limited != error
+        thrust = products.factor_product(self._gravity + command, self._inverse("thrust", share))
+        thrust = self.limited(products.thrust_product(self._steps2, thrust))
+        command = self._vertical(state.share, thrust)
+        return replace(state, command=command, target=motion, thrust_m_s2=thrust), limited != error
 
     def predict(self, state: HeightState, lies: Rows) -> HeightState:
         """Predict the estimates at the next control step; a drone that lies on the floor stays there."""
         products = self._products
-        acceleration = np.where(lies, 0, state.thrust + state.disturbance_m_step2)
+        acceleration = np.where(lies, 0, self._acceleration(state))
         mean = state.velocity_m_step + products.half_change(acceleration)
         velocity = state.velocity_m_step + products.velocity_change(acceleration)
         return replace(
@@ -275,23 +270,34 @@ class HeightAxis:
     def _cosine(self, tilt_rad: Real) -> Real:
         """Return cos roll cos pitch (n,) of angles (n, 2), at least LEAST_COSINE."""
         product = self._products.sine_product
-        square = self._products.angle_square(clamp(tilt_rad, self._steepest))
+        square = self._products.angle_square(tilt_rad)
         cosine = self._cosine_one - product(square, self._half - product(square, self._fourth))
         both = product(cosine[:, 0], cosine[:, 1])
-        return np.where(both < self._least_cosine, self._least_cosine, both)
+        limited = np.where(both < self._least_cosine, self._least_cosine, both)
+        return self._products.to_factor(limited)
 
-    def _accelerated(self, share: Real, thrust_m_s2: Real) -> Real:
-        """Return the acceleration of the thrust less gravity, m/step^2, (n,)."""
-        product = self._products.factor_product(self._products.step2_product(self._step2, thrust_m_s2), share)
-        return clamp(product - self._gravity, self._limit)
+    def _vertical(self, share: Real, thrust_m_s2: Real) -> Real:
+        """Return the share of a thrust over mass (n,) that acts vertically, m/step^2."""
+        return self._products.factor_product(self._products.step2_product(self._step2, thrust_m_s2), share)
+
+    def lift(self, state: HeightState, thrust: Real) -> Real:
+        """Return the vertical acceleration (n,) of a vertical thrust of the model, less gravity."""
+        if self._found.learns_gain:
+            thrust = self._products.factor_product(thrust, state.gain)
+        lift: Real = thrust - self._gravity
+        return lift
+
+    def _acceleration(self, state: HeightState) -> Real:
+        """Return the vertical acceleration (n,), with that of the disturbance."""
+        lift = self.lift(state, state.thrust)
+        return lift + state.disturbance_m_step2 if self._found.learns_acceleration else lift
 
     def _correct(self, state: HeightState, measured: Real, step: Real) -> HeightState:
         products, position, velocity = self._products, state.height_m, state.velocity_m_step
         height = measured[:, 0]
         if self._age is not None:
             height = height + products.aged_position(self._age, velocity)
-            acceleration = state.thrust + state.disturbance_m_step2
-            step = step + products.aged_velocity(self._age, acceleration)
+            step = step + products.aged_velocity(self._age, self._acceleration(state))
         by = height - position, step - velocity
         gain = self._gain
         corrected = replace(
@@ -302,30 +308,15 @@ class HeightAxis:
         grounded = measured[:, 2] != 0
         if self._found.learns_gain:
             change = products.gain_correction(gain[2][0], by[0], gain[2][1], by[1])
-            return self._learn(corrected, np.where(grounded & (change > 0), 0, change))
+            learnt = state.gain + np.where(grounded & (change > 0), 0, change)
+            least, most = self._one - self._learn_limit, self._one + self._learn_limit
+            return replace(corrected, gain=confine(learnt, least, most))
         if self._found.learns_acceleration:
             change = products.disturbance_correction(gain[2][0], by[0], gain[2][1], by[1])
             change = np.where(grounded & (change > 0), 0, change)
             learnt = clamp(state.disturbance_m_step2 + change, self._learn_limit)
             return replace(corrected, disturbance_m_step2=learnt)
         return corrected
-
-    def _learn(self, state: HeightState, change: Real) -> HeightState:
-        """Change the gain of the thrust, and with it what the model has of the thrust."""
-        gain = confine(state.gain + change, self._one - self._learn_limit, self._one + self._learn_limit)
-        change = gain - state.gain
-
-        def more(acceleration: Real) -> Real:
-            product = self._products.factor_product(self._gravity + acceleration, change)
-            return clamp(acceleration + product, self._limit)
-
-        return replace(
-            state,
-            gain=gain,
-            thrust=more(state.thrust),
-            lagged=more(state.lagged),
-            command=more(state.command),
-        )
 
     def _minimize(self, state: list[Real], least: Real, most: Real) -> Real:
         """Return the first free move (n,) between limits that are not symmetric."""
