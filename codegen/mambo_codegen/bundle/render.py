@@ -185,6 +185,8 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "tracker": method.tracker,
             "limiting": method.limiting,
             **limits_context(method),
+            "fuzz_reals": len(method.state) + len(method.target) + (not method.has_height),
+            "proof_reals": len(method.state) + len(method.target) + (1 - 2 * method.has_height),
             "level_columns": len(method.level_target),
             "feedback": method.feedback_steps is not None,
             "feedback_steps": method.feedback_steps,
