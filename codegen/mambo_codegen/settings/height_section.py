@@ -58,7 +58,7 @@ class Height(SettingsSection):
         description="Largest speed upwards that the controller aims at, in metres per second.",
     )
     descent_m_s: Number = Field(
-        1.5,
+        1.2,
         ge=0.1,
         le=20,
         description="Largest speed downwards that the controller aims at, in metres per second.",

@@ -91,7 +91,9 @@ class AttitudeModel:
 
     def weighed(self, acceleration: Real, weight: Real | None) -> Real:
         """Return accelerations (n, 2) or (2,) times `weight` (n,), if there is one."""
-        return acceleration if weight is None else self._products.factor_product(acceleration, weight[:, None])
+        return (
+            acceleration if weight is None else self._products.factor_product(acceleration, weight[:, None])
+        )
 
     def steady(self, command_rad: Real, weight: Real | None = None) -> AttitudeState:
         """Return the model at the steady attitude of the commands (n, 2)."""

@@ -15,8 +15,8 @@ from mambo_codegen.methods.quadratic.attitude import AttitudeModel
 from mambo_codegen.methods.quadratic.constants import QuadraticConstants
 from mambo_codegen.methods.quadratic.controller import REST_M_S, QuadraticController, QuadraticStep
 from mambo_codegen.methods.quadratic.height_constants import height_context
-from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.height_constants import refusals as height_refusals
+from mambo_codegen.methods.quadratic.height_formats import GAIN_CHANGE
 from mambo_codegen.methods.quadratic.optimizer import ROW
 from mambo_codegen.numbers.representation import COMMAND, THRUST
 from mambo_codegen.settings.key import Refusal
