@@ -24,6 +24,7 @@ from mambo_codegen.bundle.self_test import self_test
 from mambo_codegen.bundle.targets import TARGETS_FOLDER, FirmwareTarget
 from mambo_codegen.bundle.template_cache import TemplateCache
 from mambo_codegen.methods import method_of
+from mambo_codegen.methods.heading import TURN_RAD, TURNS_PER_RAD
 from mambo_codegen.methods.limits_context import limits_context
 from mambo_codegen.numbers import literals
 from mambo_codegen.numbers.fixed_point import SINE_BITS
@@ -195,6 +196,8 @@ def _context(settings: Settings, *, with_digest: bool) -> dict[str, object]:
             "sine_error": SINE_ERRORS[scalar],
             "attitude_limit_rad": ATTITUDE_LIMIT_RAD,
             "yaw_limit_rad": YAW_LIMIT_RAD,
+            "turn_rad": TURN_RAD,
+            "turns_per_rad": TURNS_PER_RAD,
             "vectors": self_test(method),
             "episodes": episode_count(method),
             "ticks": TICKS,

@@ -139,6 +139,17 @@ static void step(nmpc_t *self, const nmpc_real_t input[INPUTS])
     (void)nmpc_step(self, &state, &target, input[11], NULL);
 }
 
+/* Slew any heading by any change. */
+static void slew_heading(void)
+{
+    const nmpc_real_t range_rad = NMPC_YAW_RANGE_RAD;
+    const nmpc_real_t next_rad = nmpc_slew_heading(any_number(), any_number(), any_number());
+
+    (void)range_rad;
+    (void)next_rad;
+    /*@ assert heading_is_within_the_range: -range_rad <= next_rad <= range_rad; */
+}
+
 static void reset(nmpc_t *self, const nmpc_real_t input[INPUTS])
 {
     const nmpc_command_t command = command_of(input);
@@ -185,6 +196,7 @@ static void read_results(const nmpc_t *self)
     (void)nmpc_last_estimate(NULL, &estimate);
     (void)nmpc_last_estimate(self, NULL);
     (void)nmpc_version();
+    slew_heading();
 }
 
 /* Check every stored number: all members of nmpc_t before its single bytes. */
