@@ -44,4 +44,5 @@ def test_slewed_headings_equal_the_reference(name: str, scalar: str) -> None:
 
 def _angle(difference_rad: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return angles (n,) less whole turns."""
-    return np.angle(np.exp(1j * difference_rad))
+    turned: NDArray[np.float64] = np.angle(np.exp(1j * difference_rad))
+    return turned

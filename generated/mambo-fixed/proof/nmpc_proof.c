@@ -155,13 +155,13 @@ static void read_results(const nmpc_t *self)
     (void)nmpc_last_estimate(NULL, &estimate);
     (void)nmpc_last_estimate(self, NULL);
     (void)nmpc_version();
-    slew_heading();
 }
 
 void take_numbers(void)
 {
     nmpc_t controller;
 
+    slew_heading();
     nmpc_init(&controller);
     /* The stored numbers grow from call to call up to their bounds; the hints save Eva coarser guesses. */
     /*@ loop widen_hints "all", -3539225, 3539225, -11744051, 11744051, -20615843, 20615843, -39320788, 39320788, -62212207, 62212207, -62834329, 62834329, -134217728, 134217728, -262144000, 262144000; */

@@ -196,7 +196,6 @@ static void read_results(const nmpc_t *self)
     (void)nmpc_last_estimate(NULL, &estimate);
     (void)nmpc_last_estimate(self, NULL);
     (void)nmpc_version();
-    slew_heading();
 }
 
 /* Check every stored number: all members of nmpc_t before its single bytes. */
@@ -215,6 +214,7 @@ void take_numbers(void)
 {
     nmpc_t controller;
 
+    slew_heading();
     nmpc_init(&controller);
     while (any_int != 0) {
         nmpc_t *self = (any_int != 0) ? &controller : NULL;

@@ -135,7 +135,6 @@ static void read_results(const nmpc_t *self)
     (void)nmpc_has_converged(self);
     (void)nmpc_is_saturated(self);
     (void)nmpc_version();
-    slew_heading();
 }
 
 /* Check every stored number: all members of nmpc_t before its single bytes. */
@@ -154,6 +153,7 @@ void take_numbers(void)
 {
     nmpc_t controller;
 
+    slew_heading();
     nmpc_init(&controller);
     while (any_int != 0) {
         nmpc_t *self = (any_int != 0) ? &controller : NULL;

@@ -379,4 +379,5 @@ def _floating(settings: Settings) -> Scalar:
 def _rows(inputs: StepInputs) -> Array:
     """Join the inputs into rows (n, k), in the order of `step_quantities`."""
     target = inputs.target
+    assert inputs.thrust is not None
     return np.concatenate([inputs.state, target[:, :4], inputs.thrust[:, None], target[:, 4:]], axis=1)
