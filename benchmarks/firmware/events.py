@@ -64,7 +64,8 @@ class Watch:
         """Fly the trajectory by full-state set-points; return what the drone is off, (n, 3)."""
         off = []
         for _ in range(round(1000 * duration_s) // SET_POINT_MS):
-            self.laboratory.full_state(*self.target(begun_s), yaw_rad=heading_rad)
+            position_m, velocity_m_s, acceleration_m_s2 = self.target(begun_s)
+            self.laboratory.full_state(position_m, velocity_m_s, acceleration_m_s2, heading_rad)
             self.run(SET_POINT_MS)
             off.append(self.states[-1][:3] - self.target(begun_s)[0])
         return np.array(off)

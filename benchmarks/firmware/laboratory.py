@@ -4,7 +4,7 @@ import struct
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import cffi
 import numpy as np
@@ -13,7 +13,7 @@ from benchmarks.firmware.build import HERE
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.height_profiles import HOVER_HEIGHT_M
 
-_INTERFACE: Final = cffi.FFI()
+_INTERFACE: Any = cffi.FFI()
 _INTERFACE.cdef(
     "".join(
         line
@@ -106,7 +106,8 @@ class Laboratory:
     @property
     def console(self) -> str:
         """What the firmware has printed."""
-        return _INTERFACE.string(self._library.laboratory_console()).decode()  # type: ignore[union-attr] # bytes
+        printed: bytes = _INTERFACE.string(self._library.laboratory_console())
+        return printed.decode()
 
     def log(self, name: str) -> float:
         """Return a log variable as `group.name`; NaN if there is none."""

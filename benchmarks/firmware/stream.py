@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.firmware.laboratory import ControllerNumber, Laboratory, LaboratoryConditions, Place
 from mambo_sil.drone.plant.arrays import FloatArray
@@ -48,7 +49,7 @@ class Stream:
     acceleration: bool = True
     heading_rad: float = 0.0
 
-    def motion(self, times_s: FloatArray) -> FloatArray:
+    def motion(self, times_s: NDArray[np.floating[Any]]) -> FloatArray:
         """Return position, velocity and acceleration at times (n,) as (n, 3, 3)."""
         target = self.trajectory.target(times_s).reshape(-1, 2, 2)
         level = np.concatenate([target, self.trajectory.acceleration(times_s)[:, np.newaxis]], axis=1)
@@ -100,7 +101,10 @@ def ready(job: Job, *, take_off: bool = True) -> Laboratory:
     """
     conditions, offset, heading_rad = job.conditions, job.offset, job.stream.heading_rad
     x_m, y_m = job.stream.motion(np.zeros(1))[0, 0, :2]
-    changed = {"camera_offset_ms": offset.camera_ms, "seed": conditions.seed + offset.radio_ms}
+    changed: dict[str, Any] = {
+        "camera_offset_ms": offset.camera_ms,
+        "seed": conditions.seed + offset.radio_ms,
+    }
     laboratory = Laboratory(
         job.library, job.controller, replace(conditions, **changed), Place(x_m, y_m, heading_rad)
     )
@@ -147,7 +151,9 @@ def fly(job: Job) -> StreamedFlight:
     return judge(times_s[1:], states, motion[1:, 0], crashed=False)
 
 
-def judge(times_s: FloatArray, states: FloatArray, target_m: FloatArray, *, crashed: bool) -> StreamedFlight:
+def judge(
+    times_s: NDArray[np.floating[Any]], states: FloatArray, target_m: FloatArray, *, crashed: bool
+) -> StreamedFlight:
     """Return the measures of times (n,), states (n, 13) and targets (n, 3)."""
     distance = np.hypot(*(states[:, :2] - target_m[:, :2]).T)
     height = states[:, 2] - target_m[:, 2]

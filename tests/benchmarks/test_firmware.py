@@ -13,7 +13,7 @@ import pytest
 from benchmarks.firmware.__main__ import VARIABLE
 from benchmarks.firmware.build import NoFirmwareError, build
 from benchmarks.firmware.flight_log import write_log
-from benchmarks.firmware.laboratory import Conditions, ControllerNumber
+from benchmarks.firmware.laboratory import ControllerNumber, LaboratoryConditions
 from benchmarks.firmware.one_process import each_in_a_process
 from benchmarks.firmware.stream import OFFSETS, Job, Stream, fly, judge
 from mambo_codegen.settings import presets
@@ -33,7 +33,7 @@ def job() -> Job:
     if clone is None:
         pytest.skip(f"needs a clone of the Crazyflie's firmware: set {VARIABLE}, as --firmware does")
     require("gcc", "gcc")
-    return Job(build(Path(clone), SETTINGS), ControllerNumber.APP, CIRCLE, Conditions(), OFFSETS[4])
+    return Job(build(Path(clone), SETTINGS), ControllerNumber.APP, CIRCLE, LaboratoryConditions(), OFFSETS[4])
 
 
 def test_a_flight_is_the_same_on_every_run(job: Job) -> None:
