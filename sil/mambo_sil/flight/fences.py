@@ -21,8 +21,7 @@ Walls = tuple[float, float, float, float]
 """x_min, y_min, x_max, y_max of a fence, m; infinity for no wall."""
 
 LIMITS: Final = ("speed", "braking", "x_min", "y_min", "x_max", "y_max", "tilt")
-HEIGHT_LIMITS: Final = ("floor", "ceiling", "climb", "descent")
-"""The numbers of nmpc_limits_t, in their order; the last are those of a controller of the height."""
+"""The numbers of nmpc_limits_t, in their order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +48,7 @@ def with_limits(settings: Settings, **changed: float) -> tuple[float, ...]:
         raise FlightError(
             "the settings have no limits: give limits.speed_m_s, limits.braking_m_s2 or a fence"
         )
-    own = dict(zip((*LIMITS, *HEIGHT_LIMITS), limiting.limits.tolist(), strict=False))
+    own = dict(zip(LIMITS, limiting.limits.tolist(), strict=True))
     return tuple((own | changed).values())
 
 

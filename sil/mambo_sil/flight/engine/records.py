@@ -26,9 +26,8 @@ from mambo_sil.drone.vehicles.vehicle_sections import (
 )
 from mambo_sil.flight import altitude_loops
 from mambo_sil.flight.engine.engine_library import record_type
-from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, open_loop_updates, start_state
+from mambo_sil.flight.loop import HEIGHT_REFERENCE_M, LOST_M, Flight, lifting_updates, start_state
 from mambo_sil.flight.names import AltitudeName
-from mambo_sil.flight.thrust_delivery import CAPPED_SHARE
 
 Record = NDArray[Any]
 
@@ -45,11 +44,8 @@ _THRUST: Final = ("thrust_gain", "thrust_late_ticks", "thrust_decay_before", "th
 _MOCAP: Final = ("mocap_period_ticks", "mocap_delay_ticks", "mocap_period_s", "mocap_share")
 
 
-def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = False) -> Record:
-    """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,).
-
-    `lifting` says whether the controllers command the thrust.
-    """
+def simulation_record(flight: Flight, times_s: FloatArray) -> Record:
+    """Return the engine_simulation_t of a simulation whose updates are at `times_s` (k,)."""
     sensors, drone = flight.sensors, flight.vehicle.drone
     nominal, step_s = airframe_of(drone), drone.step_s
     transition, input_gain = instruments.discretize_imu(STEP_S)
@@ -65,7 +61,7 @@ def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = Fa
             "updates": len(times_s),
             "ticks_per_update": flight.ticks_per_update,
             "first_tick": round(times_s[0] / step_s),
-            "open_loop_updates": open_loop_updates(flight, times_s),
+            "lifting_updates": lifting_updates(flight, times_s),
             "disturbed": flight.disturbances.any,
             "windy": flight.disturbances.windy,
             "dropping": bool(np.any(flight.link.dropped_share)),
@@ -74,8 +70,7 @@ def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = Fa
             "derotated": isinstance(sensors, instruments.Sensors) and sensors.derotated,
             "near_ground": flight.disturbances.near_ground,
             "landing": flight.landing.any(),
-            "lifting": lifting,
-            "target_columns": (flight.targets_in_space if lifting else flight.given_targets).shape[2],
+            "target_columns": flight.given_targets.shape[2],
             "step_s": step_s,
             "gravity_m_s2": GRAVITY_M_S2,
             "lost_m": LOST_M,
@@ -86,7 +81,6 @@ def simulation_record(flight: Flight, times_s: FloatArray, *, lifting: bool = Fa
             "weight_n": drone.weight_n,
             "thrust_limit_n": drone.altitude.thrust_max_n,
             "take_off_thrust_n": loops.take_off_thrust_n(drone),
-            "capped_n": CAPPED_SHARE * drone.weight_n,
             "wrench_per_command": wrench_per_command(nominal)[:, 0],
             "nominal_mass_kg": nominal.mass_kg,
             "rotor_offset_m": flight.vehicle.airframe.rotor_offset_m,
