@@ -11,9 +11,9 @@ from mambo_codegen.numbers.gravity import GRAVITY_M_S2
 from mambo_codegen.settings import controller_toml, presets
 from mambo_codegen.settings.key import spell
 from mambo_codegen.settings.model import Settings
+from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.arguments import is_whole, of_shape, require, require_kind, require_path
 from mambo_sil.errors import ArgumentError
-from mambo_sil.flight.api.states import DroneState, TargetState
 from mambo_sil.flight.controllers.compiled import CompiledController
 
 LARGEST_N: Final = 1_000_000

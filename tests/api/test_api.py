@@ -28,14 +28,14 @@ from mambo_nmpc import (
     command_in_frame,
     fly,
 )
+from mambo_sil.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 from mambo_sil.drone.plant.airframe import MAMBO
 from mambo_sil.errors import FlightError
-from mambo_sil.flight.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.trajectories import Circle
 from tests.support.one_norm import ONE_NORM
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "reference" / "python.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
 LEVEL = DroneState(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3)))
 AHEAD = TargetState(np.array([[1.0, 0.0], [0.3, -0.2]]), np.zeros((2, 2)))
 AXES: dict[FrameName, NDArray[np.float64]] = {

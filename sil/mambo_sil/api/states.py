@@ -6,10 +6,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mambo_sil.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 from mambo_sil.arguments import as_numbers
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.errors import ArgumentError
-from mambo_sil.flight.api.frames import FrameName, attitude_to_ned, horizontal_to_ned
 
 
 @dataclass(frozen=True, eq=False, init=False)
