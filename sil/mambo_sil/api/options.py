@@ -19,7 +19,7 @@ class ControllerOptions(TypedDict, total=False):
     acceleration: Literal["none", "given", "tracked"]
     """What the controller knows of the target's acceleration (`target.acceleration`)."""
     tilt_rad: float
-    """Largest command (`limits.tilt_rad`)."""
+    """Largest command (`limits.tilt_rad`); a smaller one without `braking_m_s2` lowers that by as much."""
     speed_m_s: float
     """Largest speed (`limits.speed_m_s`), 0 for none."""
     braking_m_s2: float
@@ -60,6 +60,8 @@ def with_options(settings: Settings, options: ControllerOptions) -> Settings:
             values[KEYS[name]] = value
     if not values:
         return settings
+    if "tilt_rad" in options and "braking_m_s2" not in options:
+        values[KEYS["braking_m_s2"]] = _braking(settings, options["tilt_rad"])
     document: dict[str, Any] = settings.model_dump()
     for key, value in values.items():
         document = controller_toml.with_value(document, key, value)
@@ -67,6 +69,14 @@ def with_options(settings: Settings, options: ControllerOptions) -> Settings:
         return controller_toml.validate(document, "options")
     except InvalidSettingsError as error:
         raise ArgumentError(_in_arguments(str(error))) from None
+
+
+def _braking(settings: Settings, tilt_rad: object) -> float:
+    """Return the braking limit in m/s^2 that goes with a tilt limit: as much less as the tilt is."""
+    limits = settings.limits
+    if not isinstance(tilt_rad, int | float) or not 0.0 < tilt_rad < limits.tilt_rad:
+        return limits.braking_m_s2
+    return limits.braking_m_s2 * tilt_rad / limits.tilt_rad
 
 
 def _in_arguments(text: str) -> str:

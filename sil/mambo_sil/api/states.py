@@ -46,6 +46,14 @@ class DroneState:
             attitude_to_ned(frame, attitude_rad),
         )
 
+    def as_in_frame(self, frame: FrameName) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return position, velocity and attitude in another frame."""
+        return (
+            vectors_to_ned(frame, self.position_m),
+            vectors_to_ned(frame, self.velocity_m_s),
+            attitude_to_ned(frame, self.attitude_rad),
+        )
+
     @property
     def batch(self) -> tuple[int, ...]:
         """The shape of the batch."""
