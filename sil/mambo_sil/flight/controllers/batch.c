@@ -115,6 +115,15 @@ void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_real_t *state, const
         read_outcome(&controllers[i], i, outcome);
     }
 }
+
+void nmpc_batch_set_thrust(nmpc_t *controllers, int n, const nmpc_real_t *thrust_m_s2)
+{
+    int i;
+
+    for (i = 0; i < n; i++) {
+        (void)nmpc_set_thrust(&controllers[i], thrust_m_s2[i]);
+    }
+}
 #else
 void nmpc_batch_step(nmpc_t *controllers, int n, const nmpc_state_t *state, const nmpc_target_t *target,
                             const nmpc_real_t *thrust_acceleration_m_s2, const nmpc_outcome_t *outcome)

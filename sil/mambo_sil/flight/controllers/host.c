@@ -113,7 +113,8 @@ static nmpc_real_t number_of(double value, int bits)
 #endif
 
 /* One step of one controller in SI units, for the engine of the simulation. A controller of the height takes 10 numbers
- * of a state, whose last is not 0 on the floor, and no thrust, but returns it behind the angles. */
+ * of a state, whose last is not 0 on the floor, and 9 of a target; it is told a thrust that is no NaN, and returns the
+ * next one behind the angles. */
 int64_t nmpc_host_step(void *self, const double *state, const double *target,
                        double thrust_acceleration_m_s2, double *command)
 {
@@ -136,14 +137,16 @@ int64_t nmpc_host_step(void *self, const double *state, const double *target,
     measured.pitch_rad = NUMBER(state[5], ANGLE);
     measured.yaw_rad = NUMBER(state[6], YAW);
 #ifdef NMPC_HAS_HEIGHT
-    (void)thrust_acceleration_m_s2;
+    if (thrust_acceleration_m_s2 == thrust_acceleration_m_s2) {
+        (void)nmpc_set_thrust((nmpc_t *)self, NUMBER(thrust_acceleration_m_s2, THRUST));
+    }
     measured.height_m = NUMBER(state[7], POSITION);
     measured.climb_m_s = NUMBER(state[8], VELOCITY);
     measured.grounded = state[9] != 0.0;
-    wanted.height_m = NUMBER(target[LEVEL_NUMBERS], POSITION);
-    wanted.climb_m_s = NUMBER(target[LEVEL_NUMBERS + 1], VELOCITY);
+    wanted.height_m = NUMBER(target[6], POSITION);
+    wanted.climb_m_s = NUMBER(target[7], VELOCITY);
 #ifdef NMPC_HAS_TARGET_ACCELERATION
-    wanted.climb_acceleration_m_s2 = NUMBER(target[LEVEL_NUMBERS + 2], THRUST);
+    wanted.climb_acceleration_m_s2 = NUMBER(target[8], THRUST);
 #endif
     status = nmpc_step((nmpc_t *)self, &measured, &wanted, &given);
     command[2] = THRUST_M_S2(given.thrust_m_s2);
