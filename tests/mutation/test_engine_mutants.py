@@ -76,7 +76,10 @@ def digests(path: Path) -> Iterator[str]:
     """Yield the digests of all flights in the engine at `path`, and of its blocks on any numbers."""
     engine: Any = ffi.dlopen(str(path))
     flights = [flight_of(batch, PERIOD_S) for batch in BATCHES.values()]
-    lifted = [flight_of(BATCHES[name], PERIOD_S) for name in ("space", "flown in space", "truth", "take-off")]
+    lifted = [
+        flight_of(BATCHES[name], PERIOD_S)
+        for name in ("space", "flown in space", "truth", "take-off", "late thrust", "flown take-off")
+    ]
     settings = ONE_NORM
     traces = (
         fly_compiled(engine, flight, controller)

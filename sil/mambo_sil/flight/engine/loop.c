@@ -38,26 +38,15 @@ static inline void mark_lost(const engine_simulation_t *simulation, vehicle_stat
     }
 }
 
-/* The thrust that drones are given in place of that in the trace. */
-static inline void record_thrust(const engine_simulation_t *simulation, int64_t index, int64_t update,
-                                 real_t thrust_m_s2, const engine_trace_t *trace)
-{
-    int lane;
-
-    for (lane = 0; (lane < LANES) && ((index + lane) < simulation->flights); lane++) {
-        write_axes(trace->thrust_acceleration_m_s2, ((index + lane) * simulation->updates) + update, lane, 1,
-                   &thrust_m_s2);
-    }
-}
-
 /* Call the controllers, except of dropped updates, and record the update. The thrust is that of the altitude loop, or
- * what controllers that command it are told. */
+ * what controllers that command it are told; the one recorded is that of the loop, of the controllers or of a take-off. */
 static inline void call(const engine_simulation_t *simulation, const engine_flight_t *flight, int64_t index,
                         int64_t update, const double *targets, const engine_draws_t *draws,
                         engine_controller_t controller, void *self, int64_t stride, const seen_t *truth_now,
                         const seen_t *seen, real_t thrust_m_s2, real_t *held, const engine_trace_t *trace)
 {
-    const int numbers = simulation->lifting ? 3 : 2;
+    const int take_off = update < simulation->open_loop_updates;
+    const real_t lift_m_s2 = splat(simulation->take_off_thrust_n / simulation->nominal_mass_kg);
     const real_t touching = choose(flight->landing & (truth_now->position_m[2] >= 0.0), splat(1.0), splat(0.0));
     const real_t heights[3] = { -seen->position_m[2], -seen->velocity_m_s[2], touching };
     lanes_t command[3] = { { held[0] }, { held[1] }, { held[2] } };
@@ -69,7 +58,7 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
         const int64_t drop = (lane * simulation->updates) + update;
         const int dropped = simulation->dropping && (draws->drops[drop] < lane_of(flight->dropped_share, lane));
         double measured[10];
-        double answer[3];
+        double answer[3] = { 0.0, 0.0, 0.0 };
         int64_t status;
 
         for (i = 0; i < 10; i++) {
@@ -84,7 +73,7 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
         if (dropped) {
             status = -1;
         } else {
-            for (i = 0; i < numbers; i++) {
+            for (i = 0; i < 3; i++) {
                 command[i].lane[lane] = number(answer[i]);
                 held[i] = command[i].real;
             }
@@ -93,7 +82,8 @@ static inline void call(const engine_simulation_t *simulation, const engine_flig
         write_axes(trace->velocity_m_s, row, lane, 3, truth_now->velocity_m_s);
         write_axes(trace->euler_rad, row, lane, 3, truth_now->euler_rad);
         write_axes(trace->command_rad, row, lane, 2, held);
-        write_axes(trace->thrust_acceleration_m_s2, row, lane, 1, simulation->lifting ? &held[2] : &thrust_m_s2);
+        write_axes(trace->thrust_acceleration_m_s2, row, lane, 1,
+                   take_off ? &lift_m_s2 : (simulation->lifting ? &held[2] : &thrust_m_s2));
         trace->status[row] = status;
         if (simulation->sensed) {
             write_axes(trace->seen_position_m, row, lane, 3, seen->position_m);
@@ -260,9 +250,6 @@ void engine_update(const engine_simulation_t *simulation, const engine_flight_t 
             }
             call(simulation, flight, index, update, targets, draws, controller, self, stride, &truth_now, &seen,
                  told_m_s2, flying->command, trace);
-            if (update < simulation->open_loop_updates) {
-                record_thrust(simulation, index, update, thrust_n / simulation->nominal_mass_kg, trace);
-            }
         }
         carry(flight, ticks, flying->command, &flying->wire, arriving);
         wanted_n = simulation->nominal_mass_kg * arriving[2];
