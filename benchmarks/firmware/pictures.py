@@ -12,7 +12,18 @@ from benchmarks.firmware.events import SWING
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.flight.trajectories import vertical_of
 from mambo_sil.results.pictures import save
-from mambo_sil.results.style import BLUE, BROAD, GREEN, INK, ORANGE, PAGE_INCHES, TARGET, VERMILION, style
+from mambo_sil.results.style import (
+    BLUE,
+    BROAD,
+    GREEN,
+    INK,
+    ORANGE,
+    PAGE_INCHES,
+    TARGET,
+    THIN,
+    VERMILION,
+    style,
+)
 
 TITLES: Final = {DESIGN: "app", "mellinger": "Mellinger", "lee": "Lee", "pid": "PID"}
 LOOKS: Final[dict[str, dict[str, Any]]] = {
@@ -76,7 +87,7 @@ def _draw_events(paths: Paths, stem: Path) -> None:
             height.plot(path[:, 0] - 6.0, path[:, 3], **look)
         time_s = np.linspace(0.0, 10.0, 200)
         swing.plot(time_s, vertical_of(SWING, time_s + 5.0)[:, 0], color=TARGET, linewidth=BROAD, zorder=1)
-        step.axhline(1.0, color=INK, linewidth=0.5)
+        step.axhline(1.0, color=INK, linewidth=THIN)
         step.set(xlim=(-0.5, 5.0), xlabel="time after the step, s", ylabel="x, m", title="a step of 1 m")
         swing.set(xlabel="time, s", ylabel="height, m", title="a height that swings, drone of 36 g")
         away.set(

@@ -348,7 +348,7 @@ def _unknown(draw: st.DrawFn, values: Values) -> Broken:
         return Broken(
             f"{toml(others)}{section} = 3\n", section, " = 3 ", f"must be a section; write [{section}]"
         )
-    word = name if what == "key" else section
+    word = name if what == "key" else section.partition(".")[0]
     place = draw(st.integers(0, len(word) - 1))
     word = word[:place] + draw(st.sampled_from("_xyz")) + word[place:]
     if what == "key":

@@ -110,7 +110,7 @@ def refusals(settings: Sections, tilted: TiltAcceleration) -> list[Refusal]:
             Refusal("limits", "speed_m_s", f"must be at most {ranges.velocity_m_s!r} (ranges.velocity_m_s)")
         )
     most_m_s2 = tilted.at(settings.limits.tilt_rad)
-    if limits.braking_m_s2 > most_m_s2:
+    if limits.braking_m_s2 and limits.braking_m_s2 > most_m_s2:
         rule = (
             f"must be at most {math.floor(most_m_s2 * 1000) / 1000:g}, the deceleration at "
             f"limits.tilt_rad = {limits.tilt_rad:g}"
