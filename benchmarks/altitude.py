@@ -13,23 +13,19 @@ the thrust in place of that of the command.
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, astuple, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from benchmarks.feedforward import FLIGHTS, PERIOD_S, SEED, Judged, choose, row, search
+from benchmarks.feedforward import Judged, choose, drawn_flights, row, search
 from benchmarks.markdown import table
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.experiment.campaign.campaign_file import CampaignFile, distributions, load_its_drone, scenario
-from mambo_sil.experiment.campaign.parameters import draw
 from mambo_sil.flight.altitude_loops import AltitudeLaw, HeightGains, pid_altitude_gains
 from mambo_sil.flight.controllers.pd import pd_controller
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine.simulate import fly
 from mambo_sil.flight.loop import Flight
 from mambo_sil.flight.metrics import measure
-from mambo_sil.flight.scenario import flight_of
 
 CURVES: Final[dict[str, dict[str, Any]]] = {
     "tilted-circle": {"size_m": {"uniform": [0.5, 1.0]}, "rate_rad_s": {"uniform": [0.5, 1.5]}},
@@ -39,20 +35,6 @@ CURVES: Final[dict[str, dict[str, Any]]] = {
 DURATION_S: Final = 15.0
 FIRST: Final = HeightGains(25.0, 9.0, 12.0)
 """Where the search begins: two thirds more than the Crazyflie's own loop has, and an integral."""
-
-
-def drawn_flights(count: int = FLIGHTS, vehicle: str = vehicle_toml.DEFAULT) -> list[Flight]:
-    """Return `count` flights of a drone on each curve."""
-    found = []
-    for curve, drawn in CURVES.items():
-        section = {"trajectory": curve, "duration_s": DURATION_S, **drawn}
-        file = CampaignFile.model_validate({"seed": SEED, "flight": section})
-        file, drone = load_its_drone(file, Path(), "the search", vehicle)
-        parameters = distributions(file.flight, file.draws)
-        shared = file.flight.model_dump() | {"vehicle": drone.model_dump()}
-        scenarios = [scenario(shared, draw(SEED, number, parameters)) for number in range(count)]
-        found.append(flight_of(scenarios, PERIOD_S))
-    return found
 
 
 def judge(flights: Sequence[Flight], law: AltitudeLaw) -> Judged:
@@ -71,7 +53,7 @@ def judge(flights: Sequence[Flight], law: AltitudeLaw) -> Judged:
 def main() -> None:
     """Print the vehicle's own loop, that with feed-forward, the least error and the chosen gains."""
     vehicle = (sys.argv[1:] or [vehicle_toml.DEFAULT])[0]
-    flights = drawn_flights(vehicle=vehicle)
+    flights = drawn_flights(CURVES, DURATION_S, vehicle=vehicle)
     stock, feedforward = (judge(flights, AltitudeLaw(name)) for name in ("stock", "feedforward"))
     found: dict[HeightGains, Judged] = {}
     for gains, judged in search(

@@ -15,7 +15,7 @@ whose error is at most `SLACK` times the least one, that with the smallest comma
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
@@ -93,11 +93,17 @@ class Judged:
         return math.prod(self.variations) ** (1.0 / len(self.variations))
 
 
-def drawn_flights(count: int = FLIGHTS, vehicle: str = vehicle_toml.DEFAULT) -> list[Flight]:
-    """Return `count` flights of a drone on each curve."""
+def drawn_flights(
+    curves: Mapping[str, Mapping[str, Any]] = CURVES,
+    duration_s: float = DURATION_S,
+    *,
+    count: int = FLIGHTS,
+    vehicle: str = vehicle_toml.DEFAULT,
+) -> list[Flight]:
+    """Return `count` flights of a drone on each of `curves`, with what is drawn for it."""
     found = []
-    for curve, drawn in CURVES.items():
-        section = {"trajectory": curve, "duration_s": DURATION_S, **drawn}
+    for curve, drawn in curves.items():
+        section = {"trajectory": curve, "duration_s": duration_s, **drawn}
         file = CampaignFile.model_validate({"seed": SEED, "flight": section})
         file, drone = load_its_drone(file, Path(), "the search", vehicle)
         parameters = distributions(file.flight, file.draws)

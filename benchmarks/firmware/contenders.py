@@ -24,7 +24,7 @@ class FirmwareController:
 
     name: str
     number: ControllerNumber
-    library: Path
+    image: Path
 
 
 def app_settings() -> dict[str, Settings]:

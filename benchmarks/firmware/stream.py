@@ -60,7 +60,7 @@ class Stream:
 class Job:
     """A flight: who flies what, in which conditions, at which offset of the clocks."""
 
-    library: Path
+    image: Path
     controller: ControllerNumber
     stream: Stream
     conditions: LaboratoryConditions
@@ -106,7 +106,7 @@ def ready(job: Job, *, take_off: bool = True) -> Laboratory:
         "seed": conditions.seed + offset.radio_ms,
     }
     laboratory = Laboratory(
-        job.library, job.controller, replace(conditions, **changed), Place(x_m, y_m, heading_rad)
+        job.image, job.controller, replace(conditions, **changed), Place(x_m, y_m, heading_rad)
     )
     laboratory.run(1000)
     if not take_off:

@@ -96,9 +96,7 @@ def fly_streams(
         say(title)
         figures[title] = {}
         for contender in flown_by:
-            jobs = [
-                Job(contender.library, contender.number, stream, conditions, offset) for offset in OFFSETS
-            ]
+            jobs = [Job(contender.image, contender.number, stream, conditions, offset) for offset in OFFSETS]
             flights: list[StreamedFlight] = each_in_a_process(fly, jobs)
             figures[title][contender.name] = {
                 "crashed": sum(flight.crashed for flight in flights),
@@ -125,7 +123,7 @@ def fly_events(flown_by: Iterable[FirmwareController], say: Say) -> tuple[Figure
                 continue
             asked = replace(conditions, parameters=parameters)
             jobs = [
-                Job(contender.library, contender.number, Stream(Hover()), asked, offset) for offset in OFFSETS
+                Job(contender.image, contender.number, Stream(Hover()), asked, offset) for offset in OFFSETS
             ]
             flights = each_in_a_process(functools.partial(_happen, title), jobs)
             names = flights[0].figures
@@ -142,7 +140,7 @@ def replay_all(apps: Iterable[FirmwareController]) -> Figures:
     with tempfile.TemporaryDirectory() as folder:
         for app in apps:
             path = Path(folder) / f"{app.name}.csv"
-            job = Job(app.library, app.number, EIGHT, STANDARD, OFFSETS[4])
+            job = Job(app.image, app.number, EIGHT, STANDARD, OFFSETS[4])
             each_in_a_process(functools.partial(write_log, job), [path])
             settings = app_settings()[app.name]
             replayed = summarise(replay_log(path, {}, settings), path.name, app.name, settings.digest)

@@ -1288,7 +1288,7 @@ NMPC_INLINE void advance(nmpc_t *self, const nmpc_state_t *state, const nmpc_tar
     nmpc_target_t limited;
     const nmpc_target_t *aim = NULL;
 
-    /* One by one: of an initialiser compilers make a call. */
+    /* One by one: for an initialiser some compilers call memset. */
     limited.position_m[0] = (nmpc_real_t)0;
     limited.position_m[1] = (nmpc_real_t)0;
     limited.velocity_m_s[0] = (nmpc_real_t)0;

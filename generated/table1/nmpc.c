@@ -98,7 +98,7 @@ NMPC_INLINE nmpc_bits_t bits_of(nmpc_real_t value)
  * numbers takes the place of two of floats; the shift lets a Cortex-M drop the sign in the comparison itself. */
 #define NMPC_MAGNITUDE_BITS(value) ((bits_of(value) & 0x7FFFFFFFUL) << 1)
 
-/* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. `minimum` must be positive. */
+/* 1 if `minimum` <= `value` <= `maximum`, else 0; 0 for NaN. `minimum` must be positive, `maximum` not negative. */
 NMPC_INLINE int between(nmpc_real_t value, nmpc_real_t minimum, nmpc_real_t maximum)
 {
     return (bits_of(value) >= bits_of(minimum)) && (bits_of(value) <= bits_of(maximum));

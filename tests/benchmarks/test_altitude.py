@@ -1,13 +1,14 @@
 """The search for the gains of the altitude loop `pid`."""
 
-from benchmarks.altitude import CURVES, drawn_flights, judge
+from benchmarks.altitude import CURVES, DURATION_S, judge
+from benchmarks.feedforward import drawn_flights
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.altitude_loops import AltitudeLaw, pid_altitude_gains
 
 
 def test_the_flights_have_heights_and_the_shipped_gains_follow_closest() -> None:
     """Drawn, with sensors; on the first six of each curve the errors fall from law to law."""
-    flights = drawn_flights(6, "crazyflie")
+    flights = drawn_flights(CURVES, DURATION_S, count=6, vehicle="crazyflie")
     assert len(flights) == len(CURVES)
     assert all(flight.sensors is not None and flight.given_targets.shape[2] == 9 for flight in flights)
     errors = [judge(flights, AltitudeLaw(name)).error for name in ("stock", "feedforward", "pid")]

@@ -56,7 +56,7 @@ def test_the_calmest_of_the_closest_is_chosen() -> None:
 
 def test_the_flights_are_those_of_a_campaign() -> None:
     """Drawn, with sensors; on the first two of each curve the shipped gains fly closer from law to law."""
-    flights = drawn_flights(2)
+    flights = drawn_flights(count=2)
     assert len({flight.seeds for flight in flights}) == 1
     assert all(flight.sensors is not None and flight.disturbances.windy for flight in flights)
     errors_m_s = [judge(flights, gains).error for gains in (None, GAINS, pid_gains()["mambo"])]

@@ -232,3 +232,20 @@ def build(folder: Path) -> Built:
 def folder_of(settings: Settings, folder: Path) -> Path:
     """Write the target for `settings` into `folder`."""
     return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)
+
+
+def send(app: Crazyflie, x: float, speed: float = 0.0, acceleration: float = 0.0) -> None:
+    """Send a set-point along x."""
+    app.aim(np.array([x, 0.0, speed, 0.0, acceleration, 0.0]))
+
+
+def content(setpoint: Any) -> list[Any]:
+    """Return the members of a set-point that the app could change."""
+    mode, attitude = setpoint.mode, setpoint.attitude
+    values = [mode.x, mode.y, mode.z, mode.roll, mode.pitch, mode.yaw, attitude.roll, attitude.pitch]
+    return [*values, setpoint.position.x, setpoint.velocity.x, setpoint.thrust]
+
+
+def flown_since(app: Crazyflie, state: FloatArray, updates: int) -> list[tuple[float, float]]:
+    """Return what flies in the next updates, in a state that does not change."""
+    return [app.update(state) for _ in range(updates)]

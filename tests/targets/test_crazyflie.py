@@ -4,7 +4,6 @@ import itertools
 import math
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from mambo_codegen.bundle.targets import TARGETS
 from mambo_codegen.errors import InvalidSettingsError
 from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import to_toml, with_option
-from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Vehicle
 from mambo_sil.drone.vehicles import vehicle_toml
 from mambo_sil.flight.controllers.compiled import CompiledController
@@ -32,8 +30,11 @@ from tests.support.crazyflie import (
     Fleet,
     build,
     compile_host,
+    content,
+    flown_since,
     folder_of,
     link,
+    send,
 )
 from tests.support.one_norm import ONE_NORM
 from tests.support.shell import shell
@@ -73,12 +74,6 @@ GIVEN_MUTANTS = {
     "given x": ("rests ? 0.0f : ax", "rests ? 0.0f : -ax"),
     "given y": ("rests ? 0.0f : -ay", "rests ? 0.0f : ay"),
 }
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
-    """Return the target for its preset, compiled."""
-    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("crazyflie")))
 
 
 def flight_of(apps: int) -> Flight:
@@ -152,13 +147,6 @@ def test_other_set_points_go_to_the_firmware_unchanged(mode: str, built: Built) 
         assert content(app.flown) == content(app.setpoint)
 
 
-def content(setpoint: Any) -> list[Any]:
-    """Return the members of a set-point that the app could change."""
-    mode, attitude = setpoint.mode, setpoint.attitude
-    values = [mode.x, mode.y, mode.z, mode.roll, mode.pitch, mode.yaw, attitude.roll, attitude.pitch]
-    return [*values, setpoint.position.x, setpoint.velocity.x, setpoint.thrust]
-
-
 def test_height_and_yaw_stay_with_the_firmware(built: Built) -> None:
     """Of a set-point of ours only x, y, roll and pitch change."""
     app = built.app()
@@ -172,11 +160,6 @@ def test_height_and_yaw_stay_with_the_firmware(built: Built) -> None:
     assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, 30.0)
     assert (app.flown.mode.z, app.flown.mode.yaw) == (app.host.modeAbs, app.host.modeAbs)
     assert (app.flown.mode.roll, app.flown.mode.pitch) == (app.host.modeAbs, app.host.modeAbs)
-
-
-def flown_since(app: Crazyflie, state: FloatArray, updates: int) -> list[tuple[float, float]]:
-    """Return what flies in the next updates, in a state that does not change."""
-    return [app.update(state) for _ in range(updates)]
 
 
 def test_a_take_over_begins_anew_at_the_present_attitude(built: Built) -> None:
@@ -396,230 +379,6 @@ def test_the_deepest_call_is_within_the_stack(tmp_path: Path) -> None:
 def short(title: str) -> str:
     """Return the name of a function without the file that it is static in."""
     return title.rpartition(":")[2]
-
-
-def send(app: Crazyflie, x: float, speed: float = 0.0, acceleration: float = 0.0) -> None:
-    """Send a set-point along x."""
-    app.aim(np.array([x, 0.0, speed, 0.0, acceleration, 0.0]))
-
-
-def test_a_slow_set_point_is_carried_on_for_half_a_second(built: Built) -> None:
-    """At its age by the clock, though half of the ticks are lost; then it rests."""
-    app = built.app()
-    app.modes("modeAbs")
-    send(app, 1.0, 0.5, 0.2)
-    app.place(np.zeros(7))
-    for age_ms in range(0, 700, 2):
-        app.tick()
-        app.time_ms += 1
-        if age_ms % 10 == 0:
-            age_s = 0.001 * min(age_ms, 500)
-            assert app.logged("age") == age_ms
-            assert app.logged("targetX") == pytest.approx(1.0 + 0.5 * age_s + 0.1 * age_s**2, abs=1e-6)
-            speed = 0.5 + 0.2 * age_s if age_ms < 500 else 0.0
-            assert app.logged("targetVx") == pytest.approx(speed, abs=1e-6)
-    assert app.logged("step") % 2**16 > 0
-
-
-def test_a_stream_of_set_points_that_ends_is_noticed(built: Built) -> None:
-    """After 120 ms where they came every 10 ms: the set-point rests before the supervisor levels out."""
-    app = built.app()
-    app.modes("modeAbs")
-    for k in range(500):
-        send(app, 0.005 * k, 0.5)
-        app.update(np.zeros(7))
-    for age_ms in range(10, 200, 10):
-        app.update(np.zeros(7))
-        assert app.logged("age") == age_ms
-        assert app.logged("targetVx") == (pytest.approx(0.5, abs=0.01) if age_ms < 120 else 0.0)
-
-
-def test_lost_ticks_cost_no_steps(built: Built) -> None:
-    """A step every 10 ms of the clock, whatever the task missed."""
-    app = built.app()
-    app.modes("modeAbs")
-    send(app, 0.0)
-    app.place(np.zeros(7))
-    before = app.logged("step")
-    for number in range(1000):
-        app.tick()
-        app.time_ms += number % 3
-    assert app.logged("step") - before == pytest.approx(200, abs=2)
-
-
-def test_an_acceleration_that_is_not_given_is_estimated(built: Built) -> None:
-    """From the velocities of set-points that come ten times a second: near that of the circle, and smooth."""
-    app = built.app()
-    app.modes("modeAbs")
-    app.place(np.zeros(7))
-    found = []
-    for k in range(100):
-        speed = 0.75 * math.cos(0.15 * k)
-        if k % 10 == 0:
-            send(app, 0.5 * math.sin(0.15 * k / 10), 0.75 * math.cos(0.15 * k / 10))
-        flown_since(app, np.zeros(7), 1)
-        found.append(app.logged("targetAx"))
-        assert abs(speed) <= 0.75
-    wanted = [-1.125 * math.sin(0.15 * k / 10) for k in range(100)]
-    assert max(abs(a - b) for a, b in zip(found[30:], wanted[30:], strict=True)) < 0.35
-    send(app, 0.0)
-    flown_since(app, np.zeros(7), 1)
-    assert app.logged("targetAx") == 0.0, "a set-point at rest has none"
-
-
-@pytest.mark.parametrize(
-    "number", ["position.x", "position.z", "velocity.y", "acceleration.z", "attitude.yaw"]
-)
-def test_a_number_that_is_not_finite_refuses_the_whole_set_point(number: str, built: Built) -> None:
-    """The one before flies on, with its height and heading; the log counts it."""
-    app = built.app()
-    app.modes("modeAbs")
-    app.setpoint.mode.yaw = app.host.modeAbs
-    app.setpoint.position.z, app.setpoint.attitude.yaw = 1.25, 30.0
-    send(app, 0.5)
-    flown_since(app, np.zeros(7), 2)
-    refused = app.logged("refused")
-    part, member = number.split(".")
-    for value in (math.nan, math.inf):
-        send(app, 0.7)
-        app.setpoint.position.z, app.setpoint.attitude.yaw = 1.5, 40.0
-        setattr(getattr(app.setpoint, part), member, value)
-        flown_since(app, np.zeros(7), 10)
-        assert app.logged("status") == 3
-        assert app.logged("targetX") == 0.5
-        assert (app.flown.position.z, app.flown.attitude.yaw) == (1.25, 30.0)
-        setattr(getattr(app.setpoint, part), member, 0.0)
-    assert app.logged("refused") == refused + 20
-
-
-def test_a_first_set_point_that_is_not_finite_stays_here(built: Built) -> None:
-    """At the place and the heading of the drone."""
-    app = built.app()
-    app.modes("modeAbs")
-    app.setpoint.position.x = math.nan
-    here = np.array([0.3, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
-    app.update(here)
-    assert (app.logged("targetX"), app.logged("targetY")) == pytest.approx((0.3, 0.2))
-    assert app.flown.position.z == 1.0
-
-
-def test_every_kind_of_set_point_flies_in_one_mode(built: Built) -> None:
-    """The PID controller resets itself at a change of mode: the heading of a quaternion becomes an angle."""
-    app = built.app()
-    app.modes("modeAbs")
-    app.setpoint.mode.yaw = app.host.modeAbs
-    app.setpoint.attitude.yaw = 50.0
-    app.update(np.zeros(7))
-    first = content(app.flown)
-    app.setpoint.mode.yaw, app.setpoint.mode.quat = app.host.modeDisable, app.host.modeAbs
-    app.setpoint.attitude.yaw = 0.0
-    app.setpoint.attitudeQuaternion.w = math.cos(math.radians(25.0))
-    app.setpoint.attitudeQuaternion.z = math.sin(math.radians(25.0))
-    app.update(np.zeros(7))
-    assert content(app.flown) == first
-    assert app.flown.mode.quat == app.host.modeDisable
-    assert app.flown.attitude.yaw == pytest.approx(50.0, abs=1e-4)
-
-
-def test_a_heading_is_carried_on_by_its_rate(built: Built) -> None:
-    """A full-state set-point gives it."""
-    app = built.app()
-    app.modes("modeAbs")
-    app.setpoint.mode.yaw = app.host.modeAbs
-    app.setpoint.attitude.yaw, app.setpoint.attitudeRate.yaw = 50.0, 100.0
-    send(app, 0.0)
-    for _ in range(101):
-        app.tick()
-    assert app.flown.attitude.yaw == pytest.approx(60.0)
-
-
-def test_on_the_ground_it_flies_level(built: Built) -> None:
-    """While the supervisor sees no flight, and within 5 cm of the height of take-off."""
-    app = built.app()
-    app.modes("modeAbs")
-    send(app, 2.0)
-    steps = app.logged("step")
-    app.host.host_is_flying = False
-    app.state.position.z = 0.4
-    assert app.tick() == (0.0, 0.0)
-    app.host.host_is_flying = True
-    for height_m in (0.41, 0.44, 0.36):
-        app.state.position.z = height_m
-        assert app.tick() == (0.0, 0.0)
-        assert app.flown.mode.x == app.host.modeDisable
-    assert app.logged("step") == steps
-    app.state.position.z = 0.46
-    assert app.tick() != (0.0, 0.0)
-    app.host.host_is_flying = False
-    app.state.position.z = 0.0
-    app.tick()
-
-
-def measured_for(app: Crazyflie, milliseconds: int, measuring: bool) -> None:
-    """Fly on with a camera at 100 Hz, or without: variances fall at a measurement and grow between."""
-    for k in range(milliseconds):
-        grown = [1.002 * value for value in app.host.host_variances]
-        app.host.host_variances = [1e-5, 1e-4] if measuring and k % 10 == 0 else grown
-        app.tick()
-
-
-def test_a_lost_position_is_told_and_ends_on_the_floor(built: Built) -> None:
-    """After 0.3 s without a measurement: it brakes, descends, stops the motors, and waits for the pilot."""
-    app = built.app()
-    app.modes("modeAbs")
-    send(app, 0.5)
-    app.place(np.zeros(7))
-    measured_for(app, 1000, measuring=True)
-    assert (app.logged("lost"), app.logged("status")) == (0, 0)
-    measured_for(app, 250, measuring=False)
-    assert app.logged("lost") == 0
-    measured_for(app, 100, measuring=False)
-    assert (app.logged("lost"), app.logged("targetVx")) == (1, 0.0)
-    assert "position lost: braking" in app.console
-    measured_for(app, 1000, measuring=False)
-    assert app.flown.mode.z == app.host.modeAbs
-    measured_for(app, 300, measuring=False)
-    assert app.logged("lost") == 2
-    assert (app.flown.attitude.roll, app.flown.attitude.pitch) == (0.0, 0.0)
-    assert app.flown.mode.z == app.host.modeVelocity
-    assert app.flown.velocity.z == pytest.approx(-0.4)
-    measured_for(app, 5000, measuring=False)
-    assert app.logged("lost") == 3
-    assert (app.flown.mode.z, app.flown.thrust) == (app.host.modeDisable, 0.0)
-    measured_for(app, 1000, measuring=True)
-    assert app.logged("lost") == 3, "a position that comes back starts no motor"
-    app.modes("modeVelocity")
-    measured_for(app, 20, measuring=True)
-    app.modes("modeAbs")
-    measured_for(app, 20, measuring=True)
-    assert app.logged("lost") == 0
-    assert app.flown.mode.z == app.host.modeAbs
-
-
-def test_a_position_that_comes_back_is_flown_on(built: Built) -> None:
-    """Before the descent has begun."""
-    app = built.app()
-    app.modes("modeAbs")
-    send(app, 0.5)
-    app.place(np.zeros(7))
-    measured_for(app, 200, measuring=True)
-    measured_for(app, 800, measuring=False)
-    assert app.logged("lost") == 1
-    measured_for(app, 30, measuring=True)
-    assert (app.logged("lost"), app.logged("status")) == (0, 0)
-
-
-def test_without_a_position_no_flight_begins(built: Built) -> None:
-    """The motors stay off."""
-    app = built.app()
-    app.modes("modeAbs")
-    send(app, 0.5)
-    app.host.host_is_flying = False
-    app.state.position.z = 0.0
-    app.host.host_variances = [100.0, 0.01]
-    measured_for(app, 400, measuring=False)
-    assert app.logged("lost") == 1
-    assert (app.flown.mode.z, app.flown.thrust) == (app.host.modeDisable, 0.0)
 
 
 def test_kbuild_lists_every_source_with_the_flag(built: Built) -> None:

@@ -1,10 +1,7 @@
 """The scripts of the Crazyflie's app: their calls to cflib, what they refuse, what they fly in simulation."""
 
-import builtins
-import importlib
 import itertools
 import math
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -13,49 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mambo_codegen.bundle.render import render_target
-from mambo_codegen.bundle.targets import TARGETS
-from mambo_codegen.settings import presets
 from mambo_codegen.settings.controller_toml import with_option
-from mambo_codegen.settings.model import Settings
-from tests.support.bundles import place
 from tests.support.radio import ARMED, CAN_FLY, FLYING, Clock, Drone, install
+from tests.support.scripts import SETTINGS, modules_of, run, without, write
 
-SETTINGS = presets.preset("crazyflie")
-MODULES = ("fly", "figures", "radio", "simulated_drone")
 PLACE = (1.0, -0.5, 0.1)
 """Where the drone stands: x, y, height of the floor."""
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of the target."""
-    return write(SETTINGS, tmp_path_factory.mktemp("app"))
-
-
-def write(settings: Settings, folder: Path) -> Path:
-    """Write the target for `settings` into `folder`."""
-    return place(render_target(settings, TARGETS["crazyflie"], with_digest=False), folder)
-
-
-@pytest.fixture
-def scripts(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, ModuleType]:
-    """Return the modules of the folder, imported anew, in an empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return modules_of(folder, monkeypatch)
-
-
-def modules_of(folder: Path, patch: pytest.MonkeyPatch) -> dict[str, ModuleType]:
-    """Import the modules of a folder."""
-    patch.syspath_prepend(str(folder))
-    patch.setattr(sys, "dont_write_bytecode", True)
-    for name in MODULES:
-        patch.delitem(sys.modules, name, raising=False)
-    found = {name: importlib.import_module(name) for name in MODULES}
-    for name in MODULES:
-        patch.delitem(sys.modules, name)
-        patch.setitem(sys.modules, name, found[name])
-    return found
 
 
 @pytest.fixture
@@ -79,13 +39,6 @@ def drone(scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch) -> Dr
     for name in ("fly", "radio"):
         monkeypatch.setattr(scripts[name], "time", clock)
     return found
-
-
-def run(scripts: dict[str, ModuleType], *arguments: str) -> int:
-    """Run fly.py with arguments; return its exit code."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["fly.py", *arguments])
-        return int(scripts["fly"].main())
 
 
 PREPARED = ["set_value", "stop"]
@@ -400,18 +353,6 @@ def test_a_figure_that_is_too_fast_or_has_no_log_is_refused(
     assert not drone.calls
 
 
-def without(patch: pytest.MonkeyPatch, package: str) -> None:
-    """Make a package one that is not installed."""
-    original = builtins.__import__
-
-    def guarded(name: str, *arguments: Any, **options: Any) -> Any:
-        if name.partition(".")[0] == package:
-            raise ModuleNotFoundError(f"No module named {name!r}")
-        return original(name, *arguments, **options)
-
-    patch.setattr(builtins, "__import__", guarded)
-
-
 def test_without_cflib_it_says_what_to_install(
     scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -419,77 +360,6 @@ def test_without_cflib_it_says_what_to_install(
     without(monkeypatch, "cflib")
     assert run(scripts, "hover") == 1
     assert capsys.readouterr().err.endswith("pip install cflib.\n")
-
-
-@pytest.mark.parametrize(
-    "arguments", [("eight",), ("circle", "--stream"), ("goto", "--heading", "120"), ("hover",)]
-)
-def test_a_simulated_flight_makes_the_same_calls(
-    arguments: tuple[str, ...], scripts: dict[str, ModuleType], capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It follows what they ask for, lands, and leaves the log of a flight, in metres and degrees."""
-    assert run(scripts, *arguments, "--simulate", "--laps", "1") == 0
-    printed = capsys.readouterr().out
-    assert "simulated on crazyflie through motion capture" in printed
-    assert "it landed" in printed
-    rows = np.genfromtxt("flight.csv", delimiter=",", names=True)
-    for axis in "xy":
-        error = rows[f"ctrltarget{axis}"] - rows[f"stateEstimate{axis}"]
-        assert np.abs(error).max() < 0.02
-    extent = {"eight": (0.99, 0.49), "circle": (0.99, 0.99), "goto": (0.99, 0.0), "hover": (0.0, 0.0)}[
-        arguments[0]
-    ]
-    for axis, most in zip("xy", extent, strict=True):
-        assert rows[f"ctrltarget{axis}"].max() == pytest.approx(most, abs=0.02)
-    assert rows["stateEstimatez"].max() == pytest.approx(0.8, abs=0.05)
-    assert rows["stateEstimatez"][-1] == pytest.approx(0.0, abs=0.02)
-    if "--heading" in arguments:
-        assert np.median(rows["stateEstimateyaw"]) == pytest.approx(120.0, abs=1.0)
-
-
-def test_the_simulated_planner_moves_as_the_firmware_s(scripts: dict[str, ModuleType], folder: Path) -> None:
-    """From rest to rest, a go_to in motion without a jump, and a set-point that is carried on."""
-    flown = scripts["simulated_drone"].SimulatedDrone(folder, "crazyflie")
-    flown.takeoff(1.0, 2.0, yaw=None)
-    flown.wait(3.0)
-    flown.go_to(2.0, -1.0, 1.0, 0.0, 4.0)
-    flown.wait(2.0)
-    flown.go_to(0.0, 0.0, 1.5, 0.0, 3.0)
-    flown.wait(5.0)
-    flown.send_full_state_setpoint(
-        [1.0, 2.0, 1.5], [0.5, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], 0, 0, 0
-    )
-    flown.wait(0.1)
-    assert flown.vertical([0.0, 1.0, 2.0])[1] == pytest.approx([0.5, 1.09375, 0.0])
-    (before,), (after,) = flown.target([5.0 - 1e-6]), flown.target([5.0 + 1e-6])
-    assert before == pytest.approx([1.0, 0.5, 1.09375, 0.546875], abs=1e-4)
-    assert after == pytest.approx(before, abs=1e-4)
-    assert flown.acceleration([5.0 + 1e-6])[0] == pytest.approx(flown.acceleration([5.0 - 1e-6])[0], abs=1e-3)
-    assert flown.target([9.0])[0] == pytest.approx([0.0, 0.0, 0.0, 0.0], abs=1e-9)
-    assert flown.target([10.1])[0] == pytest.approx([1.051, -2.0, 0.52, 0.0])
-
-
-def test_without_mambo_nmpc_the_simulation_says_what_to_install(
-    scripts: dict[str, ModuleType], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """In one sentence; the other arguments need no mambo_nmpc."""
-    without(monkeypatch, "mambo_nmpc")
-    assert run(scripts, "hover", "--simulate") == 1
-    assert capsys.readouterr().err.startswith("No flight: --simulate needs mambo-nmpc")
-
-
-def test_a_simulation_of_other_settings_or_vehicles_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A controller.toml that was changed after generate; a vehicle that is not known."""
-    folder = write(SETTINGS, tmp_path / "app")
-    scripts = modules_of(folder, monkeypatch)
-    assert run(scripts, "hover", "--simulate", "crazyfly") == 1
-    assert "crazyfly" in capsys.readouterr().err
-    settings = folder / "controller.toml"
-    settings.write_text(settings.read_text("utf-8").replace("tilt_rad = 0.5", "tilt_rad = 0.4"), "utf-8")
-    assert run(scripts, "hover", "--simulate") == 1
-    assert "run mambo-nmpc generate again" in capsys.readouterr().err
 
 
 def test_scripts_have_the_prefix_and_what_given_accelerations_need(

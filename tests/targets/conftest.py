@@ -1,0 +1,28 @@
+"""The Crazyflie's app and its scripts, generated once for the tests of a module."""
+
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from tests.support.crazyflie import Built, build, folder_of
+from tests.support.scripts import SETTINGS, modules_of, write
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """Return the app for preset crazyflie, compiled."""
+    return build(folder_of(SETTINGS, tmp_path_factory.mktemp("crazyflie")))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the target."""
+    return write(SETTINGS, tmp_path_factory.mktemp("app"))
+
+
+@pytest.fixture
+def scripts(folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, ModuleType]:
+    """Return the modules of the folder, imported anew, in an empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return modules_of(folder, monkeypatch)
