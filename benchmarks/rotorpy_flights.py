@@ -23,6 +23,9 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.markdown import table
 from mambo_codegen.settings import controller_toml, presets
+from mambo_sil.api.api_controller import Controller
+from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
+from mambo_sil.api.states import DroneState, TargetState
 from mambo_sil.drone.plant import loops
 from mambo_sil.drone.plant.arrays import FloatArray
 from mambo_sil.drone.plant.vehicle import Seen
@@ -30,9 +33,6 @@ from mambo_sil.drone.sensors.mocap import MocapSuite, MotionCapture
 from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
 from mambo_sil.drone.vehicles.vehicle_sections import MocapSensors
 from mambo_sil.drone.vehicles.vehicle_toml import read
-from mambo_sil.flight.api.api_controller import Controller
-from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
-from mambo_sil.flight.api.states import DroneState, TargetState
 from mambo_sil.flight.names import CurveName
 from mambo_sil.flight.trajectories import CURVES
 from mambo_sil.model.derive.derived_settings import controller_text

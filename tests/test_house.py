@@ -15,10 +15,10 @@ SOURCE_ROOTS = {"mambo_codegen": "codegen", "mambo_nmpc": "sil", "mambo_sil": "s
 LONGEST_MODULE = 500
 # Rooms whose results must have the same bits on every processor, and what of them only draws or prints.
 _MANY = ("campaign", "faults", "table2")
-EXACT_ROOMS = ("drone", "flight", "board.pil", *(f"experiment.{name}" for name in _MANY))
+EXACT_ROOMS = ("api", "drone", "flight", "board.pil", *(f"experiment.{name}" for name in _MANY))
 ROUNDED = {
     "mambo_sil.flight.animation",
-    "mambo_sil.flight.api.frames",
+    "mambo_sil.api.frames",
     "mambo_sil.experiment.faults.faults_report",
 }
 # NumPy and math have these with other bits on other processors.

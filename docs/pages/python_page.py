@@ -7,12 +7,15 @@ import mambo_nmpc
 MEMBERS: Final = {"Vehicle": ["from_preset", "from_file"]}
 """What is public of a class that has more than a program should use."""
 
+MODULES: Final = ("mambo_nmpc.curves",)
+"""Modules with public names of their own."""
+
 INTRODUCTION: Final = """\
 # Python API
 
-All public names of `mambo_nmpc`; [From Python](python.md) shows them at work. The arrays have the drones
-along the first axis. `mambo_codegen` and `mambo_sil` are importable too, but may change with any
-version.
+All public names of `mambo_nmpc`; [From Python](python.md) shows them at work. n is the number of drones,
+(...) the shape of a batch of them. `mambo_codegen` and `mambo_sil` are importable too, but may change with
+any version.
 """
 
 
@@ -24,4 +27,4 @@ def python_page() -> str:
         + (f"    options:\n      members: {MEMBERS[name]}\n" if name in MEMBERS else "")
         for name, home in homes.items()
     ]
-    return "\n".join([INTRODUCTION, *blocks])
+    return "\n".join([INTRODUCTION, *blocks, *(f"::: {name}\n" for name in MODULES)])

@@ -2,8 +2,9 @@
 
     from mambo_nmpc import Controller, DroneState, TargetState, Vehicle, fly
 
-runs generated C from Python (docs/reference/python.md). `mambo_codegen` generates C from settings and
-`mambo_templates`; `mambo_sil` simulates flights with that C, and tests it.
+runs generated C from Python (docs/reference/python.md); `mambo_nmpc.curves` has curves to fly.
+`mambo_codegen` generates C from settings and `mambo_templates`; `mambo_sil` simulates flights with that C,
+and tests it.
 """
 
 import importlib
@@ -11,19 +12,23 @@ from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from mambo_codegen.errors import MamboNmpcError
+    from mambo_sil.api.api_controller import Controller
+    from mambo_sil.api.flights import Flown, fly
+    from mambo_sil.api.frames import attitude_of_quaternion, command_in_frame
+    from mambo_sil.api.options import ControllerOptions
+    from mambo_sil.api.outcome import StepOutcome
+    from mambo_sil.api.states import DroneState, TargetState
     from mambo_sil.drone.plant.vehicle import Vehicle
     from mambo_sil.errors import ArgumentError
-    from mambo_sil.flight.api.api_controller import Controller
-    from mambo_sil.flight.api.flights import Flown, fly
-    from mambo_sil.flight.api.frames import attitude_of_quaternion, command_in_frame
-    from mambo_sil.flight.api.states import DroneState, TargetState
 
 __all__ = [
     "ArgumentError",
     "Controller",
+    "ControllerOptions",
     "DroneState",
     "Flown",
     "MamboNmpcError",
+    "StepOutcome",
     "TargetState",
     "Vehicle",
     "attitude_of_quaternion",
@@ -33,15 +38,17 @@ __all__ = [
 
 _HOMES: Final = {
     "ArgumentError": "mambo_sil.errors",
-    "Controller": "mambo_sil.flight.api.api_controller",
-    "DroneState": "mambo_sil.flight.api.states",
-    "Flown": "mambo_sil.flight.api.flights",
+    "Controller": "mambo_sil.api.api_controller",
+    "ControllerOptions": "mambo_sil.api.options",
+    "DroneState": "mambo_sil.api.states",
+    "Flown": "mambo_sil.api.flights",
     "MamboNmpcError": "mambo_codegen.errors",
-    "TargetState": "mambo_sil.flight.api.states",
+    "StepOutcome": "mambo_sil.api.outcome",
+    "TargetState": "mambo_sil.api.states",
     "Vehicle": "mambo_sil.drone.plant.vehicle",
-    "attitude_of_quaternion": "mambo_sil.flight.api.frames",
-    "command_in_frame": "mambo_sil.flight.api.frames",
-    "fly": "mambo_sil.flight.api.flights",
+    "attitude_of_quaternion": "mambo_sil.api.frames",
+    "command_in_frame": "mambo_sil.api.frames",
+    "fly": "mambo_sil.api.flights",
 }
 """The module of each name: imported at its first use, so that the command line starts at once."""
 

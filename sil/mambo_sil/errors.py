@@ -7,6 +7,10 @@ class ArgumentError(MamboNmpcError, ValueError):
     """An argument of a Python call is wrong; the message names argument, value and what is allowed."""
 
 
+class PackageError(MamboNmpcError, ImportError):
+    """A package that only an adapter needs is missing; the message names the command that installs it."""
+
+
 class TrajectoryError(MamboNmpcError):
     """A trajectory is invalid; the message names file, line and rule."""
 

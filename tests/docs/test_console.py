@@ -14,6 +14,7 @@ NAMES = [str(page.relative_to(DOCS)) for page in RUN]
 LONG = {
     *(f"tutorials/{name}.md" for name in ("crazyflie", "first-flight", "own-drone", "paper")),
     *(f"how-to/{name}.md" for name in ("campaign", "check", "crazyflie", "design", "footprint", "identify")),
+    *(f"how-to/{name}.md" for name in ("gymnasium", "rotorpy")),
     *(f"how-to/{name}.md" for name in ("identify-binary", "regress", "replay", "report", "tune", "verify")),
 }
 """Pages whose commands take two seconds or more of an idle core."""
@@ -30,7 +31,13 @@ NOT_RUN = {
     "how-to/arduino.md": ("needs arduino-cli",),
     "how-to/campaign.md": ("needs a cluster; tests of their own start one",),
     "how-to/crazyflie.md": ("needs the firmware of Bitcraze, and a Crazyflie",),
+    "how-to/crazyflow.md": ("it installs", "needs crazyflow and JAX"),
     "how-to/espidf.md": ("needs ESP-IDF",),
+    "how-to/gym-pybullet-drones.md": (
+        "it installs",
+        "needs gym-pybullet-drones, which is not on PyPI",
+    ),
+    "how-to/gymnasium.md": ("it installs",),
     "how-to/identify.md": ("needs a Crazyflie",),
     "how-to/mambo.md": ("needs the toolbox of MathWorks or MIT",),
     "how-to/measure.md": ("needs a board, or QEMU with its firmware",),
@@ -41,6 +48,7 @@ NOT_RUN = {
     ),
     "how-to/platformio.md": ("needs PlatformIO",),
     "how-to/replay.md": ("needs the log of a Crazyflie",),
+    "how-to/rotorpy.md": ("it installs",),
     "how-to/tune.md": ("it installs",),
     "how-to/verify.md": ("takes minutes; tests of their own run every check",),
     "tutorials/crazyflie.md": (
@@ -64,6 +72,8 @@ def test_every_command_of_a_page_prints_what_the_page_says(name: str, tmp_path: 
         require(tool, package)
     if name in {"how-to/design.md", "how-to/tune.md"}:
         require_module("optuna")
+    if name in {"how-to/gymnasium.md", "how-to/rotorpy.md"}:
+        require_module(Path(name).stem)
     found = faults(read(DOCS / name), tmp_path)
     assert not found, "\n\n".join(found)
 

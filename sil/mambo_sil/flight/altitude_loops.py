@@ -84,10 +84,16 @@ class AltitudeLaw:
 
 
 class AltitudeLoop:
-    """The altitude loop of n drones, which is called at every tick; its memory is the integral (n,) in N."""
+    """The altitude loop of n drones; its memory is the integral (n,) in N.
 
-    def __init__(self, law: AltitudeLaw, drone: VehicleFile, flights: int) -> None:
+    `step_s` is the time between two calls, without it the tick of the drone.
+    """
+
+    def __init__(
+        self, law: AltitudeLaw, drone: VehicleFile, flights: int, step_s: float | None = None
+    ) -> None:
         self._law, self._drone, self._gains = law.name, drone, law.gains_for(drone)
+        self._step_s = drone.step_s if step_s is None else step_s
         self.integral_n = np.zeros(flights)
 
     def thrust_n(self, wanted: Vertical, seen: Seen) -> FloatArray:
@@ -107,7 +113,7 @@ class AltitudeLoop:
         _, (cos_roll, cos_pitch) = sine_cosine(seen.euler_rad[:2])
         thrust_n = upwards_n / np.maximum(cos_roll * cos_pitch, LEAST_LEVEL)
         free = (np.abs(error_m) < INTEGRATED_ERROR_M) & (np.abs(thrust_n) < most_n)
-        grown_n = self.integral_n + drone.step_s * ((mass_kg * gains.integral_1_s3) * error_m)
+        grown_n = self.integral_n + self._step_s * ((mass_kg * gains.integral_1_s3) * error_m)
         limit_n = INTEGRAL_SHARE * drone.weight_n
         self.integral_n = np.where(free, np.clip(grown_n, -limit_n, limit_n), self.integral_n)
         return np.asarray(np.clip(thrust_n, -most_n, most_n))

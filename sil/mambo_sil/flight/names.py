@@ -41,6 +41,7 @@ STARTS: Final[tuple[Start, ...]] = get_args(Start)
 SENSORS_NAMES: Final[tuple[SensorsName, ...]] = get_args(SensorsName)
 ENGINE_NAMES: Final[tuple[EngineName, ...]] = get_args(EngineName)
 CURVE_NAMES: Final[tuple[str, ...]] = get_args(CurveName)
+ALTITUDE_NAMES: Final[tuple[AltitudeName, ...]] = get_args(AltitudeName)
 IN_SPACE: Final = CURVE_NAMES[6:]
 """Curves with a height."""
 _UNTIMED: Final = ("hover", "step", "height-step", "take-off-and-landing")

@@ -1,6 +1,6 @@
 """The compiled controller: the generated C with the interface of the reference controller."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -141,9 +141,25 @@ class CompiledController:
         """
         inputs = as_arrays(self._method, self.n, state, target, thrust_acceleration_m_s2)
         outcome = empty_outcome(self._method, self.n, np.intc)
-        addresses = ffi.new("void *[]", [_address(values) for values in outcome.values()])
-        self._library.nmpc_batch_step(self._controllers, self.n, *map(_address, inputs), addresses)
+        self.stepper(inputs, outcome)()
         return self._method.make_step(outcome)
+
+    def stepper(
+        self, inputs: Sequence[NDArray[Any]], outcome: Mapping[str, NDArray[Any]]
+    ) -> Callable[[], None]:
+        """Return a function that steps all controllers, from arrays of `as_arrays` into `empty_outcome`'s.
+
+        Each call reads what is in `inputs` then, and overwrites `outcome`.
+        """
+        given = [_address(values) for values in inputs]
+        results = [_address(values) for values in outcome.values()]
+        addresses = ffi.new("void *[]", results)
+        function, controllers, n = self._library.nmpc_batch_step, self._controllers, self.n
+
+        def step(kept: object = results) -> None:  # noqa: ARG001 - keeps the arrays of the results alive
+            function(controllers, n, *given, addresses)
+
+        return step
 
     def _demand_limits(self) -> None:
         if self._method.limiting is None:

@@ -68,7 +68,7 @@ def build_library(settings: Settings, toolchain: Toolchain) -> Any:
 
         return render(settings, with_digest=False)
 
-    key = ("settings", _generator_digest(), settings.model_dump_json())
+    key = ("settings", generator_digest(), settings.model_dump_json())
     return _load(key, files, toolchain)
 
 
@@ -100,7 +100,7 @@ def _text(name: str) -> str:
 
 
 @lru_cache
-def _generator_digest() -> str:
+def generator_digest() -> str:
     """Return a hash of everything that turns settings into C."""
     hasher = hashlib.sha256()
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mambo_codegen.settings.key import spell
+from mambo_sil.api.api_controller import Controller
 from mambo_sil.arguments import (
     is_whole,
     require,
@@ -19,7 +20,6 @@ from mambo_sil.arguments import (
 from mambo_sil.drone.plant.arrays import PerFlight
 from mambo_sil.drone.plant.disturbances import Disturbances
 from mambo_sil.drone.plant.vehicle import Vehicle
-from mambo_sil.flight.api.api_controller import Controller
 from mambo_sil.flight.controllers.compiled import CompiledController
 from mambo_sil.flight.crashes import detect_crashes
 from mambo_sil.flight.engine import simulate

@@ -7,6 +7,8 @@ Ours is NED with a body that is forward, right, down. Angles are Z-Y-X: yaw, the
 | NED   | x north, y east, z down               | forward, right, down | PX4, ours           |
 | ENU   | x east, y north, z up                 | forward, left, up   | ROS (REP 103)       |
 | NWU   | x north or ahead, y west or left, z up | forward, left, up   | Crazyflie, RotorPy  |
+
+Each conversion is its own inverse: it leads from the frame to NED and from NED to the frame.
 """
 
 import math
@@ -25,34 +27,50 @@ FRAMES: Final[tuple[FrameName, ...]] = get_args(FrameName)
 LENGTH_TOLERANCE: Final = 1e-3
 """Largest difference of a quaternion's length from 1."""
 
+_AXES: Final = {"NED": [0, 1, 2], "ENU": [1, 0, 2], "NWU": [0, 1, 2]}
+_SIGNS: Final = {
+    "NED": np.array([1.0, 1.0, 1.0]),
+    "ENU": np.array([1.0, 1.0, -1.0]),
+    "NWU": np.array([1.0, -1.0, -1.0]),
+}
 
-def horizontal_to_ned(frame: FrameName, vectors: ArrayLike, name: str = "vectors") -> FloatArray:
-    """Return x and y in NED (..., 2) of vectors (..., 2) or (..., 3) in another world frame.
+
+def vectors_to_ned(frame: FrameName, vectors: ArrayLike, name: str = "vectors") -> FloatArray:
+    """Return vectors (..., 2) or (..., 3) of another world frame in NED, with as many columns.
 
     Raises ArgumentError for another frame, and for other shapes; it calls the vectors `name`.
     """
     require_choice("frame", frame, FRAMES)
-    x, y = _columns(name, vectors, 2, 3)[:2]
-    match frame:
-        case "NED":
-            return np.stack([x, y], axis=-1)
-        case "ENU":
-            return np.stack([y, x], axis=-1)
-        case "NWU":
-            return np.stack([x, -y], axis=-1)
+    array = _with_columns(name, vectors, 2, 3)
+    if frame == "NED":
+        return array
+    columns = array.shape[-1]
+    return np.asarray(array[..., _AXES[frame][:columns]] * _SIGNS[frame][:columns])
 
 
 def attitude_to_ned(frame: FrameName, attitude_rad: ArrayLike) -> FloatArray:
     """Return roll, pitch, yaw (..., 3) in NED of those in another frame; raises ArgumentError."""
     require_choice("frame", frame, FRAMES)
-    roll, pitch, yaw = _columns("attitude_rad", attitude_rad, 3)
+    array = _with_columns("attitude_rad", attitude_rad, 3)
+    if frame == "NED":
+        return array
+    converted = array.copy()
+    converted[..., 1] = -array[..., 1]
+    converted[..., 2] = yaw_to_ned(frame, array[..., 2])
+    return converted
+
+
+def yaw_to_ned(frame: FrameName, yaw_rad: ArrayLike) -> FloatArray:
+    """Return headings (...) in NED of those in another frame; raises ArgumentError."""
+    require_choice("frame", frame, FRAMES)
+    yaw = as_numbers("yaw_rad", yaw_rad)
     match frame:
         case "NED":
-            return np.stack([roll, pitch, yaw], axis=-1)
+            return yaw
         case "ENU":
-            return np.stack([roll, -pitch, math.pi / 2.0 - yaw], axis=-1)
+            return np.asarray(math.pi / 2.0 - yaw)
         case "NWU":
-            return np.stack([roll, -pitch, -yaw], axis=-1)
+            return np.asarray(-yaw)
 
 
 def command_in_frame(frame: FrameName, command_rad: ArrayLike) -> FloatArray:
@@ -61,8 +79,13 @@ def command_in_frame(frame: FrameName, command_rad: ArrayLike) -> FloatArray:
     Raises ArgumentError for a frame other than NED, ENU and NWU, and for other shapes.
     """
     require_choice("frame", frame, FRAMES)
-    roll, pitch = _columns("command_rad", command_rad, 2)
-    return np.stack([roll, pitch if frame == "NED" else -pitch], axis=-1)
+    array = _with_columns("command_rad", command_rad, 2)
+    return array if frame == "NED" else np.asarray(array * [1.0, -1.0])
+
+
+def wrapped(angle_rad: ArrayLike) -> FloatArray:
+    """Return angles (...) within -pi..pi."""
+    return np.asarray(np.remainder(np.asarray(angle_rad) + math.pi, 2.0 * math.pi) - math.pi)
 
 
 def attitude_of_quaternion(quaternion: ArrayLike) -> FloatArray:
@@ -70,7 +93,7 @@ def attitude_of_quaternion(quaternion: ArrayLike) -> FloatArray:
 
     NaN gives NaN. Raises ArgumentError for a length other than 1, and for other shapes.
     """
-    x, y, z, w = _columns("quaternion", quaternion, 4)
+    x, y, z, w = np.moveaxis(_with_columns("quaternion", quaternion, 4), -1, 0)
     with np.errstate(over="ignore"):
         length = np.sqrt(x * x + y * y + z * z + w * w)
     off = np.abs(length - 1.0) > LENGTH_TOLERANCE
@@ -81,10 +104,10 @@ def attitude_of_quaternion(quaternion: ArrayLike) -> FloatArray:
     return np.stack([roll, pitch, yaw], axis=-1)
 
 
-def _columns(name: str, values: ArrayLike, *counts: int) -> FloatArray:
-    """Return the last axis of an array first; raises ArgumentError unless its length is one of `counts`."""
+def _with_columns(name: str, values: ArrayLike, *counts: int) -> FloatArray:
+    """Return an array; raises ArgumentError unless the length of its last axis is one of `counts`."""
     array = as_numbers(name, values)
     if array.ndim == 0 or array.shape[-1] not in counts:
         allowed = " or ".join(f"(..., {count})" for count in counts)
         raise ArgumentError(f"{name}: has shape {array.shape}; it must be {allowed}")
-    return np.moveaxis(array, -1, 0)
+    return array

@@ -1,0 +1,267 @@
+"""Controllers for programs: the generated C of some settings, compiled for this machine, for n drones."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, Self, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mambo_codegen.methods import method_of
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.numbers.representation import STATE, THRUST
+from mambo_codegen.settings import controller_toml, presets
+from mambo_codegen.settings.key import spell
+from mambo_codegen.settings.model import Settings
+from mambo_sil.api.height_hold import HeightHold
+from mambo_sil.api.options import ControllerOptions, with_options
+from mambo_sil.api.outcome import StepOutcome
+from mambo_sil.api.states import DroneState, TargetState
+from mambo_sil.arguments import as_numbers, is_whole, of_shape, require, require_kind, require_path
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.errors import ArgumentError
+from mambo_sil.flight.controllers.compiled import CompiledController, empty_outcome
+from mambo_sil.flight.controllers.controller_library import generator_digest
+from mambo_sil.model.derive.derived_settings import controller_text
+
+LARGEST_N: Final = 1_000_000
+
+_RETURNED: Final = ("command_rad", "status", "saturated", "cost", "plan_rad", "active")
+"""The results of a step in C that a program gets."""
+
+
+class Controller:
+    """n independent controllers with the same settings; the first call of `step` needs no past.
+
+    The C is generated and compiled when the controller is made, and cached; that needs a C compiler.
+    Pickling, `copy.deepcopy` too, saves settings and state, and refuses the state of other C.
+    Raises BuildError and CacheError if it cannot be, ArgumentError for wrong arguments.
+    """
+
+    def __init__(self, settings: Settings, n: int = 1, height: HeightHold | None = None) -> None:
+        require_kind("settings", settings, Settings, "Settings; from_preset and from_file read them")
+        require(is_whole(n, 1, LARGEST_N), "n", n, f"be a whole number in 1..{LARGEST_N}")
+        self.settings, self.n = settings, n
+        self._compiled = CompiledController(settings, n)
+        self._method = method_of(settings)
+        self._results = {result.name: result for result in self._method.results}
+        self._outcome = empty_outcome(self._method, n, np.intc)
+        self._inputs = self._empty_inputs()
+        self._step = self._compiled.stepper(self._inputs, self._outcome)
+        self._height = height
+
+    @classmethod
+    def from_vehicle(cls, vehicle: str | Path, n: int = 1, **options: Unpack[ControllerOptions]) -> Self:
+        """Return controllers with the settings that `design` derives from a drone: a name, or a vehicle.toml.
+
+        Raises SourceNotFoundError, UnreadableFileError, and InvalidSettingsError with all broken rules.
+        """
+        drone = _read_vehicle(vehicle)
+        settings = controller_toml.parse(controller_text(drone, drone.name), f"settings for {drone.name}")
+        return cls._made(settings, n, drone, options)
+
+    @classmethod
+    def from_preset(
+        cls, name: str, n: int = 1, *, vehicle: str | Path | None = None, **options: Unpack[ControllerOptions]
+    ) -> Self:
+        """Return controllers with the settings of a preset; raises SourceNotFoundError.
+
+        vehicle: the drone of the altitude loop that `height` names; without `height` it has no use.
+        """
+        require_kind("name", name, str, f"one of {', '.join(presets.names())}")
+        return cls._made(
+            presets.preset(name), n, None if vehicle is None else _read_vehicle(vehicle), options
+        )
+
+    @classmethod
+    def from_file(
+        cls,
+        path: str | Path,
+        n: int = 1,
+        *,
+        vehicle: str | Path | None = None,
+        **options: Unpack[ControllerOptions],
+    ) -> Self:
+        """Return controllers with the settings of a controller.toml.
+
+        vehicle: as for `from_preset`.
+        Raises UnreadableFileError, and InvalidSettingsError with all broken rules.
+        """
+        require_path("path", path, "a controller.toml")
+        drone = None if vehicle is None else _read_vehicle(vehicle)
+        return cls._made(controller_toml.read(Path(path)), n, drone, options)
+
+    @classmethod
+    def _made(cls, settings: Settings, n: int, drone: VehicleFile | None, options: ControllerOptions) -> Self:
+        """Return controllers with options; raises ArgumentError."""
+        changed = with_options(settings, options)
+        controller, name = cls(changed, n), options.get("height")
+        if name is not None:
+            if drone is None:
+                raise ArgumentError(
+                    f"height = {name!r} must have a vehicle beside it, whose thrust it commands"
+                )
+            controller._height = HeightHold(name, drone, changed, n)
+        return controller
+
+    @property
+    def update_period_s(self) -> float:
+        """The time from one call of `step` to the next; a command holds until the next."""
+        return self.settings.horizon.update_period_s
+
+    def step(
+        self, state: DroneState, target: TargetState, thrust_acceleration_m_s2: ArrayLike | None = None
+    ) -> StepOutcome:
+        """Return the next commands of n drones; call it once in every update period.
+
+        state, target: in batches of the same shape, of n drones together.
+        thrust_acceleration_m_s2: thrust over mass, of the shape of the batch or one value for all; without it
+                                  9.81. With `height` the controller knows it.
+
+        Raises ArgumentError for records of another number of drones, for other shapes, for targets without
+        acceleration where the settings have `target.acceleration = "given"`, and for states or targets
+        without z where an altitude loop holds the height.
+        """
+        batch = self._batch(state, target)
+        thrust_m_s2 = yaw_rad = None
+        if self._height is None:
+            given = GRAVITY_M_S2 if thrust_acceleration_m_s2 is None else thrust_acceleration_m_s2
+            thrusts = of_shape("thrust_acceleration_m_s2", given, (), batch).reshape(-1)
+        else:
+            left_out = thrust_acceleration_m_s2 is None
+            rule = "be left out: an altitude loop commands it"
+            require(left_out, "thrust_acceleration_m_s2", thrust_acceleration_m_s2, rule)
+            thrusts, yaws = self._height.step(state, target)
+            thrust_m_s2, yaw_rad = thrusts.reshape(batch), yaws.reshape(batch)
+        aims = self._aims(target)
+        states, targets, thrust_numbers = self._inputs
+        with np.errstate(over="ignore"):  # infinity, which the C refuses
+            places = _columns(state.position_m, state.velocity_m_s) + _columns(state.attitude_rad, count=3)
+            self._write(states, STATE, places)
+            self._write(targets, self._method.target, _columns(*aims))
+            thrust_numbers[:] = self._method.numbers.quantize(thrusts[:, np.newaxis], THRUST)[:, 0]
+        self._step()
+        return StepOutcome(
+            **{name: self._in_si(name, batch) for name in _RETURNED if name in self._outcome},
+            thrust_m_s2=thrust_m_s2,
+            yaw_rad=yaw_rad,
+        )
+
+    def reset(self, command_rad: ArrayLike = (0.0, 0.0), which: ArrayLike | None = None) -> NDArray[np.int64]:
+        """Forget the past; the drones hold the attitudes of `command_rad`, one pair for all or (..., 2).
+
+        Call it before the first step after a pause. `which` chooses drones by truth values, of the shape of a
+        batch. Returns a status (n,), 0 unless a command is refused.
+        """
+        commands, chosen = self._commands(command_rad), self._chosen(which)
+        saved = self._compiled.instances.copy()
+        status = self._compiled.reset(commands)
+        self._compiled.instances[~chosen] = saved[~chosen]
+        if self._height is not None:
+            self._height.reset(chosen)
+        return np.where(chosen, status, 0)
+
+    def set_command(self, command_rad: ArrayLike) -> NDArray[np.int64]:
+        """Tell that `command_rad`, one pair for all or (..., 2), was sent in place of the last commands.
+
+        Returns a status (n,). Raises ArgumentError for a 1-norm, whose C has no such function.
+        """
+        if self._method.setter != "set_command":
+            norm = self.settings.cost.norm
+            raise ArgumentError(
+                f'set_command needs cost.norm = "quadratic"; that of the controller is {spell(norm)}'
+            )
+        return self._compiled.set_command(self._commands(command_rad))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {
+            "settings": self.settings,
+            "n": self.n,
+            "height": self._height,
+            "generator": generator_digest(),
+            "instances": self._compiled.instances.tobytes(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Controller.__init__(self, state["settings"], state["n"], state["height"])
+        instances = self._compiled.instances
+        if (state["generator"], len(state["instances"])) != (generator_digest(), instances.nbytes):
+            raise ArgumentError("state: was saved by another version, whose C may keep other numbers")
+        instances[:] = np.frombuffer(state["instances"], np.uint8).reshape(instances.shape)
+
+    def _batch(self, state: DroneState, target: TargetState) -> tuple[int, ...]:
+        """Return the shape of the batch; raises ArgumentError for records that do not fit."""
+        require_kind("state", state, DroneState, "a DroneState")
+        require_kind("target", target, TargetState, "a TargetState")
+        batch = state.batch
+        for name, shape in (("state", batch), ("target", target.batch)):
+            if (drones := math.prod(shape)) != self.n:
+                raise ArgumentError(f"{name}: has {drones} drones; the controller was made for {self.n}")
+        if target.batch != batch and self.n > 1:
+            raise ArgumentError(f"target: has a batch of shape {target.batch}; that of the state is {batch}")
+        return batch
+
+    def _aims(self, target: TargetState) -> list[NDArray[np.float64]]:
+        """Return what the controller knows of its target; raises ArgumentError if it is not told enough."""
+        aims = [target.position_m, target.velocity_m_s]
+        if self.settings.target.acceleration == "given":
+            if target.acceleration_m_s2 is None:
+                raise ArgumentError(
+                    'target: acceleration_m_s2 is missing; the settings have target.acceleration = "given"'
+                )
+            aims.append(target.acceleration_m_s2)
+        return aims
+
+    def _empty_inputs(self) -> list[NDArray[Any]]:
+        """Return the arrays that the C reads: states (n, 7), targets (n, 4) or (n, 6), thrusts (n,)."""
+        shapes = (self.n, len(STATE)), (self.n, len(self._method.target)), (self.n,)
+        return [np.empty(shape, self._method.numbers.scalar) for shape in shapes]
+
+    def _write(
+        self, numbers: NDArray[Any], quantities: Sequence[str], columns: list[NDArray[np.float64]]
+    ) -> None:
+        """Write columns (n,) in SI units into numbers (n, k) of the C."""
+        if self._method.numbers.bits is not None:
+            numbers[:] = self._method.numbers.quantize(np.stack(columns, axis=-1), quantities)
+            return
+        for number, column in enumerate(columns):  # faster than all at once
+            numbers[:, number] = column
+
+    def _in_si(self, name: str, batch: tuple[int, ...]) -> NDArray[Any]:
+        """Return a copy of a result of the last step, in SI units and with the shape of a batch."""
+        numbers, result = self._outcome[name], self._results[name]
+        values = self._method.numbers.to_si(numbers, *result.quantities) if result.quantities else numbers
+        owned = values.astype(values.dtype if result.quantities else result.count_type)
+        return owned.reshape((*batch, *result.shape))
+
+    def _commands(self, command_rad: ArrayLike) -> NDArray[np.float64]:
+        """Return commands (n, 2) of one pair, or of a batch; raises ArgumentError."""
+        array = as_numbers("command_rad", command_rad)
+        if array.shape == (2,):
+            return np.broadcast_to(array, (self.n, 2))
+        if array.shape[-1:] != (2,) or array.size != 2 * self.n:
+            raise ArgumentError(f"command_rad: has shape {array.shape}; it must be (2,) or {(self.n, 2)}")
+        return array.reshape(self.n, 2)
+
+    def _chosen(self, which: ArrayLike | None) -> NDArray[np.bool_]:
+        """Return which drones (n,) are meant; raises ArgumentError."""
+        if which is None:
+            return np.ones(self.n, np.bool_)
+        array = np.asarray(which)
+        good = array.dtype == np.bool_ and array.size == self.n
+        require(good, "which", which, f"be {self.n} truth values, one for each drone")
+        return array.reshape(self.n)
+
+
+def _columns(*batches: NDArray[np.float64], count: int = 2) -> list[NDArray[np.float64]]:
+    """Return the first columns (n,) of each of several batches of vectors."""
+    flat = [values.reshape(-1, values.shape[-1]) for values in batches]
+    return [values[:, column] for values in flat for column in range(count)]
+
+
+def _read_vehicle(vehicle: str | Path) -> VehicleFile:
+    """Return the drone of a name or file, as `design` does; raises ArgumentError for what is neither."""
+    require_path("vehicle", vehicle, f"a vehicle.toml, or one of {', '.join(vehicle_toml.names())}")
+    return vehicle_toml.read(vehicle) if isinstance(vehicle, Path) else vehicle_toml.load(vehicle)

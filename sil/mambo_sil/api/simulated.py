@@ -1,0 +1,61 @@
+"""One simulated drone that a program moves on, command by command."""
+
+import numpy as np
+
+from mambo_sil.api.states import DroneState
+from mambo_sil.drone.plant.airframe import airframe_of
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.elementary import sine_cosine
+from mambo_sil.drone.plant.rigid_body import EULER, POSITION
+from mambo_sil.drone.plant.vehicle import Vehicle, truth
+from mambo_sil.drone.vehicles.vehicle_file import VehicleFile
+from mambo_sil.flight.altitude_loops import AltitudeLaw, AltitudeLoop, Vertical
+from mambo_sil.flight.crashes import least_level
+
+LOST_M = 100.0
+"""A drone this far from the origin along any axis is lost."""
+
+
+class SimulatedDrone:
+    """The plant of the command `fly` without sensors, whose altitude loop has feed-forward."""
+
+    def __init__(self, drone: VehicleFile, update_period_s: float) -> None:
+        self.drone, self._vehicle = drone, Vehicle.of(drone)
+        self._ticks = round(update_period_s / drone.step_s)
+        self.place(np.array([0.0, 0.0, -1.0]))
+
+    def place(self, position_m: FloatArray) -> None:
+        """Let the drone hover at a position (3,) in NED, north."""
+        hover_command = airframe_of(self.drone).hover_command
+        self._state = self._vehicle.at_rest(position_m[:, np.newaxis], 0.0, hover_command)
+        self._altitude = AltitudeLoop(AltitudeLaw("feedforward"), self.drone, 1)
+        self._thrust_n = np.array([self.drone.weight_n])
+
+    def advance(self, command_rad: FloatArray, wanted: Vertical) -> None:
+        """Hold roll and pitch (2,) for one update period, heading 0, and the height that is `wanted`."""
+        with np.errstate(all="ignore"):
+            for _ in range(self._ticks):
+                seen = truth(self._state)
+                self._thrust_n = self._altitude.thrust_n(wanted, seen)
+                self._state = self._vehicle.step(
+                    self._state, command_rad[:, np.newaxis], self._thrust_n, 0.0, seen=seen
+                )
+
+    @property
+    def state(self) -> DroneState:
+        """The true state, with z."""
+        seen = truth(self._state)
+        return DroneState(seen.position_m[:, 0], seen.velocity_m_s[:, 0], seen.euler_rad[:, 0])
+
+    @property
+    def thrust_m_s2(self) -> float:
+        """The thrust over the mass that the altitude loop last demanded."""
+        return float(self._thrust_n[0]) / self.drone.body.mass_kg
+
+    @property
+    def crashed(self) -> bool:
+        """Whether it is tilted too far, on the ground, or lost."""
+        _, (cos_roll, cos_pitch, _) = sine_cosine(self._state.body[EULER][:, 0])
+        position_m = self._state.body[POSITION][:, 0]
+        inside = bool((np.abs(position_m) < LOST_M).all())  # not of NaN
+        return not (inside and position_m[2] < 0.0 and cos_roll * cos_pitch > least_level(self.drone))

@@ -1,0 +1,64 @@
+"""The plant as an environment of Gymnasium, as its checker demands it."""
+
+import importlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mambo_nmpc import ArgumentError
+from tests.support.tools import require_module
+
+NAME = "mambo_nmpc.adapters.gymnasium:MamboNmpc-v0"
+
+
+def make(**options: Any) -> Any:
+    """Return the environment by its name."""
+    require_module("gymnasium")
+    return importlib.import_module("gymnasium").make(NAME, **options)
+
+
+@pytest.mark.parametrize("action", ["target", "attitude"])
+def test_the_checker_of_gymnasium_finds_nothing(action: str) -> None:
+    """No error, and no warning: the tests turn warnings into errors."""
+    environment = make(action=action)
+    importlib.import_module("gymnasium.utils.env_checker").check_env(environment.unwrapped)
+
+
+def test_a_policy_that_aims_at_the_curve_follows_it() -> None:
+    """The C flies to the targets within the limits that info tells; the seed draws the start."""
+    environment = make(tilt_rad=0.3, speed_m_s=2.0)
+    seen, info = environment.reset(seed=4)
+    assert 0.0 < info["distance_m"] < 0.5
+    assert (seen == environment.reset(seed=4)[0]).all()
+    assert (seen != environment.reset(seed=5)[0]).any()
+    assert (info["tilt_limit_rad"], info["speed_limit_m_s"]) == (0.3, 2.0)
+    for _ in range(150):
+        seen, reward, terminated, truncated, info = environment.step((seen[:2] + seen[9:11]) / 5.0)
+        assert not terminated
+        assert not truncated
+        assert reward == -info["distance_m"]
+    assert info["distance_m"] < 0.5
+    assert info["status"] == 0
+
+
+def test_a_crash_ends_the_episode() -> None:
+    """Of a policy that tilts the drone until it is far away, or lower than the ground."""
+    environment = make(action="attitude", tilt_rad=1.1)
+    environment.reset(seed=1)
+    steps = (environment.step(np.ones(2)) for _ in range(1000))
+    reward, info = next((reward, info) for _, reward, terminated, _, info in steps if terminated)
+    assert reward == -10.0 - info["distance_m"]
+    assert "status" not in info
+
+
+def test_wrong_arguments_are_refused() -> None:
+    """By name."""
+    for wrong, message in (
+        ({"action": "thrust"}, 'action = "thrust" must be "attitude" or "target"'),
+        ({"height": "pid"}, 'height = "pid" must be left out'),
+        ({"reach_m": 0.0}, r"reach_m = 0\.0 must lie in 0\.1\.\.100"),
+        ({"tilt_deg": 3.0}, 'option = "tilt_deg" must be'),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            make(**wrong)

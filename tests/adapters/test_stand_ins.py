@@ -1,0 +1,160 @@
+"""What adapters give to simulators that CI does not install, and what is said where one is missing.
+
+crazyflow (JAX is large) and gym-pybullet-drones (not on PyPI) have stand-ins with the names and signatures of
+crazyflow 0.4.0 and of gym-pybullet-drones' DSLPIDControl. Checked are what the adapter reads, the shapes,
+frames and units of what it returns, and that it refuses what does not fit; how the simulators behave is not.
+`python -m benchmarks.simulators` flies crazyflow itself.
+"""
+
+import importlib
+import subprocess
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import Any, Final
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mambo_nmpc import ArgumentError, Controller, MamboNmpcError
+from mambo_nmpc.adapters.crazyflow import CrazyflowPilot, attach
+from mambo_nmpc.adapters.gym_pybullet_drones import pybullet_control
+from mambo_nmpc.curves import curve
+
+MASS_KG: Final = 0.0328
+KF: Final = 3.16e-10
+LEVEL: Final = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def test_adapters_import_no_simulator() -> None:
+    """But that for Gymnasium, whose class of environments is one of its own."""
+    script = (
+        "import sys, mambo_nmpc.adapters.crazyflow, mambo_nmpc.adapters.rotorpy, "
+        "mambo_nmpc.adapters.gym_pybullet_drones; print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    found = {"jax", "crazyflow", "rotorpy", "gymnasium", "gym_pybullet_drones"} & set(done.stdout.split())
+    assert not found
+
+
+def test_a_missing_package_is_named_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By an error that is an ImportError, and one of ours."""
+    for name in ("jax", "gymnasium", "gym_pybullet_drones"):
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.delitem(sys.modules, "mambo_nmpc.adapters.gymnasium", raising=False)
+    controller = Controller.from_vehicle("crazyflie", height="pid")
+    for call, command in (
+        (
+            lambda: attach(simulation(1, 1), controller, curve("hover")),
+            "pip install crazyflow jax jaxlib",
+        ),
+        (lambda: pybullet_control("cf2x", controller), r"pip install git\+https://github.com/utiasDSL/gym"),
+        (lambda: importlib.import_module("mambo_nmpc.adapters.gymnasium"), "pip install gymnasium"),
+    ):
+        with pytest.raises(ImportError, match=command) as found:
+            call()
+        assert isinstance(found.value, MamboNmpcError)
+
+
+def simulation(worlds: int, drones: int, freq: int = 500) -> Any:
+    """Return what the adapter reads of a `crazyflow.sim.Sim`."""
+    data = SimpleNamespace(params=SimpleNamespace(mass=np.array([MASS_KG])))
+    return SimpleNamespace(n_worlds=worlds, n_drones=drones, freq=freq, data=data)
+
+
+def states(worlds: int, drones: int) -> dict[str, Any]:
+    """Return drones at rest, 10 cm below the target and 30 cm right of it, in crazyflow's types."""
+    position = np.broadcast_to(np.array([0.0, -0.3, 0.9], np.float32), (worlds, drones, 3))
+    quaternion = np.broadcast_to(LEVEL.astype(np.float32), (worlds, drones, 4))
+    return {"position": position, "quaternion": quaternion, "velocity": np.zeros_like(position)}
+
+
+def test_a_crazyflow_simulation_gets_its_attitude_commands() -> None:
+    """Roll, pitch, yaw in rad and thrust in N (worlds, drones, 4); a world that is reset starts afresh."""
+    controller = Controller.from_vehicle("crazyflie-l250", 6, height="pid", age_s=0.0)
+    pilot = CrazyflowPilot(simulation(3, 2), controller, curve("hover"), height_m=1.0, yaw_rad=0.2)
+    assert pilot.ticks == 5
+    first = pilot.command(np.zeros((3, 1), np.int32), **states(3, 2))
+    assert first.shape == (3, 2, 4)
+    assert first.dtype == np.float32
+    assert (first[..., 0] < 0.0).all()  # rolls to the left
+    assert (first[..., 3] > MASS_KG * 9.81).all()
+    np.testing.assert_allclose(first[..., 2], 0.04, rtol=1e-6)  # 4 rad/s for 10 ms
+    then = pilot.command(np.array([[5], [0], [5]]), **states(3, 2))
+    np.testing.assert_array_equal(then[1], first[1])
+    assert (then[[0, 2], :, 2] > first[[0, 2], :, 2]).all()
+
+
+def test_a_crazyflow_simulation_that_does_not_fit_is_refused() -> None:
+    """By number of drones, or by frequency."""
+    controller = Controller.from_vehicle("crazyflie", 2, height="pid")
+    with pytest.raises(ArgumentError, match="controller: was made for 2 drones"):
+        CrazyflowPilot(simulation(2, 2), controller, curve("hover"), height_m=1.0, yaw_rad=0.0)
+    with pytest.raises(ArgumentError, match=r"sim\.freq = 250 must be a multiple of 100 Hz"):
+        CrazyflowPilot(simulation(1, 2, 250), controller, curve("hover"), height_m=1.0, yaw_rad=0.0)
+
+
+class DSLPIDControl:
+    """The parts of gym-pybullet-drones' controller that the adapter uses, with its signatures."""
+
+    def __init__(self, drone_model: str) -> None:
+        self.DRONE_MODEL = drone_model
+        self.KF, self.PWM2RPM_SCALE, self.PWM2RPM_CONST = KF, 0.2685, 4070.3
+        self.reset()
+
+    def reset(self) -> None:
+        """Set the counter to 0."""
+        self.control_counter = 0
+
+    def _getURDFParameter(self, parameter_name: str) -> float:  # noqa: N802 - its name
+        return {"m": MASS_KG}[parameter_name]
+
+    def computeControl(  # noqa: N802 - its name
+        self, control_timestep: float, cur_pos: Any, cur_quat: Any, cur_vel: Any, target_pos: Any, **more: Any
+    ) -> Any:
+        """Return what the position controller returns, which the attitude controller gets."""
+        target = more.get("target_rpy", np.zeros(3)), more.get("target_vel", np.zeros(3))
+        position_control = self._dslPIDPositionControl  # type: ignore[attr-defined] # of the subclass
+        return position_control(control_timestep, cur_pos, cur_quat, cur_vel, target_pos, *target)
+
+
+@pytest.fixture
+def _pybullet(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("gym_pybullet_drones", "gym_pybullet_drones.control"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    module: Any = ModuleType("gym_pybullet_drones.control.DSLPIDControl")
+    module.DSLPIDControl = DSLPIDControl
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+
+
+@pytest.mark.usefixtures("_pybullet")
+def test_a_base_control_gets_thrust_and_attitude() -> None:
+    """Thrust in PWM, angles about X, then Y, then Z of the body, and the position error."""
+    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", height="feedforward"))
+    assert isinstance(control, DSLPIDControl)
+    here, there, rest = np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 1.0]), np.zeros(3)
+    turned = Rotation.from_euler("z", 0.5).as_quat()
+    heading = np.array([0.0, 0.0, 0.5])
+    pwm, angles, error = control.computeControl(0.01, here, turned, rest, there, target_rpy=heading)
+    thrust_n = 4.0 * KF * (pwm * control.PWM2RPM_SCALE + control.PWM2RPM_CONST) ** 2
+    np.testing.assert_allclose(thrust_n, MASS_KG * 9.81, rtol=1e-6)
+    lift = Rotation.from_euler("XYZ", angles).as_matrix()[:, 2]
+    assert lift[0] > 0.01  # towards the target
+    assert abs(lift[1]) < 0.1 * lift[0]
+    np.testing.assert_array_equal(error, there - here)
+    again = control.computeControl(0.01, here, turned, rest, there, target_rpy=heading)[1]
+    control.reset()
+    after = control.computeControl(0.01, here, turned, rest, there, target_rpy=heading)[1]
+    assert (again != angles).any()
+    np.testing.assert_array_equal(after, angles)
+
+
+@pytest.mark.usefixtures("_pybullet")
+def test_a_base_control_refuses_what_does_not_fit() -> None:
+    """Another control period, and several drones."""
+    control = pybullet_control("cf2x", Controller.from_vehicle("crazyflie", height="pid"))
+    here, rest = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    with pytest.raises(ArgumentError, match=r"control_timestep = 0\.02 must be 0\.01, the update period"):
+        control.computeControl(0.02, here, LEVEL, rest, here)
+    with pytest.raises(ArgumentError, match="controller: was made for 2 drones; a BaseControl flies one"):
+        pybullet_control("cf2x", Controller.from_vehicle("crazyflie", 2))

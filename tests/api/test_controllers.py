@@ -1,0 +1,274 @@
+"""Controllers made by one call: options, batches, height and heading, saved states, curves."""
+
+import copy
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mambo_codegen.numbers.gravity import GRAVITY_M_S2
+from mambo_codegen.settings import controller_toml, presets
+from mambo_codegen.settings.controller_toml import to_toml, with_option
+from mambo_nmpc import ArgumentError, Controller, DroneState, TargetState, Vehicle, fly
+from mambo_nmpc.curves import CurvePoint, Trajectory, curve, sample
+from mambo_sil.api import height_hold
+from mambo_sil.api.frames import FRAMES, FrameName
+from mambo_sil.drone.vehicles import vehicle_toml
+from mambo_sil.flight.names import CURVE_NAMES, AltitudeName, CurveName
+from mambo_sil.model.derive.derived_settings import controller_text
+from tests.support.one_norm import ONE_NORM
+
+DERIVED = controller_toml.parse(controller_text(vehicle_toml.preset("crazyflie"), "x"), "x")
+RNG = np.random.default_rng(5)
+
+
+def aloft(*batch: int, z_m: float = -1.0, yaw_rad: float = 0.0) -> DroneState:
+    """Return drones at rest at the origin, at a height."""
+    return DroneState(
+        np.broadcast_to([0.0, 0.0, z_m], (*batch, 3)),
+        np.zeros((*batch, 3)),
+        np.broadcast_to([0.0, 0.0, yaw_rad], (*batch, 3)),
+    )
+
+
+def goal(*batch: int, yaw_rad: float | None = None) -> TargetState:
+    """Return targets at rest, a metre above the origin."""
+    return TargetState(aloft(*batch).position_m, np.zeros((*batch, 3)), yaw_rad=yaw_rad)
+
+
+def test_a_vehicle_gives_what_design_derives(tmp_path: Path) -> None:
+    """By name or as a file."""
+    assert Controller.from_vehicle("crazyflie").settings == DERIVED
+    file = tmp_path / "mine.toml"
+    axis = "{ gain = 0.9, lag_s = 0.05, dead_time_s = 0.02 }"
+    attitude = f"[attitude]\nkind = 'first_order'\nroll = {axis}\npitch = {axis}\n"
+    file.write_text(f"[body]\nmass_kg = 0.05\ndrag_1_s = 0.3\n{attitude}", "utf-8")
+    derived = controller_toml.parse(controller_text(vehicle_toml.read(file), "mine"), "mine")
+    assert Controller.from_vehicle(file).settings == derived
+    assert Controller.from_vehicle(str(file)).settings == derived
+
+
+def test_options_are_keys_of_the_settings(tmp_path: Path) -> None:
+    """From a vehicle, a preset and a file alike."""
+    document: dict[str, Any] = presets.load("crazyflie").model_dump()
+    document["observer"]["age_s"] = 0.0
+    document["target"]["acceleration"] = "given"
+    document["limits"] = {
+        "tilt_rad": 0.4,
+        "speed_m_s": 3.0,
+        "braking_m_s2": 2.5,
+        "fence": {"x_min_m": -2.0, "x_max_m": 3.0, "y_min_m": -1.0, "y_max_m": 1.5},
+    }
+    made = Controller.from_preset(
+        "crazyflie",
+        age_s=0.0,
+        acceleration="given",
+        tilt_rad=0.4,
+        speed_m_s=3.0,
+        braking_m_s2=2.5,
+        fence_m=(-2.0, 3.0, -1.0, 1.5),
+    )
+    assert made.settings == controller_toml.validate(document, "wanted")
+    careful = Controller.from_vehicle("crazyflie", tilt_rad=DERIVED.limits.tilt_rad / 2.0).settings
+    assert careful.limits.braking_m_s2 == DERIVED.limits.braking_m_s2 / 2.0
+    (tmp_path / "mine.toml").write_text(to_toml(ONE_NORM), "utf-8")
+    assert Controller.from_file(tmp_path / "mine.toml", tilt_rad=0.2).settings == with_option(
+        ONE_NORM, "limits.tilt_rad", 0.2
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"age_s": 0.3}, r"age_s = 0\.3 must lie in 0\.\.0\.2"),
+        ({"age_s": float("nan")}, "age_s = nan must"),
+        ({"age_s": "old"}, 'age_s = "old" must be a number'),
+        ({"age_s": True}, "age_s = True must be no truth value"),
+        ({"age_s": None}, "age_s = .* must be a number"),
+        ({"acceleration": "told"}, 'acceleration = "told" must be "none" or "given"'),
+        ({"tilt_rad": 2.0}, r"tilt_rad = 2\.0 must lie in"),
+        ({"speed_m_s": -1.0}, r"speed_m_s = -1\.0 must"),
+        ({"tilt_rad": 0.2, "braking_m_s2": 9.0}, "braking_m_s2 = 9.0"),
+        ({"fence_m": (0.0, 1.0)}, r"fence_m: has shape \(2,\); it must be \(4,\)"),
+        ({"fence_m": (1.0, -1.0, -1.0, 1.0)}, r"fence_m: x_max_m = -1\.0 must be more than 1\.0"),
+        ({"height": "firm"}, 'height = "firm" must be "stock" or "feedforward" or "pid"'),
+        ({"tilt_deg": 20.0}, 'option = "tilt_deg" must be "age_s" or "acceleration"'),
+    ],
+)
+def test_a_wrong_option_is_refused_by_name(options: dict[str, Any], message: str) -> None:
+    """With its value and what is allowed."""
+    with pytest.raises(ArgumentError, match=message):
+        Controller.from_vehicle("crazyflie", **options)
+
+
+def test_what_does_not_fit_together_is_refused() -> None:
+    """An age with a 1-norm, a height without a drone, x and y where x, y, z are needed."""
+    with pytest.raises(ArgumentError, match=r'age_s = 0\.0 has no use with cost\.norm = "1-norm"'):
+        Controller.from_preset("mambo-1norm", age_s=0.0)
+    with pytest.raises(ArgumentError, match="height = 'pid' must have a vehicle beside it"):
+        Controller.from_preset("crazyflie", height="pid")
+    with pytest.raises(ArgumentError, match=r"vehicle = 3 must be the path of a vehicle\.toml, or one of cr"):
+        Controller.from_vehicle(3)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="attitude_thrust needs a controller made with height"):
+        Controller.from_vehicle("crazyflie").step(aloft(), goal()).attitude_thrust("NED")
+    pilot = Controller.from_preset("crazyflie", vehicle="crazyflie", height="pid")
+    level = TargetState([0.0, 0.0], [0.0, 0.0])
+    with pytest.raises(ArgumentError, match="target: position_m has no z; height wants x, y, z"):
+        pilot.step(aloft(), level)
+    with pytest.raises(ArgumentError, match=r"thrust_acceleration_m_s2 = 9\.0 must be left out"):
+        pilot.step(aloft(), goal(), 9.0)
+    outcome = pilot.step(aloft(), goal())
+    with pytest.raises(ArgumentError, match="mass_kg = -1 must lie in"):
+        outcome.attitude_thrust("NED", mass_kg=-1)
+    with pytest.raises(ArgumentError, match=r"mass_kg = 0\.03 must be left out"):
+        outcome.attitude_thrust("NED", mass_kg=0.03, most_thrust_m_s2=16.0)
+
+
+@pytest.mark.parametrize("name", ["crazyflie", "mambo-1norm"])
+def test_the_shape_that_goes_in_comes_out(name: str) -> None:
+    """Each drone of a batch has the bits that it has alone, also in fixed point."""
+    settings = with_option(presets.load(name), "code.scalar", "fixed")
+    for each in (presets.load(name), settings):
+        position, velocity = RNG.normal(0.0, 0.3, (2, 3, 2, 2))
+        attitude = RNG.normal(0.0, 0.1, (3, 2, 3))
+        together, alone = Controller(each, 6), [Controller(each) for _ in range(6)]
+        for _ in range(2):
+            batch = together.step(
+                DroneState(position, velocity, attitude), TargetState(-position, 0 * velocity)
+            )
+            assert batch.command_rad.shape == (3, 2, 2)
+            assert batch.status.shape == (3, 2)
+            for index, one in zip(np.ndindex(3, 2), alone, strict=True):
+                single = one.step(
+                    DroneState(position[index], velocity[index], attitude[index]),
+                    TargetState(-position[index], [0.0, 0.0]),
+                )
+                assert single.command_rad.shape == (2,)
+                assert (single.command_rad == batch.command_rad[index]).all()
+    flat = TargetState(np.zeros((6, 2)), np.zeros((6, 2)))
+    with pytest.raises(ArgumentError, match=r"target: has a batch of shape \(6,\); that of the state"):
+        together.step(DroneState(position, velocity, attitude), flat)
+
+
+def test_some_of_n_are_reset() -> None:
+    """The others, and their heights and headings, go on as before."""
+    state, target = aloft(4, z_m=-0.9), goal(4, yaw_rad=1.0)
+    swarm = Controller.from_vehicle("crazyflie", 4, height="pid")
+    first = swarm.step(state, target)
+    other = copy.deepcopy(swarm)
+    which = np.array([True, False, False, True])
+    assert (swarm.reset((0.1, 0.0), which) == 0).all()
+    after, going_on = swarm.step(state, target), other.step(state, target)
+    for name in ("command_rad", "thrust_m_s2", "yaw_rad"):
+        here, there = getattr(after, name), getattr(going_on, name)
+        assert (here[~which] == there[~which]).all()
+        assert (here[which] != there[which]).any()
+    assert first.thrust_m_s2 is not None
+    assert after.thrust_m_s2 is not None
+    assert (after.thrust_m_s2[which] == first.thrust_m_s2[which]).all()
+    for wrong in ([0, 1], [True, False], [0, 1, 1, 0]):
+        with pytest.raises(ArgumentError, match=r"which = .* must be 4 truth values"):
+            swarm.reset(which=wrong)
+
+
+@pytest.mark.parametrize("name", ["crazyflie", "mambo-1norm"])
+def test_a_saved_controller_goes_on_as_the_first(name: str) -> None:
+    """Pickled and copied, with what the altitude loop remembers; other C is refused."""
+    first = Controller.from_preset(name, 2, vehicle="crazyflie", height="pid")
+    state, target = aloft(2, z_m=-0.8), goal(2, yaw_rad=2.0)
+    for _ in range(3):
+        first.step(state, target)
+    saved = pickle.dumps(first)
+    for other in (copy.deepcopy(first), pickle.loads(saved)):
+        expected = copy.deepcopy(first).step(state, target)
+        got = other.step(state, target)
+        for field in ("command_rad", "thrust_m_s2", "yaw_rad"):
+            assert (getattr(got, field) == getattr(expected, field)).all()
+    with pytest.raises(ArgumentError, match="was saved by another version"):
+        Controller.from_preset(name).__setstate__({**first.__getstate__(), "generator": "another"})
+
+
+def test_the_heading_turns_by_the_shorter_way_at_a_bounded_rate() -> None:
+    """From the measured one, across the south; without a target it stays."""
+    pilot = Controller.from_vehicle("crazyflie", height="stock")
+    state = aloft(yaw_rad=3.0)
+    yaws = [float(pilot.step(state, goal(yaw_rad=-3.0)).yaw_rad or 0.0) for _ in range(20)]
+    step = height_hold.HEADING_RATE_RAD_S * pilot.update_period_s
+    turned = np.unwrap([3.0, *yaws]) - 3.0
+    np.testing.assert_allclose(turned[1:8], step * np.arange(1, 8))
+    np.testing.assert_allclose(turned[-1], 2.0 * np.pi - 6.0)
+    pilot.reset()
+    assert [pilot.step(state, goal()).yaw_rad for _ in range(2)] == [3.0, 3.0]
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_one_call_gives_an_attitude_and_a_thrust_in_any_frame(frame: FrameName) -> None:
+    """A hover is level with the weight as thrust; below the target it is more."""
+    up = -1.0 if frame == "NED" else 1.0
+    pilot = Controller.from_vehicle("crazyflie", height="feedforward")
+    state = DroneState.in_frame(frame, [0.0, 0.0, up], [0.0, 0.0, 0.0], [0.0, 0.0, 0.5])
+    target = TargetState.in_frame(frame, [0.0, 0.0, up], [0.0, 0.0, 0.0], yaw_rad=0.5)
+    np.testing.assert_allclose(
+        pilot.step(state, target).attitude_thrust(frame), [0.0, 0.0, 0.5, GRAVITY_M_S2], atol=1e-6
+    )
+    higher = TargetState.in_frame(frame, [0.0, 0.0, 1.1 * up], [0.0, 0.0, 0.0])
+    outcome = pilot.step(state, higher)
+    over_mass = outcome.attitude_thrust(frame)[3]
+    assert over_mass > GRAVITY_M_S2
+    assert outcome.attitude_thrust(frame, mass_kg=0.03)[3] == over_mass * 0.03
+    assert outcome.attitude_thrust(frame, most_thrust_m_s2=16.0)[3] == over_mass / 16.0
+    assert outcome.attitude_thrust(frame, most_thrust_m_s2=9.0)[3] == 1.0
+
+
+def test_no_number_leaves_thrust_and_heading_as_they_are() -> None:
+    """As the C keeps its command."""
+    pilot = Controller.from_vehicle("crazyflie", height="pid")
+    before = pilot.step(aloft(z_m=-0.9), goal(yaw_rad=0.0))
+    lost = DroneState([np.nan] * 3, [np.nan] * 3, [np.nan] * 3)
+    after = pilot.step(lost, goal())
+    assert after.status != 0
+    assert (after.thrust_m_s2, after.yaw_rad) == (before.thrust_m_s2, before.yaw_rad)
+
+
+def test_a_wrong_mass_leaves_no_error_of_height_with_pid() -> None:
+    """On a point mass of 1.2 times the weight, which the stock loop lets sag."""
+    left = {}
+    names: tuple[AltitudeName, ...] = ("stock", "pid")
+    for name in names:
+        pilot = Controller.from_vehicle("crazyflie", height=name)
+        z, climb = 1.0, 0.0
+        for _ in range(700):
+            state = DroneState.in_frame("NWU", [0.0, 0.0, z], [0.0, 0.0, climb], [0.0, 0.0, 0.0])
+            thrust = pilot.step(state, TargetState.in_frame("NWU", [0.0, 0.0, 1.0], [0.0] * 3)).thrust_m_s2
+            climb += 0.01 * (float(thrust or 0.0) / 1.2 - GRAVITY_M_S2)
+            z += 0.01 * climb
+        left[name] = abs(z - 1.0)
+    assert left["stock"] > 0.1
+    assert left["pid"] < 0.01
+
+
+@pytest.mark.parametrize("name", CURVE_NAMES)
+def test_velocity_and_acceleration_of_a_curve_are_its_derivatives(name: CurveName) -> None:
+    """In every frame, by central differences, away from jumps."""
+    flown: Trajectory = curve(name, 1.5, 0.7)
+    times_s, step_s = np.array([2.3, 4.1, 7.9]), 1e-5
+    for frame in FRAMES:
+        before, now, after = (sample(flown, times_s + shift, frame) for shift in (-step_s, 0.0, step_s))
+        assert isinstance(now, CurvePoint)
+        for rate, of in ((1, 0), (2, 1)):
+            np.testing.assert_allclose(now[rate], (after[of] - before[of]) / (2.0 * step_s), atol=1e-5)
+    east = sample(flown, 2.3, "ENU", height_m=1.1).position_m
+    north = sample(flown, 2.3, "NED", height_m=1.1).position_m
+    assert (east == north[[1, 0, 2]] * [1.0, 1.0, -1.0]).all()
+    with pytest.raises(ArgumentError, match='name = "8" must be "bernoulli"'):
+        curve("8")  # type: ignore[arg-type]
+
+
+def test_curves_fly() -> None:
+    """Those of the module are those of `fly`."""
+    controller = Controller.from_preset("crazyflie")
+    vehicle = Vehicle.from_preset("crazyflie")
+    named = fly(controller, vehicle, "circle", size_m=1.0, rate_rad_s=1.0, duration_s=1.0)
+    assert named.trace.same_bits(fly(controller, vehicle, curve("circle", 1.0, 1.0), duration_s=1.0).trace)
