@@ -1,6 +1,6 @@
 """Gymnasium: the plant as an environment, `gymnasium.make("mambo_nmpc.adapters.gymnasium:MamboNmpc-v0")`."""
 
-from typing import Any, ClassVar, Final, Literal, Unpack
+from typing import Any, Final, Literal, Unpack
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from mambo_sil.api.simulated import LOST_M, SimulatedDrone
 from mambo_sil.api.states import TargetState
 from mambo_sil.arguments import require, require_choice, require_number
 from mambo_sil.drone.vehicles import vehicle_toml
-from mambo_sil.flight.altitude_loops import Vertical
 from mambo_sil.flight.names import CurveName
 
 gymnasium: Any = packages.load("gymnasium", "pip install gymnasium")
@@ -22,7 +21,6 @@ Environment: Any = gymnasium.Env
 HEIGHT_M: Final = 1.0
 SCATTER_M: Final = 0.3
 CRASH_REWARD: Final = -10.0
-EPISODE_STEPS: Final = 2000
 
 
 class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package that need not be installed
@@ -36,8 +34,6 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
     info:        distance_m, speed_m_s, the limits tilt_limit_rad, speed_limit_m_s and braking_limit_m_s2, and
                  with "target" what the C says: status, saturated, active (`nmpc_limits_active`).
     """
-
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
 
     def __init__(
         self,
@@ -81,8 +77,7 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
             outcome = self._controller.step(self._drone.state, target, self._drone.thrust_m_s2)
             command_rad = outcome.command_rad
             said = {name: getattr(outcome, name) for name in ("status", "saturated", "active")}
-        height_m, climb_m_s, lift_m_s2 = (part[2] for part in self._now)
-        self._drone.advance(command_rad, Vertical(-height_m, climb_m_s, lift_m_s2))
+        self._drone.advance(command_rad, *(part[2] for part in self._now))
         self._steps += 1
         observation, info = self._observe({name: int(x) for name, x in said.items() if x is not None})
         crashed = self._drone.crashed
@@ -109,4 +104,4 @@ class MamboNmpcEnv(Environment):  # type: ignore[misc] # a class of a package th
         return np.clip(np.concatenate(parts), *bounds).astype(np.float32), info | said
 
 
-gymnasium.register("MamboNmpc-v0", entry_point=MamboNmpcEnv, max_episode_steps=EPISODE_STEPS)
+gymnasium.register("MamboNmpc-v0", entry_point=MamboNmpcEnv, max_episode_steps=2000)

@@ -31,8 +31,11 @@ class SimulatedDrone:
         self._altitude = AltitudeLoop(AltitudeLaw("feedforward"), self.drone, 1)
         self._thrust_n = np.array([self.drone.weight_n])
 
-    def advance(self, command_rad: FloatArray, wanted: Vertical) -> None:
-        """Hold roll and pitch (2,) for one update period, heading 0, and the height that is `wanted`."""
+    def advance(
+        self, command_rad: FloatArray, height_m: float, climb_m_s: float, acceleration_m_s2: float
+    ) -> None:
+        """Hold roll and pitch (2,) for one update period, with heading 0; the altitude loop does the rest."""
+        wanted = Vertical(-height_m, climb_m_s, acceleration_m_s2)
         with np.errstate(all="ignore"):
             for _ in range(self._ticks):
                 seen = truth(self._state)
