@@ -3,7 +3,6 @@
 crazyflow (JAX is large) and gym-pybullet-drones (not on PyPI) have stand-ins with the names and signatures of
 crazyflow 0.4.0 and of gym-pybullet-drones' DSLPIDControl. Checked are what the adapter reads, the shapes,
 frames and units of what it returns, and that it refuses what does not fit; how the simulators behave is not.
-`python -m benchmarks.simulators` flies crazyflow itself.
 """
 
 import importlib

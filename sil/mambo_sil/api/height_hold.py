@@ -2,7 +2,7 @@
 
 The thrust is that of an altitude loop of `mambo_sil.flight.altitude_loops`, over the mass. The heading goes
 to that of the target at `HEADING_RATE_RAD_S` at most: a jump of the heading's set-point takes from the motors
-the thrust that carries the drone (docs/evidence/simulators.md).
+the thrust that carries the drone.
 """
 
 from typing import Final
