@@ -100,6 +100,17 @@ def test_the_picture_of_a_flight_has_its_walls(tmp_path: Path) -> None:
     assert dashes == [0, 2, 4]
 
 
+def test_the_picture_of_a_fast_flight_has_its_speed_limit(tmp_path: Path) -> None:
+    """With the speed over time; a flight slower than half of the limit, or without one, has neither."""
+    fast = trace_of([0.0, 4.0], [0.0, 4.0], [0.0, 8.0])
+    shown = {}
+    for limit_m_s in (0.0, 5.0, 9.0):
+        draw_flights({"fast": fast}, tmp_path / "fast", None, limit_m_s)
+        drawn = (tmp_path / "fast.svg").read_text("utf-8")
+        shown[limit_m_s] = drawn.count("stroke-dasharray"), drawn.count("speed, m/s")
+    assert shown == {0.0: (0, 0), 5.0: (1, 1), 9.0: (0, 0)}
+
+
 def test_a_lost_flight_has_no_metrics() -> None:
     """NaN, which exceeds every bound."""
     lost = replace(FLOWN, position_m=np.full_like(FLOWN.position_m, np.nan))

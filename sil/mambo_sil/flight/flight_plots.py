@@ -8,11 +8,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mambo_sil.drone.plant.arrays import FloatArray
+from mambo_sil.drone.plant.elementary import hypotenuse
 from mambo_sil.flight.animation import animate
 from mambo_sil.flight.fences import Walls
 from mambo_sil.flight.metrics import horizontal_error_m
@@ -30,22 +33,34 @@ _SPATIAL: Final = {
     "pitch, rad": 1.0,
 }
 """Labels of the axes of a column, and their heights relative to each other."""
+_BOUND: Final[Mapping[str, Any]] = {"color": INK, "linestyle": "--", "linewidth": THIN}
+"""How limits look."""
+_SPEED: Final = "speed, m/s"
+_FAST: Final = 0.5
+"""Share of the speed limit beyond which a flight shows its speed."""
 
 
-def draw_flights(flights: Mapping[str, Trace], stem: Path, walls: Walls | None = None) -> tuple[Path, Path]:
+def draw_flights(
+    flights: Mapping[str, Trace], stem: Path, walls: Walls | None = None, speed_limit_m_s: float = 0.0
+) -> tuple[Path, Path]:
     """Draw the first flight of each trace as one column with the same scales in all columns, and the fence.
 
-    Writes stem.png and stem.svg.
+    The speed and its limit (0: none) are shown where a flight comes near it. Writes stem.png and stem.svg.
     """
     with style():
-        labels = _labels(flights)
+        labels = dict(_labels(flights))
+        near = any(0.0 < _FAST * speed_limit_m_s < _speed_m_s(trace).max() for trace in flights.values())
+        if near:
+            labels = dict([*list(labels.items())[:-3], (_SPEED, 1.0), *list(labels.items())[-3:]])
         figure = Figure(
             figsize=(COLUMN_INCHES * len(flights), 1.47 * sum(labels.values())), layout="constrained"
         )
         ratios = tuple(labels.values())
         rows = figure.subplots(len(labels), len(flights), squeeze=False, sharey="row", height_ratios=ratios)
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
-            _draw_column(column, trace, title)
+            _draw_column(np.delete(column, -4) if near else column, trace, title)
+            if near:
+                _draw_speed(column[-4], trace, speed_limit_m_s)
             if walls is not None:
                 _draw_walls(column[0], walls)
         _share_scales(rows[0])
@@ -82,14 +97,24 @@ def _draw_column(column: NDArray[Any], trace: Trace, title: str) -> None:
     angles[-1].set_xlabel("time, s")
 
 
+def _speed_m_s(trace: Trace) -> FloatArray:
+    return hypotenuse(trace.velocity_m_s[:, 0, 0], trace.velocity_m_s[:, 0, 1])
+
+
+def _draw_speed(axes: Axes, trace: Trace, limit_m_s: float) -> None:
+    """Draw the horizontal speed of the first flight and its limit over time."""
+    axes.plot(trace.time_s, _speed_m_s(trace), color=FLOWN)
+    axes.axhline(limit_m_s, **_BOUND)
+    axes.set_ylim(0, None)
+
+
 def _draw_walls(path: Axes, walls: Walls) -> None:
     """Draw the walls of a fence in a path seen from above."""
-    look: dict[str, Any] = {"color": INK, "linestyle": "--", "linewidth": THIN}
     for x_m, y_m in (walls[:2], walls[2:]):
         if math.isfinite(x_m):
-            path.axvline(x_m, **look)
+            path.axvline(x_m, **_BOUND)
         if math.isfinite(y_m):
-            path.axhline(y_m, **look)
+            path.axhline(y_m, **_BOUND)
 
 
 def _draw_heights(axes: Sequence[Axes], trace: Trace) -> None:

@@ -167,7 +167,8 @@ def write_flight(trace: Trace, runner: Runner, settings: Settings, output: Outpu
     write_trace(trace, folder)
     if output.pictures:
         title = PD_TITLES.get(runner.controller, f"NMPC, {echo(named_source(runner))}")
-        draw_flight(trace, title, folder, walls_m(settings))
+        limit_m_s = 0.0 if runner.controller in PD_TITLES else settings.limits.speed_m_s
+        draw_flight(trace, title, folder, walls_m(settings), limit_m_s)
 
 
 def write_trace(trace: Trace, folder: Path) -> None:
@@ -176,11 +177,11 @@ def write_trace(trace: Trace, folder: Path) -> None:
     write_npz(trace, folder / "trace.npz")
 
 
-def draw_flight(trace: Trace, title: str, folder: Path, walls: Walls | None) -> None:
-    """Write the pictures of `FLIGHT_FILES`, with the fence, if there is one."""
+def draw_flight(trace: Trace, title: str, folder: Path, walls: Walls | None, speed_limit_m_s: float) -> None:
+    """Write the pictures of `FLIGHT_FILES`, with the fence and the speed limit (0: none), if any."""
     from mambo_sil.flight.flight_plots import draw_flights  # matplotlib is slow to import
 
-    draw_flights({title: trace}, folder / "flight", walls)
+    draw_flights({title: trace}, folder / "flight", walls, speed_limit_m_s)
 
 
 def finish(summary: FlightSummary, text: str, output: Output, files: tuple[str, ...]) -> None:

@@ -48,7 +48,9 @@ def fly_again(file: Path, output: Output, context: typer.Context) -> None:
             trace = simulate(flight, controller, progress)
         write_trace(trace, folder)
         if output.pictures:
-            draw_flight(trace, file.name, folder, walls_m(record.settings, record.scenario.fence_m))
+            limits = record.settings.limits
+            walls = walls_m(record.settings, record.scenario.fence_m)
+            draw_flight(trace, file.name, folder, walls, limits.speed_m_s)
         if watched is not None:
             write_inner_steps(watched, folder / INNER_STEPS)
         recorded = record.trace_sha256
