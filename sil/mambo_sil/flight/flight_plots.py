@@ -36,6 +36,8 @@ _SPATIAL: Final = {
 _BOUND: Final[Mapping[str, Any]] = {"color": INK, "linestyle": "--", "linewidth": THIN}
 """How limits look."""
 _SPEED: Final = "speed, m/s"
+_ABOVE_ERROR: Final = -4
+"""Row of the speed: above error, roll and pitch."""
 _FAST: Final = 0.5
 """Share of the speed limit beyond which a flight shows its speed."""
 
@@ -51,16 +53,18 @@ def draw_flights(
         labels = dict(_labels(flights))
         near = any(0.0 < _FAST * speed_limit_m_s < _speed_m_s(trace).max() for trace in flights.values())
         if near:
-            labels = dict([*list(labels.items())[:-3], (_SPEED, 1.0), *list(labels.items())[-3:]])
+            placed = list(labels.items())
+            placed.insert(_ABOVE_ERROR + 1, (_SPEED, 1.0))
+            labels = dict(placed)
         figure = Figure(
             figsize=(COLUMN_INCHES * len(flights), 1.47 * sum(labels.values())), layout="constrained"
         )
         ratios = tuple(labels.values())
         rows = figure.subplots(len(labels), len(flights), squeeze=False, sharey="row", height_ratios=ratios)
         for column, (title, trace) in zip(rows.T, flights.items(), strict=True):
-            _draw_column(np.delete(column, -4) if near else column, trace, title)
+            _draw_column(np.delete(column, _ABOVE_ERROR) if near else column, trace, title)
             if near:
-                _draw_speed(column[-4], trace, speed_limit_m_s)
+                _draw_speed(column[_ABOVE_ERROR], trace, speed_limit_m_s)
             if walls is not None:
                 _draw_walls(column[0], walls)
         _share_scales(rows[0])
